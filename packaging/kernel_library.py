@@ -94,15 +94,20 @@ def write_text(folder: Path, part: str) -> None:
     from osimlite import __version__
     from osimlite.mechanics.codegen.cplusplus import HEADER, header_text, write_library
     from osimlite.mechanics.codegen.sources import compute_digest
-    from osimlite.simulation.elements.laws import DIRECTIONS, law_of, library_laws, symbol_of
+    from osimlite.simulation.elements.laws import (
+        DIRECTIONS,
+        find_law,
+        get_symbol,
+        list_library_laws,
+    )
 
-    laws = library_laws(0 if part == PARTS[0] else DIRECTIONS)
-    text = write_library({symbol_of(law): law_of(law) for law in laws})
+    laws = list_library_laws(0 if part == PARTS[0] else DIRECTIONS)
+    text = write_library({get_symbol(law): find_law(law) for law in laws})
     write_file(folder / f"kernels_{part}.cpp", text)
     if part == PARTS[0]:
         write_file(folder / HEADER, header_text())
-        digests = {law: compute_digest(law_of(law)[0]) for law in laws}
-        digests |= {law: digests[law.partition("~")[0]] for law in library_laws(DIRECTIONS)}
+        digests = {law: compute_digest(find_law(law)[0]) for law in laws}
+        digests |= {law: digests[law.partition("~")[0]] for law in list_library_laws(DIRECTIONS)}
         table = {
             "version": __version__,
             "sources": describe_sources(ROOT / "osimlite"),

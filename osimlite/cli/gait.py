@@ -217,7 +217,7 @@ def simulate_walk(
 
 def _told(found: GaitReport, files: Sequence[Path]) -> Facts:
     from osimlite.base.text import format_count
-    from osimlite.simulation.elements import by_class
+    from osimlite.simulation.elements import summarize_skipped
 
     walk, cycle = found.walk, found.cycle
     facts = Facts(found.model)
@@ -261,7 +261,7 @@ def _told(found: GaitReport, files: Sequence[Path]) -> Facts:
         facts.add(
             "basin", f"{basin.part:.0%} of {basin.steps.size} starts make {basin.wanted} steps"
         )
-    for skipped in by_class(found.skipped):
+    for skipped in summarize_skipped(found.skipped):
         facts.add("left out", skipped)
     if files:
         facts.add("files", ", ".join(str(path) for path in files))

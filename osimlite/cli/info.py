@@ -245,7 +245,7 @@ def _simulation(model: Model, folder: Path, text: str) -> tuple[str, bool]:
     try:
         require("numpy", extra="sim", purpose="simulations")
         from osimlite.mechanics.multibody import build_mechanism
-        from osimlite.simulation.elements import by_class, force_elements
+        from osimlite.simulation.elements import force_elements, summarize_skipped
 
         mechanism = build_mechanism(model)
         forces = force_elements(model, mechanism, skip_unsupported=True, folder=folder)
@@ -255,8 +255,6 @@ def _simulation(model: Model, folder: Path, text: str) -> tuple[str, bool]:
         return f"not possible: {error}", False
     answer = "possible, nothing is left out"
     if forces.skipped:
-        answer = (
-            f"not without leaving out (--skip-unsupported) {join_words(by_class(forces.skipped))}"
-        )
+        answer = f"not without leaving out (--skip-unsupported) {join_words(summarize_skipped(forces.skipped))}"
     # An element with this attribute stands in a file of its own.
     return answer, not forces.reads_files and re.search(r"\sfile\s*=", text) is None

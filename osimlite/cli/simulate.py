@@ -192,7 +192,7 @@ def write_files(
 
 
 def _told(trajectory: Trajectory, files: Sequence[Path]) -> Facts:
-    from osimlite.simulation.elements import by_class
+    from osimlite.simulation.elements import summarize_skipped
 
     summary = trajectory.summary
     facts = Facts(f"{summary['model']}, {trajectory.times[-1]:g} s")
@@ -220,7 +220,7 @@ def _told(trajectory: Trajectory, files: Sequence[Path]) -> Facts:
         )
         size, when = largest["force_N"], largest["time_s"]
         facts.add(name, f"at most {size:.4g} N ({when:.4g} s)" + (f"; {shown}" if times else ""))
-    for skipped in by_class(summary["skipped_forces"]):
+    for skipped in summarize_skipped(summary["skipped_forces"]):
         facts.add("left out", skipped)
     facts.add("files", ", ".join(str(path) for path in files))
     return facts

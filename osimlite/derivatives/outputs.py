@@ -138,7 +138,7 @@ def compute_output_columns(
         (f"{element.path}|{name}", workspace.data[items[-1][0] + place])
         for element, items in zip(forces.elements, packed.items, strict=True)
         if isinstance(element, DeclaredForce) and items
-        for name, place in element.force_type.recorded.items()
+        for name, place in element.force_type.record_offsets.items()
     ]
     probed = [
         (f"{probe.path}|{label}", probe.gain * workspace.data[items[-1][0] + place])
@@ -220,7 +220,7 @@ def _list_contact_values(
             and element.force_type.geometry is SPHERE_ON_PLANE
             and items
         ):
-            pairs.append((element.path, items[-1][0] + len(element.force_type.recorded)))
+            pairs.append((element.path, items[-1][0] + len(element.force_type.record_offsets)))
     return [
         (f"{name}|{what}_{axis}", workspace.data[place + 3 * part + k])
         for name, place in pairs

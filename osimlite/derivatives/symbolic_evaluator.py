@@ -20,7 +20,7 @@ from osimlite.mechanics.kernels.layout import CONSTRAINED, ITEM, MODEL, RUN, STA
 from osimlite.mechanics.kernels.pointers import address, call
 from osimlite.mechanics.multibody.functions import Function
 from osimlite.simulation.elements import Forces
-from osimlite.simulation.elements.geometries.load import Load, find_load
+from osimlite.simulation.elements.geometries.load import Load, evaluate_load
 from osimlite.simulation.engines.linking import PYTHON, Program
 from osimlite.simulation.pack import Packed
 
@@ -204,7 +204,7 @@ class SymbolicEvaluator:
             data[WORK.TIME] = self._t
             for k, control in enumerate(self._controls):
                 data[self.structure[MODEL.WORK_CONTROL] + k] = control
-            with replace_kernel(find_load, self._find_load) if self._loads else nullcontext():
+            with replace_kernel(evaluate_load, self._find_load) if self._loads else nullcontext():
                 result = law(model, reals, data, y, f)
             return SymbolicWorkspace(model, reals, data, f, result, branches.run.failures)
 
@@ -220,11 +220,11 @@ class SymbolicEvaluator:
             ) from error
 
     def _find_load(self, g: Vector, gp: Vector, room: Vector, t: Any) -> None:
-        """Write the values of loads into the work vector, instead of the kernel :func:`find_load`."""
+        """Write the values of loads into the work vector, instead of the kernel :func:`evaluate_load`."""
         owner = self._packed.owners[max(item for item in self._packed.owners if item <= g.first)]
         element: Any = self._elements[owner]
         first = len(list_load_functions(self._elements[:owner]))
-        for group, functions in enumerate(element.place.groups):
+        for group, functions in enumerate(element.location.groups):
             for k in range(len(functions)):
                 room[3 * group + k] = self._loads[first + k]
             first += len(functions)
@@ -233,7 +233,9 @@ class SymbolicEvaluator:
 def list_load_functions(elements: Sequence[Any]) -> list[Function]:
     """Return the functions of time of all measured and prescribed forces, points and torques."""
     loads = (
-        element.place for element in elements if isinstance(getattr(element, "place", None), Load)
+        element.location
+        for element in elements
+        if isinstance(getattr(element, "location", None), Load)
     )
     return [function for load in loads for group in load.groups for function in group]
 

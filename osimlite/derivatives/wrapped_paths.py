@@ -58,7 +58,7 @@ class SymbolicPath:
         """Number of symbols."""
         return 1 + 2 * len(self.coordinates)
 
-    def items(self, places: Places) -> list[ForceRecord]:
+    def make_records(self, places: Places) -> list[ForceRecord]:
         """Return the items of a path that is a function of coordinates; see :mod:`osimlite.mechanics.kernels.function_paths`."""
         freedoms = [places.freedom(coordinate) for coordinate in self.coordinates]
         count = len(freedoms)
@@ -80,13 +80,13 @@ class SymbolicPath:
 
         law.takes_symbols = speed_law.takes_symbols = True  # type: ignore[attr-defined]
         given = ForceRecord(
-            "", room=DERIVATIVES + count, is_part=True, python=register_symbolic(law)
+            "", record_size=DERIVATIVES + count, is_part=True, python=register_symbolic(law)
         )
-        speed = ForceRecord("", room=1, is_part=True, python=register_symbolic(speed_law))
+        speed = ForceRecord("", record_size=1, is_part=True, python=register_symbolic(speed_law))
         before = [ForceRecord("pull_coordinates", is_part=True), given, speed]
         backs = [sum(ITEM.OWN + len(item.ints) for item in before[first:]) for first in range(3)]
         ints = backs[0], count, backs[1], backs[2], *freedoms, *[0] * count
-        return [*before, ForceRecord("function_path", ints, room=ARMS + count, is_part=True)]
+        return [*before, ForceRecord("function_path", ints, record_size=ARMS + count, is_part=True)]
 
 
 class WrappedPaths:
@@ -119,7 +119,7 @@ class WrappedPaths:
         self._default = np.array([info.default_value for info in mechanism.coordinates])
         self._system = PathSystem(
             mechanism.released(),
-            Forces(tuple(MeasuredPath(item.path, item.place) for item in owners)),
+            Forces(tuple(MeasuredPath(item.path, item.location) for item in owners)),
         )
         poses = self._sample_poses(mechanism)
         arms = np.abs(self._system.pulled(poses)).max(axis=0)
@@ -130,7 +130,7 @@ class WrappedPaths:
         self.size = sum(item.size for item in self.symbolic_paths)
         others = {item.path: given for item, given in zip(owners, self.symbolic_paths, strict=True)}
         elements = (
-            replace(e, place=others[e.path]) if e.path in others else e for e in forces.elements
+            replace(e, location=others[e.path]) if e.path in others else e for e in forces.elements
         )
         self.forces = replace(forces, elements=tuple(elements))
 
@@ -247,11 +247,11 @@ def _is_wrapped(element: Any) -> bool:
     """Return whether a force acts along a path around surfaces."""
     if (
         not (isinstance(element, DeclaredForce) and element.force_type.geometry is PATH)
-        or element.place is None
+        or element.location is None
     ):
         return False
-    surfaces = getattr(element.place, "surfaces", None)
-    return bool(surfaces) if surfaces is not None else not hasattr(element.place, "length")
+    surfaces = getattr(element.location, "surfaces", None)
+    return bool(surfaces) if surfaces is not None else not hasattr(element.location, "length")
 
 
 class _NumericCallback(casadi.Callback):  # type: ignore[misc]

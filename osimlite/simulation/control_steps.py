@@ -112,8 +112,8 @@ class Held:
         Raises:
             SettingError: one is a function of Python, beside which no machine code adds anything.
         """
-        result = controls.driven({path: Constant(0.0) for path in self.paths})
-        if not isinstance(result.record()[2], str):
+        result = controls.add_functions({path: Constant(0.0) for path in self.paths})
+        if not isinstance(result.make_record()[2], str):
             raise SettingError(
                 "beside a controller, controls are numbers or tables, not functions of Python"
             )
@@ -256,4 +256,4 @@ class HeldRuns:
         added: Mapping[str, Function] = {
             path: PiecewiseConstant(times, tuple(table[path].tolist())) for path in self.held.paths
         }
-        return controls.driven(added)
+        return controls.add_functions(added)

@@ -57,7 +57,7 @@ class Copies:
         self.engine = engine
         own = simulation.forces.controls
         self.controls = own.names
-        driven = own.driven({name: Constant(0.0) for name in own.names})
+        driven = own.add_functions({name: Constant(0.0) for name in own.names})
         self.engine.drive(driven)
         self.start = np.array(simulation.initial_state({}, {}, equilibrate=True))
         self.places = places_of(engine, driven)

@@ -120,13 +120,13 @@ def loads_of(
     """
     if not applied_to:
         return external_loads
-    from osimlite.simulation.elements.external_loads import pushing
+    from osimlite.simulation.elements.external_loads import build_external_loads
 
     if not isinstance(external_loads, str | Path):
         raise SettingError(
             "applied_to says what the columns of a table push; name the table as external_loads"
         )
-    return pushing(external_loads, applied_to)
+    return build_external_loads(external_loads, applied_to)
 
 
 def add_forces(

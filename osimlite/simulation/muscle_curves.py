@@ -228,7 +228,7 @@ class _Muscle(NamedTuple):
             is_settled = False
         known = {
             name: system.recorded(element.path, place)
-            for name, place in element.force_type.recorded.items()
+            for name, place in element.force_type.record_offsets.items()
         }
         result = {"length": known["length"]}
         if is_settled:

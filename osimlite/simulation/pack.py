@@ -105,7 +105,7 @@ class Packer(LinkPacker):
 
     def item_records(self) -> list[list[tuple[int, int]]]:
         """Write the items; the records of the contacts come first, in their order."""
-        groups = [element.items(self.places) for element in self.elements]
+        groups = [element.make_records(self.places) for element in self.elements]
         self.ints[MODEL.CONTACTS] = sum(item.is_contact for group in groups for item in group)
         contact = self.ints[MODEL.WORK_CONTACT] = self.reserve_work(
             CONTACT_WORK.SIZE * self.ints[MODEL.CONTACTS]
@@ -124,14 +124,15 @@ class Packer(LinkPacker):
                 place = (
                     contact + CONTACT_WORK.SIZE * len(pairs)
                     if item.is_contact
-                    else self.reserve_work(item.room)
+                    else self.reserve_work(item.record_size)
                 )
-                result[-1].append((place, CONTACT_WORK.SIZE if item.is_contact else item.room))
+                size = CONTACT_WORK.SIZE if item.is_contact else item.record_size
+                result[-1].append((place, size))
                 if item.is_contact:
                     pairs.append(len(self.ints))
                 if not item.is_part:
-                    if not runs or runs[-1][0] != item.abreast:
-                        runs.append((item.abreast, len(records)))
+                    if not runs or runs[-1][0] != item.batched:
+                        runs.append((item.batched, len(records)))
                     records.append(len(self.ints))
                 if item.kernel or item.python is not None:
                     self.kernels[len(self.ints)] = (
@@ -145,7 +146,7 @@ class Packer(LinkPacker):
                 own = list(item.ints)
                 for number, at_state in enumerate(item.states):
                     own[at_state] = self.state.first_of(element) + number
-                for number, path in item.looks_at:
+                for number, path in item.record_references:
                     own[number] += places[path]
                 places[element.path] = place
                 self.ints += [*self.item_head(place, first), *own]
@@ -190,6 +191,6 @@ class Packer(LinkPacker):
         if not self.controls.names:
             return
         self.ints[MODEL.CONTROLS] = len(self.ints)
-        own, numbers, self.kernels[len(self.ints)] = self.controls.record()
+        own, numbers, self.kernels[len(self.ints)] = self.controls.make_record()
         self.ints += [*self.item_head(self.ints[MODEL.WORK_CONTROL], 0), *own]
         self.numbers += numbers

@@ -43,9 +43,9 @@ class MeasuredPath(Silent):
         """What is said of it in a pose in which it has no length."""
         return f"'{self.path}': the path has no length in this pose"
 
-    def items(self, places: Places) -> list[ForceRecord]:
+    def make_records(self, places: Places) -> list[ForceRecord]:
         """Its parts, of which the path is no part of another item."""
-        *parts, last = self.along.items(places)
+        *parts, last = self.along.make_records(places)
         return [*parts, replace(last, is_part=False)]
 
 

@@ -46,7 +46,7 @@ class Course(Protocol):
     def start(self) -> tuple[int, Array]:
         """The body that it starts in, and where there (3,)."""
 
-    def items(self, places: Places) -> list[ForceRecord]:
+    def make_records(self, places: Places) -> list[ForceRecord]:
         """Parts, of which the last is the path's own."""
 
 
@@ -91,11 +91,11 @@ class Polylines:
         self._calls: list[int] = []
         for route in routes:
             place = len(ints)
-            for item in route.items(program.tree.places):
+            for item in route.make_records(program.tree.places):
                 place = len(ints)
                 ints += [self._law(item.kernel, place), len(numbers), self.work, 0, *item.ints]
                 numbers += item.numbers
-                self.work += item.room
+                self.work += item.record_size
             self.items.append(place)
             self.traces.append(self._law(route.trace))
             for curve in route.curves:

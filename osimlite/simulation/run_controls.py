@@ -105,7 +105,7 @@ def driven(
             f"the {what} are given from {max(begin, start):g} to {min(end, to):g} s of a motion from {start:g} to "
             f"{to:g} s; their first and last values hold before and after"
         )
-    return controls.driven(functions)
+    return controls.add_functions(functions)
 
 
 def told(given: Mapping[str, Any] | StoTable | str | Path) -> Any:
@@ -162,7 +162,7 @@ def _by_name(given: Mapping[str, Any] | StoTable | str | Path) -> Mapping[str, A
         return given
     if isinstance(given, str | Path) and Path(given).suffix == ".xml":
         curves = ControlCurves.read(Path(given))
-        return {name: curves.of(name) for name in curves.actuators}
+        return {name: curves.find_curve(name) for name in curves.actuators}
     if not isinstance(given, str | Path | StoTable):
         raise SettingError(f"controls are a mapping of names, a table or a file, not {given!r}")
     table = given if isinstance(given, StoTable) else read_controls(given)
@@ -208,7 +208,7 @@ def _lines(name: str, times: Any, values: Any) -> tuple[Function, float, float]:
 
 def places_of(engine: Any, driven: Controls) -> Ints:
     """Where the numbers of the model have the last function of each control, a constant."""
-    own, numbers, _ = driven.record()
+    own, numbers, _ = driven.make_record()
     tables = [*own[1 + len(driven.names) :], len(numbers)]
     last = [own[1 + k] for k in range(len(driven.names))]
     first = int(engine.structure[engine.structure[MODEL.CONTROLS] + ITEM.NUMBERS])

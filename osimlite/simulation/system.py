@@ -136,7 +136,7 @@ class System:
         place = self.structure[MODEL.CONTROLS]
         if controls is self._controls or not place:
             return
-        own, numbers, kernel = controls.record()
+        own, numbers, kernel = controls.make_record()
         first = self.structure[place + ITEM.NUMBERS]
         if self._driven_by == (own, len(numbers), kernel):
             # Other numbers in the same places, of which whoever runs the kernels need not be told.
@@ -330,7 +330,7 @@ class System:
         on_path = isinstance(element, DeclaredForce) and element.force_type.geometry is PATH
         if on_path and isnan(self._w[parts[-1][0] + LENGTH]):
             return f"'{element.path}', whose path has no length in this pose"
-        return element.told(self._w[place : place + room].tolist())
+        return element.describe_failure(self._w[place : place + room].tolist())
 
     def refusal(self, status: int, t: float, y: Sequence[float]) -> SimulationError:
         """The error for what the kernels say of a state."""
@@ -365,12 +365,12 @@ class System:
 
     def places_of(self, path: str, names: Iterable[str]) -> list[int]:
         """Where the work vector has what is known of an element, by the names of its kind."""
-        known = self.kind_at(path).known_of
+        known = self.kind_at(path).record_names
         return [self._records_at[path] + known[name] for name in names]
 
     def knows(self, path: str, name: str) -> bool:
         """Whether that is known of an element."""
-        return name in self.kind_at(path).known_of
+        return name in self.kind_at(path).record_names
 
     def kind_at(self, path: str) -> Any:
         """Return the declaration of the force at this path."""
@@ -588,7 +588,7 @@ class System:
         return (
             kinetic,
             gravity,
-            float(sum(element.energy(records) for element, records in self.read_records())),
+            float(sum(element.compute_energy(records) for element, records in self.read_records())),
         )
 
     def energy_of(self, path: str, t: float, y: Sequence[float]) -> float:
@@ -596,7 +596,7 @@ class System:
         self.applied(t, y)
         return float(
             sum(
-                element.energy(records)
+                element.compute_energy(records)
                 for element, records in self.read_records()
                 if element.path == path
             )

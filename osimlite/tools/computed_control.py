@@ -22,7 +22,7 @@ from osimlite.mechanics.multibody.smoothing_spline import PiecewisePolynomial
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.control_sets import ControlLinear, ControlLinearNode, ControlSet
 from osimlite.schema.muscles import Muscle
-from osimlite.simulation.elements.control_sets import EXCITATION, node_curve
+from osimlite.simulation.elements.control_sets import EXCITATION, make_node_curve
 from osimlite.simulation.engines.protocol import Settings
 from osimlite.simulation.run import Simulation
 from osimlite.simulation.system import System
@@ -109,7 +109,7 @@ class ActuatorControl:
         default = found.default_min, found.default_max
         # As in OpenSim, upper bounds count only where there are lower ones.
         curves = [
-            node_curve(found, nodes) if nodes and found.min_nodes else None
+            make_node_curve(found, nodes) if nodes and found.min_nodes else None
             for nodes in (found.min_nodes, found.max_nodes)
         ]
 
@@ -352,7 +352,7 @@ class ComputedControl:
     def _drive_functions(self, functions: Sequence[Function]) -> None:
         """Drive the model with a function of time for each actuator."""
         controls = self.simulation.forces.controls
-        self.engine.drive(controls.driven(dict(zip(self._paths, functions, strict=True))))
+        self.engine.drive(controls.add_functions(dict(zip(self._paths, functions, strict=True))))
 
     def drive_all_windows(self) -> None:
         """Drive the model with the computed controls of all windows."""

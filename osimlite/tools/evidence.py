@@ -17,7 +17,7 @@ from osimlite.mechanics.multibody.mechanism import GROUND, Mechanism
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.model import Model
 from osimlite.schema.prescribed import ExternalLoads
-from osimlite.simulation.elements.external_loads import loads_table
+from osimlite.simulation.elements.external_loads import read_loads_table
 
 STANCE_FORCE_N = 20.0
 """Vertical force above which a foot stands on the ground, N."""
@@ -101,7 +101,7 @@ def find_steps(loads: Path, up: int) -> dict[str, Steps]:
         OsimliteError: osimlite cannot read the file or its data.
     """
     document = read_object(loads, ExternalLoads)
-    table = loads_table(document, loads.parent, str(loads))
+    table = read_loads_table(document, loads.parent, str(loads))
     result: dict[str, Array] = {}
     for force in document.objects:
         side, label = (

@@ -16,7 +16,7 @@ from osimlite.mechanics.kernels.motion import move, place
 from osimlite.mechanics.kernels.paths import pull_path
 from osimlite.mechanics.kernels.projection import project_speeds
 from osimlite.mechanics.multibody.constraints import Constraint, Coupler
-from osimlite.simulation.elements.laws import law_function
+from osimlite.simulation.elements.laws import find_function
 from osimlite.simulation.polylines import Polylines
 
 FOR_ARMS, FOR_SPEEDS = (move, clear_wrenches, pull_path, generalized_forces), (bind, project_speeds)
@@ -68,7 +68,7 @@ def program_data(paths: Polylines, constraints: Sequence[Constraint]) -> dict[st
 
 def kernels_text(program: Mapping[str, Any]) -> str:
     """What the page computes with."""
-    laws = [law_function(name) for name in program["laws"]]
+    laws = [find_function(name) for name in program["laws"]]
     others = [
         place,
         *(FOR_ARMS if program["items"] else ()),

@@ -35,7 +35,7 @@ from osimlite.schema.springs import (
 )
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.force_type import ForceType
-from osimlite.simulation.elements.laws import law_function
+from osimlite.simulation.elements.laws import find_function
 from osimlite.simulation.elements.registry import FORCE_TYPES
 from osimlite.simulation.pack import pack
 from osimlite.simulation.run import Simulation
@@ -130,7 +130,7 @@ def test_paths_over_obstacles():
 
 def test_every_kernel_is_written_for_symbols():
     names = [*LAW_MODULES, *(kind.name for kind in FORCE_TYPES if isinstance(kind, ForceType))]
-    parts = {part for name in names for part in collect_functions(law_function(name))}
+    parts = {part for name in names for part in collect_functions(find_function(name))}
     assert len(parts) > 500 and all(map(make_symbolic, parts))
 
 

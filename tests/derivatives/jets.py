@@ -16,7 +16,7 @@ import numpy as np
 from osimlite.mechanics.kernels.dynamics import evaluate
 from osimlite.mechanics.kernels.layout import MODEL, STAGE, WORK
 from osimlite.mechanics.laws.dual_numbers import is_nothing, settled
-from osimlite.simulation.elements.laws import law_function
+from osimlite.simulation.elements.laws import find_function
 from osimlite.simulation.engines.linking import PYTHON, Program
 
 
@@ -256,7 +256,7 @@ def carried(
     )[:-1]
     f = np.zeros(len(y)).astype(object)
     kernels = [*packed.laws, *(k for k in packed.kernels.values() if isinstance(k, str))]
-    with _carried([evaluate, *map(law_function, kernels)]):
+    with _carried([evaluate, *map(find_function, kernels)]):
         evaluate(s, packed.numbers.astype(object), w, state, f, STAGE.ACCELERATION)
     found = [each if isinstance(each, Jet) else Jet(float(each), none, 0.0, none) for each in f]
     value, slopes, bends = (np.array([getattr(e, part) for e in found]) for part in ("v", "g", "h"))

@@ -179,7 +179,7 @@ OF_RATES += [
     kind.name + form
     for kind in FORCE_TYPES
     if isinstance(kind, ForceType)
-    for form in ("", RIGID)[: 1 + bool(kind.rigid)]
+    for form in ("", RIGID)[: 1 + bool(kind.rigid_law)]
 ]
 
 

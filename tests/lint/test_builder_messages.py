@@ -178,10 +178,10 @@ def test_every_message_is_reported_by_a_rule_wherever_the_builder_raises_it(erro
 
     for message in read_messages():
         with monkeypatch.context() as context:
-            if message.module.startswith("multibody"):
+            if message.module.startswith("mechanics/multibody"):
                 context.setattr(construction, "build_mechanism", raised(message))
             else:
-                context.setattr(ElementBuilder, "element", raised(message))
+                context.setattr(ElementBuilder, "make_element", raised(message))
             remembering._memory.clear()
             report = validate(source)
         codes = {"OSIM421", "OSIM531"} if error is ModelError else {"OSIM533"}

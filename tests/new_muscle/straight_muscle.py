@@ -10,8 +10,8 @@ from osimlite.schema.facts import NAN, Contradiction, Facts
 from osimlite.schema.fields import real
 from osimlite.schema.muscles import Muscle
 from osimlite.simulation.elements.force_type import State
-from osimlite.simulation.elements.muscle import muscle
-from osimlite.simulation.elements.parameters import Number, positive
+from osimlite.simulation.elements.muscle import define_muscle
+from osimlite.simulation.elements.parameters import Number, require_positive
 from osimlite.simulation.elements.registry import register_force_type
 
 
@@ -65,17 +65,17 @@ def straight(
 
 
 register_force_type(
-    muscle(
+    define_muscle(
         StraightMuscle,
         straight,
         ("activation_rate", "fiber_velocity"),
         Number("max_isometric_force"),
-        positive("optimal_fiber_length"),
+        require_positive("optimal_fiber_length"),
         Number("tendon_slack_length"),
-        positive("fastest"),
-        positive("width"),
+        require_positive("fastest"),
+        require_positive("width"),
         Number("grip"),
-        positive("rise_time"),
+        require_positive("rise_time"),
         states=(State("activation", lambda force: force.default_activation),),
     )
 )

@@ -281,7 +281,7 @@ def test_a_column_beside_a_function_of_the_same_name_in_an_old_document(model, w
     ("label", "method", "words"),
     [
         ("moter", None, "the column 'moter' .* did you mean 'motor'"),
-        ("motor", None, "by the column 'motor' and otherwise too; leave one out"),
+        ("motor", None, "by the column 'motor' and by another entry; remove one of them"),
         ("other", -1, "is -1, which 2 rows do not allow"),
         ("other", 3, "is 3, which 2 rows do not allow"),
     ],

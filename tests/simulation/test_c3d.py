@@ -68,7 +68,7 @@ def test_loads_of_a_c3d_file_are_those_of_a_table(tmp_path: Path) -> None:
     for file in ("trial.c3d", "trial.sto"):
         (tmp_path / "loads.xml").write_text(LOADS.format(file=file))
         (force,) = read_external_loads(mechanism, tmp_path / "loads.xml")
-        load: Any = force.place
+        load: Any = force.location
         result.append([f.derivatives(0.0123)[0] for f in (*load.force, *load.point, *load.torque)])
     assert result[0] == pytest.approx(result[1], rel=1e-12) and len(result[0]) == 9
 

@@ -69,7 +69,7 @@ LEFT, RIGHT = point("/ground", -0.3, 0.01, 0), point("/bodyset/b", 0, 0.01, 0)
         (
             (LEFT, over(), RIGHT),
             ContactSphere(radius=0.4),
-            "no way over its obstacles where the model starts",
+            "cannot be laid over its obstacles in the default pose",
         ),
     ],
 )

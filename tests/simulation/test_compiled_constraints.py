@@ -22,7 +22,7 @@ from osimlite.schema.functions import Sine
 from osimlite.simulation import Simulation, simulate
 from osimlite.simulation.batches import ENDINGS, Watch, run_many
 from osimlite.simulation.elements import Forces
-from osimlite.simulation.elements.laws import law_function
+from osimlite.simulation.elements.laws import find_function
 from osimlite.simulation.engines.compiled import CompiledEngine
 from osimlite.simulation.engines.linking import PYTHON
 from osimlite.simulation.engines.protocol import Settings
@@ -198,7 +198,7 @@ def test_kernels_are_what_they_mean_in_python(make: Any):
     room, result = np.zeros(engine.structure[MODEL.WORK_SIZE]), np.zeros(len(y))
     room[WORK.SCRATCH : WORK.SCRATCH + 2] = 1e-9, np.inf
     assert (
-        law_function("project")(python.program.ints, engine.numbers, room, y, result, 0)
+        find_function("project")(python.program.ints, engine.numbers, room, y, result, 0)
         == OUTCOME.OK
     )
     assert y[: len(y) // 2].tolist() == ends.states[0][: len(y) // 2].tolist()

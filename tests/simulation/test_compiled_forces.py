@@ -23,7 +23,7 @@ from osimlite.simulation.elements.registry import FORCE_TYPES
 pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
 
 from osimlite.mechanics.kernels.layout import OUTCOME, STAGE
-from osimlite.simulation.elements.external_loads import external_load
+from osimlite.simulation.elements.external_loads import make_external_load
 from osimlite.simulation.elements.geometries.load import Load
 from osimlite.simulation.engines.bullet.engine import BulletEngine
 from osimlite.simulation.engines.compiled import CompiledEngine
@@ -169,7 +169,7 @@ def test_measured_load():
     for given in ((1, 1, 1), (1, 0, 0), (0, 0, 1), (1, 1, 0)):
         kinds = [functions if wanted else () for wanted in given]
         forces = Forces(
-            (external_load("/a", "a", Load(("b2_a_F", "b2_a_p", "b2_a_T"), *frames, *kinds)),)
+            (make_external_load("/a", "a", Load(("b2_a_F", "b2_a_p", "b2_a_T"), *frames, *kinds)),)
         )
         with BulletEngine(mechanism, forces) as theirs:
             assert_same(mechanism, CompiledEngine(mechanism, forces), theirs)

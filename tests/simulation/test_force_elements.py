@@ -185,7 +185,7 @@ def test_what_cannot_be_computed_is_named(make, message):
         ),
         (
             lambda: around(method="spiral"),
-            "method of '/forceset/a/path/wrap' is 'spiral'; take hybrid",
+            "method of '/forceset/a/path/wrap' is 'spiral'; use hybrid",
         ),
         (lambda: PathSpring(name="a", geometry_path=straight()), "not a finite number"),
         (

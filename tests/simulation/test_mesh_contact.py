@@ -81,7 +81,8 @@ def test_fixed_steps_converge_at_first_order(tmp_path):
 def test_where_mesh_files_are(tmp_path, monkeypatch):
     model = thrown(tmp_path)
     with pytest.raises(
-        ModelError, match=r"the mesh file 'stone\.obj' is not there; put it beside the model's file"
+        ModelError,
+        match=r"the mesh file 'stone\.obj' does not exist; put it beside the model's file",
     ):
         osimlite.simulate(model, 0.01)
     monkeypatch.chdir(tmp_path)

@@ -40,7 +40,7 @@ def test_files_of_all_kinds(kind, shape, tmp_path):
 def test_corners_of_stl_files_that_are_nearly_in_one_place(tmp_path):
     corners = triangles(*block((1.0, 1.0, 1.0)))
     rng = np.random.default_rng(1)
-    mesh = TriangleMesh.of_corners(corners + rng.uniform(-2e-7, 2e-7, corners.shape), "x.stl")
+    mesh = TriangleMesh.from_corners(corners + rng.uniform(-2e-7, 2e-7, corners.shape), "x.stl")
     assert len(mesh.points) == 12
 
 
@@ -54,12 +54,12 @@ def test_many_corners_make_a_fan_about_their_middle(tmp_path):
 
 def test_nearest_points():
     points, faces = ball((0.5, 0.5, 0.5), 24, 12)
-    mesh = TriangleMesh.of_corners(triangles(points, faces), "ball.stl")
+    mesh = TriangleMesh.from_corners(triangles(points, faces), "ball.stl")
     rng = np.random.default_rng(3)
     places = rng.uniform(-0.7, 0.7, (200, 3))
     # Straight out of edges and corners, where several triangles are equally near.
     places = np.concatenate([places, 1.3 * mesh.points, 0.9 * mesh.points])
-    result, inside = mesh.nearest(places)
+    result, inside = mesh.find_nearest(places)
     size = np.linalg.norm(places, axis=1)
     sure = np.abs(size - 0.5) > 0.02
     assert np.array_equal(inside[sure], size[sure] < 0.5)
@@ -73,21 +73,21 @@ def test_nearest_points():
 
 
 def test_surfaces_that_cross():
-    one = TriangleMesh.of_corners(triangles(*ball((0.5, 0.5, 0.5))), "ball.stl")
+    one = TriangleMesh.from_corners(triangles(*ball((0.5, 0.5, 0.5))), "ball.stl")
     frame = np.eye(4)
     for shift, crossing in ((0.1, False), (0.6, True), (1.2, False)):
         frame[0, 3] = shift
-        small = TriangleMesh.of_corners(triangles(*block((0.2, 0.2, 0.2))), "block.stl").moved(
-            frame
-        )
+        small = TriangleMesh.from_corners(
+            triangles(*block((0.2, 0.2, 0.2))), "block.stl"
+        ).transform(frame)
         assert one.crosses(small) is small.crosses(one) is crossing
     both = np.concatenate([triangles(*ball((0.5, 0.5, 0.5))), small.corners])
-    assert not TriangleMesh.of_corners(both, "both.stl").is_one_piece
+    assert not TriangleMesh.from_corners(both, "both.stl").is_one_piece
 
 
 def test_what_is_refused(tmp_path):
     with pytest.raises(
-        ModelError, match=r"the mesh file 'none.obj' is not there; put it beside the model's file"
+        ModelError, match=r"the mesh file 'none.obj' does not exist; put it beside the model's file"
     ):
         TriangleMesh.read("none.obj", MeshFolders(tmp_path))
     (tmp_path / "inner").mkdir()

@@ -28,9 +28,9 @@ from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.builder import ElementBuilder
 from osimlite.simulation.elements.force_records import ForceElement
 from osimlite.simulation.elements.geometries.paths.scholz2015_geometry_path import (
-    check as check_cable,
+    check_cable as check_cable,
 )
-from osimlite.simulation.elements.probe_type import probe_elements
+from osimlite.simulation.elements.probe_type import make_probes
 from osimlite.simulation.engines.linking import AT_HAND
 from osimlite.simulation.system import System
 
@@ -100,7 +100,7 @@ class _Construction:
         except OsimliteError as error:
             yield self.describe(error, Stage.FORCE)
             return
-        for force in builder.forces():
+        for force in builder.iterate_forces():
             if isinstance(getattr(force, "geometry_path", None), Scholz2015GeometryPath):
                 # Its way is searched once; in every evaluation it takes seconds without machine
                 # code.
@@ -110,11 +110,11 @@ class _Construction:
                     yield self.describe(error, Stage.CABLE, builder.path(force))
                 continue
             try:
-                elements.append(builder.element(force))
+                elements.append(builder.make_element(force))
             except OsimliteError as error:
                 yield self.describe(error, Stage.FORCE, builder.path(force))
         try:
-            probe_elements(builder, elements)
+            make_probes(builder, elements)
         except OsimliteError as error:
             yield self.describe(error, Stage.FORCE)
 

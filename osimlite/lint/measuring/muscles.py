@@ -37,11 +37,11 @@ class MuscleFibers(NamedTuple):
     @property
     def is_elastic(self) -> bool:
         """Whether there is something to bring into equilibrium."""
-        return not set(self.kind.settled).isdisjoint(states_of(self.component))
+        return not set(self.kind.solved_states).isdisjoint(states_of(self.component))
 
     def get_start_states(self) -> dict[str, float]:
         """The states where they start."""
-        return {state.name: state.at_start(self.component) for state in self.kind.states}
+        return {state.name: state.initial_value(self.component) for state in self.kind.states}
 
     def equilibrate(self, length: float, states: dict[str, float]) -> dict[str, float]:
         """The states in equilibrium at a length of the path (m), NaN if there is none."""
@@ -49,7 +49,7 @@ class MuscleFibers(NamedTuple):
             return states
         is_found, *result = self._call_law(self.kind.equilibrium, length, states)
         return states | dict(
-            zip(self.kind.settled, result if is_found else repeat(nan), strict=False)
+            zip(self.kind.solved_states, result if is_found else repeat(nan), strict=False)
         )
 
     def evaluate_law(self, length: float, states: dict[str, float]) -> dict[str, float]:

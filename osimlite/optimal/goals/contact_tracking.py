@@ -25,7 +25,7 @@ from osimlite.schema.contact_forces import SmoothSphereHalfSpaceForce
 from osimlite.schema.moco.goals import MocoGoal
 from osimlite.schema.moco.tracking import MocoContactImpulseTrackingGoal, MocoContactTrackingGoal
 from osimlite.schema.prescribed import ExternalLoads
-from osimlite.simulation.elements.external_loads import loads_table
+from osimlite.simulation.elements.external_loads import read_loads_table
 
 if TYPE_CHECKING:
     from osimlite.optimal.problem import Problem
@@ -107,7 +107,7 @@ def read_contact_groups(goal: ContactGoal, problem: Problem) -> list[ContactGrou
         folder = file.parent
         loads = read_anew(file, ExternalLoads)
         StudyContext(file, None).check_values(loads)
-    table = loads_table(loads, folder, None if file is None else str(file))
+    table = read_loads_table(loads, folder, None if file is None else str(file))
     force_by_name = {force.name: force for force in loads.objects}
     groups = []
     for group in goal.contact_groups:

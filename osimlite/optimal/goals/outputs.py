@@ -191,9 +191,9 @@ def _find_output(
         ),
         None,
     )
-    index = law.known_of.get(name) if law is not None else None
+    index = law.record_names.get(name) if law is not None else None
     if law is None or index is None:
         raise problem.unsupported_error(part, f"the output '{name}' of {path} is not supported")
     # The record of the force may have another label for the output.
-    label = f"{path}|{next(label for label, at in law.recorded.items() if at == index)}"
+    label = f"{path}|{next(label for label, at in law.record_offsets.items() if at == index)}"
     return 1, (lambda point, path: point.output("forces")[label], path)

@@ -1,4 +1,4 @@
-"""Builder of the elements of one model: access to the model and its mechanism for declarations."""
+"""Builder of the elements of one model: what declarations read from the model and its mechanism."""
 
 from __future__ import annotations
 
@@ -27,24 +27,25 @@ C = TypeVar("C")
 Triple = tuple[float, float, float]
 
 WRAPPINGS = OPENSIM, GEODESIC = "opensim", "geodesic"
-"""How paths may bend around surfaces."""
+"""Methods by which paths bend around surfaces."""
 
 
 class ElementBuilder:
-    """Makes the elements of one model.
+    """Maker of the elements of one model.
 
     Attributes:
-        tree: of the model.
-        mechanism: of the model.
-        reads_files: whether anything has asked for a file.
-        drives: what controllers do, by their paths, of those that have been asked.
-        early_return: whether Simbody's defect in contact is reproduced.
-        own_times: whether OpenSim's defect in activation is not.
+        model: the model.
+        tree: component tree of the model.
+        mechanism: mechanism of the model.
+        reads_files: whether an element has used a file.
+        drives: drives of the controllers that were read so far, by the paths of the controllers.
+        early_return: whether to reproduce Simbody's defect in contact of several surfaces.
+        own_times: whether each muscle uses its own activation times (OpenSim's defect shares them).
         geodesic: whether paths bend around surfaces along geodesics.
-        rigid_tendons: whether muscles pull as if they had rigid tendons and no states.
+        rigid_tendons: whether muscles are computed with rigid tendons and without states.
 
     Raises:
-        SettingError: there is no such wrapping.
+        SettingError: the wrapping is unknown.
     """
 
     def __init__(
@@ -76,27 +77,27 @@ class ElementBuilder:
 
     @property
     def folder(self) -> Path:
-        """Of the model's file: of what stands beside it."""
+        """Folder of the model's file, in which other files are found."""
         self.reads_files = True
         return self._folder
 
     @property
     def mesh_folders(self) -> MeshFolders:
-        """Where mesh files may be."""
+        """Folders that may contain mesh files."""
         from osimlite.io.meshes.folders import MeshFolders
 
         return MeshFolders(self.folder)
 
-    def components(self, component_class: type[C]) -> list[C]:
-        """The components of a class, in the order of the model."""
+    def find_components(self, component_class: type[C]) -> list[C]:
+        """Return the components of a class, in the order of the model."""
         if component_class not in self._of:
             self._of[component_class] = [
                 item for item in self.tree.components if isinstance(item, component_class)
             ]
         return self._of[component_class]
 
-    def forces(self) -> Iterator[Any]:
-        """Yield everything that applies a force, known or not, or has states that go with one."""
+    def iterate_forces(self) -> Iterator[Any]:
+        """Yield every component that applies a force or has the states of one, including unknown classes."""
         for component in self.tree.components:
             unknown = (
                 isinstance(component, Unknown)
@@ -111,33 +112,49 @@ class ElementBuilder:
             ):
                 yield component
 
-    def element(self, force: Any) -> ForceElement:
-        """The element of a force; UnsupportedError, with its path and class for a message, if there is none."""
+    def make_element(self, force: Any) -> ForceElement:
+        """Return the element of a force.
+
+        Raises:
+            UnsupportedError: osimlite cannot compute it; the message is its path and class.
+        """
         component: type = type(force)
         force_type = FORCE_TYPES.find(component)
         if force_type is None:
-            raise self.unsupported(force)
+            raise self.unsupported_error(force)
         element: ForceElement = force_type.make(self, force)
         return element
 
     @cached_property
     def controls(self) -> ModelControls:
-        """What the controllers of the model do."""
+        """Controls that the controllers of the model set."""
         return ModelControls(self)
 
-    # ---------------------------------------------------------------------------------- what kinds ask for
-    def coordinate(self, force: Any, field: str = "coordinate") -> int:
-        """Place of the coordinate that a force names."""
+    # -------------------------------------------------------------------------- access for declarations
+    def find_coordinate(self, force: Any, field: str = "coordinate") -> int:
+        """Return the index in the mechanism of the coordinate that a force names.
+
+        Args:
+            force: the component.
+            field: property that names the coordinate.
+        """
         named = getattr(force, field)
         if not named:
-            raise ModelError(f"the force '{self.path(force)}' names no coordinate; give it one")
-        return self.mechanism.coordinate_index(self.path(self.target(force, field, named)))
+            raise ModelError(
+                f"the force '{self.path(force)}' names no coordinate; set its '{field}'"
+            )
+        return self.mechanism.coordinate_index(self.path(self.resolve_target(force, field, named)))
 
-    def target(self, holder: Any, field: str, value: Any) -> Any:
-        """The component that a property refers to.
+    def resolve_target(self, holder: Any, field: str, value: Any) -> Any:
+        """Return the component that a property refers to.
+
+        Args:
+            holder: component with the property.
+            field: name of the property.
+            value: value of the property, a path or a component.
 
         Raises:
-            ModelError: there is none.
+            ModelError: the property is empty, or there is no such component.
         """
         if not value:
             raise ModelError(f"the '{field}' of '{self.path(holder)}' is empty; give it a name")
@@ -149,46 +166,58 @@ class ElementBuilder:
             )
         return result
 
-    def placement(self, frame: Any) -> FramePlacement:
-        """Body and place in it of a frame."""
+    def find_placement(self, frame: Any) -> FramePlacement:
+        """Return the body of a frame and the frame's placement in it."""
         return self.mechanism.placement(self.path(frame))
 
-    def function(self, force: Any, function: Any, what: str) -> Function:
-        """A function of one number that belongs to a force.
+    def read_function(self, force: Any, function: Any, what: str) -> Function:
+        """Return a function of one argument that belongs to a force.
+
+        Args:
+            force: the component.
+            function: the function of the schema.
+            what: name of the property, for messages.
 
         Raises:
-            UnsupportedError: it is none that osimlite knows.
+            UnsupportedError: osimlite does not know the class of the function.
         """
         try:
             return convert_function(function, 1, f"'{what}' of '{self.path(force)}'")
         except UnsupportedError:
-            raise self.unsupported(force, f" with the {kind_of(function)} '{what}'") from None
+            raise self.unsupported_error(
+                force, f" with the {get_class_name(function)} '{what}'"
+            ) from None
 
-    def check(self, component: Any, numbers: Sequence[float]) -> None:
+    def check_finite(self, component: Any, numbers: Sequence[float]) -> None:
         """Raise a ModelError if a number is not finite."""
-        # A sum is finite only of finite numbers; that of great ones may be infinite.
+        # A finite sum proves that all numbers are finite; the sum of large ones may overflow.
         if not (isfinite(sum(numbers)) or all(map(isfinite, numbers))):
             raise ModelError(
-                f"'{self.path(component)}' has a parameter that is not a finite number; give one"
+                f"'{self.path(component)}' has a parameter that is not a finite number; give it a finite value"
             )
 
-    def unsupported(self, force: Any, why: str = "") -> UnsupportedError:
-        """The error that names a force that cannot be computed."""
-        return UnsupportedError(f"'{self.path(force)}' ({kind_of(force)}{why})")
+    def unsupported_error(self, force: Any, why: str = "") -> UnsupportedError:
+        """Return the error that names a force that cannot be computed.
+
+        Args:
+            force: the component.
+            why: continuation of the message after the class.
+        """
+        return UnsupportedError(f"'{self.path(force)}' ({get_class_name(force)}{why})")
 
     def path(self, component: Any) -> str:
-        """Absolute path of a component."""
+        """Return the absolute path of a component."""
         path = self.tree.path_of(component)
         assert path is not None
         return path
 
 
-def kind_of(component: Any) -> str:
-    """Name of a component's class."""
+def get_class_name(component: Any) -> str:
+    """Return the name of a component's class, as the file has it."""
     return getattr(component, "class_name", "") or type(component).__name__
 
 
-def triple(values: Any) -> Triple:
-    """Three numbers."""
+def as_triple(values: Any) -> Triple:
+    """Return three values as floats."""
     x, y, z = (float(value) for value in values)
     return x, y, z

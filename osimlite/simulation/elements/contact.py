@@ -1,4 +1,4 @@
-"""Contact between half spaces, spheres and ellipsoids by the law of Hunt and Crossley, in sets of pairs."""
+"""Contact between half spaces, spheres and ellipsoids by the law of Hunt and Crossley, in pairs."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from osimlite.schema.contact import (
 from osimlite.schema.forces import HuntCrossleyForce
 from osimlite.schema.frames import PhysicalFrame
 from osimlite.schema.tree import Use
-from osimlite.simulation.elements.builder import ElementBuilder, Triple, kind_of, triple
+from osimlite.simulation.elements.builder import ElementBuilder, Triple, as_triple, get_class_name
 from osimlite.simulation.elements.force_records import ForceRecord, Response
 from osimlite.simulation.elements.registry import register_force_type
 from osimlite.simulation.states import StateVariable
@@ -32,40 +32,41 @@ if TYPE_CHECKING:
     from osimlite.simulation.elements.triangle_mesh import TriangleMesh
 
 RESPONSE = "contact_response"
+"""Kernel that computes derivatives of a contact force along the normal and across it."""
 
 Material = tuple[float, float, float, float, float]
-"""Stiffness, dissipation, and coefficients of static, dynamic and viscous friction of a surface, as in the model."""
+"""Stiffness (Pa), dissipation (s/m), and static, dynamic (1) and viscous (s/m) friction, as in the model."""
 
 
 @dataclass(frozen=True, slots=True)
 class ContactSurface:
-    """A half space, a sphere, an ellipsoid or a mesh, fixed to a body (index, -1 for ground)."""
+    """Half space, sphere, ellipsoid or mesh that is fixed to a body (index, -1 for ground)."""
 
     name: str
     body: int
-    frame: str  # name of the frame that holds it in the model
-    center: Triple  # of the sphere, or a point on the plane, in the body frame (m)
-    # of the sphere, the largest of the ellipsoid, or of the ball around the mesh (m); infinite for
-    # a half space
+    frame: str  # name of the frame that the model fixes it to
+    center: Triple  # center of the sphere, or a point on the plane, in the body frame (m)
+    # radius of the sphere, largest half axis of the ellipsoid, or radius of the ball around the
+    # mesh (m); infinite for a half space
     radius: float
-    normal: Triple  # unit vector out of the half space, in the body frame
+    normal: Triple  # outward unit normal of the half space, in the body frame
     material: Material  # the law's K (Pa), c (s/m), us, ud (1), uv (s/m)
-    radii: Triple | None = None  # half axes of an ellipsoid (m), None for the others
-    # their directions in the body frame, as the columns of a matrix
+    radii: Triple | None = None  # half axes of an ellipsoid (m); None for other surfaces
+    # directions of the half axes in the body frame, as columns of a matrix
     axes: tuple[Triple, Triple, Triple] | None = None
     mesh: TriangleMesh | None = None  # the triangles of a mesh, in the body frame
 
     @property
     def is_half_space(self) -> bool:
-        """Whether it is a half space."""
+        """Whether the surface is a half space."""
         return self.radius == inf
 
 
 @dataclass(frozen=True, slots=True)
 class ContactPair:
-    """Two surfaces (places in the element) that may touch; of a half space and a sphere, the half space is first.
+    """Two surfaces (indices in the element) that may touch; a half space comes before a sphere.
 
-    k, a, c, us, ud, uv are the effective parameters of the law.
+    `effective` has the combined parameters k, a, c, us, ud, uv of the law.
     """
 
     first: int
@@ -75,11 +76,16 @@ class ContactPair:
 
 @dataclass(frozen=True)
 class PairContact:
-    """Contact of all surfaces of one force on different bodies, in pairs.
+    """Contact of all surfaces of one force that are on different bodies, in pairs.
 
-    Attributes: vt: transition velocity, m/s. early_return: reproduce Simbody's defect, see
-        `osimlite.mechanics.laws.hunt_crossley.contact_forces`. records: the surfaces in the order
-        of OpenSim's record.
+    Attributes:
+        path: path of the component.
+        name: name of the component.
+        surfaces: surfaces in the order of OpenSim's report.
+        pairs: pairs that may touch.
+        vt: transition velocity, m/s.
+        early_return: whether to reproduce Simbody's defect, see
+            `osimlite.mechanics.laws.hunt_crossley.contact_forces`.
     """
 
     states: ClassVar[tuple[StateVariable, ...]] = ()
@@ -91,28 +97,31 @@ class PairContact:
     vt: float
     early_return: bool = False
 
-    def items(self, places: Places) -> list[ForceRecord]:
-        """An item for each pair, and what computes them one by one if they depend on one another."""
+    def make_records(self, places: Places) -> list[ForceRecord]:
+        """Return a record for each pair, and one that computes them in order if they depend on one another."""
         result = []
         for pair in self.pairs:
             one, two = self.surfaces[pair.first], self.surfaces[pair.second]
-            links, numbers = self.pair_numbers(pair, places)
+            links, numbers = self.pack_pair(pair, places)
             kernel = "touch_half_space" if one.is_half_space else "touch_spheres"
             if one.radii or two.radii:
                 kernel = "touch_ellipsoid" if one.is_half_space else "touch_ellipsoids"
                 shapes = (surface for surface in (one, two) if not surface.is_half_space)
-                numbers = (*numbers, *(x for surface in shapes for x in _shape(surface, places)))
+                numbers = (
+                    *numbers,
+                    *(x for surface in shapes for x in _pack_shape(surface, places)),
+                )
             result.append(
                 ForceRecord(kernel, links, numbers, is_contact=True, is_part=self.early_return)
             )
         if self.early_return:
-            result.append(self._early_return(places))
+            result.append(self._make_early_return(places))
         else:
-            result += self._responses()
+            result += self._make_responses()
         return result
 
-    def _responses(self) -> list[ForceRecord]:
-        """What tells how the force of each pair of half spaces and spheres changes, along its normal and across it."""
+    def _make_responses(self) -> list[ForceRecord]:
+        """Return records for derivatives of the force of each pair without ellipsoids, along three axes."""
         result, back = [], (ITEM.OWN + 2) * len(self.pairs)
         for pair in self.pairs:
             one, two = self.surfaces[pair.first], self.surfaces[pair.second]
@@ -126,10 +135,18 @@ class PairContact:
             back -= ITEM.OWN + 2
         return result
 
-    def pair_numbers(
+    def pack_pair(
         self, pair: ContactPair, places: Places
     ) -> tuple[tuple[int, int], tuple[float, ...]]:
-        """Links and numbers of a pair."""
+        """Return links and numbers of a pair.
+
+        Args:
+            pair: the pair.
+            places: placement of the bodies in the links of the tree.
+
+        Returns:
+            The links of both surfaces, and the numbers of the kernel.
+        """
         one, two = self.surfaces[pair.first], self.surfaces[pair.second]
         first, center = places.station(one.body, one.center)
         second, other = places.station(two.body, two.center)
@@ -147,8 +164,8 @@ class PairContact:
             self.vt,
         )
 
-    def _early_return(self, places: Places) -> ForceRecord:
-        """What computes the pairs one by one in Simbody's order."""
+    def _make_early_return(self, places: Places) -> ForceRecord:
+        """Return the record that computes the pairs one by one in Simbody's order."""
         stations = [places.station(surface.body, surface.center) for surface in self.surfaces]
         links = (link for link, _ in stations)
         pairs = (place for pair in self.pairs for place in (pair.first, pair.second))
@@ -158,18 +175,18 @@ class PairContact:
             for x in (*center, surface.radius)
         )
         ints = len(stations), len(self.pairs), *links, *pairs
-        return ForceRecord("early_return", ints, tuple(numbers), room=5 * len(stations))
+        return ForceRecord("early_return", ints, tuple(numbers), record_size=5 * len(stations))
 
-    def pair_name(self, place: int) -> str:
-        """What to call a pair: the force, and the surfaces if it has more than one pair."""
+    def pair_name(self, index: int) -> str:
+        """Return the name of a pair: that of the force, with the surfaces if the force has several pairs."""
         if len(self.pairs) == 1:
             return self.name
-        pair = self.pairs[place]
+        pair = self.pairs[index]
         return f"{self.name} ({self.surfaces[pair.second].name}, {self.surfaces[pair.first].name})"
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """Force and torque on the frame of each surface."""
+        """Labels of force and torque on the frame of each surface."""
         labels = [f"{kind}.{axis}" for kind in ("force", "torque") for axis in "XYZ"]
         return tuple(
             f"{self.name}.{surface.frame}.{label}" for surface in self.surfaces for label in labels
@@ -178,12 +195,12 @@ class PairContact:
     def report(
         self, records: Sequence[Sequence[float]], origins: Sequence[Sequence[float]]
     ) -> list[float]:
-        """Total force on the body of each surface, and its torque about the body's origin, in ground."""
+        """Return the force on the body of each surface, and its torque about the body's origin, in ground."""
         loads: dict[int, list[float]] = {}
         for pair, record in zip(self.pairs, records, strict=False):
             if not record[CONTACT_WORK.DEPTH] > 0.0:
                 continue
-            force, torque = vector(record, 0), vector(self.torque(records, pair), 0)
+            force, torque = vector(record, 0), vector(self.find_torque(records, pair), 0)
             for surface, sign in (
                 (self.surfaces[pair.first], -1.0),
                 (self.surfaces[pair.second], 1.0),
@@ -197,12 +214,12 @@ class PairContact:
             row += loads.get(surface.body, [0.0] * 6)
         return row
 
-    def torque(self, records: Sequence[Sequence[float]], pair: ContactPair) -> Sequence[float]:
-        """The torque (N.m) on surface 2 of a contact besides that of the force at its point."""
+    def find_torque(self, records: Sequence[Sequence[float]], pair: ContactPair) -> Sequence[float]:
+        """Return the torque (N.m) on surface 2 of a contact in addition to that of the force at its point."""
         return 0.0, 0.0, 0.0
 
-    def energy(self, records: Sequence[Sequence[float]]) -> float:
-        """Potential energy, J."""
+    def compute_energy(self, records: Sequence[Sequence[float]]) -> float:
+        """Return the potential energy, J."""
         return sum(
             contact_energy(
                 record[CONTACT_WORK.DEPTH], record[CONTACT_WORK.RADIUS], pair.effective[0]
@@ -214,15 +231,22 @@ class PairContact:
 
 @register_force_type
 class HuntCrossley(PairContact):
-    """One HuntCrossleyForce on half spaces, spheres and ellipsoids."""
+    """HuntCrossleyForce on half spaces, spheres and ellipsoids."""
 
     component: ClassVar = HuntCrossleyForce
 
     @classmethod
     def make(cls, builder: ElementBuilder, force: HuntCrossleyForce) -> HuntCrossley:
-        """The element of a force."""
-        surfaces = [surface_of(builder, force, *result) for result in geometries(builder, force)]
-        builder.check(
+        """Return the element of a force.
+
+        Raises:
+            ModelError: a geometry does not exist, or a parameter has no meaning.
+            UnsupportedError: osimlite cannot compute contact of one of the geometries.
+        """
+        surfaces = [
+            read_surface(builder, force, *result) for result in read_geometries(builder, force)
+        ]
+        builder.check_finite(
             force,
             (force.transition_velocity, *(x for surface in surfaces for x in surface.material)),
         )
@@ -241,13 +265,13 @@ class HuntCrossley(PairContact):
                 raise ModelError(f"the force '{builder.path(force)}': {error}") from None
         early_return = builder.early_return and len(pairs) > 1
         if early_return and any(surface.radii for surface in surfaces):
-            raise builder.unsupported(force, " with an ellipsoid, and Simbody's early return")
+            raise builder.unsupported_error(force, " with an ellipsoid, and Simbody's early return")
         path, vt = builder.path(force), force.transition_velocity
         return cls(path, force.name, tuple(surfaces), tuple(pairs), vt, early_return)
 
 
-def _shape(surface: ContactSurface, places: Places) -> tuple[float, ...]:
-    """Axes in the link, and half axes, of an ellipsoid or a sphere."""
+def _pack_shape(surface: ContactSurface, places: Places) -> tuple[float, ...]:
+    """Return the axes in the link, and the half axes, of an ellipsoid or a sphere."""
     if surface.radii is None or surface.axes is None:
         return (
             1.0,
@@ -267,8 +291,10 @@ def _shape(surface: ContactSurface, places: Places) -> tuple[float, ...]:
     return (*(x for axis in axes for x in axis), *surface.radii)
 
 
-def geometries(builder: ElementBuilder, force: Any) -> Iterator[tuple[ContactGeometry, Material]]:
-    """The contact geometry of a force in its order, with the material that the force gives it.
+def read_geometries(
+    builder: ElementBuilder, force: Any
+) -> Iterator[tuple[ContactGeometry, Material]]:
+    """Yield the contact geometries of a force in its order, each with the material that the force gives it.
 
     Raises:
         ModelError: the model has no geometry of a name.
@@ -294,41 +320,57 @@ def geometries(builder: ElementBuilder, force: Any) -> Iterator[tuple[ContactGeo
             yield geometry, material
 
 
-def surface_of(
+def read_surface(
     builder: ElementBuilder, force: Any, geometry: Any, material: Material
 ) -> ContactSurface:
-    """A contact geometry as the surface of a contact.
+    """Return a contact geometry as the surface of a contact.
+
+    Args:
+        builder: builder of the elements.
+        force: the force, for messages.
+        geometry: the contact geometry.
+        material: parameters that the force gives it.
 
     Raises:
-        UnsupportedError: it is no half space, sphere or ellipsoid, or not fixed to a body.
+        ModelError: a radius of an ellipsoid is not positive.
+        UnsupportedError: it is not a half space, sphere or ellipsoid, or is not fixed to a body.
     """
     if not isinstance(geometry, ContactHalfSpace | ContactSphere | ContactEllipsoid):
-        raise builder.unsupported(force, f" on the {kind_of(geometry)} '{builder.path(geometry)}'")
-    frame, body, placed = place_of(builder, geometry)
+        raise builder.unsupported_error(
+            force, f" on the {get_class_name(geometry)} '{builder.path(geometry)}'"
+        )
+    frame, body, placed = find_frame(builder, geometry)
     center, axes = placed[:3, 3], placed[:3, :3]
-    # The half space is x > 0 of the geometry's own frame.
+    # The half space is solid at x > 0 of the geometry's frame.
     normal = -axes[:, 0]
     if isinstance(geometry, ContactEllipsoid):
-        builder.check(geometry, (*center, *axes.ravel(), *geometry.radii))
+        builder.check_finite(geometry, (*center, *axes.ravel(), *geometry.radii))
         if not min(geometry.radii) > 0.0:
             raise ModelError(
-                f"the radii of '{builder.path(geometry)}' are not all positive; give such"
+                f"the radii of '{builder.path(geometry)}' are not all positive; make them positive"
             )
-        place, still = triple(center), (0.0, 0.0, 0.0)
-        rows = triple(axes[0]), triple(axes[1]), triple(axes[2])
-        longest, radii = max(geometry.radii), triple(geometry.radii)
+        place, still = as_triple(center), (0.0, 0.0, 0.0)
+        rows = as_triple(axes[0]), as_triple(axes[1]), as_triple(axes[2])
+        longest, radii = max(geometry.radii), as_triple(geometry.radii)
         return ContactSurface(
             geometry.name, body, frame, place, longest, still, material, radii, rows
         )
     radius = geometry.radius if isinstance(geometry, ContactSphere) else inf
-    builder.check(geometry, (*center, *normal, 0.0 if radius == inf else radius))
+    builder.check_finite(geometry, (*center, *normal, 0.0 if radius == inf else radius))
     return ContactSurface(
-        geometry.name, body, frame, triple(center), radius, triple(normal), material
+        geometry.name, body, frame, as_triple(center), radius, as_triple(normal), material
     )
 
 
-def place_of(builder: ElementBuilder, geometry: ContactGeometry) -> tuple[str, int, Array]:
-    """Name of the frame that holds a contact geometry, its body, and the geometry's own frame (4, 4) in the body.
+def find_frame(builder: ElementBuilder, geometry: ContactGeometry) -> tuple[str, int, Array]:
+    """Return where a contact geometry is fixed.
+
+    Args:
+        builder: builder of the elements.
+        geometry: the contact geometry.
+
+    Returns:
+        Name of its frame, the frame's body, and the geometry's axes and origin (4, 4) in the body.
 
     Raises:
         UnsupportedError: it is not fixed to a body.
@@ -336,7 +378,7 @@ def place_of(builder: ElementBuilder, geometry: ContactGeometry) -> tuple[str, i
     frame = builder.tree.target(geometry, "socket_frame", geometry.socket_frame)
     if not isinstance(frame, PhysicalFrame):
         raise UnsupportedError(
-            f"the contact geometry '{builder.path(geometry)}' on the {kind_of(frame)} '{builder.path(frame)}'"
+            f"the contact geometry '{builder.path(geometry)}' on the {get_class_name(frame)} '{builder.path(frame)}'"
         )
-    body, placed = builder.placement(frame)
+    body, placed = builder.find_placement(frame)
     return frame.name, body, placed @ make_offset(geometry.location, geometry.orientation)

@@ -1,4 +1,4 @@
-"""Control curves: the lines and steps of OpenSim's ControlSet."""
+"""Controls in a ControlSet or a table, and the controller that applies them."""
 
 from __future__ import annotations
 
@@ -25,16 +25,17 @@ from osimlite.schema.control_sets import (
 from osimlite.schema.controller_types import ControlSetController
 from osimlite.simulation.elements.builder import ElementBuilder
 from osimlite.simulation.elements.control_tables import read_controls
-from osimlite.simulation.elements.controls import Drive, actuators_by_name, named
+from osimlite.simulation.elements.controls import Drive, find_actuators, map_actuators
 from osimlite.simulation.elements.registry import register_controller
 
 
 @dataclass(frozen=True)
 class ControlCurves:
-    """The controls of a file.
+    """Controls of a file.
 
-    Attributes: curves: functions of time by the names of the controls; of several controls of a
-        name the first. of_model: the names of those that the model is to have.
+    Attributes:
+        curves: functions of time by the names of the controls; the first one of each name.
+        of_model: names of the controls that the model must have.
     """
 
     curves: Mapping[str, Function]
@@ -42,75 +43,90 @@ class ControlCurves:
 
     @classmethod
     def read(cls, path: Path) -> ControlCurves:
-        """From a document, or from a table (``.sto``), which is one of lines between its rows.
+        """Read a document, or a table (``.sto``), which is interpolated linearly.
 
         Raises:
-            DocumentError: it holds something else.
+            DocumentError: the file is neither.
             ModelError: a control has no nodes, or their times go back.
         """
         curves: dict[str, Function] = {}
         if ".sto" in path.name:
             table = read_controls(path)
             for label, values in zip(table.columns, table.rows.T.tolist(), strict=True):
-                curves.setdefault(label, _lines(table.times.tolist(), values, goes_on=True))
+                curves.setdefault(
+                    label, _connect_points(table.times.tolist(), values, extrapolate=True)
+                )
             return cls(curves, table.columns)
         controls = read_object(path, ControlSet).objects
         for control in controls:
-            curves.setdefault(control.name, _curve(control, str(path)))
+            curves.setdefault(control.name, _make_curve(control, str(path)))
         return cls(curves, [control.name for control in controls if control.is_model_control])
 
     @property
     def actuators(self) -> list[str]:
-        """Names of the actuators that the model is to have."""
+        """Names of the actuators that the model must have."""
         return [name.removesuffix(EXCITATION) for name in self.of_model]
 
-    def of(self, actuator: str) -> Function | None:
-        """The control that is called after an actuator, or else with ``.excitation`` behind its name."""
+    def find_curve(self, actuator: str) -> Function | None:
+        """Return the control named like an actuator, or like it with the suffix ``.excitation``."""
         return self.curves.get(actuator) or self.curves.get(actuator + EXCITATION)
 
 
 EXCITATION = ".excitation"
+"""Suffix of the names of controls of muscles."""
 
 
-def _curve(control: Control, file: str) -> Function:
+def _make_curve(control: Control, file: str) -> Function:
     if isinstance(control, ControlConstant):
         return Constant(control.value)
     assert isinstance(control, ControlLinear)
     if not control.x_nodes:
-        raise ModelError(f"the control '{control.name}' has no x_nodes; give it some", file=file)
-    return node_curve(control, control.x_nodes, file)
+        raise ModelError(
+            f"the control '{control.name}' has no x_nodes; add at least one", file=file
+        )
+    return make_node_curve(control, control.x_nodes, file)
 
 
-def node_curve(
+def make_node_curve(
     control: ControlLinear, nodes: Sequence[ControlLinearNode], file: str | None = None
 ) -> Function:
-    """Lines or steps through nodes of a control, such as its x_nodes.
+    """Return lines or steps through nodes of a control, such as its x_nodes.
+
+    Args:
+        control: the control, which says whether there are steps and extrapolation.
+        nodes: the nodes in the order of time.
+        file: file of the control, for messages.
 
     Raises:
-        ModelError: their times go back.
+        ModelError: the times go back, or a number is not finite.
     """
     times, values = [node.t for node in nodes], [node.value for node in nodes]
     if not np.isfinite([*times, *values]).all() or (np.diff(times) < 0.0).any():
         raise ModelError(
-            f"the x_nodes of the control '{control.name}' go back in time, or have no numbers; sort them",
+            f"the x_nodes of the control '{control.name}' go back in time or are not finite; sort and correct them",
             file=file,
         )
     if control.use_steps:
-        # A value holds up to its own time, that included.
+        # Each value applies up to and including its own time.
         return PiecewiseConstant(
             (times[0], *(nextafter(time, inf) for time in times[:-1])), tuple(values)
         )
-    return _lines(times, values, goes_on=control.extrapolate)
+    return _connect_points(times, values, extrapolate=control.extrapolate)
 
 
-def _lines(times: Sequence[float], values: Sequence[float], *, goes_on: bool) -> Function:
-    """Straight lines between points; outside they go on, or the end values hold. Points at one time make a jump."""
+def _connect_points(
+    times: Sequence[float], values: Sequence[float], *, extrapolate: bool
+) -> Function:
+    """Return straight lines between points; two points at one time make a jump.
+
+    Outside, the first and last lines are extrapolated, or the end values are constant.
+    """
     if len(times) == 1:
         return Constant(values[0])
     widths = np.diff(times)
     slopes = np.where(widths > 0.0, np.diff(values) / np.where(widths > 0.0, widths, 1.0), 0.0)
     lines = np.column_stack((values[:-1], slopes))
-    if goes_on:
+    if extrapolate:
         return PiecewisePolynomial(np.array(times[:-1]), lines)
     ends = np.array(((values[0], 0.0), (values[-1], 0.0)))
     return PiecewisePolynomial(np.array((times[0], *times)), np.vstack((ends[:1], lines, ends[1:])))
@@ -120,17 +136,17 @@ def _lines(times: Sequence[float], values: Sequence[float], *, goes_on: bool) ->
 def drive_by_control_set(
     builder: ElementBuilder, controller: ControlSetController
 ) -> Iterator[Drive]:
-    """What it does to the actuators that it names, and to the first of each name in its file.
+    """Yield the drives of the actuators that the controller names, and of those that its file names.
 
     Raises:
-        ModelError: there is no actuator of a name in the file, or a control has no meaning.
+        ModelError: the model has no actuator of a name in the file, or a control has no meaning.
     """
     if controller.controls_file in ("", "Unassigned"):
         return
     path = beside(builder.folder, str(controller.controls_file))
     result = ControlCurves.read(path)
-    driven = named(builder, controller)
-    actuators = actuators_by_name(builder)
+    driven = find_actuators(builder, controller)
+    actuators = map_actuators(builder)
     for name in result.actuators:
         if name not in actuators:
             raise ModelError(
@@ -141,6 +157,6 @@ def drive_by_control_set(
         if all(item.name != name for item in driven):
             driven.append(actuators[name])
     for actuator in driven:
-        curve = result.of(actuator.name)
+        curve = result.find_curve(actuator.name)
         if curve is not None:
             yield Drive(actuator, curve)

@@ -15,11 +15,11 @@ from osimlite.mechanics.multibody.smoothing_spline import smoothing_spline
 
 
 def read_controls(path: str | Path) -> StoTable:
-    """A table of controls; of rows at the same time the last one counts, as in OpenSim.
+    """Return a table of controls; as in OpenSim, the last of several rows at one time counts.
 
     Raises:
-        DocumentError: it is no table.
-        ModelError: the times do not increase, a number is not finite, or there are no rows.
+        DocumentError: the file is not a table.
+        ModelError: the times go back, a number is not finite, or there are no rows.
     """
     rows: dict[float, list[float]] = {}
     with TableStream(path) as stream:
@@ -47,7 +47,7 @@ def read_controls(path: str | Path) -> StoTable:
             last = time
         if not rows:
             raise ModelError(
-                "the table has no rows; give it some", file=stream.file, line=stream.line
+                "the table has no rows; add at least one", file=stream.file, line=stream.line
             )
         return StoTable(
             stream.name,
@@ -58,27 +58,27 @@ def read_controls(path: str | Path) -> StoTable:
         )
 
 
-def column_function(table: StoTable, place: int, degree: int, what: str) -> Function:
-    """A column as a function of time, as OpenSim makes it one: steps, or a spline through its values.
+def make_column_function(table: StoTable, index: int, degree: int, what: str) -> Function:
+    """Return a column as a function of time, as OpenSim does: steps, or a spline through its values.
 
-    Outside, steps and straight lines hold the end values, and other splines go on as polynomials of
-    lower degree.
+    Outside the table, steps and lines have the end values; other splines are extrapolated by
+    polynomials of lower degree.
 
     Args:
-        table: with the column.
-        place: of the column.
-        degree: of the spline; 0 is steps, and an even number stands for the odd one below it.
-        what: sets the degree, for messages.
+        table: the table.
+        index: index of the column.
+        degree: degree of the spline; 0 for steps; an even degree stands for the odd one below it.
+        what: name of the setting of the degree, for messages.
 
     Raises:
-        ModelError: the degree is not possible with so many rows.
+        ModelError: the table has too few rows for the degree.
     """
-    times, values, half_order = table.times, table.rows[:, place], (degree + 1) // 2
+    times, values, half_order = table.times, table.rows[:, index], (degree + 1) // 2
     if degree == 0:
         return PiecewiseConstant(tuple(times.tolist()), tuple(values.tolist()))
     if not 1 <= half_order <= 4 or len(times) < 2 * half_order:
         raise ModelError(
-            f"{what} is {degree}, which {len(times)} rows do not allow; take 0 for steps or 1 for straight lines",
+            f"{what} is {degree}, which {len(times)} rows do not allow; use 0 for steps or 1 for straight lines",
             file=table.file,
         )
     return smoothing_spline(times, values, half_order, 0.0)

@@ -13,32 +13,32 @@ from osimlite.schema.controller_types import PrescribedController
 from osimlite.schema.examples import ToyPropMyoController, ToyReflexController
 from osimlite.schema.muscles import Muscle
 from osimlite.simulation.elements.builder import ElementBuilder
-from osimlite.simulation.elements.control_tables import column_function, read_controls
-from osimlite.simulation.elements.controls import Drive, Reflex, actuators_by_name, named
+from osimlite.simulation.elements.control_tables import make_column_function, read_controls
+from osimlite.simulation.elements.controls import Drive, Reflex, find_actuators, map_actuators
 from osimlite.simulation.elements.registry import register_controller
 
 LISTS_OF_PATHS = 40600
-"""Documents before this version name actuators by their names."""
+"""Documents before this version name actuators by name instead of path."""
 
 
 @register_controller(PrescribedController)
 def drive_as_prescribed(
     builder: ElementBuilder, controller: PrescribedController
 ) -> Iterator[Drive]:
-    """What it does to each actuator.
+    """Yield the functions of the controller, and the columns of its file.
 
     Raises:
-        ModelError: it has not one function for each actuator, or its file does not fit.
+        ModelError: the number of functions is not that of the actuators, or the file does not fit.
     """
     path, given = builder.path(controller), controller.ControlFunctions.objects
-    actuators = named(builder, controller)
+    actuators = find_actuators(builder, controller)
     if len(given) != len(actuators):
         raise ModelError(
             f"'{path}' has {len(given)} functions for {len(actuators)} actuators; give it one for each"
         )
     for actuator, function in zip(actuators, given, strict=True):
         try:
-            signal: Any = builder.function(actuator, function, f"control by {path}")
+            signal: Any = builder.read_function(actuator, function, f"control by {path}")
         except UnsupportedError as error:
             signal = error
         yield Drive(actuator, signal)
@@ -49,14 +49,14 @@ def drive_as_prescribed(
 def _from_file(
     builder: ElementBuilder, controller: PrescribedController, taken: list[Any]
 ) -> Iterator[Drive]:
-    """The columns of the file, which are called by names or paths of actuators.
+    """Yield the columns of the file, whose labels are names or paths of actuators.
 
-    As in OpenSim, a column is passed over if the controller names an actuator by the same word, or
-    if one before it has the same label.
+    As in OpenSim, a column is ignored if the controller names an actuator by the same text, or if an
+    earlier column has the same label.
     """
     path = builder.path(controller)
-    actuators = actuators_by_name(builder)
-    actuators |= {builder.path(item): item for item in builder.components(Actuator)}
+    actuators = map_actuators(builder)
+    actuators |= {builder.path(item): item for item in builder.find_components(Actuator)}
     table = read_controls(beside(builder.folder, str(controller.controls_file)))
     known = {
         word if isinstance(word, str) else builder.path(word)
@@ -71,34 +71,35 @@ def _from_file(
         if label not in actuators:
             names = [item.name for item in actuators.values()]
             raise ModelError(
-                f"the column '{label}' of the file of '{path}' is no actuator of the model{suggest_name(label, names)}",
+                f"the column '{label}' of the file of '{path}' is not an actuator of the model{suggest_name(label, names)}",
                 file=table.file,
             )
         actuator = actuators[label]
         if any(item is actuator for item in taken):
             raise ModelError(
-                f"'{path}' sets '{builder.path(actuator)}' by the column '{label}' and otherwise too; leave one out",
+                f"'{path}' sets '{builder.path(actuator)}' by the column '{label}' and by another entry; remove one of them",
                 file=table.file,
             )
         known.add(label)
         taken.append(actuator)
         degree = 1 if controller.interpolation_method is None else controller.interpolation_method
         yield Drive(
-            actuator, column_function(table, index, degree, f"the interpolation_method of '{path}'")
+            actuator,
+            make_column_function(table, index, degree, f"the interpolation_method of '{path}'"),
         )
 
 
 @register_controller(ToyReflexController)
 def drive_by_reflex(builder: ElementBuilder, controller: ToyReflexController) -> Iterator[Drive]:
-    """The gain where a muscle lengthens at its greatest contraction velocity, less where it is slower.
+    """Yield a reflex for each muscle, with the gain at its maximum contraction velocity.
 
     Raises:
-        ModelError: it names an actuator that is no muscle.
+        ModelError: the controller names an actuator that is not a muscle.
     """
-    for muscle in named(builder, controller):
+    for muscle in find_actuators(builder, controller):
         if isinstance(muscle, Actuator) and not isinstance(muscle, Muscle):
             raise ModelError(
-                f"'{builder.path(controller)}' drives '{builder.path(muscle)}', which is no muscle; name muscles only"
+                f"'{builder.path(controller)}' drives '{builder.path(muscle)}', which is not a muscle; name muscles only"
             )
         yield Drive(muscle, Reflex(controller.gain))
 
@@ -107,7 +108,7 @@ def drive_by_reflex(builder: ElementBuilder, controller: ToyReflexController) ->
 def refuse_proportional_control(
     builder: ElementBuilder, controller: ToyPropMyoController
 ) -> Iterator[Drive]:
-    """Why its actuator cannot be computed."""
-    actuator = builder.target(controller, "socket_actuator", controller.socket_actuator)
+    """Yield the error that osimlite does not compute this controller."""
+    actuator = builder.resolve_target(controller, "socket_actuator", controller.socket_actuator)
     why = f" driven by the ToyPropMyoController '{builder.path(controller)}', which follows an activation"
-    yield Drive(actuator, builder.unsupported(actuator, why))
+    yield Drive(actuator, builder.unsupported_error(actuator, why))

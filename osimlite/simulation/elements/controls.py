@@ -1,7 +1,7 @@
-"""The controls of a model's actuators: what its controllers, and the user, make of each.
+"""Controls of a model's actuators: the sum of what its controllers and the user set.
 
-A control that nothing drives is 0; what several want of one is added up. OpenSim keeps it within no
-limits.
+A control that nothing drives is 0; several drives of one control are added. As in OpenSim, controls
+have no limits.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from osimlite.schema.actuators import Actuator
 from osimlite.schema.base import Unknown
 from osimlite.schema.controller_types import ControlSetController, TrackingController
 from osimlite.schema.sets import Controller
-from osimlite.simulation.elements.integral import value_of
+from osimlite.simulation.elements.integral import evaluate_function
 from osimlite.simulation.elements.registry import CONTROLLERS
 
 if TYPE_CHECKING:
@@ -27,23 +27,28 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Controls:
-    """All controls: for each of them the functions of time whose sum it is."""
+    """All controls of a model: for each of them the functions of time whose sum it is."""
 
-    # paths of the actuators in the order of the model; of one with several controls with `_0`, `_1`
-    # ... behind it, as OpenSim's tools call them.
+    # paths of the actuators in the order of the model; as in OpenSim's tools, an actuator with
+    # several controls has suffixes `_0`, `_1` ...
     names: tuple[str, ...] = ()
-    functions: tuple[tuple[Function, ...], ...] = ()  # of each
+    functions: tuple[tuple[Function, ...], ...] = ()  # terms of each control's sum
 
-    def driven(self, more: Mapping[str, Function]) -> Controls:
-        """With a function added to some of them, by name."""
+    def add_functions(self, more: Mapping[str, Function]) -> Controls:
+        """Return these controls with a function added to some of them, by name."""
         pairs = zip(self.names, self.functions, strict=True)
         return replace(
             self,
             functions=tuple((*own, more[name]) if name in more else own for name, own in pairs),
         )
 
-    def record(self) -> tuple[list[int], list[float], str | Callable[..., None]]:
-        """Integers and numbers for the kernel that computes them, and this; in Python if a function has no table."""
+    def make_record(self) -> tuple[list[int], list[float], str | Callable[..., None]]:
+        """Return what computes the controls.
+
+        Returns:
+            Integers and numbers of the record, and the name of the kernel, or a Python function if one of
+            the functions of time has no table.
+        """
         ends: list[int] = []
         tables: list[int] = []
         numbers: list[float] = []
@@ -54,67 +59,69 @@ class Controls:
                 try:
                     numbers += table_of_one(function, f"the control of '{name}'")
                 except UnsupportedError:
-                    kernel = self._computed
+                    kernel = self._compute_in_python
             ends.append(len(tables))
         return [len(ends), *ends, *tables], numbers, kernel
 
-    def _computed(self, s: Any, x: Any, w: Any, y: Any, f: Any, item: int) -> None:
+    def _compute_in_python(self, s: Any, x: Any, w: Any, y: Any, f: Any, item: int) -> None:
         first, time = s[item + ITEM.RECORD], w[WORK.TIME]
         for number, functions in enumerate(self.functions):
-            w[first + number] = sum(value_of(function, time) for function in functions)
+            w[first + number] = sum(evaluate_function(function, time) for function in functions)
 
 
 NO_CONTROLS = Controls()
+"""Controls of a model without actuators."""
 
 
 class Reflex(NamedTuple):
-    """A control in proportion to how fast a muscle lengthens, over its greatest contraction velocity."""
+    """Control in proportion to a muscle's lengthening speed over its maximum contraction velocity."""
 
     gain: float
 
 
 class Drive(NamedTuple):
-    """What a controller does to an actuator."""
+    """Contribution of a controller to one control."""
 
     actuator: Any  # the component
-    # what it adds to a control, or the error that says why that cannot be computed
+    # term of a control, or the error that says why it cannot be computed
     signal: Function | Reflex | UnsupportedError
-    # of the control among those of the actuator; of the only one if left out
+    # index among the controls of the actuator; None for an actuator with one control
     number: int | None = None
 
 
 class ModelControls:
-    """What the controllers of a model do.
+    """Controls that the controllers of a model set.
 
     Args:
-        builder: of the model's elements.
+        builder: builder of the model's elements.
 
-    Attributes: controls: the functions of time. reflexes: by the paths of the muscles that have
-        one, what reflexes add where they lengthen the fastest.
+    Attributes:
+        controls: the functions of time.
+        reflexes: by the paths of muscles with reflexes, the control at the maximum lengthening speed.
 
     Raises:
-        ModelError: a controller has no meaning, or a file that it names does not fit the model.
+        ModelError: a controller has no meaning, or its file does not fit the model.
     """
 
     def __init__(self, builder: ElementBuilder) -> None:
         names: list[str] = []
         self._first: dict[str, int] = {}
-        for actuator in builder.components(Actuator):
+        for actuator in builder.find_components(Actuator):
             path, count = builder.path(actuator), actuator.control_count
             self._first[path] = len(names)
             names += [path] if count == 1 else [f"{path}_{number}" for number in range(count)]
         functions: list[list[Function]] = [[] for _ in names]
         self.reflexes: dict[str, float] = {}
         self._refused: dict[str, UnsupportedError] = {}
-        for controller, (actuator, signal, number) in _drives(builder):
+        for controller, (actuator, signal, number) in _iterate_drives(builder):
             if not isinstance(actuator, Actuator):
-                # Of a class that nobody knows, which is refused for that.
+                # An actuator of an unknown class is reported as an unsupported force.
                 continue
             path = builder.path(actuator)
             if number is None and actuator.control_count > 1:
-                # OpenSim 4.6 takes the others from the memory behind the first.
+                # OpenSim 4.6 reads the other controls from the memory behind the first.
                 why = f" driven by '{builder.path(controller)}', which has one control for its {actuator.control_count}"
-                signal = builder.unsupported(actuator, why)
+                signal = builder.unsupported_error(actuator, why)
             if isinstance(signal, UnsupportedError):
                 self._refused[path] = signal
             elif isinstance(signal, Reflex):
@@ -123,30 +130,30 @@ class ModelControls:
                 functions[self._first[path] + (number or 0)].append(signal)
         self.controls = Controls(tuple(names), tuple(map(tuple, functions)))
 
-    def first_of(self, builder: ElementBuilder, actuator: Any) -> int:
-        """Number of the first control of an actuator.
+    def find_first(self, builder: ElementBuilder, actuator: Any) -> int:
+        """Return the index of the first control of an actuator.
 
         Raises:
-            UnsupportedError: something drives it that cannot be computed.
+            UnsupportedError: osimlite cannot compute one of its drives.
         """
         path = builder.path(actuator)
         if path in self._refused:
             raise self._refused[path]
         return self._first[path]
 
-    def gain(self, builder: ElementBuilder, actuator: Any) -> float:
-        """What reflexes add to the control of a muscle, for how fast it lengthens, s/m."""
+    def compute_gain(self, builder: ElementBuilder, actuator: Any) -> float:
+        """Return the gain of the stretch reflexes of a muscle: control per lengthening speed, s/m."""
         fastest = actuator.optimal_fiber_length * actuator.max_contraction_velocity
         gain = self.reflexes.get(builder.path(actuator), 0.0)
         return gain / fastest if gain else 0.0
 
 
-def _drives(builder: ElementBuilder) -> Iterator[tuple[Controller, Drive]]:
-    """What each enabled controller does.
+def _iterate_drives(builder: ElementBuilder) -> Iterator[tuple[Controller, Drive]]:
+    """Yield the drives of each enabled controller, with the controller.
 
     `CONTROLLERS` has the function of each class of controllers.
     """
-    for controller in builder.components(Controller):
+    for controller in builder.find_components(Controller):
         if isinstance(controller, Unknown):
             continue
         # OpenSim 4.6 enables a ControlSetController that has read its file.
@@ -161,20 +168,25 @@ def _drives(builder: ElementBuilder) -> Iterator[tuple[Controller, Drive]]:
         why = f" driven by the {type(controller).__name__} '{builder.path(controller)}'"
         if isinstance(controller, TrackingController):
             why += ", whose desired motion is known to its tool only"
-        for actuator in named(builder, controller):
-            yield controller, Drive(actuator, builder.unsupported(actuator, why))
+        for actuator in find_actuators(builder, controller):
+            yield controller, Drive(actuator, builder.unsupported_error(actuator, why))
 
 
-def named(builder: ElementBuilder, controller: Controller) -> list[Any]:
-    """The actuators that a controller names."""
+def find_actuators(builder: ElementBuilder, controller: Controller) -> list[Any]:
+    """Return the actuators that a controller names."""
     return [
-        builder.target(controller, "socket_actuators", word) for word in controller.socket_actuators
+        builder.resolve_target(controller, "socket_actuators", word)
+        for word in controller.socket_actuators
     ]
 
 
-def actuators_by_name(builder: ElementBuilder) -> dict[str, Actuator]:
-    """The first actuator of each name."""
+def map_actuators(builder: ElementBuilder) -> dict[str, Actuator]:
+    """Return the first actuator of each name.
+
+    Returns:
+        Actuators by name.
+    """
     result: dict[str, Actuator] = {}
-    for component in builder.components(Actuator):
+    for component in builder.find_components(Actuator):
         result.setdefault(component.name, component)
     return result

@@ -1,8 +1,7 @@
 """Measured forces: the ExternalLoads of a document and the columns of their data file (.sto, .mot, .c3d).
 
-As in OpenSim, a column is a natural cubic spline through all its values, straight lines if there
-are two or three, and a constant if there is one. Before the first time and after the last, a spline
-goes on straight.
+As in OpenSim, a column is a natural cubic spline through all its values, straight lines if it has
+two or three values, and a constant if it has one. Outside its times a spline is extrapolated linearly.
 """
 
 from __future__ import annotations
@@ -32,26 +31,37 @@ if TYPE_CHECKING:
     from osimlite.simulation.elements.builder import ElementBuilder
 
 Functions = tuple[Function, Function, Function]
+"""Functions of time of three components."""
 TABLES = (".mot", ".sto", ENDING)
-"""How files of forces over time end."""
+"""Suffixes of files of forces over time."""
 PARTS = ("force", "point", "torque")
-"""What columns of a load may give."""
+"""Parts of a load that columns may give."""
 
 
-def external_load(path: str, name: str, load: Load) -> DeclaredForce:
-    """The force element of a load."""
+def make_external_load(path: str, name: str, load: Load) -> DeclaredForce:
+    """Return the force element of a load.
+
+    Args:
+        path: path of the component.
+        name: name of the component.
+        load: the load.
+    """
     return DeclaredForce(ExternalForce, path, name, load, ())
 
 
-def pushing(table: str | Path, applied_to: Mapping[str, Sequence[Sequence[str]]]) -> ExternalLoads:
-    """The loads of a table without a document.
+def build_external_loads(
+    table: str | Path, applied_to: Mapping[str, Sequence[Sequence[str]]]
+) -> ExternalLoads:
+    """Return the ExternalLoads for a table without a document.
 
-    Args: table: a .mot, .sto or .c3d file, in the axes of ground. applied_to: by the names of
-        bodies, for each load on one what the labels of its force, point and moment begin with; the
-        last one or two may be left out. Without a point it acts at the origin of the body.
+    Args:
+        table: a .mot, .sto or .c3d file, in the axes of ground.
+        applied_to: by the names of bodies, for each load the starts of the labels of its force, point
+            and moment; the last one or two may be omitted. Without a point the force acts at the
+            origin of the body.
 
     Raises:
-        SettingError: it is no such file, or a load has none of these, or more.
+        SettingError: the file has another suffix, or a load has no labels or more than three.
     """
     if Path(table).suffix.lower() not in TABLES:
         raise SettingError(
@@ -74,16 +84,20 @@ def pushing(table: str | Path, applied_to: Mapping[str, Sequence[Sequence[str]]]
 def read_external_loads(
     mechanism: Mechanism, source: str | Path | ExternalLoads
 ) -> tuple[DeclaredForce, ...]:
-    """The loads of a document of ExternalLoads, those whose `appliesForce` is false left out.
+    """Return the loads of a document of ExternalLoads whose `appliesForce` is true.
+
+    The data file is found beside the document, or else from the working directory.
 
     Args:
-        mechanism: that they push.
+        mechanism: mechanism that the loads act on.
         source: the document, or its file.
 
-    Its data file is looked for beside it, then from the folder that the program runs in.
+    Returns:
+        The force elements, in the order of the document.
 
-    Raises: DocumentError: a file is missing, or holds something else; the mechanism has no body of
-        a name, or the data file no three columns for an identifier.
+    Raises:
+        DocumentError: a file is missing or has other content, the mechanism has no body of a name, or
+            an identifier does not match three columns.
     """
     if isinstance(source, ExternalLoads):
         loads, folder, file = source, Path(), None
@@ -103,35 +117,42 @@ def read_external_loads(
             )
             raise DocumentError(message, file=file)
     forces = [force for force in loads.objects if force.appliesForce]
-    columns = _Columns(loads_table(loads, folder, file), forces)
+    columns = _Columns(read_loads_table(loads, folder, file), forces)
     return tuple(
-        external_load(
+        make_external_load(
             f"/componentset/{loads.name}/{force.name}",
             force.name,
-            _load(mechanism, force, columns, file),
+            _read_load(mechanism, force, columns, file),
         )
         for force in forces
     )
 
 
-def load_in_model(builder: ElementBuilder, force: ExternalForce) -> Load:
-    """The load of an ExternalForce in a set of ExternalLoads that is part of the model.
+def read_load_of_model(builder: ElementBuilder, force: ExternalForce) -> Load:
+    """Return the load of an ExternalForce in a set of ExternalLoads that is part of the model.
 
     Raises:
-        UnsupportedError: it stands elsewhere, where OpenSim finds no data for it either.
+        UnsupportedError: it is elsewhere, where OpenSim finds no data for it either.
     """
     loads: Any = builder.tree.parent_of(force)
     if not isinstance(loads, ExternalLoads):
-        raise builder.unsupported(force, " outside of ExternalLoads, so that it has no data file")
-    columns = _Columns(loads_table(loads, builder.folder, builder.path(loads)), [force])
-    return _load(builder.mechanism, force, columns, builder.path(loads))
+        raise builder.unsupported_error(
+            force, " outside of ExternalLoads, so that it has no data file"
+        )
+    columns = _Columns(read_loads_table(loads, builder.folder, builder.path(loads)), [force])
+    return _read_load(builder.mechanism, force, columns, builder.path(loads))
 
 
-def loads_table(loads: ExternalLoads, folder: Path, file: str | None) -> StoTable:
-    """The data of some loads, looked for in a folder first.
+def read_loads_table(loads: ExternalLoads, folder: Path, file: str | None) -> StoTable:
+    """Return the data of some loads.
+
+    Args:
+        loads: the loads.
+        folder: folder in which the data file is searched first.
+        file: file of the loads, for messages.
 
     Raises:
-        DocumentError: they name no data file, or it cannot be read.
+        DocumentError: the loads name no data file, or it cannot be read.
     """
     name = loads.datafile.strip()
     if name in ("", "Unassigned"):
@@ -140,18 +161,20 @@ def loads_table(loads: ExternalLoads, folder: Path, file: str | None) -> StoTabl
     return (
         read_c3d_forces(path)
         if path.suffix.lower() == ENDING
-        else _known(str(path)) or read_sto(path)
+        else _read_cached_table(str(path)) or read_sto(path)
     )
 
 
-_known = while_unchanged(4)(read_sto)
-"""Each of the loads asks for the table of all."""
+_read_cached_table = while_unchanged(4)(read_sto)
+"""Cached reader, since each of the loads reads the same table."""
 
 
-def _load(mechanism: Mechanism, force: ExternalForce, columns: _Columns, file: str | None) -> Load:
+def _read_load(
+    mechanism: Mechanism, force: ExternalForce, columns: _Columns, file: str | None
+) -> Load:
     given = {
-        what: columns.three(identifier, f"the {what}_identifier of '{force.name}'", file)
-        for what, identifier in _identifiers(force).items()
+        what: columns.find_functions(identifier, f"the {what}_identifier of '{force.name}'", file)
+        for what, identifier in _list_identifiers(force).items()
     }
     if not given.keys() & {"force", "torque"}:
         raise DocumentError(
@@ -164,23 +187,23 @@ def _load(mechanism: Mechanism, force: ExternalForce, columns: _Columns, file: s
             file=file,
         )
 
-    def place(field: str) -> FramePlacement:
-        return _place(mechanism, getattr(force, field), f"the {field} of '{force.name}'", file)
+    def find_frame(field: str) -> FramePlacement:
+        return _find_frame(mechanism, getattr(force, field), f"the {field} of '{force.name}'", file)
 
     start = f"{force.applied_to_body}_{force.name}"
     return Load(
         (f"{start}_F", f"{start}_p", f"{start}_T"),
-        place("applied_to_body"),
-        place("force_expressed_in_body"),
-        place("point_expressed_in_body"),
+        find_frame("applied_to_body"),
+        find_frame("force_expressed_in_body"),
+        find_frame("point_expressed_in_body"),
         given.get("force", ()),
         given.get("point", ()),
         given.get("torque", ()),
     )
 
 
-def _identifiers(force: ExternalForce) -> dict[str, str]:
-    """What the labels of the columns of a force begin with, by their parts; those that are given."""
+def _list_identifiers(force: ExternalForce) -> dict[str, str]:
+    """Return the starts of the labels of a force's columns, by the parts that the force has."""
     given = {what: (getattr(force, f"{what}_identifier") or "").strip() for what in PARTS}
     return {
         what: identifier
@@ -189,8 +212,8 @@ def _identifiers(force: ExternalForce) -> dict[str, str]:
     }
 
 
-def _place(mechanism: Mechanism, value: Any, what: str, file: str | None) -> FramePlacement:
-    """The frame of a path or the name of a body."""
+def _find_frame(mechanism: Mechanism, value: Any, what: str, file: str | None) -> FramePlacement:
+    """Return the placement of a frame, by its path or the name of a body."""
     name = value if isinstance(value, str) else value.name
     try:
         return mechanism.placement(f"/{name.lstrip('./')}" if "/" in name else name)
@@ -199,7 +222,7 @@ def _place(mechanism: Mechanism, value: Any, what: str, file: str | None) -> Fra
 
 
 class _Columns:
-    """The columns of a table that some forces name, as functions of time."""
+    """Columns of a table that some forces name, as functions of time."""
 
     def __init__(self, table: StoTable, forces: Sequence[ExternalForce]) -> None:
         self.table, self._forces = table, forces
@@ -214,25 +237,38 @@ class _Columns:
 
     @cached_property
     def _functions(self) -> dict[int, Function]:
-        """Those of all columns that are named, by their places: one solution of the equations of their splines."""
+        """Functions of all named columns by index; their splines are solved together."""
         starts = tuple(
-            {identifier for force in self._forces for identifier in _identifiers(force).values()}
+            {
+                identifier
+                for force in self._forces
+                for identifier in _list_identifiers(force).values()
+            }
         )
         named = [
             index for index, label in enumerate(self.table.columns) if label.startswith(starts)
         ]
         rows = self.table.rows[:, named]
-        # Gaps are told of where they are asked for.
+        # `find_functions` reports gaps in the columns that a force uses.
         sound = np.where(np.isfinite(rows), rows, 0.0)
-        return dict(zip(named, functions_of(self.table.times, sound), strict=True))
+        return dict(zip(named, make_column_functions(self.table.times, sound), strict=True))
 
-    def three(self, identifier: str, what: str, file: str | None) -> Functions:
-        """The functions of the three columns whose labels begin with an identifier."""
+    def find_functions(self, identifier: str, what: str, file: str | None) -> Functions:
+        """Return the functions of the three columns whose labels begin with an identifier.
+
+        Args:
+            identifier: start of the labels.
+            what: name of the property, for messages.
+            file: file of the loads, for messages.
+
+        Raises:
+            DocumentError: there are not exactly three columns, or one has a gap.
+        """
         labels = self.table.columns
         places = [place for place, label in enumerate(labels) if label.startswith(identifier)]
         if len(places) != 3:
             raise DocumentError(
-                f"{what} is '{identifier}'; {self._why(identifier, places)}", file=file
+                f"{what} is '{identifier}'; {self._explain_mismatch(identifier, places)}", file=file
             )
         rows = self.table.rows[:, places]
         bad = np.argwhere(~np.isfinite(rows))
@@ -245,7 +281,7 @@ class _Columns:
         x, y, z = (self._functions[place] for place in places)
         return x, y, z
 
-    def _why(self, identifier: str, places: Sequence[int]) -> str:
+    def _explain_mismatch(self, identifier: str, places: Sequence[int]) -> str:
         file, labels = self.table.file, self.table.columns
         if places:
             result = join_words([labels[place] for place in places])
@@ -256,8 +292,8 @@ class _Columns:
         return f"no column of '{file}' begins so{hint}"
 
 
-def functions_of(times: Array, columns: Array) -> list[Function]:
-    """Columns (n, k) at times (n,) that increase, as functions of time."""
+def make_column_functions(times: Array, columns: Array) -> list[Function]:
+    """Return columns (n, k) at increasing times (n,) as functions of time."""
     if len(times) == 1:
         return [Constant(float(value)) for value in columns[0]]
     if len(times) < 4:
@@ -272,7 +308,7 @@ class MeasuredLoad(GivenLoad):
 
     def read(self, builder: ElementBuilder, force: Any) -> Load:
         """Return the load of a force."""
-        return load_in_model(builder, force)
+        return read_load_of_model(builder, force)
 
 
 register_force_type(ForceType(ExternalForce, MeasuredLoad()))

@@ -1,4 +1,4 @@
-"""What a force element is to the kernels: items, each with a kernel, integers, numbers and a record."""
+"""Records of force elements: the kernel, integers, numbers and output record of each computation."""
 
 from __future__ import annotations
 
@@ -11,9 +11,13 @@ from osimlite.simulation.states import StateVariable
 
 
 class Response(NamedTuple):
-    """How a force along one displacement changes with that: the kernel that finds its derivatives,
-    the place among the item's integers of the first of those that say where its states are, their
-    count, and -1 if it pulls, else 1.
+    """Derivatives of a force along one displacement with respect to that displacement.
+
+    Attributes:
+        kernel: name of the kernel that computes the derivatives.
+        first_state: index, among the record's integers, of the first offset of a state.
+        states: number of states.
+        sense: 1 if a positive force pushes along the displacement, -1 if it pulls against it.
     """
 
     kernel: str
@@ -23,38 +27,38 @@ class Response(NamedTuple):
 
 
 CONTROLS = ""
+"""Stands for the record of the controls in `ForceRecord.record_references`."""
 
 
 @dataclass(frozen=True)
 class ForceRecord:
-    """One item."""
+    """One computation of an element, as the kernels see it."""
 
-    # name of what computes it, see `law_function`; "" for one that only tells how another one
-    # changes
+    # name of the kernel, see `find_function`; "" for a record that only has a response
     kernel: str = ""
-    ints: tuple[int, ...] = ()  # of its own
-    numbers: tuple[float, ...] = ()  # of its own
-    room: int = 0  # length of its record, if it is not that of a contact
-    is_contact: bool = False  # whether its record is that of a contact
-    is_part: bool = False  # whether another item of the element calls its kernel
-    # places among its integers where those of its element's states in y are put, in their order
+    ints: tuple[int, ...] = ()  # integers behind those that every record has
+    numbers: tuple[float, ...] = ()  # parameters
+    record_size: int = 0  # size of the output record, unless it is a contact
+    is_contact: bool = False  # whether the output record is that of a contact
+    is_part: bool = False  # whether the kernel of another record calls its kernel
+    # indices among its integers that receive the offsets of the element's states in y, in order
     states: tuple[int, ...] = ()
-    # which of its integers are places in the record of another element, which comes before, and the
-    # path of that; or CONTROLS for the record of the controls
-    looks_at: tuple[tuple[int, str], ...] = ()
-    # name of the kernel that brings its states into equilibrium, if they have one
+    # indices of integers that are offsets in the output record of an earlier element, with the path
+    # of that element, or CONTROLS for the record of the controls
+    record_references: tuple[tuple[int, str], ...] = ()
+    # name of the kernel that sets its states to equilibrium; "" if there is none
     equilibrium: str = ""
-    response: Response | None = None  # of a force along one displacement
-    abreast: str = (
+    response: Response | None = None  # derivatives of a force along one displacement
+    batched: str = (
         ""  # name of the kernel that computes several that follow one another, if there is one
     )
-    # what computes it in place of a kernel, called with (model, reals, data, y, f, place of the
-    # item) as arrays
+    # Python function that replaces the kernel, with arguments (model, reals, data, y, f, offset of
+    # the record) as arrays
     python: Callable[..., None] | None = None
 
 
 class ForceElement(Protocol):
-    """Anything that pushes bodies or coordinates."""
+    """Anything that applies forces to bodies or coordinates."""
 
     @property
     def path(self) -> str:
@@ -62,44 +66,44 @@ class ForceElement(Protocol):
 
     @property
     def name(self) -> str:
-        """Its name."""
+        """Name of the component."""
 
     @property
     def states(self) -> tuple[StateVariable, ...]:
-        """Its auxiliary states."""
+        """Auxiliary states, in the order of its offsets."""
 
-    def items(self, places: Places) -> list[ForceRecord]:
-        """What the kernels compute."""
+    def make_records(self, places: Places) -> list[ForceRecord]:
+        """Return the records that the kernels compute."""
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """Labels of what :meth:`report` gives, as OpenSim's ForceReporter has them."""
+        """Labels of the values of :meth:`report`, as OpenSim's ForceReporter writes them."""
 
     def report(
         self, records: Sequence[Sequence[float]], origins: Sequence[Sequence[float]]
     ) -> list[float]:
-        """One row of the columns.
+        """Return one row of the columns.
 
         Args:
-            records: of its items after an evaluation.
-            origins: origin of each body in ground, m; ground's own last.
+            records: its output records after an evaluation.
+            origins: origin of each body in ground, m; ground's origin is the last.
         """
 
-    def energy(self, records: Sequence[Sequence[float]]) -> float:
-        """Potential energy, J."""
+    def compute_energy(self, records: Sequence[Sequence[float]]) -> float:
+        """Return the potential energy, J."""
 
 
 class Silent:
-    """An element that has no forces to report, and stores no energy."""
+    """Base of elements that report no forces and store no energy."""
 
     columns: tuple[str, ...] = ()
 
     def report(
         self, records: Sequence[Sequence[float]], origins: Sequence[Sequence[float]]
     ) -> list[float]:
-        """Nothing."""
+        """Return an empty row."""
         return []
 
-    def energy(self, records: Sequence[Sequence[float]]) -> float:
-        """None, J."""
+    def compute_energy(self, records: Sequence[Sequence[float]]) -> float:
+        """Return 0 J."""
         return 0.0

@@ -1,7 +1,7 @@
-"""Contact of meshes by an elastic foundation, in sets of pairs.
+"""Contact of meshes by an elastic foundation, in pairs.
 
-As in Simbody, meshes touch half spaces, spheres and each other; nothing else touches in such a
-force. The springs of two meshes are both taken, each with half its area.
+As in Simbody, meshes touch half spaces, spheres and each other; other surfaces of such a force do
+not touch. Between two meshes both have springs, each with half its area.
 """
 
 from __future__ import annotations
@@ -25,15 +25,15 @@ from osimlite.mechanics.multibody.mechanism import GROUND
 from osimlite.mechanics.multibody.spatial import Array, make_transform
 from osimlite.schema.contact import ContactMesh
 from osimlite.schema.contact_forces import ElasticFoundationForce
-from osimlite.simulation.elements.builder import ElementBuilder, triple
+from osimlite.simulation.elements.builder import ElementBuilder, as_triple
 from osimlite.simulation.elements.contact import (
     ContactPair,
     ContactSurface,
     Material,
     PairContact,
-    geometries,
-    place_of,
-    surface_of,
+    find_frame,
+    read_geometries,
+    read_surface,
 )
 from osimlite.simulation.elements.force_records import ForceRecord
 from osimlite.simulation.elements.registry import register_force_type
@@ -43,29 +43,29 @@ Load = tuple[Vector, Vector, float]
 """Force (N), torque about a point (N·m), and energy (J)."""
 
 
-@dataclass(frozen=True)
 @register_force_type
+@dataclass(frozen=True)
 class ElasticFoundation(PairContact):
-    """One ElasticFoundationForce; surface 2 of each pair is a mesh, surface 1 may be one."""
+    """ElasticFoundationForce; surface 2 of each pair is a mesh, surface 1 may be one."""
 
     component: ClassVar = ElasticFoundationForce
 
     @classmethod
     def make(cls, builder: ElementBuilder, force: ElasticFoundationForce) -> ElasticFoundation:
-        """The element of a force.
+        """Return the element of a force.
 
         Raises:
-            ModelError: a mesh file is missing or not a closed surface.
+            ModelError: a mesh file is missing or is not a closed surface.
             OsimliteError: a mesh file cannot be read.
-            UnsupportedError: a surface is neither a mesh, a half space, a sphere nor an ellipsoid.
+            UnsupportedError: a surface is not a mesh, half space, sphere or ellipsoid.
         """
         surfaces = []
-        for geometry, material in geometries(builder, force):
+        for geometry, material in read_geometries(builder, force):
             if isinstance(geometry, ContactMesh):
-                surfaces.append(_mesh_surface(builder, force, geometry, material))
+                surfaces.append(_read_mesh(builder, force, geometry, material))
             else:
-                surfaces.append(surface_of(builder, force, geometry, material))
-        builder.check(
+                surfaces.append(read_surface(builder, force, geometry, material))
+        builder.check_finite(
             force,
             (force.transition_velocity, *(x for surface in surfaces for x in surface.material)),
         )
@@ -84,26 +84,26 @@ class ElasticFoundation(PairContact):
             force.transition_velocity,
         )
 
-    def items(self, places: Places) -> list[ForceRecord]:
-        """The contacts, and after them what computes each."""
+    def make_records(self, places: Places) -> list[ForceRecord]:
+        """Return a contact record for each pair, then the records that compute them."""
         contacts = [
             ForceRecord("touch_mesh", (GROUND, GROUND), is_contact=True, is_part=True)
             for _ in self.pairs
         ]
         return contacts + [
-            self._pair(number, pair, places) for number, pair in enumerate(self.pairs)
+            self._make_pair(number, pair, places) for number, pair in enumerate(self.pairs)
         ]
 
-    def _pair(self, number: int, pair: ContactPair, places: Places) -> ForceRecord:
+    def _make_pair(self, number: int, pair: ContactPair, places: Places) -> ForceRecord:
         one, two = self.surfaces[pair.first], self.surfaces[pair.second]
-        links, numbers = self.pair_numbers(pair, places)
+        links, numbers = self.pack_pair(pair, places)
         assert two.mesh is not None
         ints = *links, number, len(two.mesh.areas), int(one.is_half_space)
         if one.mesh is not None:
             touching = _Meshes(
                 Springs(one, two, self.vt), places.placement(one.body), places.placement(two.body)
             )
-            return ForceRecord("", ints, numbers, room=MESH_WORK, python=touching)
+            return ForceRecord("", ints, numbers, record_size=MESH_WORK, python=touching)
         stiffness, *material = two.material
         middles = (places.station(two.body, middle)[1] for middle in two.mesh.centroids.tolist())
         springs = (
@@ -112,38 +112,38 @@ class ElasticFoundation(PairContact):
             for x in (stiffness * area, *middle)
         )
         return ForceRecord(
-            "touch_mesh", ints, (*numbers[:11], *material, self.vt, *springs), room=MESH_WORK
+            "touch_mesh", ints, (*numbers[:11], *material, self.vt, *springs), record_size=MESH_WORK
         )
 
-    def torque(self, records: Sequence[Sequence[float]], pair: ContactPair) -> Sequence[float]:
-        """What turns surface 2 besides the force."""
+    def find_torque(self, records: Sequence[Sequence[float]], pair: ContactPair) -> Sequence[float]:
+        """Return the torque (N.m) on surface 2 in addition to that of the force."""
         return records[len(self.pairs) + self.pairs.index(pair)][6:9]
 
-    def energy(self, records: Sequence[Sequence[float]]) -> float:
-        """Potential energy, J."""
+    def compute_energy(self, records: Sequence[Sequence[float]]) -> float:
+        """Return the potential energy, J."""
         return sum(record[9] for record in records[len(self.pairs) :])
 
 
-def _mesh_surface(
+def _read_mesh(
     builder: ElementBuilder, force: Any, geometry: ContactMesh, material: Material
 ) -> ContactSurface:
-    frame, body, placed = place_of(builder, geometry)
-    builder.check(geometry, placed.ravel().tolist())
+    frame, body, placed = find_frame(builder, geometry)
+    builder.check_finite(geometry, placed.ravel().tolist())
     if not geometry.filename:
         raise ModelError(f"the contact mesh '{builder.path(geometry)}' names no file; give it one")
     if material[0] < 0.0:
         raise ModelError(
             f"the force '{builder.path(force)}': a contact stiffness must not be negative"
         )
-    mesh = TriangleMesh.read(geometry.filename, builder.mesh_folders).moved(placed)
-    center, still = triple(mesh.center), (0.0, 0.0, 0.0)
+    mesh = TriangleMesh.read(geometry.filename, builder.mesh_folders).transform(placed)
+    center, still = as_triple(mesh.center), (0.0, 0.0, 0.0)
     return ContactSurface(
         geometry.name, body, frame, center, mesh.radius, still, material, mesh=mesh
     )
 
 
 class Springs:
-    """The springs of two meshes, each of which has half the area.
+    """Springs of two meshes, each with half the area of its triangle.
 
     Args:
         one: surface 1.
@@ -161,34 +161,34 @@ class Springs:
         ]
 
     def load(self, one: Pose, two: Pose, about: Vector, v: Vector, turning: Vector) -> Load:
-        """The load on surface 2.
+        """Return the load on surface 2.
 
         Args:
-            one: where the body of surface 1 is, in ground.
-            two: where the body of surface 2 is.
+            one: pose of the body of surface 1 in ground.
+            two: pose of the body of surface 2 in ground.
             about: point for the torque, m.
-            v: velocity at that point (m/s) of surface 1 relative to surface 2.
-            turning: its angular velocity likewise, 1/s.
+            v: velocity of surface 1 relative to surface 2 at that point, m/s.
+            turning: angular velocity of surface 1 relative to surface 2, 1/s.
         """
         first, second = self._first, self._second
-        own = _inside(self._stiffness[0], first, one, second, two)
-        others = _inside(self._stiffness[1], second, two, first, one)
-        # As in Simbody, a mesh that is wholly within another does not touch it.
+        own = _find_springs_inside(self._stiffness[0], first, one, second, two)
+        others = _find_springs_inside(self._stiffness[1], second, two, first, one)
+        # As in Simbody, a mesh that is completely inside another does not touch it.
         if not (own or others) or not (
             any(
                 mesh.is_one_piece and 0 < len(result) < len(mesh.triangles)
                 for mesh, result in ((first, own), (second, others))
             )
-            or first.crosses(second.moved(one.inverse_times(two)))
+            or first.crosses(second.transform(one.inverse_times(two)))
         ):
             return ZERO, ZERO, 0.0
-        force1, torque1, energy1 = self._sum(
+        force1, torque1, energy1 = self._add_springs(
             self.one, own, about, times(-1.0, v), times(-1.0, turning)
         )
-        force2, torque2, energy2 = self._sum(self.two, others, about, v, turning)
+        force2, torque2, energy2 = self._add_springs(self.two, others, about, v, turning)
         return minus(force2, force1), minus(torque2, torque1), energy1 + energy2
 
-    def _sum(
+    def _add_springs(
         self,
         surface: ContactSurface,
         acting: Iterable[Sequence[float]],
@@ -196,44 +196,44 @@ class Springs:
         v: Vector,
         turning: Vector,
     ) -> Load:
-        """The load on a mesh of the springs that act: stiffness, middle and end of each."""
+        """Return the load on a mesh of its active springs: stiffness, middle and end of each."""
         _, c, us, ud, uv = surface.material
         force = torque = ZERO
         energy = 0.0
         for k, x, y, z, *end in acting:
             push, turn, stored = spring_load(
-                k, c, us, ud, uv, self.vt, (x, y, z), triple(end), about, v, turning
+                k, c, us, ud, uv, self.vt, (x, y, z), as_triple(end), about, v, turning
             )
             force, torque, energy = plus(force, push), plus(torque, turn), energy + stored
         return force, torque, energy
 
 
 class Pose(NamedTuple):
-    """Where a body is in ground: rotation (3, 3) and origin (3,)."""
+    """Pose of a body in ground: rotation (3, 3) and origin (3,)."""
 
     turn: Array
     origin: Array
 
     def points(self, stations: Array) -> Array:
-        """Stations of the body, in ground."""
+        """Return stations of the body, in ground."""
         return stations @ self.turn.T + self.origin
 
     def inverse_times(self, other: Pose) -> Array:
-        """The other pose seen from this one, as a matrix (4, 4)."""
+        """Return the other pose relative to this one, as a matrix (4, 4)."""
         return make_transform(self.turn.T @ other.turn, self.turn.T @ (other.origin - self.origin))
 
 
-def _inside(
+def _find_springs_inside(
     stiffness: Array, mesh: TriangleMesh, own: Pose, other: TriangleMesh, theirs: Pose
 ) -> list[list[float]]:
-    """The springs of a mesh that are inside another: stiffness, middle and end of each."""
+    """Return the springs of a mesh that are inside another: stiffness, middle and end of each."""
     middles = own.points(mesh.centroids)
     seen = (middles - theirs.origin) @ theirs.turn
     boxed = np.all((seen >= other.points.min(axis=0)) & (seen <= other.points.max(axis=0)), axis=1)
     places = np.flatnonzero(boxed)
     if not len(places):
         return []
-    ends, inside = other.nearest(seen[places])
+    ends, inside = other.find_nearest(seen[places])
     acting = places[inside]
     return np.column_stack(
         (stiffness[acting], middles[acting], theirs.points(ends[inside]))
@@ -242,18 +242,18 @@ def _inside(
 
 @dataclass(frozen=True)
 class _Meshes:
-    """What computes the contact of two meshes, in Python."""
+    """Function that computes the contact of two meshes, in Python."""
 
-    springs: Springs  # of the meshes
-    one: Placement  # where the body of surface 1 is in its link
-    two: Placement  # where the body of surface 2 is in its link
+    springs: Springs  # springs of both meshes
+    one: Placement  # placement of the body of surface 1 in its link
+    two: Placement  # placement of the body of surface 2 in its link
 
     def __call__(
         self, model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int
     ) -> None:
         """Compute and apply the contact."""
         data[model[item + ITEM.RECORD] :][:MESH_WORK] = 0.0
-        one, two = self._pose(model, data, self.one), self._pose(model, data, self.two)
+        one, two = self._find_pose(model, data, self.one), self._find_pose(model, data, self.two)
         first, second = self.springs.one, self.springs.two
         about, other = two.points(np.array(second.center)), one.points(np.array(first.center))
         point: Vector = tuple(about.tolist())
@@ -267,10 +267,10 @@ class _Meshes:
         load_mesh(model, data, item, point, *load)
 
     @staticmethod
-    def _pose(model: Ints, data: Floats, placement: Placement) -> Pose:
+    def _find_pose(model: Ints, data: Floats, placement: Placement) -> Pose:
         link, frame = placement
         if link < 0:
             return Pose(frame[:3, :3], frame[:3, 3])
         start = model[MODEL.WORK_LINK] + LINK_WORK.SIZE * link
-        origin = np.array(station(model, data, link, triple(frame[:3, 3])))
+        origin = np.array(station(model, data, link, as_triple(frame[:3, 3])))
         return Pose(data[start : start + 9].reshape(3, 3) @ frame[:3, :3], origin)

@@ -1,4 +1,4 @@
-"""The forces of a model, gathered as force elements."""
+"""Collection of all force elements, controls and probes of a model."""
 
 from __future__ import annotations
 
@@ -23,10 +23,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Forces:
-    """The force elements of a model, then its probes; forces that were left out, as ``path (class)``; all controls.
+    """Force elements of a model, followed by its probes.
 
-    `reads_files` tells whether any of them is of more than the model: of a mesh, of measured loads
-    or controls.
+    Attributes:
+        elements: the elements in the order of the model.
+        skipped: forces that were left out, as ``path (class)``.
+        controls: all controls of the actuators.
+        reads_files: whether an element depends on a file besides the model: a mesh, measured loads,
+            controls.
     """
 
     elements: tuple[ForceElement, ...]
@@ -48,23 +52,28 @@ def force_elements(
     folder: str | Path | None = None,
     rigid_tendons: bool = False,
 ) -> Forces:
-    """Gather the forces of a model.
+    """Return the force elements, controls and probes of a model.
 
-    Those whose `appliesForce` is false have nothing but their states, as in OpenSim.
+    As in OpenSim, a force whose `appliesForce` is false has only its states.
 
-    Args: model: whose forces. mechanism: of the same model. skip_unsupported: leave out what cannot
-        be computed instead of raising. simbody_early_return: reproduce Simbody's defect in contact
-        of several surfaces. own_activation_times: do not reproduce OpenSim's defect in the
-        activation of several DeGrooteFregly2016Muscles. wrapping: how paths bend around surfaces,
-        see :class:`osimlite.simulation.Options`. external_loads: measured loads or their file,
-        which follow the forces of the model. folder: where the model's file is, and the files that
-        it names; the folder that the program runs in if None. rigid_tendons: muscles pull with
-        their control times the force of fully active fibers along a rigid tendon.
+    Args:
+        model: the model.
+        mechanism: mechanism of the same model.
+        skip_unsupported: leave out forces that cannot be computed instead of raising.
+        simbody_early_return: reproduce Simbody's defect in contact of several surfaces.
+        own_activation_times: do not reproduce OpenSim's defect in the activation of several
+            DeGrooteFregly2016Muscles.
+        wrapping: how paths bend around surfaces, see :class:`osimlite.simulation.Options`.
+        external_loads: measured loads or their file; their elements follow the forces of the model.
+        folder: folder of the model's file and of the files that it names; the working directory if
+            None.
+        rigid_tendons: compute each muscle's tension as its control times the force of fully active
+            fibers along a rigid tendon.
 
     Raises:
         UnsupportedError: some forces cannot be computed; the message names them.
-        ModelError: a force names what does not exist, or a parameter has no meaning.
-        OsimliteError: a file that is named cannot be read.
+        ModelError: a force names something that does not exist, or a parameter has no meaning.
+        OsimliteError: a file cannot be read.
     """
     builder = ElementBuilder(
         model,
@@ -77,22 +86,22 @@ def force_elements(
     )
     elements: list[ForceElement] = []
     skipped: list[str] = []
-    for component in builder.forces():
+    for component in builder.iterate_forces():
         try:
-            elements.append(builder.element(component))
+            elements.append(builder.make_element(component))
         except UnsupportedError as error:
             skipped.append(error.message)
     if skipped and not skip_unsupported:
         raise UnsupportedError(
-            f"osimlite cannot compute {join_words(by_class(skipped))}; set appliesForce to false{SKIP_ADVICE}"
+            f"osimlite cannot compute {join_words(summarize_skipped(skipped))}; set appliesForce to false{SKIP_ADVICE}"
         )
     if external_loads is not None:
         from osimlite.simulation.elements.external_loads import read_external_loads
 
         elements += read_external_loads(mechanism, external_loads)
-    from osimlite.simulation.elements.probe_type import probe_elements
+    from osimlite.simulation.elements.probe_type import make_probes
 
-    elements += probe_elements(builder, elements)
+    elements += make_probes(builder, elements)
     controls, reads_files = (
         builder.controls.controls,
         builder.reads_files or external_loads is not None,
@@ -103,13 +112,13 @@ def force_elements(
 SKIP_ADVICE = (
     ", or leave out what cannot be computed with --skip-unsupported (skip_unsupported=True)"
 )
-"""Advice for those commands that have this option; those that run setups have not, and take it out of the message."""
+"""Advice of commands with the option --skip-unsupported; commands without it remove this from the message."""
 FEW = 4
-"""So many forces that are left out are told of one by one."""
+"""Up to this number, skipped forces are listed one by one."""
 
 
-def by_class(skipped: Sequence[str]) -> list[str]:
-    """What was left out for people: one by one if it is few, else how many of each class."""
+def summarize_skipped(skipped: Sequence[str]) -> list[str]:
+    """Return the skipped forces for a message: one by one if they are few, else the count of each class."""
     if len(skipped) <= FEW:
         return list(skipped)
     groups: dict[str, list[str]] = {}

@@ -1,4 +1,4 @@
-"""The integral of a function of one number."""
+"""Values and integrals of functions of one argument."""
 
 from __future__ import annotations
 
@@ -9,17 +9,22 @@ import numpy as np
 from osimlite.mechanics.multibody.functions import Function
 
 
-def value_of(function: Function, argument: float) -> float:
-    """The value of a function of one number."""
+def evaluate_function(function: Function, argument: float) -> float:
+    """Return the value of a function of one argument."""
     value, _, _ = function.evaluate(np.array((argument,)))
     return float(value)
 
 
-def integral(function: Function, start: float, end: float) -> float:
-    """The integral of a function of one number, exact for pieces of polynomials up to the ninth degree.
+def integrate(function: Function, start: float, end: float) -> float:
+    """Return the integral of a function of one argument.
 
-    By Gauss and Legendre's five points from knot to knot, or in sixteen parts where there are no
-    knots.
+    Gauss-Legendre quadrature with five nodes from knot to knot, or in sixteen intervals for functions
+    without knots. It is exact for piecewise polynomials up to degree nine.
+
+    Args:
+        function: the function.
+        start: lower limit.
+        end: upper limit.
     """
     inner = [
         knot for knot in getattr(function, "x", ()) if min(start, end) < knot < max(start, end)
@@ -30,6 +35,6 @@ def integral(function: Function, start: float, end: float) -> float:
     total = 0.0
     for left, right in pairwise(knots.tolist()):
         half = 0.5 * (right - left)
-        values = [value_of(function, left + half * (1.0 + node)) for node in nodes]
+        values = [evaluate_function(function, left + half * (1.0 + node)) for node in nodes]
         total += half * float(weights @ values)
     return total

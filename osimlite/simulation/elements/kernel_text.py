@@ -1,4 +1,4 @@
-"""The kernels of a kind of force, written from its declaration."""
+"""Generator of the kernels of a force type from its declaration."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from osimlite.mechanics.kernels.condensation import WIDTH
 from osimlite.mechanics.kernels.layout import ITEM
 from osimlite.mechanics.kernels.table import GIVEN, written
 from osimlite.mechanics.laws.dual_numbers import carrying, carrying_room, slope_of
-from osimlite.simulation.elements.laws import ABREAST, EQUILIBRIUM, OFF, RESPONSE, RIGID
+from osimlite.simulation.elements.laws import BATCHED, EQUILIBRIUM, OFF, RESPONSE, RIGID
 from osimlite.simulation.elements.registry import FORCE_TYPES
 
 if TYPE_CHECKING:
@@ -28,125 +28,130 @@ if TYPE_CHECKING:
     from osimlite.simulation.elements.parameters import Parameter
 
 SOLVED = "solved"
-"""The output that tells whether the law has a solution; without it, it always has one."""
+"""Output that says whether the law has a solution; a law without it always has one."""
 
-SOUGHT_ROUNDS = 4
-"""Of a search for a sum, from between the ends of a section."""
+SEARCH_ITERATIONS = 4
+"""Iterations of a search for a sum, which starts between the ends of a segment."""
 
 
-class Asked(NamedTuple):
-    """A part of a law that follows when curves were asked."""
+class LookupStage(NamedTuple):
+    """Stage of a batched law after the lookup of curve values."""
 
-    # names of the curves, each with the name of what is known that is its argument
+    # names of the curves, each with the name of the quantity that is its argument
     curves: dict[str, str]
-    law: Callable[..., Any]  # given what is known, the first parameter, and the value of each curve
-    results: tuple[str, ...]  # names of what it finds
+    law: Callable[..., Any]  # function of the quantities, the first parameter, and the curve values
+    results: tuple[str, ...]  # names of the quantities that the law returns
 
 
-class Sought(NamedTuple):
-    """A part of a law that follows when one of some curves was asked, itself or a sum of it and its argument."""
+class SearchStage(NamedTuple):
+    """Stage of a batched law after one lookup: of a curve, or of a weighted sum of a curve and its argument."""
 
     curves: tuple[str, ...]  # names of the curves
-    # given what is known and the first parameter, tells the number of the curve, factors of it and
-    # of its argument, and what the sum of both is; a curve itself is asked where the first factor
-    # is 0 and the second 1
+    # function of the quantities and the first parameter that returns the index of the curve, the
+    # factors of its value and its argument, and their sum; factors 0 and 1 look up the curve itself
     asking: Callable[..., Any]
-    # given the same, the value of the curve, and how far a search has missed
+    # function of the same, the value of the curve, and the residual of the search
     law: Callable[..., Any]
-    results: tuple[str, ...]  # names of what it finds
+    results: tuple[str, ...]  # names of the quantities that the law returns
 
 
-class Abreast(NamedTuple):
-    """A law in parts, for several forces: their curves are asked together, which a processor does side by side.
+class BatchedLaw(NamedTuple):
+    """Law in stages for several forces, whose curves are evaluated together by SIMD lanes.
 
-    The results are those of the law to the last bit.
+    The results equal those of the law to the last bit.
     """
 
-    known: type[Any]  # named tuple of what the parts find
-    # makes it, from what the law is given of the moment, and the first parameter
+    known: type[Any]  # named tuple of the quantities that the stages compute
+    # function of the law's inputs and the first parameter that returns the quantities
     begin: Callable[..., Any]
-    asked: Asked  # the first part
-    sought: Sought  # the second
-    end: Callable[..., Any]  # the results of the law, from what is known and the first parameter
+    asked: LookupStage  # first stage
+    sought: SearchStage  # second stage
+    end: Callable[..., Any]  # function of the quantities and the first parameter: the law's results
 
 
 @dataclass(frozen=True, eq=False)
 class KernelText:
-    """Writes the kernels of a kind."""
+    """Generator of the kernels of one force type."""
 
     force_type: ForceType  # the declaration
 
     @cached_property
     def kernel(self) -> Callable[..., int]:
-        """The function that computes and applies one force."""
-        return self._function(
-            "", self.force_type.law, [*self._computing, *self.force_type.geometry.after]
+        """Function that computes and applies one force."""
+        return self._write_function(
+            "", self.force_type.law, [*self._law_lines, *self.force_type.geometry.apply_code]
         )
 
     @cached_property
     def off_kernel(self) -> Callable[..., int]:
-        """The function that computes one force and does not apply it."""
-        return self._function(OFF, self.force_type.law, self._computing)
+        """Function that computes one force and does not apply it."""
+        return self._write_function(OFF, self.force_type.law, self._law_lines)
 
     @cached_property
     def equilibrium_kernel(self) -> Callable[..., int]:
-        """The function that brings the states of one force into equilibrium."""
+        """Function that sets the states of one force to equilibrium."""
         force_type = self.force_type
-        lines = [f"{', '.join((SOLVED, *force_type.settled))} = {self._call(self._arguments)}"]
-        lines += self._noted((*force_type.geometry.inputs, *force_type.settled))
+        lines = [
+            f"{', '.join((SOLVED, *force_type.solved_states))} = {self._write_call(self._arguments)}"
+        ]
+        lines += self._write_record((*force_type.geometry.inputs, *force_type.solved_states))
         lines += [f"if not {SOLVED}:", "    return OUTCOME.UNSOLVED"]
-        for place, state in self._places.items():
-            if state.name in force_type.settled:
+        for place, state in self._state_indices.items():
+            if state.name in force_type.solved_states:
                 lines += [f"if i[{place}] >= 0:", f"    y[i[{place}]] = {state.name}"]
-        return self._function(EQUILIBRIUM, force_type.equilibrium, lines)
+        return self._write_function(EQUILIBRIUM, force_type.equilibrium, lines)
 
     @cached_property
     def rigid_kernel(self) -> Callable[..., int]:
-        """The function of a muscle that pulls with its control times the force of fully active fibers."""
-        lines = [f"active_fiber_force = {self._call(self._arguments)}"]
+        """Function of a muscle whose tension is its control times the force of fully active fibers."""
+        lines = [f"active_fiber_force = {self._write_call(self._arguments)}"]
         lines += [f"activation = {self._arguments[len(self.force_type.geometry.inputs)]}"]
         lines += ["tension = activation * active_fiber_force"]
-        lines += self._noted(
+        lines += self._write_record(
             ("tension", "activation", "active_fiber_force", *self.force_type.geometry.inputs)
         )
-        return self._function(
-            RIGID, self.force_type.rigid, [*lines, *self.force_type.geometry.after]
+        return self._write_function(
+            RIGID, self.force_type.rigid_law, [*lines, *self.force_type.geometry.apply_code]
         )
 
     @cached_property
     def response_kernel(self) -> Callable[..., int]:
-        """The function that applies 1 of a force along a displacement, and leaves its derivatives in SCRATCH.
+        """Function that applies a unit force along the displacement and writes derivatives to SCRATCH.
 
-        A row for the force and for the rate of each state, see
-        :mod:`osimlite.mechanics.kernels.condensation`. The moment is that of the last evaluation,
-        whose record tells what that has found.
+        There is one row for the force and one for the rate of each state, see
+        :mod:`osimlite.mechanics.kernels.condensation`. The derivatives are those at the last evaluation,
+        whose record has its results.
         """
-        force_type, force = self.force_type, self.force_type.geometry.along[0]
+        force_type, force = self.force_type, self.force_type.geometry.displacement_output[0]
         rows, changed = (force, *(state.rate for state in force_type.states)), self.changed_outputs
         arguments = self._arguments
         directions = {column: direction for direction, column in enumerate(changed)}
-        law, count = force_type.again or force_type.law, len(changed)
+        law, count = force_type.law_from_record or force_type.law, len(changed)
         for column, place in changed.items():
             arguments[place] = f"carrying({arguments[place]}, {directions[column]}, {count})"
-        # Formulas compute in the record; controls have what reflexes add to them.
+        # Expressions compute in the record. The stored control already includes the reflex (rate 0).
         arguments = [
             f"carrying_room({each}, {count})"
             if each.startswith("at(found")
             else each.replace(", rate)", ", 0.0)")
             for each in arguments
         ]
-        if force_type.again is not None and force_type.law is not None:
+        if force_type.law_from_record is not None and force_type.law is not None:
             given = signature(force_type.law).parameters
             arguments += [
-                f"found[{force_type.recorded[name]}]"
-                for name in signature(force_type.again).parameters
+                f"found[{force_type.record_offsets[name]}]"
+                for name in signature(force_type.law_from_record).parameters
                 if name not in given
             ]
-        # A rate may have the name of an output of another meaning, such as that of a state.
+        # A rate may be named like another state (fiber_velocity), hence the suffix.
         lines = [
-            f"{', '.join(f'{name}_0' for name in force_type.outputs)} = {self._call(arguments)}"
+            f"{', '.join(f'{name}_0' for name in force_type.outputs)} = {self._write_call(arguments)}"
         ]
-        lines += [f"{force} = 1.0", *force_type.geometry.after, "change = at(data, WORK.SCRATCH)"]
+        lines += [
+            f"{force} = 1.0",
+            *force_type.geometry.apply_code,
+            "change = at(data, WORK.SCRATCH)",
+        ]
         for row, name in enumerate(rows):
             for column in range(WIDTH):
                 value = (
@@ -154,29 +159,37 @@ class KernelText:
                 )
                 lines.append(f"change[{WIDTH * row + column}] = {value}")
         lines[:0] = (
-            *self._places_of_item,
-            *(force_type.geometry.again or force_type.geometry.before),
+            *self._pointer_lines,
+            *(force_type.geometry.recorded_setup_code or force_type.geometry.setup_code),
         )
         carried = {function.__name__: function for function in (carrying, carrying_room, slope_of)}
-        return self._written(RESPONSE, "item", lines, law=law, **carried)
+        return self._compile(RESPONSE, "item", lines, law=law, **carried)
 
     @cached_property
-    def abreast_kernel(self) -> Callable[..., int]:
-        """The function that computes and applies several forces that follow one another."""
-        force_type, made = self.force_type, self.force_type.abreast
+    def batched_kernel(self) -> Callable[..., int]:
+        """Function that computes and applies several consecutive forces.
+
+        Raises:
+            TypeError: the force type has no batched law.
+        """
+        force_type, made = self.force_type, self.force_type.batched
         if made is None:
             raise TypeError(f"the law of {force_type.name} has no parts")
         inputs, recorded, arguments = (
             force_type.geometry.inputs,
-            force_type.recorded,
+            force_type.record_offsets,
             self._arguments,
         )
-        # Up to the end the record has what is known.
+        # The record stores the quantities between the stages.
         own = (f"found[{place}]" for name, place in recorded.items() if name not in inputs)
         known = dict(zip(made.known._fields, own, strict=False))
-        of_moment = len(self.input_names) + 1 + sum(state.given for state in force_type.states)
+        of_moment = (
+            len(self.input_names) + 1 + sum(state.is_argument for state in force_type.states)
+        )
         told = f"known({', '.join(known.values())}), {arguments[of_moment]}"
-        begin = f"{', '.join(known.values())} = {self._call(arguments[: of_moment + 1], 'begin')}"
+        begin = (
+            f"{', '.join(known.values())} = {self._write_call(arguments[: of_moment + 1], 'begin')}"
+        )
         first, second = made.asked, made.sought
         *_, curves = force_type.terms
         places, number = {}, self.size - curves.size
@@ -189,10 +202,10 @@ class KernelText:
         ]
         lines = [
             "asked = 0",
-            *self._each(
+            *self._write_loop(
                 [
-                    *force_type.geometry.before,
-                    *self._noted(inputs),
+                    *force_type.geometry.setup_code,
+                    *self._write_record(inputs),
                     begin,
                     *asks,
                     f"asked += {count}",
@@ -203,11 +216,11 @@ class KernelText:
         place = places[second.curves[-1]]
         for number, curve in reversed([*enumerate(second.curves[:-1])]):
             place = f"{places[curve]} if which == {number} else {place}"
-        # Whoever has an answer asks for the next at once, in the room of what is answered.
+        # A force requests its second lookup in the lane of its first, whose result is used.
         lines += [
             "answer(lanes, asked, 1)",
             "asked = 0",
-            *self._each(
+            *self._write_loop(
                 [
                     f"{', '.join(known[name] for name in first.results)} = law({told}, {answers})",
                     f"which, of_curve, of_argument, total = asking({told})",
@@ -220,17 +233,17 @@ class KernelText:
                 ]
             ),
         ]
-        lines += [f"answer(lanes, asked, {SOUGHT_ROUNDS})", "asked = 0"]
+        lines += [f"answer(lanes, asked, {SEARCH_ITERATIONS})", "asked = 0"]
         found = ", ".join(known[name] for name in second.results)
         ended = [
             f"{found} = found_law({told}, value_of(lanes, asked), missed_of(lanes, asked))",
             "asked += 1",
         ]
         end = [f"{', '.join(force_type.outputs)} = end({told})"]
-        end += self._results(name for name in recorded if name not in inputs)
-        lines += self._each([*ended, *end, *force_type.geometry.after])
-        return self._written(
-            ABREAST,
+        end += self._write_results(name for name in recorded if name not in inputs)
+        lines += self._write_loop([*ended, *end, *force_type.geometry.apply_code])
+        return self._compile(
+            BATCHED,
             "run",
             [
                 "lanes, first = at(data, model[run + RUN.ROOM]), model[run + RUN.FIRST]",
@@ -250,8 +263,8 @@ class KernelText:
             **{"value_of": value_of, "missed_of": missed_of},
         )
 
-    def _each(self, lines: Sequence[str]) -> list[str]:
-        """Lines about each item of a run; who is told of an item without a solution is told its number."""
+    def _write_loop(self, lines: Sequence[str]) -> list[str]:
+        """Return a loop over the records of a run; a record without a solution reports its number in f[0]."""
         refused = "    return OUTCOME.UNSOLVED"
         told = [
             new
@@ -261,12 +274,12 @@ class KernelText:
         return [
             "for number in range(first, end_of_part):",
             "    item = model[model[MODEL.ITEM_AT] + number]",
-            *(f"    {line}" for line in (*self._places_of_item, *told)),
+            *(f"    {line}" for line in (*self._pointer_lines, *told)),
         ]
 
     @property
     def changed_outputs(self) -> dict[int, int]:
-        """By column of the derivatives the place of the argument that is changed."""
+        """Column of the derivatives to index of the law's argument that is varied."""
         force_type = self.force_type
         inputs = list(self.input_names)
         result = {
@@ -274,8 +287,8 @@ class KernelText:
             for column, name in enumerate(force_type.geometry.inputs)
             if name in inputs
         }
-        given = [column for column, state in enumerate(force_type.states) if state.given]
-        first = len(inputs) + force_type.controlled
+        given = [column for column, state in enumerate(force_type.states) if state.is_argument]
+        first = len(inputs) + force_type.has_control
         return result | {2 + column: first + number for number, column in enumerate(given)}
 
     @property
@@ -284,27 +297,30 @@ class KernelText:
         force_type = self.force_type
         return (
             force_type.law is not None
-            and force_type.geometry.along[0] in force_type.outputs
+            and force_type.geometry.displacement_output[0] in force_type.outputs
             and bool(self.changed_outputs)
         )
 
-    def _function(
+    def _write_function(
         self, form: str, law: Callable[..., Any] | None, lines: Sequence[str]
     ) -> Callable[..., int]:
-        return self._written(
-            form, "item", [*self._places_of_item, *self.force_type.geometry.before, *lines], law=law
+        return self._compile(
+            form,
+            "item",
+            [*self._pointer_lines, *self.force_type.geometry.setup_code, *lines],
+            law=law,
         )
 
     @property
-    def _places_of_item(self) -> list[str]:
-        recorded = len(self.force_type.recorded)
+    def _pointer_lines(self) -> list[str]:
+        recorded = len(self.force_type.record_offsets)
         return [
             "i = at(model, item)",
             "p, found = at(reals, i[ITEM.NUMBERS]), at(data, i[ITEM.RECORD])",
-            f"g, gp, room = at(i, {ITEM.OWN + self.heads}), at(p, {self.size}), at(found, {recorded})",
+            f"g, gp, work = at(i, {ITEM.OWN + self.int_count}), at(p, {self.size}), at(found, {recorded})",
         ]
 
-    def _written(
+    def _compile(
         self, form: str, place: str, lines: Sequence[str], **own: Any
     ) -> Callable[..., int]:
         force_type, name = self.force_type, self.force_type.name + form
@@ -316,95 +332,103 @@ class KernelText:
             ]
         )
         scope = {
-            name: value for term in force_type.terms for name, value in term.functions().items()
+            name: value
+            for term in force_type.terms
+            for name, value in term.list_functions().items()
         }
-        if force_type.together is not None:
-            scope[force_type.together.__name__] = force_type.together
+        if force_type.inputs_type is not None:
+            scope[force_type.inputs_type.__name__] = force_type.inputs_type
         return written(
             name,
             FORCE_TYPES.module_of(force_type.component),
             source,
             **own,
-            **force_type.geometry.functions(),
+            **force_type.geometry.list_functions(),
             **scope,
         )
 
     @property
-    def _computing(self) -> list[str]:
-        """What is done with the law, but for the force."""
+    def _law_lines(self) -> list[str]:
+        """Lines that call the law and record its results, without the force being applied."""
         force_type, lines = self.force_type, []
         if force_type.law is not None:
             results = f"{', '.join(force_type.outputs)} = " if force_type.outputs else ""
-            lines.append(f"{results}{self._call(self._arguments)}")
-        return lines + self._results(force_type.recorded)
+            lines.append(f"{results}{self._write_call(self._arguments)}")
+        return lines + self._write_results(force_type.record_offsets)
 
-    def _results(self, names: Iterable[str]) -> list[str]:
-        """Note results of the law by their names, and what it says of states."""
-        force_type, lines = self.force_type, self._noted(names)
+    def _write_results(self, names: Iterable[str]) -> list[str]:
+        """Return lines that record results of the law by name, and write the rates of states."""
+        force_type, lines = self.force_type, self._write_record(names)
         if SOLVED in force_type.outputs:
             lines += [f"if not {SOLVED}:", "    return OUTCOME.UNSOLVED"]
-        for place, state in self._places.items():
+        for place, state in self._state_indices.items():
             lines += [f"if i[{place}] >= 0:", f"    f[i[{place}]] = {state.rate}"]
         return lines
 
-    def _noted(self, names: Iterable[str]) -> list[str]:
-        recorded = self.force_type.recorded
+    def _write_record(self, names: Iterable[str]) -> list[str]:
+        recorded = self.force_type.record_offsets
         return [f"found[{recorded[name]}] = {name}" for name in names if name in recorded]
 
     @property
-    def _places(self) -> dict[int, State]:
-        """Each state, by the integer of an item that says where it is, -1 if it has none."""
-        first = ITEM.OWN + sum(term.heads for term in self.force_type.terms)
+    def _state_indices(self) -> dict[int, State]:
+        """Each state by the index of its offset among the integers of a record; -1 marks an absent state."""
+        first = ITEM.OWN + sum(term.int_count for term in self.force_type.terms)
         return {first + number: state for number, state in enumerate(self.force_type.states)}
 
     @property
     def _arguments(self) -> list[str]:
-        """What a law is called with."""
+        """Arguments of the law, as expressions."""
         force_type = self.force_type
-        terms = arguments_of(force_type.terms, ITEM.OWN, 0)
-        given = [place for place, state in self._places.items() if state.given]
+        terms = write_arguments(force_type.terms, ITEM.OWN, 0)
+        given = [place for place, state in self._state_indices.items() if state.is_argument]
         states = [f"(y[i[{place}]] if i[{place}] >= 0 else 0.0)" for place in given]
-        count = 1 if force_type.controlled else 0
+        count = 1 if force_type.has_control else 0
         return [*self.input_names, *terms[:count], *states, *terms[count:]]
 
     @property
     def input_names(self) -> tuple[str, ...]:
-        """Names of what the law gets from the geometry."""
+        """Names of the geometry's inputs that the law takes."""
         return (
             self.force_type.geometry.inputs
             if self.force_type.inputs is None
             else self.force_type.inputs
         )
 
-    def _call(self, arguments: Sequence[str], law: str = "law") -> str:
-        """The law called with these; as one, those that change with time, if the kind says so."""
-        made = self.force_type.together
+    def _write_call(self, arguments: Sequence[str], law: str = "law") -> str:
+        """Return a call of a law; `inputs_type` combines the arguments that change with time."""
+        made = self.force_type.inputs_type
         if made is None:
             return f"{law}({', '.join(arguments)})"
         names = (
             *self.input_names,
             "excitation",
-            *(state.name for state in self.force_type.states if state.given),
+            *(state.name for state in self.force_type.states if state.is_argument),
         )
         given = dict(zip(names, arguments, strict=False))
         first = f"{made.__name__}({', '.join(given.get(name, '0.0') for name in made._fields)})"
         return f"{law}({', '.join((first, *arguments[len(names) :]))})"
 
     @property
-    def heads(self) -> int:
-        """How many integers of an item are the kind's own."""
-        return sum(term.heads for term in self.force_type.terms) + len(self.force_type.states)
+    def int_count(self) -> int:
+        """Number of integers of a record that belong to the force type."""
+        return sum(term.int_count for term in self.force_type.terms) + len(self.force_type.states)
 
     @property
     def size(self) -> int:
-        """How many numbers of an item are the parameters."""
+        """Number of numbers of a record that are parameters."""
         return sum(term.size for term in self.force_type.terms)
 
 
-def arguments_of(terms: Iterable[Parameter], head: int, number: int) -> list[str]:
-    """What a law is called with for terms whose integers and numbers begin at these places."""
+def write_arguments(terms: Iterable[Parameter], head: int, number: int) -> list[str]:
+    """Return the arguments of a law for terms, as expressions.
+
+    Args:
+        terms: the parameters.
+        head: index of their first integer.
+        number: index of their first number.
+    """
     result = []
     for term in terms:
-        result += term.arguments(head, number)
-        head, number = head + term.heads, number + term.size
+        result += term.write_arguments(head, number)
+        head, number = head + term.int_count, number + term.size
     return result

@@ -1,10 +1,9 @@
-"""The functions that are compiled by themselves, with those of forces and probes, by name.
+"""Functions that are compiled separately, by name: those of the engine, of force types and of probes.
 
-The kernel of a kind of force is written from its declaration, and has the name of the module that
-declares it; so are the one that brings such a force into equilibrium, with EQUILIBRIUM behind the
-name, that of a force that is off, with OFF, the one that finds its derivatives, with RESPONSE, and
-that of a muscle whose tendon is taken for rigid, with RIGID. Kernels of probes are written
-likewise.
+The kernel of a force type is generated from its declaration and has the name of the class in snake
+case. A suffix distinguishes its other kernels: EQUILIBRIUM computes equilibrium states, OFF belongs
+to a force that is off, RESPONSE computes derivatives, RIGID belongs to a muscle with a rigid
+tendon, and BATCHED computes several forces together. Kernels of probes are generated in the same way.
 """
 
 from __future__ import annotations
@@ -15,56 +14,55 @@ from typing import Any
 from osimlite.mechanics.kernels.table import LAW_MODULES, own_function
 from osimlite.simulation.elements.registry import FORCE_TYPES, PROBE_TYPES
 
-EQUILIBRIUM, OFF, RESPONSE, RIGID, ABREAST = (
+EQUILIBRIUM, OFF, RESPONSE, RIGID, BATCHED = (
     "_equilibrium",
     "_off",
     "_response",
     "_rigid",
-    "_abreast",
+    "_batched",
 )
 FORMS = {
     EQUILIBRIUM: "equilibrium_kernel", OFF: "off_kernel", RESPONSE: "response_kernel", RIGID: "rigid_kernel",
-    ABREAST: "abreast_kernel",
+    BATCHED: "batched_kernel",
 }  # fmt: skip
+"""Attribute of KernelText that has the kernel, by the suffix of its name."""
 ALONG = "~"
-"""Between the name of a function and how many directions its numbers carry derivatives along."""
+"""Separates the name of a function from the number of directions of its derivatives."""
 
 DIRECTIONS = 16
-"""Number of directions of the derivatives that the library of kernels is compiled for."""
+"""Number of directions of derivatives that the library of kernels is compiled for."""
 
 WITHOUT_DERIVATIVES = frozenset(
     (
-        # Whole motions, which are followed step by step, and methods that no derivatives are
-        # followed along.
+        # Complete motions are differentiated step by step; these integrators are not differentiated.
         "run_several", "hold_several", "walk_several", "run_by_reflexes", "euler2", "adams", "bdf", "rosenbrock",
-        # Searches, and looks at many poses.
+        # Searches, and evaluations of many poses.
         "fit_frames", "least_effort", "watch", "look", "push_each", "assemble_poses",
-        # What finds a start, which is held.
+        # These compute initial states, which derivatives regard as constants.
         "equilibrate", "project",
-        # What methods for stiff motions ask, and pictures.
+        # Methods for stiff motions and pictures use these.
         "contact_response", "smooth_contact_response", "contact_places",
         *(name for name in LAW_MODULES if name.startswith("trace_")),
     )
 )  # fmt: skip
-"""Laws of the engine that nobody needs derivatives from: the library has them for floats only."""
+"""Laws of the engine that the library contains for floats only, because nothing differentiates them."""
 
 
-def library_laws(directions: int = 0) -> list[str]:
-    """Return the names of all laws of this package, in a fixed order, as the library of kernels has them.
+def list_library_laws(directions: int = 0) -> list[str]:
+    """Return the names of all laws of this package in a fixed order, as the library of kernels has them.
 
     Args:
-        directions: of the derivatives that their numbers carry; 0 for floats.
+        directions: number of directions of derivatives; 0 for floats.
     """
     names = list(LAW_MODULES)
     for force_type in FORCE_TYPES:
-        # Contacts in pairs have kernels of the engine.
+        # Contacts in pairs use kernels of the engine.
         names += [force_type.name + form for form in getattr(force_type, "forms", ())]
     names += [probe.name for probe in PROBE_TYPES if probe.law is not None]
     if not directions:
         return names
-    # The kernels of responses have derivatives of their own within; nothing is brought into
-    # equilibrium on the way.
-    without = EQUILIBRIUM, RESPONSE, ABREAST
+    # Kernels of responses compute derivatives themselves; equilibrium is not differentiated.
+    without = EQUILIBRIUM, RESPONSE, BATCHED
     return [
         f"{name}{ALONG}{directions}"
         for name in names
@@ -72,19 +70,26 @@ def library_laws(directions: int = 0) -> list[str]:
     ]
 
 
-def symbol_of(name: str) -> str:
+def get_symbol(name: str) -> str:
     """Return the symbol of a law in compiled libraries."""
     return name.replace(ALONG, "_along_")
 
 
-def law_of(name: str) -> tuple[Callable[..., Any], int]:
-    """The function of a name, and how many directions its numbers carry derivatives along, 0 if they are floats."""
+def find_law(name: str) -> tuple[Callable[..., Any], int]:
+    """Return a law and the number of directions of its derivatives.
+
+    Args:
+        name: name of the function, with `ALONG` and the number of directions if it has derivatives.
+
+    Returns:
+        The function, and the number of directions; 0 for floats.
+    """
     name, _, directions = name.partition(ALONG)
-    return law_function(name), int(directions or 0)
+    return find_function(name), int(directions or 0)
 
 
-def law_function(name: str) -> Callable[..., Any]:
-    """The function of a name."""
+def find_function(name: str) -> Callable[..., Any]:
+    """Return the function of a law by its name without directions."""
     function: Callable[..., Any]
     if name in LAW_MODULES:
         function = own_function(name)

@@ -22,20 +22,20 @@ from osimlite.simulation.elements.probe_type import (
     ProbeType,
     Reading,
     Subject,
-    members_of,
+    find_members,
 )
 from osimlite.simulation.elements.registry import register_probe_type
 
 
 class Power(NamedTuple):
-    """A factor of a quantity, and the power to which both are raise_to_power."""
+    """Factor of a quantity, and the exponent to which the product is raised."""
 
     factor: float
     exponent: float
 
 
 def raise_to_power(x: float, exponent: float) -> float:
-    """A power of a number, as C++ has it."""
+    """Return x to a power, with the results of C++ for negative and zero bases."""
     if x < 0.0 and exponent != floor(exponent):
         return nan
     if x == 0.0 and exponent < 0.0:
@@ -44,12 +44,12 @@ def raise_to_power(x: float, exponent: float) -> float:
 
 
 def compute_actuator_force(actuation: float, n: Power) -> float:
-    """A force, N or N.m, to a power."""
+    """Return the force of an actuator (N or N.m), raised to a power."""
     return raise_to_power(n.factor * actuation, n.exponent)
 
 
 def _read_forces(builder: ElementBuilder, probe: ActuatorForceProbe) -> Reading:
-    actuators = members_of(builder, probe, probe.actuator_names, "/forceset", "Actuator")
+    actuators = find_members(builder, probe, probe.actuator_names, "/forceset", "Actuator")
     subjects = tuple(Subject(actuator, Power(1.0, probe.exponent)) for actuator in actuators)
     return define_reading(
         probe.name, [item.name for item in actuators], subjects, is_sum=probe.sum_forces_together
@@ -59,7 +59,14 @@ def _read_forces(builder: ElementBuilder, probe: ActuatorForceProbe) -> Reading:
 def define_reading(
     name: str, subjects: list[str], read: tuple[Subject, ...], *, is_sum: bool
 ) -> Reading:
-    """What a probe reads whose results are those of its subjects, or their sum."""
+    """Return the reading of a probe whose results are those of its subjects, or their sum.
+
+    Args:
+        name: name of the probe.
+        subjects: names of the subjects.
+        read: the subjects.
+        is_sum: whether the only result is the sum.
+    """
     if is_sum:
         return Reading((f"{name}_Summed",), read)
     return Reading(tuple(f"{name}_{subject}" for subject in subjects), read, first=0)
@@ -71,13 +78,13 @@ register_probe_type(
 
 
 def compute_actuator_power(actuation: float, speed: float, n: Power) -> float:
-    """A power, W, to a power."""
+    """Return the power of an actuator (W), raised to a power."""
     return raise_to_power(n.factor * actuation * speed, n.exponent)
 
 
 def _read_powers(builder: ElementBuilder, probe: ActuatorPowerProbe) -> Reading:
-    actuators = members_of(builder, probe, probe.actuator_names, "/forceset", "Actuator")
-    # A tension pulls against the lengthening speed.
+    actuators = find_members(builder, probe, probe.actuator_names, "/forceset", "Actuator")
+    # A tension acts against the lengthening speed.
     factors = [-1.0 if isinstance(item, PathActuator) else 1.0 for item in actuators]
     subjects = tuple(
         Subject(item, Power(factor, probe.exponent))
@@ -98,7 +105,7 @@ register_probe_type(
 def _read_joints(builder: ElementBuilder, probe: JointInternalPowerProbe) -> Reading:
     mechanism, joints = (
         builder.mechanism,
-        members_of(builder, probe, probe.joint_names, "/jointset", "Joint"),
+        find_members(builder, probe, probe.joint_names, "/jointset", "Joint"),
     )
     infos = [
         (place, info)
@@ -111,7 +118,9 @@ def _read_joints(builder: ElementBuilder, probe: JointInternalPowerProbe) -> Rea
     if any(driven) and not all(
         isinstance(item, Lock | Prescribed) for item in mechanism.constraints
     ):
-        raise builder.unsupported(probe, " of prescribed coordinates beside other constraints")
+        raise builder.unsupported_error(
+            probe, " of prescribed coordinates beside other constraints"
+        )
     reading = define_reading(
         probe.name, [joint.name for joint in joints], (), is_sum=probe.sum_powers_together
     )
@@ -121,7 +130,10 @@ def _read_joints(builder: ElementBuilder, probe: JointInternalPowerProbe) -> Rea
 def _measure_joint_power(
     probe: DeclaredProbe, system: Any, t: float, y: Sequence[float]
 ) -> list[float]:
-    """What the motion takes besides gravity and the forces, times the speeds."""
+    """Return the power of the joints' prescribed coordinates.
+
+    It is the generalized force that the motion requires besides gravity and the forces, times the speed.
+    """
     driven, exponent, is_sum = probe.reading.details
     powers = np.zeros(len(system.mechanism.coordinates))
     if any(driven):
@@ -147,7 +159,7 @@ def _read_energies(builder: ElementBuilder, probe: SystemEnergyProbe) -> Reading
 
 
 def _measure_energy(probe: DeclaredProbe, system: Any, t: float, y: Sequence[float]) -> list[float]:
-    """Of the kinetic energy and those of gravity and forces, the sum of those that are asked for."""
+    """Return the sum of the requested energies: kinetic, of gravity, and of forces."""
     return [
         sum(
             factor * part

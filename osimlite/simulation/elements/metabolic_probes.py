@@ -33,13 +33,18 @@ def read_metabolic_probe(
     numbers: Callable[[Any, Any, float], Any],
     curve: Function | None = None,
 ) -> Reading:
-    """The power of all muscles of a probe and the basal one, and, if the probe reports them, that and each muscle's.
+    """Return the reading of a metabolic probe: the total power, and if requested the basal one and each muscle's.
 
-    Args: builder: of the elements. probe: that reads. numbers: what the law is given, from the
-        parameters of a muscle, the muscle, and its find_muscle_mass (kg). curve: that the law is given.
+    Args:
+        builder: builder of the elements.
+        probe: the probe.
+        numbers: function that returns the numbers of the law from the parameters of a muscle, the
+            muscle, and its mass (kg).
+        curve: curve that the law takes.
 
-    Raises: UnsupportedError: OpenSim switches the probe off, for a muscle that does not exist or a
-        number without meaning.
+    Raises:
+        UnsupportedError: OpenSim disables the probe, because a muscle does not exist or a number has no
+            meaning.
     """
     known: dict[str, Any] = builder.tree.members("/forceset", "Muscle")
     parameters = probe.metabolic_muscle_parameter_set.objects
@@ -47,7 +52,7 @@ def read_metabolic_probe(
     for item in parameters:
         muscle = known.get(item.name)
         if muscle is None:
-            raise builder.unsupported(
+            raise builder.unsupported_error(
                 probe, f" of the muscle '{item.name}', which the model does not have"
             )
         subjects.append(
@@ -67,7 +72,13 @@ def read_metabolic_probe(
 
 
 def find_muscle_mass(builder: ElementBuilder, probe: Any, item: Any, muscle: Any) -> float:
-    """Of a muscle, kg: the one that is provided, or density, optimal fiber length and cross-section.
+    """Return the mass of a muscle, kg: the provided one, or density times fiber length and cross-section.
+
+    Args:
+        builder: builder of the elements.
+        probe: the probe, for messages.
+        item: the probe's parameters of the muscle.
+        muscle: the muscle.
 
     Raises:
         UnsupportedError: a number has no meaning.
@@ -80,11 +91,11 @@ def find_muscle_mass(builder: ElementBuilder, probe: Any, item: Any, muscle: Any
     )
     for name in names:
         if not (getattr(item, name) or 0.0) > 0.0:
-            raise builder.unsupported(
+            raise builder.unsupported_error(
                 probe, f" of the muscle '{item.name}', whose {name} is not positive"
             )
     if not 0.0 <= item.ratio_slow_twitch_fibers <= 1.0:
-        raise builder.unsupported(
+        raise builder.unsupported_error(
             probe, f" of the muscle '{item.name}', whose ratio_slow_twitch_fibers is not 0 to 1"
         )
     if item.use_provided_muscle_mass:
@@ -108,7 +119,19 @@ def compute_bhargava(
     curve: Floats,
     m: Bhargava2004,
 ) -> float:
-    """Return the metabolic power (W) of one muscle."""
+    """Return the metabolic power (W) of one muscle.
+
+    Args:
+        activation: activation, 0 to 1.
+        excitation: control, 0 to 1.
+        active_force: active fiber force, N.
+        passive_force: passive fiber force, N.
+        fiber_length: fiber length, m.
+        fiber_velocity: lengthening speed of the fibers, m/s.
+        force_length: active force-length factor.
+        curve: maintenance factor over normalized fiber length.
+        m: parameters of the muscle and the probe.
+    """
     maintained, _, _ = value_at(curve, fiber_length / m.optimal_fiber_length)
     return bhargava2004(
         activation,
@@ -123,7 +146,14 @@ def compute_bhargava(
 
 
 def define_bhargava(probe: Any, item: Any, muscle: Any, mass: float) -> Bhargava2004:
-    """What the law must know of a muscle and of a probe, whose switches are on if it has none."""
+    """Return the parameters of the law; switches that the probe does not have are on.
+
+    Args:
+        probe: the probe.
+        item: the probe's parameters of the muscle.
+        muscle: the muscle.
+        mass: mass of the muscle, kg.
+    """
     return Bhargava2004(
         muscle.max_isometric_force,
         muscle.optimal_fiber_length,
@@ -135,7 +165,7 @@ def define_bhargava(probe: Any, item: Any, muscle: Any, mass: float) -> Bhargava
 
 def _read_bhargava(builder: ElementBuilder, probe: Bhargava2004MuscleMetabolicsProbe) -> Reading:
     name = "normalized_fiber_length_dependence_on_maintenance_rate"
-    curve = builder.function(probe, getattr(probe, name), name)
+    curve = builder.read_function(probe, getattr(probe, name), name)
     return read_metabolic_probe(builder, probe, partial(define_bhargava, probe), curve)
 
 
@@ -148,6 +178,7 @@ BHARGAVA_INPUTS = (
     "fiber_velocity",
     "active_force_length",
 )
+"""Inputs of the law from the record of a muscle."""
 
 register_probe_type(
     ProbeType(
@@ -162,7 +193,9 @@ register_probe_type(
 
 
 RATE_NAMES = "metabolic", "activation", "maintenance", "shortening", "mechanical_work"
+"""Names of the rates in the labels of the outputs."""
 MAINTENANCE_CURVE = PiecewiseLinear((0.0, 0.5, 1.0, 1.5, 10.0), (0.5, 0.5, 1.0, 0.0, 0.0))
+"""Maintenance factor over normalized fiber length, as in OpenSim."""
 
 
 def _read_smoothed(
@@ -176,7 +209,7 @@ def _read_smoothed(
     subjects = []
     labels = [f"{path}|total_{rate}_rate" for rate in RATE_NAMES]
     for item in component.muscle_parameters:
-        muscle: Any = builder.target(item, "socket_muscle", item.socket_muscle)
+        muscle: Any = builder.resolve_target(item, "socket_muscle", item.socket_muscle)
         numbers = define_bhargava(
             component, item, muscle, find_muscle_mass(builder, component, item, muscle)
         )
@@ -189,7 +222,7 @@ def _read_smoothed(
 def _measure_smoothed(
     probe: DeclaredProbe, system: Any, t: float, y: Sequence[float]
 ) -> list[float]:
-    """Sums of the rates of all muscles, the basal one added to the first, and the whole rate of each."""
+    """Return the sums of the rates of all muscles (the first with the basal rate), and each muscle's total rate."""
     rates = []
     for places, numbers in zip(probe.places, probe.numbers, strict=True):
         m, by = (

@@ -1,4 +1,4 @@
-"""What muscles have in common: one tension along a path by an excitation, and what is recorded of them."""
+"""What muscles have in common: one tension along a path, an excitation, and the recorded quantities."""
 
 from __future__ import annotations
 
@@ -23,41 +23,50 @@ RECORDED = (
     "active_fiber_force",
     "passive_fiber_force",
 )
-"""What the law of a muscle gives first: N, m, N; what is kept of it besides are length and rate of
-the path, and the velocity of the fibers.
+"""First outputs of the law of a muscle; forces in N, lengths in m.
+
+The record also has length and rate of the path, and the fiber velocity.
 """
 
 STRENGTH = "active_fiber_force"
-"""The force (N) of fully active fibers, where the tendon is taken for rigid."""
+"""Output with the force (N) of fully active fibers, of muscles with a rigid tendon."""
 
 SPRING = "elastic_fiber_force"
-"""What of the passive force of fibers with damping is not by that, N."""
+"""Output with the elastic part (N) of the passive force of fibers with damping."""
 
 PENNATION = Number(
     "pennation_angle_at_optimal",
     lambda x: 0.0 <= x <= 0.5 * pi - SIGNIFICANT,
     "is not from 0 to less than pi/2",
 )
+"""Pennation angle of a muscle at optimal fiber length, rad."""
 
 
-def height(builder: ElementBuilder, force: Any) -> tuple[float]:
-    """Of the fibers across the tendon, m."""
+def compute_height(builder: ElementBuilder, force: Any) -> tuple[float]:
+    """Return the height of the fibers across the tendon, m, as a tuple of one number.
+
+    Returns:
+        Optimal fiber length times the sine of the pennation angle.
+    """
     return (
         force.optimal_fiber_length * sin(Number("pennation_angle_at_optimal").read(builder, force)),
     )
 
 
-def curve(
+def define_curve(
     name: str,
     size: int,
     make: Callable[..., Sequence[float]],
     changed: Callable[[Any], dict[str, Any]] = lambda _: {},
 ) -> Vector:
-    """The curve that a property of a muscle stands for; the law is given its numbers, as `curve_value` takes them.
+    """Return the parameter for a curve of a muscle; the law takes its numbers, for `curve_value`.
 
-    Args: name: of the property. size: how many numbers. make: makes them of the curve's own
-        properties, in their order; a ValueError tells why there is no such curve. changed: those
-        that the muscle changes.
+    Args:
+        name: property with the curve.
+        size: number of numbers.
+        make: function that computes the numbers from the curve's properties, in their order; its
+            ValueError says why the properties make no curve.
+        changed: function that returns the properties of the curve that the muscle changes.
     """
 
     def read(builder: ElementBuilder, force: Any) -> Sequence[float]:
@@ -75,11 +84,11 @@ def curve(
     return Vector(size, read)
 
 
-def require(builder: ElementBuilder, force: Any, *numbers: Number) -> None:
-    """Refuse a muscle that OpenSim refuses for its activation or its pennation, or for what `numbers` do not accept.
+def check_muscle(builder: ElementBuilder, force: Any, *numbers: Number) -> None:
+    """Raise an error if OpenSim refuses the activation or pennation of a muscle, or one of the numbers.
 
     Raises:
-        ModelError: a property has no meaning; it is named.
+        ModelError: a property has no meaning; the message names it.
     """
     least = force.minimum_activation
     usual = (
@@ -100,9 +109,9 @@ def require(builder: ElementBuilder, force: Any, *numbers: Number) -> None:
         number.read(builder, force)
 
 
-def _told(known: Mapping[str, float]) -> str:
+def _describe_failure(known: Mapping[str, float]) -> str:
     off = known["length"] - known["tendon_slack_length"] - known["optimal_fiber_length"]
-    # A search that is not for a fiber length has none to tell.
+    # Not every search is for a fiber length.
     fibers = (
         f", with fibers of {known['fiber_length']:.4g} m" if known["fiber_length"] > 0.0 else ""
     )
@@ -112,21 +121,21 @@ def _told(known: Mapping[str, float]) -> str:
     )
 
 
-def muscle(
+def define_muscle(
     component: type,
     law: Callable[..., Any],
     rates: tuple[str, ...],
     *parameters: Parameter,
     **more: Any,
 ) -> ForceType:
-    """The kind of a muscle.
+    """Return the force type of a muscle.
 
     Args:
-        component: its class.
-        law: gives what is recorded, and then rates, from :class:`MuscleInputs` and the parameters.
-        rates: of states, of which "fiber_velocity" is one, and what else the law gives.
-        parameters: that the law is given.
-        more: attributes of the kind.
+        component: class of the muscle.
+        law: function of :class:`MuscleInputs` and the parameters, which returns `RECORDED` and `rates`.
+        rates: outputs after `RECORDED`: rates of states, including "fiber_velocity", and others.
+        parameters: parameters of the law.
+        more: attributes of the force type.
     """
     return ForceType(
         component,
@@ -134,10 +143,10 @@ def muscle(
         law,
         outputs=(*RECORDED, *rates),
         parameters=parameters,
-        kept=("length", "rate", "fiber_velocity"),
-        controlled=True,
-        together=MuscleInputs,
+        recorded_inputs=("length", "rate", "fiber_velocity"),
+        has_control=True,
+        inputs_type=MuscleInputs,
         labels={"{name}": "tension"},
-        told=_told,
+        describe_failure=_describe_failure,
         **more,
     )

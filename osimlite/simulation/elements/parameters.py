@@ -1,4 +1,4 @@
-"""What a law is given of a component: numbers, curves, formulas, the control."""
+"""Parameters of laws: numbers, curves, expressions and controls that a law takes from a component."""
 
 from __future__ import annotations
 
@@ -13,235 +13,257 @@ from osimlite.mechanics.multibody.formula import Formula, program
 from osimlite.mechanics.multibody.function_tables import table_of_one
 from osimlite.mechanics.multibody.functions import Function
 from osimlite.simulation.elements.builder import ElementBuilder
-from osimlite.simulation.elements.kernel_text import arguments_of
+from osimlite.simulation.elements.kernel_text import write_arguments
 
 
 class Tail:
-    """What stands behind the parts of fixed length of an item.
+    """Data of variable length behind the fixed part of a record.
 
     Args:
-        ints: place of the first integer, from the item's record on.
-        numbers: place of the first number, from the item's numbers on.
-        room: place of the first number of the record.
+        ints: offset of the first integer, from the start of the record.
+        numbers: offset of the first number, from the record's numbers.
+        record_size: size of the output record so far.
     """
 
-    def __init__(self, ints: int, numbers: int, room: int) -> None:
+    def __init__(self, ints: int, numbers: int, record_size: int) -> None:
         self._first = ints, numbers
         self.ints: list[int] = []
         self.numbers: list[float] = []
-        self.room = room
+        self.record_size = record_size
 
     def put_ints(self, ints: Sequence[int]) -> int:
-        """Add integers; returns their place."""
+        """Append integers, and return their offset."""
         self.ints += ints
         return self._first[0] + len(self.ints) - len(ints)
 
     def put_numbers(self, numbers: Sequence[float]) -> int:
-        """Add numbers; returns their place."""
+        """Append numbers, and return their offset."""
         self.numbers += numbers
         return self._first[1] + len(self.numbers) - len(numbers)
 
-    def put_room(self, count: int) -> int:
-        """Make room in the record; returns its place."""
-        self.room += count
-        return self.room - count
+    def reserve_record(self, count: int) -> int:
+        """Reserve numbers in the output record, and return their offset."""
+        self.record_size += count
+        return self.record_size - count
 
 
 class Parameter(ABC):
-    """Something that a law is given of a component."""
+    """One argument of a law, or several, from a component."""
 
-    size: int = 0  # how many numbers of fixed place it takes
-    heads: int = 0  # how many integers that say where something of variable length is
+    size: int = 0  # number of numbers of fixed position
+    int_count: int = 0  # number of integers, which are offsets of data of variable length
 
     @abstractmethod
     def read(self, builder: ElementBuilder, force: Any) -> Any:
-        """Its value, from a component."""
+        """Return the value, from a component."""
 
     @abstractmethod
-    def arguments(self, head: int, number: int) -> list[str]:
-        """What the law is called with; `head` is the place of its integers, `number` that of its numbers."""
+    def write_arguments(self, head: int, number: int) -> list[str]:
+        """Return the arguments of the law, as expressions.
 
-    def functions(self) -> dict[str, Callable[..., Any]]:
-        """What the arguments call, by name."""
+        Args:
+            head: index of its first integer in the record.
+            number: index of its first number.
+        """
+
+    def list_functions(self) -> dict[str, Callable[..., Any]]:
+        """Return the functions that the arguments call, by name.
+
+        Returns:
+            The functions by the names in the expressions.
+        """
         return {}
 
     @abstractmethod
     def pack(self, value: Any, tail: Tail, where: str) -> tuple[Sequence[int], Sequence[float]]:
-        """Its integers and numbers; what is of variable length goes into the tail."""
+        """Return the integers and numbers of a value; data of variable length goes into the tail.
+
+        Args:
+            value: result of `read`.
+            tail: receives data of variable length.
+            where: the force, for messages.
+
+        Returns:
+            Integers and numbers of fixed position.
+        """
 
 
 @dataclass(frozen=True)
 class Number(Parameter):
-    """A property that is a number, or a yes or no that the law is given as 1 or 0."""
+    """Property that is a number, or a boolean that the law takes as 1 or 0."""
 
-    name: str  # of the property
-    accepts: Callable[[float], bool] = lambda value: True  # whether a number will do
-    needs: str = ""  # what is said of one that does not, after "the <name> of '<path>' "
+    name: str  # name of the property
+    accepts: Callable[[float], bool] = lambda value: True  # whether a number is accepted
+    needs: str = ""  # message about other numbers, after "the <name> of '<path>' "
     size = 1
 
     def read(self, builder: ElementBuilder, force: Any) -> float:
-        """The number."""
+        """Return the number.
+
+        Raises:
+            ModelError: it is not finite or not accepted.
+        """
         value = float(getattr(force, self.name))
-        builder.check(force, (value,))
+        builder.check_finite(force, (value,))
         if not self.accepts(value):
             raise ModelError(f"the {self.name} of '{builder.path(force)}' {self.needs}")
         return value
 
-    def arguments(self, head: int, number: int) -> list[str]:
-        """It."""
+    def write_arguments(self, head: int, number: int) -> list[str]:
+        """Return the number's expression."""
         return [f"p[{number}]"]
 
     def pack(self, value: float, tail: Tail, where: str) -> tuple[Sequence[int], Sequence[float]]:
-        """It."""
+        """Return no integer and the number itself."""
         return (), (value,)
 
 
-def positive(name: str) -> Number:
-    """A property that is a positive number."""
-    return Number(name, lambda value: value > 0.0, "is not positive; give it one that is")
+def require_positive(name: str) -> Number:
+    """Return the parameter for a property that is a positive number."""
+    return Number(name, lambda value: value > 0.0, "is not positive; give it a positive value")
 
 
 @dataclass(frozen=True)
 class Numbers(Parameter):
-    """Several numbers that are computed together."""
+    """Several numbers that are computed from a component together."""
 
-    count: int  # how many
-    of: Callable[[ElementBuilder, Any], Sequence[float]]  # from a component and the builder
+    count: int  # number of values
+    of: Callable[[ElementBuilder, Any], Sequence[float]]  # function of the builder and a component
 
     @property
     def size(self) -> int:  # type: ignore[override]
-        """How many."""
+        """Number of values."""
         return self.count
 
     def read(self, builder: ElementBuilder, force: Any) -> tuple[float, ...]:
-        """The numbers."""
+        """Return the values."""
         values = tuple(map(float, self.of(builder, force)))
-        builder.check(force, values)
+        builder.check_finite(force, values)
         return values
 
-    def arguments(self, head: int, number: int) -> list[str]:
-        """They, one by one."""
+    def write_arguments(self, head: int, number: int) -> list[str]:
+        """Return one expression for each value."""
         return [f"p[{number + k}]" for k in range(self.count)]
 
     def pack(
         self, value: Sequence[float], tail: Tail, where: str
     ) -> tuple[Sequence[int], Sequence[float]]:
-        """They."""
+        """Return no integers and the values."""
         return (), value
 
 
 @dataclass(frozen=True)
 class Fields(Parameter):
-    """Numbers that the law is given as one named tuple."""
+    """Numbers that the law takes as one named tuple."""
 
-    type: type[Any]  # the tuple; its first fields are the properties
-    properties: tuple[Number, ...]  # that are numbers
-    # the rest of its fields, from a component whose properties will do
+    type: type[Any]  # type of the tuple; its first fields are the properties
+    properties: tuple[Number, ...]  # parameters of the first fields
+    # function that returns the other fields, from a component whose properties are accepted
     others: Callable[[ElementBuilder, Any], Sequence[float]] = lambda builder, force: ()
 
     @property
     def size(self) -> int:  # type: ignore[override]
-        """How many."""
+        """Number of fields."""
         return len(self.type._fields)
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of the properties, and of the fields that are none."""
+        """Names of the values: those of the properties, then those of the other fields."""
         return (
             *(item.name for item in self.properties),
             *self.type._fields[len(self.properties) :],
         )
 
     def read(self, builder: ElementBuilder, force: Any) -> Any:
-        """The tuple."""
+        """Return the named tuple."""
         values = [item.read(builder, force) for item in self.properties]
         values += map(float, self.others(builder, force))
-        builder.check(force, values)
+        builder.check_finite(force, values)
         return self.type(*values)
 
-    def arguments(self, head: int, number: int) -> list[str]:
-        """It."""
+    def write_arguments(self, head: int, number: int) -> list[str]:
+        """Return the constructor call of the named tuple."""
         return [f"{self.type.__name__}({', '.join(f'p[{number + k}]' for k in range(self.size))})"]
 
-    def functions(self) -> dict[str, Callable[..., Any]]:
-        """What makes it."""
+    def list_functions(self) -> dict[str, Callable[..., Any]]:
+        """Return the type of the tuple, by name."""
         return {self.type.__name__: self.type}
 
     def pack(
         self, value: Sequence[float], tail: Tail, where: str
     ) -> tuple[Sequence[int], Sequence[float]]:
-        """Its numbers."""
+        """Return no integers and the values of the tuple."""
         return (), value
 
 
 @dataclass(frozen=True)
 class Vector(Numbers):
-    """Several numbers, of which the law is given the place."""
+    """Several numbers that the law takes as a pointer."""
 
     def read(self, builder: ElementBuilder, force: Any) -> tuple[float, ...]:
-        """The numbers as they are: muscles share those of their curves."""
+        """Return the numbers unchanged: muscles share those of equal curves."""
         values = tuple(self.of(builder, force))
-        builder.check(force, values)
+        builder.check_finite(force, values)
         return values
 
-    def arguments(self, head: int, number: int) -> list[str]:
-        """Where they begin."""
+    def write_arguments(self, head: int, number: int) -> list[str]:
+        """Return the pointer to the first number."""
         return [f"at(p, {number})"]
 
 
 @dataclass(frozen=True)
 class Curve(Parameter):
-    """A property that is a function of one number; the law is given its table, for `value_at`."""
+    """Property that is a function of one argument; the law takes its table, for `value_at`."""
 
     name: str
-    heads = 1
+    int_count = 1
 
     def read(self, builder: ElementBuilder, force: Any) -> Function:
-        """The function."""
-        return builder.function(force, getattr(force, self.name), self.name)
+        """Return the function."""
+        return builder.read_function(force, getattr(force, self.name), self.name)
 
-    def arguments(self, head: int, number: int) -> list[str]:
-        """Its table."""
+    def write_arguments(self, head: int, number: int) -> list[str]:
+        """Return the pointer to the table."""
         return [f"at(p, i[{head}])"]
 
     def pack(
         self, value: Function, tail: Tail, where: str
     ) -> tuple[Sequence[int], Sequence[float]]:
-        """Place of the table."""
+        """Return the offset of the table, which goes into the tail."""
         return (tail.put_numbers(table_of_one(value, f"the {self.name} of {where}")),), ()
 
 
 @dataclass(frozen=True)
 class Together(Parameter):
-    """Several of these that the law is given as one named tuple."""
+    """Several parameters that the law takes as one named tuple."""
 
-    type: type[Any]  # the tuple
-    terms: tuple[Parameter, ...]  # what is in each of its fields
+    type: type[Any]  # type of the tuple
+    terms: tuple[Parameter, ...]  # parameter of each field
 
     @property
     def size(self) -> int:  # type: ignore[override]
-        """How many numbers."""
+        """Number of numbers."""
         return sum(term.size for term in self.terms)
 
     @property
-    def heads(self) -> int:  # type: ignore[override]
-        """How many integers."""
-        return sum(term.heads for term in self.terms)
+    def int_count(self) -> int:  # type: ignore[override]
+        """Number of integers."""
+        return sum(term.int_count for term in self.terms)
 
     def read(self, builder: ElementBuilder, force: Any) -> Any:
-        """The tuple."""
+        """Return the named tuple."""
         return self.type(*(term.read(builder, force) for term in self.terms))
 
-    def arguments(self, head: int, number: int) -> list[str]:
-        """It."""
-        return [f"{self.type.__name__}({', '.join(arguments_of(self.terms, head, number))})"]
+    def write_arguments(self, head: int, number: int) -> list[str]:
+        """Return the constructor call of the named tuple."""
+        return [f"{self.type.__name__}({', '.join(write_arguments(self.terms, head, number))})"]
 
-    def functions(self) -> dict[str, Callable[..., Any]]:
-        """What makes it."""
+    def list_functions(self) -> dict[str, Callable[..., Any]]:
+        """Return the type of the tuple, by name."""
         return {self.type.__name__: self.type}
 
     def pack(self, value: Any, tail: Tail, where: str) -> tuple[Sequence[int], Sequence[float]]:
-        """Their integers and numbers, one after another."""
+        """Return the integers and numbers of all its parameters, one after another."""
         packed = [term.pack(own, tail, where) for term, own in zip(self.terms, value, strict=True)]
         return [place for ints, _ in packed for place in ints], [
             x for _, numbers in packed for x in numbers
@@ -250,104 +272,104 @@ class Together(Parameter):
 
 @dataclass(frozen=True)
 class Expression(Parameter):
-    """A property that is a formula; the law is given its steps, constants and registers, for `compute`."""
+    """Property that is an expression; the law takes its steps, constants and registers, for `compute`."""
 
-    name: str  # of the property
-    variables: tuple[str, ...]  # that it may name
-    heads = 3
+    name: str  # name of the property
+    variables: tuple[str, ...]  # names of its variables
+    int_count = 3
 
     def read(self, builder: ElementBuilder, force: Any) -> Formula:
-        """The formula."""
+        """Return the parsed expression."""
         where = f"the {self.name} of '{builder.path(force)}'"
         return Formula.parse(getattr(force, self.name), self.variables, where)
 
-    def arguments(self, head: int, number: int) -> list[str]:
-        """Steps, constants, registers."""
+    def write_arguments(self, head: int, number: int) -> list[str]:
+        """Return the pointers to steps, constants and registers."""
         return [f"at(i, i[{head}])", f"at(p, i[{head + 1}])", f"at(found, i[{head + 2}])"]
 
     def pack(self, value: Formula, tail: Tail, where: str) -> tuple[Sequence[int], Sequence[float]]:
-        """Places of steps (their count first), constants and registers."""
+        """Return the offsets of the steps (after their count), the constants and the registers."""
         steps, constants = program(value)
         count = len(steps) // 3
-        # Where they are to carry derivatives, these are by the variables.
-        registers = tail.put_room((1 + len(self.variables)) * (len(self.variables) + count))
+        # Each register may carry its derivatives with respect to the variables.
+        registers = tail.reserve_record((1 + len(self.variables)) * (len(self.variables) + count))
         return (tail.put_ints((count, *steps)), tail.put_numbers(constants), registers), ()
 
 
 @dataclass(frozen=True)
 class Expressions(Parameter):
-    """Properties that are formulas in the same variables.
+    """Properties that are expressions in the same variables.
 
-    The law is given the steps of each, with their count and the place of its constants before them;
-    the numbers that these places count from; and the registers that they share.
+    The law takes the steps of each, preceded by their count and the offset of its constants; the
+    numbers that these offsets refer to; and the registers, which all expressions use.
     """
 
-    names: tuple[str, ...]  # of the properties
-    variables: tuple[str, ...]  # that they may name
-    heads = 2
+    names: tuple[str, ...]  # names of the properties
+    variables: tuple[str, ...]  # names of their variables
+    int_count = 2
 
     def read(self, builder: ElementBuilder, force: Any) -> tuple[Formula, ...]:
-        """The formulas."""
+        """Return the parsed expressions."""
         return tuple(Expression(name, self.variables).read(builder, force) for name in self.names)
 
-    def arguments(self, head: int, number: int) -> list[str]:
-        """Steps, numbers, registers."""
+    def write_arguments(self, head: int, number: int) -> list[str]:
+        """Return the pointers to steps, numbers and registers."""
         return [f"at(i, i[{head}])", "p", f"at(found, i[{head + 1}])"]
 
     def pack(
         self, value: Sequence[Formula], tail: Tail, where: str
     ) -> tuple[Sequence[int], Sequence[float]]:
-        """Places of the steps and of the registers."""
+        """Return the offsets of the steps and of the registers."""
         ints: list[int] = []
         most = 0
         for formula in value:
             steps, constants = program(formula)
             ints += (len(steps) // 3, tail.put_numbers(constants), *steps)
             most = max(most, len(steps) // 3)
-        return (tail.put_ints(ints), tail.put_room(len(self.variables) + most)), ()
+        return (tail.put_ints(ints), tail.reserve_record(len(self.variables) + most)), ()
 
 
 @dataclass(frozen=True)
 class Control(Parameter):
-    """What the controllers set: the controls of an actuator, as many as it has."""
+    """Controls of an actuator, as many as it has."""
 
     count: int
-    heads = 1
+    int_count = 1
 
     def read(self, builder: ElementBuilder, force: Any) -> Any:
-        """Number of the first of them among those of the model."""
-        return builder.controls.first_of(builder, force)
+        """Return the index of its first control among those of the model."""
+        return builder.controls.find_first(builder, force)
 
-    def arguments(self, head: int, number: int) -> list[str]:
-        """They, one by one."""
+    def write_arguments(self, head: int, number: int) -> list[str]:
+        """Return one expression for each control."""
         return [f"data[model[MODEL.WORK_CONTROL] + i[{head}] + {k}]" for k in range(self.count)]
 
     def pack(self, value: Any, tail: Tail, where: str) -> tuple[Sequence[int], Sequence[float]]:
-        """The number."""
+        """Return the index and no numbers."""
         return (value,), ()
 
 
 @dataclass(frozen=True)
 class ReflexControl(Control):
-    """The control of a muscle, to which its own lengthening may add."""
+    """Control of a muscle, to which a stretch reflex may add."""
 
     count: int = 1
     size = 1
 
     def read(self, builder: ElementBuilder, force: Any) -> Any:
-        """Its number, and the gain of the reflex, s/m."""
-        return super().read(builder, force), builder.controls.gain(builder, force)
+        """Return the index of the control, and the gain of the reflex, s/m."""
+        return super().read(builder, force), builder.controls.compute_gain(builder, force)
 
-    def arguments(self, head: int, number: int) -> list[str]:
-        """The control."""
+    def write_arguments(self, head: int, number: int) -> list[str]:
+        """Return the expression of the control with the reflex."""
         return [f"with_reflex(data, model[MODEL.WORK_CONTROL] + i[{head}], p[{number}], rate)"]
 
-    def functions(self) -> dict[str, Callable[..., Any]]:
-        """What adds."""
+    def list_functions(self) -> dict[str, Callable[..., Any]]:
+        """Return the function that adds the reflex, by name."""
         return {"with_reflex": with_reflex}
 
     def pack(
         self, value: tuple[int, float], tail: Tail, where: str
     ) -> tuple[Sequence[int], Sequence[float]]:
-        """Number and gain."""
+        """Return the index and the gain."""
         return value[:1], value[1:]

@@ -33,62 +33,63 @@ from osimlite.simulation.elements.registry import PROBE_TYPES, kernel_name
 from osimlite.simulation.states import StateVariable
 
 HEAD = ITEM.OWN + 5
-"""Offset of the integers that tell what a probe reads, after those of its own."""
+"""Offset of the integers of a probe's subjects, after its own integers."""
 
 INTEGRATE = "integrate"
+"""Operation of a probe that reports an integral over time."""
 
 
 class Subject(NamedTuple):
-    """One actuator, and the numbers that the law is given with it."""
+    """One actuator, and the numbers that the law takes for it."""
 
     actuator: Any
     numbers: Any
 
 
 class Reading(NamedTuple):
-    """What a probe reads."""
+    """Inputs of a probe, and the labels of its results."""
 
-    labels: tuple[str, ...]  # of its results
-    subjects: tuple[Subject, ...] = ()  # what the law is called for
-    # place among the results of that of the first subject; -1 if the sum is all there is. The sum
-    # is the first result unless the subjects begin there.
+    labels: tuple[str, ...]  # labels of its results
+    subjects: tuple[Subject, ...] = ()  # actuators that the law is called for
+    # index of the first subject's result; -1 if the sum is the only result. The sum is the first
+    # result unless this index is 0.
     first: int = -1
-    # that the sum begins with; it is the second result if the subjects begin after it
+    # first term of the sum, which is also the second result if `first` is 2
     constant: float = 0.0
-    curve: Function | None = None  # that the law is given
-    details: Any = ()  # what a measure must know
+    curve: Function | None = None  # curve that the law takes
+    details: Any = ()  # data for `measure`
 
 
 @dataclass(frozen=True, eq=False)
 class ProbeType:
-    """A kind of probe."""
+    """Declaration of how the probes of one class are computed."""
 
     component: type  # class of the probes
-    # what one reads; raises an UnsupportedError for one that cannot be computed
+    # returns the inputs of a probe; raises an UnsupportedError if it cannot be computed
     read: Callable[[ElementBuilder, Any], Reading]
-    law: Callable[..., float] | None = None  # gives the quantity of one subject
-    # names of what it is given of a subject: of its record, or "actuation", "speed" and "control"
+    law: Callable[..., float] | None = None  # returns the quantity of one subject
+    # inputs of the law from a subject: recorded quantities, or "actuation", "speed" and "control"
     reads: tuple[str, ...] = ()
-    numbers: Any = tuple  # the tuple that it is given last
-    # computes the results in the place of a law, from the probe, the system after its forces were
-    # evaluated, and for what time (s) and state that was
+    numbers: Any = tuple  # type of the last argument of the law, a named tuple
+    # computes the results instead of a law, from the probe, the system after an evaluation of its
+    # forces, and the time (s) and state of the evaluation
     measure: Callable[[DeclaredProbe, Any, float, Sequence[float]], Sequence[float]] | None = None
-    has_curve: bool = False  # whether the law is given a curve
+    has_curve: bool = False  # whether the law takes a curve
 
     @property
     def name(self) -> str:
-        """Of its kernel, and of the module that declares it."""
+        """Name of its kernel, which is the name of the class in snake case."""
         return kernel_name(self.component.__name__)
 
     @cached_property
     def kernel(self) -> Callable[..., int]:
-        """The function that computes one probe."""
+        """Function that computes one probe."""
         scope = {"law": self.law, self.numbers.__name__: self.numbers}
         return written(self.name, PROBE_TYPES.module_of(self.component), self.source, **scope)
 
     @property
     def source(self) -> str:
-        """The text of the kernel."""
+        """Source text of the kernel."""
         size, count = len(self.numbers._fields), len(self.reads)
         given = [f"data[a[{k}]]" for k in range(count)]
         given += [f"at(p, i[{HEAD - 1}])"] if self.has_curve else []
@@ -116,40 +117,43 @@ class ProbeType:
 
 @dataclass(frozen=True)
 class DeclaredProbe(Silent):
-    """One probe; see :class:`osimlite.simulation.elements.force_records.ForceElement` for what it is to the kernels."""
+    """Probe of a declared type; see :class:`osimlite.simulation.elements.force_records.ForceElement`."""
 
-    component: type  # its class
-    path: str  # of the component
-    name: str  # of the component
-    operation: str  # what is made of its results: "value", "integrate" and so on
-    gain: float  # factor of what is reported
-    initial: tuple[float, ...]  # where integrals start
-    reading: Reading  # what it reads
-    # for each subject and each thing that it reads, the element whose record has it, and where
-    # there
+    component: type  # class of the component
+    path: str  # path of the component
+    name: str  # name of the component
+    operation: str  # operation on its results: "value", "integrate" and so on
+    gain: float  # factor of the reported results
+    initial: tuple[float, ...]  # initial values of integrals
+    reading: Reading  # inputs
+    # for each subject and each input, the element whose record has it, and the offset there
     places: tuple[tuple[tuple[str, int], ...], ...] = ()
-    numbers: tuple[tuple[float, ...], ...] = ()  # that the law is given of each subject
+    numbers: tuple[tuple[float, ...], ...] = ()  # last argument of the law for each subject
 
     @property
     def probe_type(self) -> ProbeType:
-        """The declaration."""
+        """Declaration of its class."""
         return PROBE_TYPES.find(self.component)
 
     @property
     def states(self) -> tuple[StateVariable, ...]:
-        """Its integrals."""
+        """Integrals that the probe reports, which are states.
+
+        Returns:
+            One state for each result; none if the operation is not `integrate`.
+        """
         labels = self.reading.labels if self.operation == INTEGRATE else ()
         return tuple(StateVariable(f"{self.path}/{label}", is_named=False) for label in labels)
 
-    def items(self, places: Places) -> list[ForceRecord]:
-        """What the kernels compute."""
+    def make_records(self, places: Places) -> list[ForceRecord]:
+        """Return the record that the kernels compute; none if the probe has no law."""
         if self.probe_type.law is None:
             return []
         reading, integrals = self.reading, len(self.states)
         numbers = [reading.constant, *(number for row in self.numbers for number in row)]
         ints = [len(self.places), reading.first, integrals, 0, len(numbers)]
         reads = [read for row in self.places for read in row]
-        looks_at = tuple((len(ints) + number, owner) for number, (owner, _) in enumerate(reads))
+        references = tuple((len(ints) + number, owner) for number, (owner, _) in enumerate(reads))
         ints += [place for _, place in reads]
         if reading.curve is not None:
             numbers += table_of_one(reading.curve, f"the curve of '{self.path}'")
@@ -158,27 +162,26 @@ class DeclaredProbe(Silent):
                 self.probe_type.name,
                 tuple(ints),
                 tuple(numbers),
-                room=len(reading.labels),
+                record_size=len(reading.labels),
                 is_part=not integrals,
                 states=(3,) if integrals else (),
-                looks_at=looks_at,
+                record_references=references,
             )
         ]
 
 
-def probe_elements(
-    builder: ElementBuilder, elements: Sequence[ForceElement]
-) -> list[DeclaredProbe]:
-    """The probes of a model that are enabled, in its order; those that cannot be computed are told of and left out.
+def make_probes(builder: ElementBuilder, elements: Sequence[ForceElement]) -> list[DeclaredProbe]:
+    """Return the enabled probes of a model, in its order.
 
-    Components whose outputs are reported are among them.
+    Components whose outputs are reported are included. A probe that cannot be computed is left out, with
+    a notice.
 
     Args:
-        builder: of the elements.
-        elements: the forces of the model.
+        builder: builder of the elements.
+        elements: forces of the model.
 
     Raises:
-        ModelError: a probe names what does not exist, where OpenSim stops too.
+        ModelError: a probe names something that does not exist, where OpenSim fails too.
     """
     by_path = {element.path: element for element in elements}
     result = []
@@ -187,28 +190,29 @@ def probe_elements(
         if probe_type is None or not getattr(probe, "enabled", True):
             continue
         try:
-            result.append(_made(probe_type, builder, probe, by_path))
+            result.append(_make_probe(probe_type, builder, probe, by_path))
         except UnsupportedError as error:
             warn_caller(f"{error.message} is left out of the probes")
     return result
 
 
-def _made(
+def _make_probe(
     probe_type: ProbeType, builder: ElementBuilder, probe: Any, elements: Mapping[str, ForceElement]
 ) -> DeclaredProbe:
     path, reading = builder.path(probe), probe_type.read(builder, probe)
-    # A component with outputs has values, and no operations.
+    # A component with outputs has no operations: it reports values.
     operation, gain = getattr(probe, "probe_operation", "value"), float(getattr(probe, "gain", 1.0))
     if operation == INTEGRATE and probe_type.law is None:
-        raise builder.unsupported(probe, ", whose integral osimlite does not compute")
+        raise builder.unsupported_error(probe, ", whose integral osimlite does not compute")
     initial: tuple[float, ...] = tuple(getattr(probe, "initial_conditions_for_integration", ()))
     if len(initial) != len(reading.labels):
-        # As in OpenSim, which says that it is an error.
+        # As in OpenSim, which reports an error and continues.
         initial = (0.0,) * len(reading.labels)
     subjects = [
-        _subject(probe_type, builder, probe, subject, elements) for subject in reading.subjects
+        _locate_inputs(probe_type, builder, probe, subject, elements)
+        for subject in reading.subjects
     ]
-    builder.check(
+    builder.check_finite(
         probe, [gain, reading.constant, *initial, *(x for _, numbers in subjects for x in numbers)]
     )
     return DeclaredProbe(
@@ -224,49 +228,49 @@ def _made(
     )
 
 
-def _subject(
+def _locate_inputs(
     probe_type: ProbeType,
     builder: ElementBuilder,
     probe: Any,
     subject: Subject,
     elements: Mapping[str, ForceElement],
 ) -> tuple[tuple[tuple[str, int], ...], tuple[float, ...]]:
-    """Where what the law is given of a subject stands, and its numbers."""
+    """Return where the records have the inputs of the law for a subject, and the subject's numbers."""
     actuator, numbers = subject
     path = builder.path(actuator)
-    control = CONTROLS, builder.controls.first_of(builder, actuator)
+    control = CONTROLS, builder.controls.find_first(builder, actuator)
     element = elements.get(path)
     if not actuator.appliesForce and "factor" in getattr(numbers, "_fields", ()):
-        # Its force is 0.
+        # A force that is off is 0.
         return (control,) * len(probe_type.reads), tuple(map(float, numbers._replace(factor=0.0)))
     if not isinstance(element, DeclaredForce) or not actuator.appliesForce:
-        raise builder.unsupported(probe, f" of '{path}', which applies no force that is computed")
-    known = element.force_type.known_of
+        raise builder.unsupported_error(probe, f" of '{path}', whose force is not computed")
+    known = element.force_type.record_names
     places = []
     for name in probe_type.reads:
         place = known.get(name)
         if place is None and name != "control":
-            raise builder.unsupported(
-                probe, f" of '{path}', of which no {name.replace('_', ' ')} is known"
+            raise builder.unsupported_error(
+                probe, f" of '{path}', whose {name.replace('_', ' ')} is unknown"
             )
         places.append(control if place is None else (path, place))
     return tuple(places), tuple(map(float, numbers))
 
 
-def members_of(
+def find_members(
     builder: ElementBuilder, probe: Any, words: Sequence[Any], path: str, probe_type: str
 ) -> list[Any]:
-    """The components in a set that a probe names; the one word `all` means all.
+    """Return the components in a set that a probe names; the single word `all` means all.
 
     Args:
-        builder: of the elements.
-        probe: that names them.
+        builder: builder of the elements.
+        probe: the probe.
         words: names, or components.
-        path: of the set.
+        path: path of the set.
         kind: class of the components.
 
     Raises:
-        ModelError: there is none of a name.
+        ModelError: the set has no component of a name.
     """
     known = builder.tree.members(path, probe_type)
     names = [word if isinstance(word, str) else word.name for word in words]

@@ -1,4 +1,4 @@
-"""Controllers by synergies, and outputs of components that are functions of time, as their inputs."""
+"""Controllers by synergies, and their inputs: outputs of components that are functions of time."""
 
 from __future__ import annotations
 
@@ -14,19 +14,24 @@ from osimlite.schema.controller_types import SynergyController
 from osimlite.schema.reporters import SignalGenerator, TableSource__double_
 from osimlite.simulation.elements.builder import ElementBuilder
 from osimlite.simulation.elements.control_tables import read_controls
-from osimlite.simulation.elements.controls import Drive, named
+from osimlite.simulation.elements.controls import Drive, find_actuators
 from osimlite.simulation.elements.registry import register_controller
 
 
 @dataclass(frozen=True)
 class TableColumn(PiecewiseLinear):
-    """Straight lines between the rows of a table, outside of which there is nothing."""
+    """Linear interpolation between the rows of a table, which is undefined outside of the table."""
 
     source: str = ""  # path of the component that has the table
 
 
 def read_signal(builder: ElementBuilder, controller: Any, text: str) -> Function | None:
-    """The output that a controller's input names as `path|output:channel`; None if it is no function of time.
+    """Return the output that the text `path|output:channel` names; None if it is not a function of time.
+
+    Args:
+        builder: builder of the elements.
+        controller: controller with the input.
+        text: the text of the input.
 
     Raises:
         ModelError: there is no such output.
@@ -40,7 +45,7 @@ def read_signal(builder: ElementBuilder, controller: Any, text: str) -> Function
         )
     name, _, channel = output.partition(":")
     if isinstance(source, SignalGenerator) and name == "signal":
-        return builder.function(source, source.function, "function")
+        return builder.read_function(source, source.function, "function")
     if isinstance(source, TableSource__double_) and name == "column":
         table = read_controls(beside(builder.folder, source.filename))
         if channel not in table.columns:
@@ -58,14 +63,15 @@ def read_signal(builder: ElementBuilder, controller: Any, text: str) -> Function
 
 @register_controller(SynergyController)
 def drive_by_synergies(builder: ElementBuilder, controller: SynergyController) -> Iterator[Drive]:
-    """The signals times the weights of each control; nothing without signals.
+    """Yield each signal times the weight of each control; nothing if there are no signals.
 
     Raises:
-        ModelError: there is not one read_signal for each vector, or not one weight for each control.
+        ModelError: the numbers of signals and vectors, or of weights and controls, differ.
     """
     path, vectors = builder.path(controller), controller.synergy_vectors
     counts = [
-        (item, getattr(type(item), "control_count", 1)) for item in named(builder, controller)
+        (item, getattr(type(item), "control_count", 1))
+        for item in find_actuators(builder, controller)
     ]
     targets = [(item, number) for item, count in counts for number in range(count)]
     for vector in vectors:
@@ -83,9 +89,9 @@ def drive_by_synergies(builder: ElementBuilder, controller: SynergyController) -
         function = read_signal(builder, controller, word)
         for (actuator, number), weight in zip(targets, vector.synergy_weights, strict=True):
             if function is None:
-                refused: UnsupportedError = builder.unsupported(
+                refused: UnsupportedError = builder.unsupported_error(
                     actuator,
-                    f" driven by '{path}', whose input '{word}' is no function of time that is known",
+                    f" driven by '{path}', whose input '{word}' is not a known function of time",
                 )
                 yield Drive(actuator, refused)
             else:

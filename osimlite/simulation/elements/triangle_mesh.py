@@ -1,4 +1,4 @@
-"""Closed surfaces of triangles for contact, cut into triangles as Simbody does."""
+"""Closed surfaces of triangles for contact, with polygons divided into triangles as Simbody does."""
 
 from __future__ import annotations
 
@@ -19,43 +19,45 @@ from osimlite.io.meshes.vtp import vtp_polygons
 from osimlite.mechanics.multibody.spatial import Array
 
 _SAME_POINT = 8.7e-7
-"""STL files have no common points; corners nearer than this in every direction are one, as for Simbody (m)."""
+"""Corners of an STL file are one point if they are nearer than this in every direction (m), as in Simbody."""
 
 _AS_NEAR = 1.0 + 1e-10
-"""Squared distances within this factor are one; where triangles meet, the angle decides which is nearest."""
+"""Squared distances within this factor count as equal; then the angle decides which triangle is nearest."""
 
 _STEPS = np.array(list(product((0, -1, 1), repeat=3)))
-"""To a cell of a grid and its neighbours."""
+"""Offsets from a cell of a grid to itself and its neighbours."""
 
 Flags = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
 class TriangleMesh:
-    """A closed surface."""
+    """Closed surface of triangles."""
 
-    points: Array  # (n, 3), m
-    triangles: Indices  # (t, 3) places of points, counter-clockwise seen from outside
+    points: Array  # positions (n, 3), m
+    triangles: Indices  # indices of points (t, 3), counter-clockwise seen from outside
 
     @classmethod
     def read(cls, name: str, folders: MeshFolders) -> TriangleMesh:
-        """The surface in a file (.vtp, .stl, .stla or .obj) in one of the folders of a model.
+        """Return the surface in a file (.vtp, .stl, .stla or .obj) in one of the folders of a model.
 
         Raises:
-            ModelError: there is no such file, it is of another kind, or it is not a closed surface.
+            ModelError: there is no such file, its format is unknown, or it is not a closed surface.
             OsimliteError: the file cannot be read, or is outside the folders.
         """
         path = folders.find(name)
         if path is None:
-            raise ModelError(f"the mesh file '{name}' is not there; put it beside the model's file")
+            raise ModelError(
+                f"the mesh file '{name}' does not exist; put it beside the model's file"
+            )
         content = read_file(path)
         match path.suffix.lower():
             case ".vtp":
-                return cls.of_polygons(vtp_polygons(content, str(path)), str(path))
+                return cls.from_polygons(vtp_polygons(content, str(path)), str(path))
             case ".obj":
-                return cls.of_polygons(obj_polygons(content, str(path)), str(path))
+                return cls.from_polygons(obj_polygons(content, str(path)), str(path))
             case ".stl" | ".stla":
-                return cls.of_corners(stl_corners(content, str(path)), str(path))
+                return cls.from_corners(stl_corners(content, str(path)), str(path))
             case kind:
                 raise ModelError(
                     f"osimlite, like OpenSim, does not read {kind} files; save it as .obj",
@@ -63,8 +65,8 @@ class TriangleMesh:
                 )
 
     @classmethod
-    def of_corners(cls, corners: Array, file: str) -> TriangleMesh:
-        """The surface of triangles (t, 3, 3), whose corners are common where they are in one place."""
+    def from_corners(cls, corners: Array, file: str) -> TriangleMesh:
+        """Return the surface of triangles (t, 3, 3), in which corners at one position become one point."""
         different, which = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
         points: list[Array] = []
         cells: dict[tuple[int, ...], int] = {}
@@ -77,11 +79,11 @@ class TriangleMesh:
             if place == len(points):
                 points.append(point)
                 cells[tuple(cell.tolist())] = place
-        return cls._closed(np.array(points), place_of[which].reshape(-1, 3), file)
+        return cls._make_closed(np.array(points), place_of[which].reshape(-1, 3), file)
 
     @classmethod
-    def of_polygons(cls, polygons: Polygons, file: str) -> TriangleMesh:
-        """The surface of polygons: four corners make two triangles, more make a fan about their mean."""
+    def from_polygons(cls, polygons: Polygons, file: str) -> TriangleMesh:
+        """Return the surface of polygons: a quadrilateral becomes two triangles, a larger one a fan about its mean."""
         points, triangles = polygons.points.tolist(), []
         for around in np.split(polygons.corners, polygons.ends[:-1]):
             match around.tolist():
@@ -94,12 +96,12 @@ class TriangleMesh:
                         (a, b, len(points)) for a, b in zip(many, [*many[1:], many[0]], strict=True)
                     ]
                     points.append(polygons.points[around].mean(axis=0).tolist())
-        return cls._closed(
+        return cls._make_closed(
             np.array(points), np.array(triangles, dtype=np.int64).reshape(-1, 3), file
         )
 
     @classmethod
-    def _closed(cls, points: Array, triangles: Indices, file: str) -> TriangleMesh:
+    def _make_closed(cls, points: Array, triangles: Indices, file: str) -> TriangleMesh:
         edges = np.concatenate([triangles[:, [a, b]] for a, b in ((0, 1), (1, 2), (2, 0))])
         codes, back = (edges @ np.array(pair) for pair in ((len(points), 1), (1, len(points))))
         counts = np.unique(codes, return_counts=True)[1]
@@ -121,48 +123,48 @@ class TriangleMesh:
         volume = np.einsum("ij,ij->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))
         return result if volume > 0.0 else cls(points, triangles[:, ::-1])
 
-    def moved(self, frame: Array) -> TriangleMesh:
-        """The surface in another frame, in which its own is `frame` (4, 4)."""
+    def transform(self, frame: Array) -> TriangleMesh:
+        """Return the surface in another frame, in which its axes and origin are `frame` (4, 4)."""
         return TriangleMesh(self.points @ frame[:3, :3].T + frame[:3, 3], self.triangles)
 
     @cached_property
     def corners(self) -> Array:
-        """Corners (t, 3, 3) of the triangles."""
+        """Corners (t, 3, 3) of the triangles, m."""
         return np.asarray(self.points[self.triangles])
 
     @cached_property
     def centroids(self) -> Array:
-        """Middles (t, 3) of the triangles."""
+        """Centroids (t, 3) of the triangles, m."""
         return np.asarray(self.corners.mean(axis=1))
 
     @cached_property
-    def _doubled(self) -> Array:
+    def _doubled_normals(self) -> Array:
         a, b, c = np.moveaxis(self.corners, 1, 0)
         return np.asarray(np.cross(b - a, c - a))
 
     @cached_property
     def areas(self) -> Array:
         """Areas (t,) of the triangles, m^2."""
-        return np.asarray(0.5 * np.linalg.norm(self._doubled, axis=1))
+        return np.asarray(0.5 * np.linalg.norm(self._doubled_normals, axis=1))
 
     @cached_property
     def normals(self) -> Array:
-        """Outward unit vectors (t, 3) of the triangles."""
-        return np.asarray(self._doubled / (2.0 * self.areas[:, None]))
+        """Outward unit normals (t, 3) of the triangles."""
+        return np.asarray(self._doubled_normals / (2.0 * self.areas[:, None]))
 
     @cached_property
     def center(self) -> Array:
-        """Middle (3,) of the box around the surface."""
+        """Middle (3,) of the bounding box, m."""
         return np.asarray(0.5 * (self.points.min(axis=0) + self.points.max(axis=0)))
 
     @cached_property
     def radius(self) -> float:
-        """Of the ball about `center` that holds the surface, m."""
+        """Radius of the ball about `center` that contains the surface, m."""
         return float(np.linalg.norm(self.points - self.center, axis=1).max())
 
     @cached_property
     def _reaches(self) -> Array:
-        """Distance (t,) from the middle of each triangle to its farthest corner."""
+        """Distance (t,) from the centroid of each triangle to its farthest corner, m."""
         return np.asarray(
             np.linalg.norm(self.corners - self.centroids[:, None], axis=2).max(axis=1)
         )
@@ -179,8 +181,15 @@ class TriangleMesh:
                 return len(np.unique(label[self.triangles])) == 1
             label = new
 
-    def nearest(self, places: Array) -> tuple[Array, Flags]:
-        """The nearest points (m, 3) of the surface to some places (m, 3), and which of those are inside it."""
+    def find_nearest(self, places: Array) -> tuple[Array, Flags]:
+        """Return the nearest points of the surface to some points.
+
+        Args:
+            places: the points (m, 3), m.
+
+        Returns:
+            The nearest points (m, 3), and which of the given points are inside the surface (m,).
+        """
         apart = np.linalg.norm(places[:, None] - self.centroids, axis=2)
         least = (apart + self._reaches).min(axis=1)
         which, triangles = np.nonzero(apart - self._reaches <= least[:, None])
@@ -189,8 +198,7 @@ class TriangleMesh:
         squares = np.einsum("ij,ij->i", ways, ways)
         bound = np.full(len(places), np.inf)
         np.minimum.at(bound, which, squares)
-        # Where triangles meet, the one that is seen most from the front tells the inside from the
-        # outside.
+        # Where triangles meet, the one most perpendicular to the offset decides what is inside.
         height = np.einsum("ij,ij->i", ways, self.normals[triangles])
         near = np.flatnonzero(squares <= _AS_NEAR * bound[which])
         order = near[np.lexsort((-np.abs(height[near]), which[near]))]
@@ -198,31 +206,31 @@ class TriangleMesh:
         return result[best], height[best] > 0.0
 
     def crosses(self, other: TriangleMesh) -> bool:
-        """Whether a triangle of one surface cuts one of the other."""
+        """Return whether a triangle of this surface intersects one of the other."""
         return _edges_cross(self, other) or _edges_cross(other, self)
 
 
 def _nearest_on_triangles(corners: Array, places: Array) -> Array:
-    """The nearest point (k, 3) of each triangle (k, 3, 3) to a place (k, 3)."""
+    """Return the nearest point (k, 3) of each triangle (k, 3, 3) to a point (k, 3)."""
     a, b, c = np.moveaxis(corners, 1, 0)
     normal = np.cross(b - a, c - a)
-    height = _dots(places - a, normal) / _dots(normal, normal)
+    height = _dot_rows(places - a, normal) / _dot_rows(normal, normal)
     on_plane = places - height[:, None] * normal
     inside = np.ones(len(places), dtype=bool)
     best, least = on_plane.copy(), np.full(len(places), np.inf)
     for start, end in ((a, b), (b, c), (c, a)):
         along = end - start
-        inside &= _dots(np.cross(along, on_plane - start), normal) >= 0.0
-        part = np.clip(_dots(places - start, along) / _dots(along, along), 0.0, 1.0)
+        inside &= _dot_rows(np.cross(along, on_plane - start), normal) >= 0.0
+        part = np.clip(_dot_rows(places - start, along) / _dot_rows(along, along), 0.0, 1.0)
         point = start + part[:, None] * along
-        distance = _dots(point - places, point - places)
+        distance = _dot_rows(point - places, point - places)
         best = np.where((distance < least)[:, None], point, best)
         least = np.minimum(distance, least)
     return np.where(inside[:, None], on_plane, best)
 
 
 def _edges_cross(one: TriangleMesh, two: TriangleMesh) -> bool:
-    """Whether an edge of one surface goes through a triangle of another."""
+    """Return whether an edge of one surface goes through a triangle of another."""
     edges = np.concatenate([one.triangles[:, [a, b]] for a, b in ((0, 1), (1, 2), (2, 0))])
     edges = edges[edges[:, 0] < edges[:, 1]]
     start, end = one.points[edges[:, 0]], one.points[edges[:, 1]]
@@ -234,15 +242,15 @@ def _edges_cross(one: TriangleMesh, two: TriangleMesh) -> bool:
     edge, triangle = np.nonzero(near)
     a, b, c = np.moveaxis(two.corners[triangle], 1, 0)
     p, q = start[edge], end[edge]
-    # The ends lie on either side of the plane, and the line passes all sides on the same hand.
+    # The ends are on different sides of the plane, and the line passes all edges on the same side.
     normal = two.normals[triangle]
-    divided = _dots(p - a, normal) * _dots(q - a, normal) <= 0.0
-    hands = [_dots(q - p, np.cross(u - p, v - p)) for u, v in ((a, b), (b, c), (c, a))]
+    divided = _dot_rows(p - a, normal) * _dot_rows(q - a, normal) <= 0.0
+    hands = [_dot_rows(q - p, np.cross(u - p, v - p)) for u, v in ((a, b), (b, c), (c, a))]
     same = np.all([hand >= 0.0 for hand in hands], axis=0) | np.all(
         [hand <= 0.0 for hand in hands], axis=0
     )
     return bool(np.any(divided & same))
 
 
-def _dots(a: Array, b: Array) -> Array:
+def _dot_rows(a: Array, b: Array) -> Array:
     return np.asarray(np.einsum("ij,ij->i", a, b))

@@ -31,7 +31,7 @@ from osimlite.mechanics.codegen.toolchain import (
     find_compiler,
     library_suffix,
 )
-from osimlite.simulation.elements.laws import law_of, symbol_of
+from osimlite.simulation.elements.laws import find_law, get_symbol
 from osimlite.simulation.engines.private_files import read_private, write_private
 
 _log = logging.getLogger(__name__)
@@ -71,7 +71,7 @@ def load_function(symbol: str, function: Function, directions: int) -> int | Non
 
 def load_law(name: str) -> int | None:
     """Return the address of a law that was compiled before; None if there is no file that only the user can write."""
-    return load_function(symbol_of(name), *law_of(name))
+    return load_function(get_symbol(name), *find_law(name))
 
 
 def compile_laws(names: Sequence[str]) -> dict[str, int]:
@@ -89,7 +89,9 @@ def compile_laws(names: Sequence[str]) -> dict[str, int]:
     find_compiler()
     _log.info("compiling %d kernels", len(names))
     with ThreadPoolExecutor(max(1, min(count_cores(), len(names)))) as pool:
-        addresses = pool.map(lambda name: compile_function(symbol_of(name), *law_of(name)), names)
+        addresses = pool.map(
+            lambda name: compile_function(get_symbol(name), *find_law(name)), names
+        )
         return dict(zip(names, addresses, strict=True))
 
 

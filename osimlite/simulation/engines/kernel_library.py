@@ -17,7 +17,7 @@ from zlib import crc32
 from osimlite.mechanics.codegen.processor import processor_features, supports_v3
 from osimlite.mechanics.codegen.sources import compute_digest
 from osimlite.mechanics.codegen.toolchain import BASELINE, NATIVE, X86_64_V3, library_suffix
-from osimlite.simulation.elements.laws import law_of, symbol_of
+from osimlite.simulation.elements.laws import find_law, get_symbol
 
 PACKAGE = Path(__file__).parents[2]
 FOLDER = PACKAGE / "native"
@@ -52,7 +52,7 @@ class KernelLibrary:
         digest = self.table["laws"].get(name)
         if digest is None or not self._is_current(name, digest):
             return None
-        return ctypes.cast(self._library[symbol_of(name)], ctypes.c_void_p).value
+        return ctypes.cast(self._library[get_symbol(name)], ctypes.c_void_p).value
 
     @cached_property
     def changed_files(self) -> list[str]:
@@ -80,7 +80,7 @@ class KernelLibrary:
         if any(file.startswith("mechanics/codegen/") for file in self.changed_files):
             # Another translation of the same law.
             return False
-        return compute_digest(law_of(name)[0]) == digest
+        return compute_digest(find_law(name)[0]) == digest
 
 
 @cache

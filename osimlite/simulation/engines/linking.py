@@ -16,7 +16,7 @@ from osimlite.mechanics.kernels import pointers
 from osimlite.mechanics.kernels.layout import MODEL, OUTCOME
 from osimlite.mechanics.kernels.pointers import Ints
 from osimlite.mechanics.kernels.table import LAW_NUMBERS
-from osimlite.simulation.elements.laws import ALONG, RESPONSE, law_function
+from osimlite.simulation.elements.laws import ALONG, RESPONSE, find_function
 from osimlite.simulation.engines import machine_code
 from osimlite.simulation.engines.dual_numbers import DualVector, carried_by
 from osimlite.simulation.interrupts import defer_sigint
@@ -110,7 +110,7 @@ class _Compiled(Code):
         return lambda number: code(*addresses, number)
 
     def _function(self, function: str) -> Callable[..., int]:
-        parts = signature(law_function(function)).parameters.values()
+        parts = signature(find_function(function)).parameters.values()
         kinds = [
             ctypes.c_void_p if part.annotation in ("Floats", "Ints") else ctypes.c_int64
             for part in parts
@@ -189,17 +189,17 @@ class _Python(Code):
         pass
 
     def address(self, function: str) -> int:
-        law = law_function(function)
+        law = find_function(function)
         return pointers.address(carried_by(law) if function.endswith(RESPONSE) else law)
 
     def entry(self, function: str) -> Callable[..., int]:
-        kernel = law_function(function)
+        kernel = find_function(function)
         return lambda *parts: kernel(
             *(part.reshape(-1) if isinstance(part, np.ndarray) else part for part in parts)
         )
 
     def bound(self, function: str, *arrays: Any) -> Callable[[int], int]:
-        kernel = law_function(function)
+        kernel = find_function(function)
         return lambda number: kernel(*arrays, number)
 
     def callback(self, python: Callable[..., int], sizes: Sequence[int]) -> tuple[int, Any]:
@@ -218,16 +218,16 @@ class PythonTangents(_Python):
 
     def address(self, function: str) -> int:
         """Return what stands for the address of a function of the kernels."""
-        return pointers.address(carried_by(law_function(function)))
+        return pointers.address(carried_by(find_function(function)))
 
     def entry(self, function: str) -> Callable[..., int]:
         """Return a function of the kernels, called with contiguous arrays and integers."""
-        kernel = carried_by(law_function(function))
+        kernel = carried_by(find_function(function))
         return lambda *parts: kernel(*map(_to_duals, parts))
 
     def bound(self, function: str, *arrays: Any) -> Callable[[int], int]:
         """Return a function of the kernels with its arrays, called with one integer."""
-        kernel, vectors = carried_by(law_function(function)), [_to_duals(item) for item in arrays]
+        kernel, vectors = carried_by(find_function(function)), [_to_duals(item) for item in arrays]
         return lambda number: kernel(*vectors, number)
 
     def callback(self, python: Callable[..., int], sizes: Sequence[int]) -> tuple[int, Any]:

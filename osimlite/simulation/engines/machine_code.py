@@ -15,7 +15,7 @@ from collections.abc import Iterable, Sequence
 from osimlite.base.text import suggest_or_list
 from osimlite.errors import OsimliteError
 from osimlite.mechanics.codegen.toolchain import CompilationError, find_compiler
-from osimlite.simulation.elements.laws import law_of
+from osimlite.simulation.elements.laws import find_law
 from osimlite.simulation.engines import kernel_library
 
 VARIABLE = "OSIMLITE_KERNELS"
@@ -113,7 +113,7 @@ def can_prepare(names: Iterable[str]) -> bool:
         return True
     if allows(COMPILER) and find_compiler() is not None:
         return True
-    has_duals = any(law_of(name)[1] for name in missing)
+    has_duals = any(find_law(name)[1] for name in missing)
     return not has_duals and allows(NUMBA) and _has_numba()
 
 

@@ -24,7 +24,7 @@ from osimlite.simulation.batches import Renewed
 from osimlite.simulation.elements import ElementBuilder, Forces
 from osimlite.simulation.elements.controls import Controls, ModelControls
 from osimlite.simulation.elements.force_records import ForceRecord
-from osimlite.simulation.elements.probe_type import DeclaredProbe, probe_elements
+from osimlite.simulation.elements.probe_type import DeclaredProbe, make_probes
 from osimlite.simulation.elements.registry import FORCE_TYPES
 from osimlite.simulation.pack import pack
 
@@ -51,7 +51,7 @@ class NumbersOnly:
         freedoms = {place: number for number, place in enumerate(engine.order)}
         self._places = Places(engine.mechanism, freedoms, engine.placements)
         self._items = {
-            element.path: element.items(self._places) for element in engine.forces.elements
+            element.path: element.make_records(self._places) for element in engine.forces.elements
         }
         # The numbers of all items are the last ones before those of the controls, in their order.
         controls = engine.structure[MODEL.CONTROLS]
@@ -87,14 +87,14 @@ class NumbersOnly:
         sharing = {
             type(owner)
             for owner in owners
-            if getattr(FORCE_TYPES.find(type(owner)), "shares", False)
+            if getattr(FORCE_TYPES.find(type(owner)), "shares_numbers", False)
         }
         for force in (
             *owners,
             *(other for each in sharing for other in self._model.components(each)),
         ):
             if isinstance(force, Force):
-                element = self._builder.element(force)
+                element = self._builder.make_element(force)
                 made[element.path] = element
         if not made.keys() <= self._items.keys():
             return None
@@ -105,7 +105,7 @@ class NumbersOnly:
                 # The mass of the model has a say in what muscles use.
                 return None
             made |= {
-                probe.path: probe for probe in probe_elements(self._builder, self._forces.elements)
+                probe.path: probe for probe in make_probes(self._builder, self._forces.elements)
             }
         elements = tuple(made.get(element.path, element) for element in self._forces.elements)
         forces = replace(self._forces, elements=elements, controls=controls)
@@ -123,7 +123,7 @@ class NumbersOnly:
         """The given numbers with those of some elements, and of the controls, in their places."""
         numbers = self._engine.numbers.copy()
         for path, element in made.items():
-            items = element.items(self._places)
+            items = element.make_records(self._places)
             if [_kind(item) for item in items] != [_kind(item) for item in self._items[path]]:
                 return None
             place = self._first[path]
@@ -131,7 +131,7 @@ class NumbersOnly:
         if controls is not self._forces.controls:
             structure = self._engine.structure
             place = structure[MODEL.CONTROLS]
-            ints, own, _ = controls.record()
+            ints, own, _ = controls.make_record()
             if structure[place + ITEM.OWN :].tolist() != ints:
                 return None
             numbers[structure[place + ITEM.NUMBERS] :] = own
@@ -165,4 +165,11 @@ def _length(items: Sequence[ForceRecord]) -> int:
 
 def _kind(item: ForceRecord) -> tuple[object, ...]:
     """What of an item is not its numbers."""
-    return item.kernel, item.ints, len(item.numbers), item.room, item.is_contact, item.is_part
+    return (
+        item.kernel,
+        item.ints,
+        len(item.numbers),
+        item.record_size,
+        item.is_contact,
+        item.is_part,
+    )

@@ -19,7 +19,7 @@ from osimlite.mechanics.codegen.sources import compute_digest
 from osimlite.mechanics.codegen.toolchain import CompilationError
 from osimlite.mechanics.kernels import pointers
 from osimlite.mechanics.kernels.layout import Record
-from osimlite.simulation.elements.laws import law_of
+from osimlite.simulation.elements.laws import find_law
 
 _entries: dict[str, Any] = {}
 """Compiled laws by name: their machine code stays as long as these do."""
@@ -40,7 +40,7 @@ def compile_law(name: str) -> int:
     Raises:
         CompilationError: numba has no numbers that carry derivatives, or cannot compile the law.
     """
-    function, directions = law_of(name)
+    function, directions = find_law(name)
     if directions:
         raise CompilationError("numba has no derivatives of kernels")
     if name not in _entries:

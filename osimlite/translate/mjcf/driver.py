@@ -340,13 +340,14 @@ class Driver:
         """Add MuJoCo's controls to those of the model: numbers, whose places among those of the forces are found."""
         controls = self.system.forces.controls
         none, one = (
-            controls.driven(dict.fromkeys(controls.names, Constant(value))) for value in (0.0, 1.0)
+            controls.add_functions(dict.fromkeys(controls.names, Constant(value)))
+            for value in (0.0, 1.0)
         )
         self.system.drive(none)
         place = self.system.structure[MODEL.CONTROLS]
         first = self.system.structure[place + ITEM.NUMBERS] if place else 0
         self._controls = first + np.flatnonzero(
-            np.array(none.record()[1]) != np.array(one.record()[1])
+            np.array(none.make_record()[1]) != np.array(one.make_record()[1])
         )
         names = [self.model.actuator(k).name for k in range(self.model.nu)]
         self._states = names.index(STATES) if STATES in names else -1

@@ -84,8 +84,8 @@ def _fastest(draft: Draft) -> float:
     if not len(mass) or np.linalg.eigvalsh(mass)[0] < SAFE_MASS:
         return 0.0
     builder = ElementBuilder(draft.model, mechanism, draft.folder or Path())
-    owners = [force for force in builder.forces() if isinstance(force, SPRINGS)]
-    springs = [builder.element(force) for force in owners]
+    owners = [force for force in builder.iterate_forces() if isinstance(force, SPRINGS)]
+    springs = [builder.make_element(force) for force in owners]
     bushings = [
         spring
         for force, spring in zip(owners, springs, strict=True)

@@ -18,7 +18,7 @@ from typing import Any
 from osimlite.mechanics.codegen.cplusplus.library import make_library
 from osimlite.mechanics.codegen.cplusplus.types import FLOAT, INTEGER, Tuple, Type, is_plain_number
 from osimlite.mechanics.kernels.pointers import Floats, Ints
-from osimlite.simulation.elements.laws import law_of, library_laws, symbol_of
+from osimlite.simulation.elements.laws import find_law, get_symbol, list_library_laws
 
 SIZE = 160
 """Length of each vector."""
@@ -31,7 +31,7 @@ def all_kernels(directions: int) -> dict[str, tuple[Callable[..., Any], int]]:
     Args:
         directions: number of the derivatives; 0 for plain numbers.
     """
-    return {symbol_of(name): law_of(name) for name in library_laws(directions)}
+    return {get_symbol(name): find_law(name) for name in list_library_laws(directions)}
 
 
 def is_of_numbers(kind: Type | None) -> bool:

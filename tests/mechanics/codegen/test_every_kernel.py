@@ -16,7 +16,7 @@ import pytest
 from osimlite.mechanics.codegen.cplusplus import write_library
 from osimlite.mechanics.codegen.reader import find_tree
 from osimlite.mechanics.codegen.sources import collect_functions
-from osimlite.simulation.elements.laws import library_laws, symbol_of
+from osimlite.simulation.elements.laws import get_symbol, list_library_laws
 from tests.conftest import ROOT
 from tests.mechanics.codegen import motions, pure_functions
 from tests.mechanics.codegen.compiled import are_same_bits, compile_text, needs_compiler
@@ -148,9 +148,9 @@ def test_functions_have_no_undefined_behaviour(wrapped, text, tmp_path, name):
 @pytest.fixture(scope="module")
 def kernels(tmp_path_factory):
     """The text of all kernels, for floats and for numbers with derivatives, and their symbols by name."""
-    names = [*library_laws(0), *library_laws(16)]
+    names = [*list_library_laws(0), *list_library_laws(16)]
     text = write_library(pure_functions.all_kernels(0) | pure_functions.all_kernels(16))
-    return text, {name: symbol_of(name) for name in names}
+    return text, {name: get_symbol(name) for name in names}
 
 
 def build_kernels(kernels, folder, compiler, *flags):

@@ -15,7 +15,7 @@ from osimlite.mechanics.kernels.paths import pull_path
 from osimlite.mechanics.kernels.pointers import at
 from osimlite.mechanics.kernels.table import LAW_MODULES
 from osimlite.simulation.elements.force_type import ForceType
-from osimlite.simulation.elements.laws import law_function
+from osimlite.simulation.elements.laws import find_function
 from osimlite.simulation.elements.registry import FORCE_TYPES
 from tests.mechanics.codegen import constructs
 from tests.mechanics.codegen.compiled import are_same_bits, call_python
@@ -128,7 +128,7 @@ def test_all_kernels_are_translated_but_those_with_random_numbers():
     translated = []
     for name in kernels:
         try:
-            translated.append((name, write_javascript([law_function(name)], [pull_path])))
+            translated.append((name, write_javascript([find_function(name)], [pull_path])))
         except TranslationError as error:
             assert "the function 'reflexes_" in str(error) and "64 bits" in str(error), name
     assert {*kernels} - {name for name, _ in translated} == {"run_by_reflexes", "walk_several"}

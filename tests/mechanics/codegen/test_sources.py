@@ -11,12 +11,12 @@ import pytest
 from osimlite.mechanics.codegen.sources import compute_digest
 from osimlite.mechanics.kernels import constrained_dynamics, linear_algebra, pointers
 from osimlite.mechanics.kernels.table import LAW_MODULES
-from osimlite.simulation.elements.laws import law_function
+from osimlite.simulation.elements.laws import find_function
 
 
 def digests():
     compute_digest.cache_clear()
-    return {name: compute_digest(law_function(name)) for name in LAW_MODULES}
+    return {name: compute_digest(find_function(name)) for name in LAW_MODULES}
 
 
 @pytest.fixture
@@ -77,7 +77,7 @@ def test_words_and_layout_concern_nobody(changed):
 
 
 def test_the_settings_of_a_translator_concern_all():
-    function = law_function("evaluate")
+    function = find_function("evaluate")
     assert compute_digest(function, "one") != compute_digest(function, "other")
 
 

@@ -45,7 +45,7 @@ def laws():
         for _, function in inspect.getmembers(module, inspect.isfunction)
     ]
     for kind in (kind for kind in FORCE_TYPES if isinstance(kind, ForceType)):
-        own = kind.law, kind.equilibrium, *kind.geometry.calls
+        own = kind.law, kind.equilibrium, *kind.geometry.called_functions
         pending += [law for law in own if law is not None]
     result = set()
     while pending:

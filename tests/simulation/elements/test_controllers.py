@@ -50,10 +50,10 @@ HEAD = "controls\nversion=1\nnRows=2\nnColumns=3\ninDegrees=no\nendheader\ntime\
         ),
         ("0\t1\n", "controls.sto:8:4: the row has 2 numbers and needs 3"),
         ("0\t1\tx\n", "controls.sto:8:5: 'x' is no number"),
-        ("", "controls.sto:7: the table has no rows; give it some"),
+        ("", "controls.sto:7: the table has no rows; add at least one"),
         (
             "0\t1\t2\n1\t1\t2\n",
-            "controls.sto: the column 'other' of the file of '/controllerset/brain' is no actuator of the model; "
+            "controls.sto: the column 'other' of the file of '/controllerset/brain' is not an actuator of the model; "
             "did you mean 'motor'?",
         ),
     ],
@@ -75,10 +75,10 @@ def nodes(*times) -> str:
             f'<ControlLinear name="moter"><x_nodes>{nodes(0)}</x_nodes></ControlLinear>',
             "'/controllerset/brain' has no actuator for the control 'moter' of its file; did you mean 'motor'?",
         ),
-        ('<ControlLinear name="motor"/>', "the control 'motor' has no x_nodes; give it some"),
+        ('<ControlLinear name="motor"/>', "the control 'motor' has no x_nodes; add at least one"),
         (
             f'<ControlLinear name="motor"><x_nodes>{nodes(0, 2, 1)}</x_nodes></ControlLinear>',
-            "the x_nodes of the control 'motor' go back in time, or have no numbers; sort them",
+            "the x_nodes of the control 'motor' go back in time or are not finite; sort and correct them",
         ),
     ],
 )
@@ -146,7 +146,7 @@ def test_a_synergy_of_what_is_no_function_of_time(model, tmp_path):
     error = told(model, tmp_path)
     assert isinstance(error, UnsupportedError)
     assert (
-        "driven by '/controllerset/brain', whose input '/jointset/j0/q0|value' is no function of time"
+        "driven by '/controllerset/brain', whose input '/jointset/j0/q0|value' is not a known function of time"
         in str(error)
     )
 
@@ -155,7 +155,7 @@ def test_controllers_of_the_examples(model, tmp_path):
     brain = ToyReflexController(name="brain", socket_actuators=("/forceset/motor",))
     model.add(brain)
     message = (
-        "'/controllerset/brain' drives '/forceset/motor', which is no muscle; name muscles only"
+        "'/controllerset/brain' drives '/forceset/motor', which is not a muscle; name muscles only"
     )
     assert told(model, tmp_path).message == message
     brain.enabled = False

@@ -32,15 +32,15 @@ def test_the_kernel_follows_from_the_declaration(force_type):
     assert source.startswith(f"def {force_type.name}(") and source.endswith("return OUTCOME.OK\n")
     assert force_type.law is None or " law(" in source
     # What the geometry applies is given by the law.
-    applied = set(re.findall(r"\w+", " ".join(force_type.geometry.after)))
+    applied = set(re.findall(r"\w+", " ".join(force_type.geometry.apply_code)))
     assert applied & {"force", "torque", "tension", "fx", "fy", "fz"} <= set(
         force_type.outputs
-    ) | applied & {"room"}
+    ) | applied & {"work"}
     for state in force_type.states:
         assert state.rate in force_type.outputs
         assert f"= {state.rate}\n" in source
     for output in (force_type.labels or {}).values():
-        assert output in force_type.recorded
+        assert output in force_type.record_offsets
 
 
 @pytest.mark.parametrize("force_type", DECLARED, ids=lambda force_type: force_type.name)

@@ -70,7 +70,7 @@ def muscular(**more) -> Model:
         ),
         (
             ActuatorForceProbe(name="p", actuator_names=("motor",), exponent=float("nan")),
-            "'/probeset/p' has a parameter that is not a finite number; give one",
+            "'/probeset/p' has a parameter that is not a finite number; give it a finite value",
         ),
     ],
 )
@@ -86,7 +86,7 @@ def test_what_opensim_stops_at(model, probe, message):
     [
         (
             ActuatorPowerProbe(name="p", actuator_names=("push",)),
-            "'/probeset/p' (ActuatorPowerProbe of '/forceset/push', of which no actuation is known)",
+            "'/probeset/p' (ActuatorPowerProbe of '/forceset/push', whose actuation is unknown)",
         ),
         (
             SystemEnergyProbe(name="p", probe_operation="integrate"),

@@ -32,18 +32,18 @@ def jets_of(kind: Any, given: tuple[Any, ...]) -> tuple[list[Any], list[int]]:
     names = [
         *kind.text.input_names,
         "excitation",
-        *(state.name for state in kind.states if state.given),
+        *(state.name for state in kind.states if state.is_argument),
     ]
-    flat = [getattr(given[0], name) for name in names] if kind.together else [*given]
+    flat = [getattr(given[0], name) for name in names] if kind.inputs_type else [*given]
     none = np.zeros(count)
     for direction, place in enumerate(changed.values()):
         flat[place] = Jet(float(flat[place]), np.eye(count)[direction], 0.0, none)
     # Registers of formulas take jets.
     rest = [
         part.astype(object) if isinstance(part, np.ndarray) else part
-        for part in given[1 if kind.together else 0 :]
+        for part in given[1 if kind.inputs_type else 0 :]
     ]
-    if kind.together:
+    if kind.inputs_type:
         return [given[0]._replace(**dict(zip(names, flat, strict=True))), *rest], [*changed]
     return [flat[k] if isinstance(flat[k], Jet) else part for k, part in enumerate(rest)], [
         *changed
@@ -93,7 +93,9 @@ def test_they_are_derivatives_of_the_law(case, monkeypatch):
                 )
             )
             for row, output in zip(
-                slopes, (kind.geometry.along[0], *(s.rate for s in kind.states)), strict=False
+                slopes,
+                (kind.geometry.displacement_output[0], *(s.rate for s in kind.states)),
+                strict=False,
             ):
                 result = results[output]
                 wanted = np.zeros(WIDTH)

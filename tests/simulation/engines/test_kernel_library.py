@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from osimlite.mechanics.codegen.toolchain import NATIVE, library_suffix
-from osimlite.simulation.elements.laws import DIRECTIONS, library_laws
+from osimlite.simulation.elements.laws import DIRECTIONS, list_library_laws
 from osimlite.simulation.engines import kernel_library
 from osimlite.simulation.engines.kernel_library import KernelLibrary, load_library
 
@@ -22,8 +22,8 @@ needs_library = pytest.mark.skipif(
 @needs_library
 def test_every_law_is_in_the_library():
     assert {*LIBRARY.table["laws"]} >= {
-        *library_laws(),
-        *library_laws(DIRECTIONS),
+        *list_library_laws(),
+        *list_library_laws(DIRECTIONS),
     } or LIBRARY.changed_files
 
 

@@ -15,17 +15,23 @@ from osimlite.simulation.elements.geometries.body import AXIS, BODY, POINT, POIN
 from osimlite.simulation.elements.geometries.coordinate import COORDINATE
 from osimlite.simulation.elements.geometries.geometry import Geometry
 from osimlite.simulation.elements.geometries.path import PATH
-from osimlite.simulation.elements.parameters import Number, positive
+from osimlite.simulation.elements.parameters import Number, require_positive
 from osimlite.simulation.elements.registry import register_force_type
 
 
 def scale_control(control: float, optimal_force: float) -> float:
-    """The control times the optimal force."""
+    """Return the control times the optimal force (N, N.m)."""
     return optimal_force * control
 
 
 def define_actuator(component: type, geometry: Geometry, output: str) -> ForceType:
-    """The kind of an define_actuator whose control times its optimal force is what the geometry applies."""
+    """Return the force type of an actuator whose output is its control times its optimal force.
+
+    Args:
+        component: class of the actuator.
+        geometry: where the output acts.
+        output: name of the output that the geometry applies.
+    """
     return ForceType(
         component,
         geometry,
@@ -33,7 +39,7 @@ def define_actuator(component: type, geometry: Geometry, output: str) -> ForceTy
         inputs=(),
         outputs=(output,),
         parameters=("optimal_force",),
-        controlled=True,
+        has_control=True,
         labels={"{name}": output},
     )
 
@@ -44,7 +50,17 @@ register_force_type(define_actuator(CoordinateActuator, COORDINATE, "force"))
 def scale_activation(
     control: float, activation: float, optimal_force: float, time: float
 ) -> tuple[float, float]:
-    """The activation times the optimal force, and its rate: what it lacks of the control over a time constant (s)."""
+    """Return force F a and activation rate (x - a) / T of first-order activation dynamics.
+
+    Args:
+        control: x.
+        activation: a.
+        optimal_force: F, N.m or N.
+        time: time constant T, s.
+
+    Returns:
+        Force (N.m, N) and rate of the activation (1/s).
+    """
     return optimal_force * activation, (control - activation) / time
 
 
@@ -55,11 +71,11 @@ register_force_type(
         scale_activation,
         inputs=(),
         outputs=("force", "activation_rate"),
-        parameters=("optimal_force", positive("activation_time_constant")),
-        controlled=True,
+        parameters=("optimal_force", require_positive("activation_time_constant")),
+        has_control=True,
         states=(State("activation"),),
         labels={"{name}": "force"},
-        goes_on=True,
+        states_change_when_off=True,
     )
 )
 
@@ -73,10 +89,14 @@ register_force_type(define_actuator(PointActuator, POINT, "force"))
 register_force_type(define_actuator(PointToPointActuator, POINTS, "force"))
 
 
-def return_wrench(
+def pass_controls(
     tx: float, ty: float, tz: float, fx: float, fy: float, fz: float
 ) -> tuple[float, float, float, float, float, float]:
-    """The controls: torque (N.m) and force (N)."""
+    """Return the six controls of a BodyActuator, which are its loads.
+
+    Returns:
+        Torque (N.m) and force (N).
+    """
     return tx, ty, tz, fx, fy, fz
 
 
@@ -84,9 +104,9 @@ register_force_type(
     ForceType(
         BodyActuator,
         BODY,
-        return_wrench,
+        pass_controls,
         outputs=("tx", "ty", "tz", "fx", "fy", "fz"),
-        controlled=True,
+        has_control=True,
         labels={},
     )
 )
@@ -103,11 +123,11 @@ register_force_type(
         inputs=("length",),
         outputs=("tension",),
         parameters=(
-            Number("number_of_turns", lambda value: value != 0.0, "is 0; give it some"),
+            Number("number_of_turns", lambda value: value != 0.0, "is 0; give it another value"),
             "thread_length",
             "cord_length",
         ),
-        controlled=True,
+        has_control=True,
         labels={"{name}": "tension"},
     )
 )

@@ -13,8 +13,13 @@ from osimlite.schema.springs import (
     FunctionBasedBushingForce,
 )
 from osimlite.simulation.elements.force_type import DeclaredForce, ForceType, State
-from osimlite.simulation.elements.geometries.frames import DEVIATIONS, BetweenFrames, damp, damped
-from osimlite.simulation.elements.integral import integral
+from osimlite.simulation.elements.geometries.frames import (
+    DEVIATIONS,
+    BetweenFrames,
+    add_damping,
+    mask_undamped_rate,
+)
+from osimlite.simulation.elements.integral import integrate
 from osimlite.simulation.elements.parameters import Curve, Expressions, Vector
 from osimlite.simulation.elements.registry import register_force_type
 
@@ -22,10 +27,14 @@ from osimlite.simulation.elements.registry import register_force_type
 def compute_linear_bushing(
     deviations: Floats, rates: Floats, loads: Floats, stiffness: Floats, damping: Floats
 ) -> tuple[float, float]:
-    """Energy, and the power that the dampers take up; fills the loads."""
+    """Fill the loads k x + d v of the six deviations x with rates v.
+
+    Returns:
+        Energy (J), and the power that the dampers dissipate (W).
+    """
     energy = power = 0.0
     for k in range(6):
-        rate = damped(rates[k], damping[k])
+        rate = mask_undamped_rate(rates[k], damping[k])
         loads[k] = bushing_load(deviations[k], rate, stiffness[k], damping[k])
         energy += spring_energy(deviations[k], stiffness[k])
         power += bushing_dissipation(rate, damping[k])
@@ -50,8 +59,8 @@ register_force_type(
                 6, lambda builder, force: (*force.rotational_damping, *force.translational_damping)
             ),
         ),
-        states=(State("dissipated_energy", given=False, is_simbody=True),),
-        goes_on=True,
+        states=(State("dissipated_energy", is_argument=False, is_simbody=True),),
+        states_change_when_off=True,
     )
 )
 
@@ -68,21 +77,21 @@ def compute_function_bushing(
     fy: Floats,
     fz: Floats,
 ) -> None:
-    """Fill the loads."""
+    """Fill the loads by one function of each deviation, and add damping."""
     loads[0], _, _ = value_at(mx, deviations[0])
     loads[1], _, _ = value_at(my, deviations[1])
     loads[2], _, _ = value_at(mz, deviations[2])
     loads[3], _, _ = value_at(fx, deviations[3])
     loads[4], _, _ = value_at(fy, deviations[4])
     loads[5], _, _ = value_at(fz, deviations[5])
-    damp(loads, rates, damping)
+    add_damping(loads, rates, damping)
 
 
 def _compute_function_energy(force: DeclaredForce, record: Sequence[float]) -> float:
     _, *functions = force.values
     deviations = record[DEVIATIONS : DEVIATIONS + 6]
     return sum(
-        integral(function, 0.0, value)
+        integrate(function, 0.0, value)
         for function, value in zip(functions, deviations, strict=True)
     )
 
@@ -103,12 +112,13 @@ register_force_type(
             Curve("f_y_delta_y_function"),
             Curve("f_z_delta_z_function"),
         ),
-        stored=_compute_function_energy,
+        compute_energy=_compute_function_energy,
     )
 )
 
 
 DEVIATION_NAMES = ("theta_x", "theta_y", "theta_z", "delta_x", "delta_y", "delta_z")
+"""Names of the deviations in the expressions: angles (rad) and translations (m)."""
 
 
 def compute_expression_bushing(
@@ -120,14 +130,14 @@ def compute_expression_bushing(
     constants: Floats,
     registers: Floats,
 ) -> None:
-    """Fill the loads."""
+    """Fill the loads by expressions of all six deviations, and add damping; the energy is unknown."""
     for k in range(6):
         registers[k] = deviations[k]
     for k in range(6):
-        # Each formula has its count of steps before it, and the place of its constants.
+        # Each expression is preceded by its number of steps and the offset of its constants.
         loads[k] = compute(at(steps, 2), steps[0], at(constants, steps[1]), registers, 6)
         steps = at(steps, 2 + 3 * steps[0])
-    damp(loads, rates, damping)
+    add_damping(loads, rates, damping)
 
 
 register_force_type(

@@ -30,7 +30,18 @@ from osimlite.simulation.elements.registry import register_force_type
 def compute_coordinate_spring(
     q: float, u: float, k: float, q0: float, c: float
 ) -> tuple[float, float]:
-    """Force and energy."""
+    """Return force and energy of a spring and damper on a coordinate.
+
+    Args:
+        q: coordinate, rad or m.
+        u: its speed, rad/s or m/s.
+        k: stiffness, N.m/rad or N/m.
+        q0: rest value, rad or m.
+        c: viscosity, N.m.s/rad or N.s/m.
+
+    Returns:
+        Generalized force (N.m, N) and energy (J).
+    """
     return coordinate_spring_force(q, u, k, q0, c), spring_energy(q - q0, k)
 
 
@@ -61,7 +72,21 @@ register_force_type(
 def compute_coordinate_limit(
     q: float, u: float, Ku: float, qu: float, Kl: float, ql: float, D: float, t: float
 ) -> tuple[float, float, float]:
-    """Force, power that the damper takes up, energy."""
+    """Return the force of a spring and damper that act beyond the limits of a coordinate.
+
+    Args:
+        q: coordinate, rad or m.
+        u: its speed, rad/s or m/s.
+        Ku: stiffness at the upper limit, N.m/rad or N/m.
+        qu: upper limit, rad or m.
+        Kl: stiffness at the lower limit, N.m/rad or N/m.
+        ql: lower limit, rad or m.
+        D: damping, N.m.s/rad or N.s/m.
+        t: transition, rad or m.
+
+    Returns:
+        Generalized force (N.m, N), dissipated power (W), and energy (J).
+    """
     if ql <= q <= qu:
         return 0.0, 0.0, 0.0
     force = limit_force(q, u, Ku, qu, Kl, ql, D, t)
@@ -71,7 +96,15 @@ def compute_coordinate_limit(
 def read_limit_constants(
     force: CoordinateLimitForce, info: CoordinateInfo
 ) -> tuple[float, float, float, float, float, float]:
-    """What the law is given besides the state, from the properties of the force and what its coordinate is."""
+    """Return the constants of the law of a CoordinateLimitForce, in radians or metres.
+
+    Args:
+        force: the component, with degrees for rotations.
+        info: the coordinate.
+
+    Returns:
+        Ku, qu, Kl, ql, D, t of `compute_coordinate_limit`.
+    """
     return limit_constants(
         force.upper_stiffness,
         force.upper_limit,
@@ -86,7 +119,9 @@ def read_limit_constants(
 def _read_limit_parameters(
     builder: ElementBuilder, force: CoordinateLimitForce
 ) -> tuple[float, ...]:
-    return read_limit_constants(force, builder.mechanism.coordinates[builder.coordinate(force)])
+    return read_limit_constants(
+        force, builder.mechanism.coordinates[builder.find_coordinate(force)]
+    )
 
 
 register_force_type(
@@ -96,7 +131,7 @@ register_force_type(
         compute_coordinate_limit,
         outputs=("force", "dissipatedEnergy_rate", "energy"),
         parameters=(Numbers(6, _read_limit_parameters),),
-        states=(State("dissipatedEnergy", given=False),),
+        states=(State("dissipatedEnergy", is_argument=False),),
         labels={"{name}": "force", "{name}.PotentialEnergy": "energy"},
     )
 )
@@ -105,18 +140,21 @@ register_force_type(
 def compute_linear_stop(
     q: float, u: float, k: float, d: float, upper: float, lower: float
 ) -> tuple[float, float]:
-    """Generalized force -k x (1 + d v), N.m (N for a translation), which never pulls, and energy k x^2 / 2, J.
+    """Return the force -k x (1 + d v) of a stop, which never pulls, and the energy k x^2 / 2.
 
-    x is how far the coordinate is beyond the limit, and v how fast it runs on. Source: Simbody's
-    MobilityLinearStop, as the documentation of OpenSim's class has it.
+    x is how far the coordinate is beyond the limit, and v its rate. Source: Simbody's
+    MobilityLinearStop, according to the documentation of OpenSim's class.
 
     Args:
-        q: coordinate, rad (m).
-        u: its speed, rad/s (m/s).
-        k: stiffness, N.m/rad (N/m).
-        d: damping, s/rad (s/m).
-        upper: limit, rad (m).
-        lower: limit, rad (m).
+        q: coordinate, rad or m.
+        u: its speed, rad/s or m/s.
+        k: stiffness, N.m/rad or N/m.
+        d: damping, s/rad or s/m.
+        upper: upper limit, rad or m.
+        lower: lower limit, rad or m.
+
+    Returns:
+        Generalized force (N.m, N) and energy (J).
     """
     if q > upper:
         return min(0.0, -k * (q - upper) * (1.0 + d * u)), 0.5 * k * (q - upper) * (q - upper)
@@ -149,20 +187,23 @@ register_force_type(
 def compute_exponential_limit(
     q: float, u: float, lower: float, upper: float, a: float, b: float, c: float, d: float
 ) -> tuple[float, float]:
-    """Generalized force a exp(-b (q - lower)) - c exp(d (q - upper)), N.m (N for a translation), and its energy, J.
+    """Return the force a exp(-b (q - lower)) - c exp(d (q - upper)) and its energy.
 
     Source: F. C. Anderson and M. G. Pandy, "A dynamic optimization solution for vertical jumping in
     three dimensions", Computer Methods in Biomechanics and Biomedical Engineering 2 (1999) 201-231.
 
     Args:
-        q: coordinate, rad (m).
-        u: its speed; nothing depends on it.
-        lower: limit, rad (m).
-        upper: limit, rad (m).
-        a: force at the lower limit, N.m (N).
-        b: how steeply it grows, 1/rad (1/m).
-        c: force at the upper limit, N.m (N).
-        d: how steeply it grows, 1/rad (1/m).
+        q: coordinate, rad or m.
+        u: its speed, which has no effect.
+        lower: lower limit, rad or m.
+        upper: upper limit, rad or m.
+        a: force at the lower limit, N.m or N.
+        b: growth rate below it, 1/rad or 1/m.
+        c: force at the upper limit, N.m or N.
+        d: growth rate above it, 1/rad or 1/m.
+
+    Returns:
+        Generalized force (N.m, N) and energy (J).
     """
     below, above = a * exp(-b * (q - lower)), c * exp(d * (q - upper))
     return below - above, below / b + above / d
@@ -172,7 +213,7 @@ def _read_shape_parameters(builder: ElementBuilder, force: Any) -> tuple[float, 
     shapes = *force.lower_shape_parameters, *force.upper_shape_parameters
     if not all(shape > 0.0 for shape in shapes):
         raise ModelError(
-            f"the shape parameters of '{builder.path(force)}' are not all positive; give such"
+            f"the shape parameters of '{builder.path(force)}' are not all positive; make them positive"
         )
     return shapes
 

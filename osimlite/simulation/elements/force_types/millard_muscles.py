@@ -49,17 +49,23 @@ from osimlite.schema.muscles import (
 )
 from osimlite.simulation.elements.builder import ElementBuilder
 from osimlite.simulation.elements.force_type import DeclaredForce, State
-from osimlite.simulation.elements.kernel_text import Abreast, Asked, Sought
-from osimlite.simulation.elements.muscle import PENNATION, SPRING, curve, muscle, require
-from osimlite.simulation.elements.parameters import Fields, Number, Together, positive
+from osimlite.simulation.elements.kernel_text import BatchedLaw, LookupStage, SearchStage
+from osimlite.simulation.elements.muscle import (
+    PENNATION,
+    SPRING,
+    check_muscle,
+    define_curve,
+    define_muscle,
+)
+from osimlite.simulation.elements.parameters import Fields, Number, Together, require_positive
 from osimlite.simulation.elements.registry import register_force_type
 
 MIN_FIBER_DAMPING = 0.001
-"""A muscle whose `fiber_damping` is less has none, as in OpenSim."""
+"""As in OpenSim, a smaller `fiber_damping` counts as 0."""
 
 
 def _read_minimum_activation(force: Any) -> float:
-    # Without dynamics of activation, OpenSim's part for them never hears of the property.
+    # OpenSim passes the property on to its activation model only if that model is used.
     owner = MuscleFirstOrderActivationDynamicModel() if force.ignore_activation_dynamics else force
     return float(owner.minimum_activation)
 
@@ -114,24 +120,24 @@ def _set_end_slopes(concentric: float, eccentric: float) -> dict[str, float]:
 def _check_equilibrium_muscle(builder: ElementBuilder, force: Any) -> None:
     least = 0.01 if force.is_classic else 0.0
     slack = Number("tendon_slack_length", lambda x: x >= 0.0, "is negative")
-    require(
+    check_muscle(
         builder,
         force,
         Number("minimum_activation", lambda x: x >= least, f"is less than {least:g}"),
-        slack if force.ignore_tendon_compliance else positive("tendon_slack_length"),
+        slack if force.ignore_tendon_compliance else require_positive("tendon_slack_length"),
     )
 
 
 def _compute_equilibrium_energy(force: DeclaredForce, record: Sequence[float]) -> float:
     _, m, curves = force.values
-    known = force.known(record)
+    known = force.named_values(record)
     return millard2012_energy(
         m, known["length"], known["fiber_length"], known["cos_pennation"], curves
     )
 
 
 register_force_type(
-    muscle(
+    define_muscle(
         Millard2012EquilibriumMuscle,
         millard2012_equilibrium,
         ("solved", "activation_rate", "fiber_velocity", SPRING),
@@ -139,11 +145,11 @@ register_force_type(
             Millard2012Equilibrium,
             (
                 Number("max_isometric_force"),
-                positive("optimal_fiber_length"),
+                require_positive("optimal_fiber_length"),
                 Number("tendon_slack_length"),
-                positive("max_contraction_velocity"),
-                positive("activation_time_constant"),
-                positive("deactivation_time_constant"),
+                require_positive("max_contraction_velocity"),
+                require_positive("activation_time_constant"),
+                require_positive("deactivation_time_constant"),
                 Number("ignore_tendon_compliance"),
                 Number("ignore_activation_dynamics"),
             ),
@@ -152,21 +158,23 @@ register_force_type(
         Together(
             MillardCurves,
             (
-                curve(
+                define_curve(
                     "active_force_length_curve",
                     ACTIVE_SIZE,
                     active_force_length,
                     _adapt_active_curve,
                 ),
-                curve("force_velocity_curve", VELOCITY_SIZE, force_velocity, _adapt_velocity_curve),
-                curve(
+                define_curve(
+                    "force_velocity_curve", VELOCITY_SIZE, force_velocity, _adapt_velocity_curve
+                ),
+                define_curve(
                     "force_velocity_curve",
                     VELOCITY_SIZE,
                     partial(force_velocity, inverse=True),
                     _adapt_inverse_curve,
                 ),
-                curve("fiber_force_length_curve", PASSIVE_SIZE, fiber_force_length),
-                curve("tendon_force_length_curve", TENDON_SIZE, tendon_force_length),
+                define_curve("fiber_force_length_curve", PASSIVE_SIZE, fiber_force_length),
+                define_curve("tendon_force_length_curve", TENDON_SIZE, tendon_force_length),
             ),
         ),
         states=(
@@ -183,18 +191,18 @@ register_force_type(
             ),
         ),
         equilibrium=millard2012_equilibrium_length,
-        settled=("fiber_length",),
-        rigid=millard2012_rigid,
-        again=millard2012_again,
-        abreast=Abreast(
+        solved_states=("fiber_length",),
+        rigid_law=millard2012_rigid,
+        law_from_record=millard2012_again,
+        batched=BatchedLaw(
             Fibers,
             fibers_at,
-            Asked(
+            LookupStage(
                 {"active": "by_length", "passive": "by_length", "tendon": "tendon"},
                 fibers_loaded,
                 ("velocity", "by_velocity", "by_length", "elastic", "tendon"),
             ),
-            Sought(
+            SearchStage(
                 ("velocity", "inverse"),
                 fibers_asking,
                 fibers_moved,
@@ -202,7 +210,7 @@ register_force_type(
             ),
             muscle_of,
         ),
-        stored=_compute_equilibrium_energy,
+        compute_energy=_compute_equilibrium_energy,
         check=_check_equilibrium_muscle,
     )
 )
@@ -226,14 +234,14 @@ def _check_acceleration_muscle(builder: ElementBuilder, force: Any) -> None:
 
 def _compute_acceleration_energy(force: DeclaredForce, record: Sequence[float]) -> float:
     _, m, curves = force.values
-    known = force.known(record)
+    known = force.named_values(record)
     return millard2012_acceleration_energy(
         m, known["length"], known["fiber_length"], known["cos_pennation"], curves
     )
 
 
 register_force_type(
-    muscle(
+    define_muscle(
         Millard2012AccelerationMuscle,
         millard2012_acceleration,
         ("solved", "activation_rate", "fiber_velocity", "fiber_acceleration"),
@@ -241,10 +249,10 @@ register_force_type(
             Millard2012Acceleration,
             (
                 Number("max_isometric_force"),
-                positive("optimal_fiber_length"),
-                positive("tendon_slack_length"),
-                positive("max_contraction_velocity"),
-                positive("mass"),
+                require_positive("optimal_fiber_length"),
+                require_positive("tendon_slack_length"),
+                require_positive("max_contraction_velocity"),
+                require_positive("mass"),
                 Number("tendon_force_length_damping"),
                 Number("fiber_compressive_force_length_damping"),
                 Number("fiber_force_length_damping"),
@@ -256,16 +264,16 @@ register_force_type(
         Together(
             AccelerationCurves,
             (
-                curve("active_force_length_curve", ACTIVE_SIZE, active_force_length),
-                curve("force_velocity_curve", VELOCITY_SIZE, force_velocity),
-                curve("fiber_force_length_curve", PASSIVE_SIZE, fiber_force_length),
-                curve("tendon_force_length_curve", TENDON_SIZE, tendon_force_length),
-                curve(
+                define_curve("active_force_length_curve", ACTIVE_SIZE, active_force_length),
+                define_curve("force_velocity_curve", VELOCITY_SIZE, force_velocity),
+                define_curve("fiber_force_length_curve", PASSIVE_SIZE, fiber_force_length),
+                define_curve("tendon_force_length_curve", TENDON_SIZE, tendon_force_length),
+                define_curve(
                     "fiber_compressive_force_length_curve",
                     COMPRESSIVE_SIZE,
                     fiber_compressive_force_length,
                 ),
-                curve(
+                define_curve(
                     "fiber_compressive_force_cos_pennation_curve",
                     COMPRESSIVE_SIZE,
                     fiber_compressive_force_cos_pennation,
@@ -278,9 +286,9 @@ register_force_type(
             State("fiber_velocity", output="fiber_acceleration"),
         ),
         equilibrium=millard2012_acceleration_equilibrium,
-        settled=("fiber_length", "fiber_velocity"),
-        rigid=millard2012_acceleration_rigid,
-        stored=_compute_acceleration_energy,
+        solved_states=("fiber_length", "fiber_velocity"),
+        rigid_law=millard2012_acceleration_rigid,
+        compute_energy=_compute_acceleration_energy,
         check=_check_acceleration_muscle,
     )
 )

@@ -32,29 +32,39 @@ from osimlite.schema.old_muscles import (
 )
 from osimlite.simulation.elements.builder import ElementBuilder
 from osimlite.simulation.elements.force_type import ForceType, State
-from osimlite.simulation.elements.muscle import height, muscle
+from osimlite.simulation.elements.muscle import compute_height, define_muscle
 from osimlite.simulation.elements.parameters import (
     Curve,
     Fields,
     Number,
     Parameter,
     Together,
-    positive,
+    require_positive,
 )
 from osimlite.simulation.elements.registry import register_force_type
 
 ForceLaw = Callable[[float, float, Any, Any], tuple[float, float, float]]
-"""Active force at full activation, passive force and the tendon's, normalized; from a normalized
-fiber length, a strain of the tendon, and numbers and curves that are the muscle's fields.
+"""Function of normalized fiber length, tendon strain, fields and curves of a muscle.
+
+It returns the active force at full activation, the passive force and the tendon force, normalized.
 """
 
 FiberForces = tuple[float, float, float, float]
+"""Cosine of pennation, and active, passive and tendon force, normalized."""
 
 
 def compute_fiber_forces(
     now: MuscleInputs, m: OldMuscle, force_law: ForceLaw, fields: Any, curves: Any
 ) -> FiberForces:
-    """Cosine of pennation and `force_law` of the fibers."""
+    """Return the cosine of pennation and the normalized forces at the current fiber length.
+
+    Args:
+        now: path, excitation and states.
+        m: numbers that all deprecated muscles have.
+        force_law: forces of the class.
+        fields: numbers of the class.
+        curves: curves of the class.
+    """
     fiber_length = now.fiber_length
     cos = cos_upright(fiber_length, m.height)
     strain = (now.length - fiber_length * cos) / m.slack - 1.0
@@ -65,7 +75,16 @@ def compute_fiber_forces(
 def list_recorded(
     now: MuscleInputs, fibers: FiberForces, m: OldMuscle
 ) -> tuple[float, float, float, float, float, float, float, float]:
-    """What is list_recorded of every muscle; nobody knows of a factor by velocity."""
+    """Return the quantities of `muscle.RECORDED`; the force-velocity factor is unknown (NaN).
+
+    Args:
+        now: path, excitation and states.
+        fibers: result of `compute_fiber_forces`.
+        m: numbers of the muscle.
+
+    Returns:
+        The values in the order of `RECORDED`.
+    """
     cos, active, passive, tendon = fibers
     tension, passive_force = m.strength * tendon, m.strength * passive
     return (
@@ -89,19 +108,19 @@ def find_isometric_length(
     fields: Any,
     curves: Any,
 ) -> float:
-    """The fiber length, m, where fibers at rest and tendon are in equilibrium, as computeIsometricForce of OpenSim.
+    """Return the fiber length (m) at which resting fibers and tendon are in equilibrium.
 
-    To 0.01 N, or where the search has got to after its rounds; fibers stand upright where the path
-    is too short.
+    The search is that of OpenSim's computeIsometricForce: it ends at an error of 0.01 N or after
+    its last iteration. Fibers are perpendicular to the tendon if the path is too short.
 
     Args:
-        length: of the path, m.
-        start: fiber length that is tried first, m.
-        activation: of the muscle.
-        m: the muscle.
-        force_law: of it.
-        fields: third argument of them.
-        curves: fourth one.
+        length: length of the path, m.
+        start: first guess of the fiber length, m.
+        activation: activation of the muscle.
+        m: numbers of the muscle.
+        force_law: forces of the class.
+        fields: numbers of the class.
+        curves: curves of the class.
     """
     if length < m.slack:
         return m.height
@@ -124,11 +143,18 @@ def find_isometric_length(
 def compute_full_force(
     now: MuscleInputs, start: float, m: OldMuscle, force_law: ForceLaw, fields: Any, curves: Any
 ) -> float:
-    """Force (N) in equilibrium at rest, fully activated, times a factor by the rate of the path.
+    """Return the force (N) in equilibrium at rest and full activation, times a factor of the path's rate.
 
-    It is what OpenSim takes for the active force along a rigid tendon; see
-    calcInextensibleTendonActiveFiberForce of ActivationFiberLengthMuscle_Deprecated. Args as of
-    `find_isometric_length`.
+    OpenSim uses it as the active force along a rigid tendon; see
+    calcInextensibleTendonActiveFiberForce of ActivationFiberLengthMuscle_Deprecated.
+
+    Args:
+        now: path, excitation and states.
+        start: first guess of the fiber length, m.
+        m: numbers of the muscle.
+        force_law: forces of the class.
+        fields: numbers of the class.
+        curves: curves of the class.
     """
     if now.length < m.slack:
         return 0.0
@@ -153,39 +179,39 @@ def define_old_muscle(
     rates: tuple[str, ...] = (),
     states: tuple[State, ...] = (),
 ) -> ForceType:
-    """The kind of such a muscle: activation and fiber length start at 0, whatever the file says.
+    """Return the force type of a deprecated muscle, whose activation and fiber length start at 0.
 
     Args:
-        component: its class.
-        law: gives what is list_recorded, and then rates.
-        equilibrium: gives the fiber length.
-        rigid: gives the greatest force.
-        parameters: that both are given besides the muscle's numbers.
-        rates: of states besides activation and fiber length.
-        states: besides these.
+        component: class of the muscle.
+        law: function that returns `RECORDED` and the rates.
+        equilibrium: function that returns the fiber length.
+        rigid: function that returns the force of fully active fibers.
+        parameters: parameters of these functions after the muscle's numbers.
+        rates: outputs after the rates of activation and fiber length.
+        states: states after activation and fiber length.
     """
     numbers = (
         Number("max_isometric_force"),
-        positive("optimal_fiber_length"),
-        positive("tendon_slack_length"),
+        require_positive("optimal_fiber_length"),
+        require_positive("tendon_slack_length"),
         Number("max_contraction_velocity"),
     )
-    return muscle(
+    return define_muscle(
         component,
         law,
         ("activation_rate", "fiber_velocity", *rates),
-        Fields(OldMuscle, numbers, height),
+        Fields(OldMuscle, numbers, compute_height),
         *parameters,
         states=(State("activation"), State("fiber_length", output="fiber_velocity"), *states),
         equilibrium=equilibrium,
-        settled=("fiber_length",),
-        rigid=rigid,
+        solved_states=("fiber_length",),
+        rigid_law=rigid,
         check=_check_flags,
     )
 
 
 class DelpCurves(NamedTuple):
-    """The curves of the muscle."""
+    """Curves of Delp1990Muscle_Deprecated."""
 
     active: Floats
     passive: Floats
@@ -194,7 +220,7 @@ class DelpCurves(NamedTuple):
 
 
 class DelpFields(NamedTuple):
-    """The properties of the muscle that are numbers."""
+    """Numbers of Delp1990Muscle_Deprecated."""
 
     time: float
     more: float
@@ -205,7 +231,11 @@ class DelpFields(NamedTuple):
 def compute_delp_forces(
     length: float, strain: float, fields: DelpFields, curves: DelpCurves
 ) -> tuple[float, float, float]:
-    """Active, passive and tendon force."""
+    """Return active, passive and tendon force, normalized.
+
+    Returns:
+        The three forces.
+    """
     active, _, _ = value_at(curves.active, length)
     passive, _, _ = value_at(curves.passive, length)
     tendon, _, _ = value_at(curves.tendon, strain)
@@ -215,10 +245,13 @@ def compute_delp_forces(
 def compute_delp(
     now: MuscleInputs, m: OldMuscle, fields: DelpFields, curves: DelpCurves
 ) -> tuple[float, ...]:
-    """The muscle at a moment; see Delp1990Muscle_Deprecated::computeActuation of OpenSim.
+    """Return the quantities of a muscle with a mass between fibers and tendon.
 
-    Its acceleration is no number while the fibers have no length, as before they are brought into
-    equilibrate_delp.
+    Source: Delp1990Muscle_Deprecated::computeActuation of OpenSim. The acceleration is NaN while the
+    fiber length is 0, before the equilibrium is computed.
+
+    Returns:
+        `RECORDED`, then activation rate (1/s), fiber velocity (m/s) and fiber acceleration (m/s^2).
     """
     fibers = compute_fiber_forces(now, m, compute_delp_forces, fields, curves)
     cos, active, passive, tendon = fibers
@@ -241,7 +274,11 @@ def compute_delp(
 def equilibrate_delp(
     now: MuscleInputs, m: OldMuscle, fields: DelpFields, curves: DelpCurves
 ) -> tuple[bool, float]:
-    """The fiber length in equilibrate_delp; the velocity stays as it is."""
+    """Return the fiber length in equilibrium; the velocity does not change.
+
+    Returns:
+        True, and the fiber length (m).
+    """
     return True, find_isometric_length(
         now.length, now.length - m.slack, now.activation, m, compute_delp_forces, fields, curves
     )
@@ -250,7 +287,7 @@ def equilibrate_delp(
 def compute_rigid_delp(
     now: MuscleInputs, m: OldMuscle, fields: DelpFields, curves: DelpCurves
 ) -> float:
-    """The greatest force."""
+    """Return the force (N) of fully active fibers."""
     return compute_full_force(now, now.length - m.slack, m, compute_delp_forces, fields, curves)
 
 
@@ -263,10 +300,10 @@ register_force_type(
         Fields(
             DelpFields,
             (
-                positive("time_scale"),
+                require_positive("time_scale"),
                 Number("activation1"),
                 Number("activation2"),
-                positive("mass"),
+                require_positive("mass"),
             ),
         ),
         Together(
@@ -285,7 +322,7 @@ register_force_type(
 
 
 class SchutteCurves(NamedTuple):
-    """The curves of the muscle."""
+    """Curves of Schutte1993Muscle_Deprecated."""
 
     active: Floats
     passive: Floats
@@ -293,7 +330,7 @@ class SchutteCurves(NamedTuple):
 
 
 class SchutteFields(NamedTuple):
-    """The properties of the muscle that are numbers, and whether the file has a curve of the passive force."""
+    """Numbers of Schutte1993Muscle_Deprecated, and whether the file has a passive curve."""
 
     time: float
     more: float
@@ -305,7 +342,11 @@ class SchutteFields(NamedTuple):
 def compute_schutte_forces(
     length: float, strain: float, fields: SchutteFields, curves: SchutteCurves
 ) -> tuple[float, float, float]:
-    """Active, passive and tendon force."""
+    """Return active, passive and tendon force, normalized.
+
+    Returns:
+        The three forces.
+    """
     active, _, _ = value_at(curves.active, length)
     tendon, _, _ = value_at(curves.tendon, strain)
     passive = (
@@ -317,7 +358,13 @@ def compute_schutte_forces(
 def compute_schutte(
     now: MuscleInputs, m: OldMuscle, fields: SchutteFields, curves: SchutteCurves
 ) -> tuple[float, ...]:
-    """The muscle at a moment; see Schutte1993Muscle_Deprecated::computeActuation of OpenSim."""
+    """Return the quantities of the muscle.
+
+    Source: Schutte1993Muscle_Deprecated::computeActuation of OpenSim.
+
+    Returns:
+        `RECORDED`, then activation rate (1/s) and fiber velocity (m/s).
+    """
     fibers = compute_fiber_forces(now, m, compute_schutte_forces, fields, curves)
     cos, active, passive, tendon = fibers
     if cos > NOTHING:
@@ -338,7 +385,11 @@ def compute_schutte(
 def equilibrate_schutte(
     now: MuscleInputs, m: OldMuscle, fields: SchutteFields, curves: SchutteCurves
 ) -> tuple[bool, float]:
-    """The fiber length in equilibrate_schutte."""
+    """Return the fiber length in equilibrium.
+
+    Returns:
+        True, and the fiber length (m).
+    """
     return True, find_isometric_length(
         now.length, m.optimal, now.activation, m, compute_schutte_forces, fields, curves
     )
@@ -347,7 +398,7 @@ def equilibrate_schutte(
 def compute_rigid_schutte(
     now: MuscleInputs, m: OldMuscle, fields: SchutteFields, curves: SchutteCurves
 ) -> float:
-    """The greatest force."""
+    """Return the force (N) of fully active fibers."""
     return compute_full_force(now, m.optimal, m, compute_schutte_forces, fields, curves)
 
 
@@ -364,10 +415,10 @@ register_force_type(
         Fields(
             SchutteFields,
             (
-                positive("time_scale"),
+                require_positive("time_scale"),
                 Number("activation1"),
                 Number("activation2"),
-                positive("damping"),
+                require_positive("damping"),
             ),
             _has_curve,
         ),
@@ -380,7 +431,7 @@ register_force_type(
 
 
 class ThelenFields(NamedTuple):
-    """The properties of the muscle, in the order and with the units of the file."""
+    """Numbers of Thelen2003Muscle_Deprecated, in the order and with the units of the file."""
 
     rising: float
     falling: float
@@ -398,7 +449,11 @@ class ThelenFields(NamedTuple):
 def compute_thelen_forces(
     length: float, strain: float, fields: ThelenFields, curves: tuple[()]
 ) -> tuple[float, float, float]:
-    """Active, passive and tendon force."""
+    """Return active, passive and tendon force, normalized.
+
+    Returns:
+        The three forces.
+    """
     passive = thelen_passive_force(length, fields.passive_strain, fields.passive_shape)
     return (
         thelen_active_force(length, fields.width),
@@ -408,7 +463,13 @@ def compute_thelen_forces(
 
 
 def compute_thelen(now: MuscleInputs, m: OldMuscle, fields: ThelenFields) -> tuple[float, ...]:
-    """The muscle at a moment; see Thelen2003Muscle_Deprecated::computeActuation of OpenSim."""
+    """Return the quantities of the muscle.
+
+    Source: Thelen2003Muscle_Deprecated::computeActuation of OpenSim.
+
+    Returns:
+        `RECORDED`, then activation rate (1/s) and fiber velocity (m/s).
+    """
     fibers = compute_fiber_forces(now, m, compute_thelen_forces, fields, ())
     cos, active, passive, tendon = fibers
     if cos > NOTHING:
@@ -425,14 +486,18 @@ def compute_thelen(now: MuscleInputs, m: OldMuscle, fields: ThelenFields) -> tup
 
 
 def equilibrate_thelen(now: MuscleInputs, m: OldMuscle, fields: ThelenFields) -> tuple[bool, float]:
-    """The fiber length in equilibrate_thelen."""
+    """Return the fiber length in equilibrium.
+
+    Returns:
+        True, and the fiber length (m).
+    """
     return True, find_isometric_length(
         now.length, m.optimal, now.activation, m, compute_thelen_forces, fields, ()
     )
 
 
 def compute_rigid_thelen(now: MuscleInputs, m: OldMuscle, fields: ThelenFields) -> float:
-    """The greatest force."""
+    """Return the force (N) of fully active fibers."""
     return compute_full_force(now, m.optimal, m, compute_thelen_forces, fields, ())
 
 
@@ -445,16 +510,16 @@ register_force_type(
         Fields(
             ThelenFields,
             (
-                positive("activation_time_constant"),
-                positive("deactivation_time_constant"),
+                require_positive("activation_time_constant"),
+                require_positive("deactivation_time_constant"),
                 Number("Vmax"),
                 Number("Vmax0"),
                 *map(
-                    positive,
+                    require_positive,
                     ("FmaxTendonStrain", "FmaxMuscleStrain", "KshapeActive", "KshapePassive"),
                 ),
                 Number("damping"),
-                positive("Af"),
+                require_positive("Af"),
                 Number("Flen", lambda x: x > 1.0, "is not above 1"),
             ),
         ),

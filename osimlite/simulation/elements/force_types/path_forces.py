@@ -21,15 +21,26 @@ from osimlite.schema.path_forces import (
 )
 from osimlite.simulation.elements.force_type import DeclaredForce, ForceType, State
 from osimlite.simulation.elements.geometries.path import PATH
-from osimlite.simulation.elements.integral import integral
-from osimlite.simulation.elements.parameters import Curve, Expression, Number, positive
+from osimlite.simulation.elements.integral import integrate
+from osimlite.simulation.elements.parameters import Curve, Expression, Number, require_positive
 from osimlite.simulation.elements.registry import register_force_type
 
 
 def compute_path_spring(
     length: float, rate: float, l0: float, k: float, d: float
 ) -> tuple[float, float]:
-    """Tension and energy."""
+    """Return tension and energy of a spring along a path.
+
+    Args:
+        length: length of the path, m.
+        rate: lengthening speed, m/s.
+        l0: resting length, m.
+        k: stiffness, N/m.
+        d: dissipation, s/m.
+
+    Returns:
+        Tension (N) and energy (J).
+    """
     return path_spring_tension(length, rate, l0, k, d), path_spring_energy(length, l0, k)
 
 
@@ -46,28 +57,33 @@ register_force_type(
 
 
 MIN_ENGAGING_CONTROL = 2.0 ** (-52.0 * 7.0 / 8.0)
-"""A control that is no larger does not engage the spring: Simbody's SignificantReal."""
+"""Controls up to this value do not engage the spring: Simbody's SignificantReal."""
 
 
 def compute_clutched_spring(
     rate: float, control: float, stretch: float, k: float, d: float, relaxation: float
 ) -> tuple[float, float]:
-    """Tension c k z (1 + d v), N, and rate of the stretch z, m/s: that of the path, -z / relaxation without control.
+    """Return the tension c k z (1 + d v) and the rate of the stretch z of a clutched spring.
+
+    The rate is v while the clutch is engaged, and -z / relaxation otherwise.
 
     Args:
-        rate: v of the path, m/s.
-        control: c, kept between 0 and 1.
+        rate: lengthening speed v of the path, m/s.
+        control: c, limited to 0 to 1.
         stretch: z, m.
         k: stiffness, N/m.
         d: dissipation, s/m.
         relaxation: time constant, s.
+
+    Returns:
+        Tension (N) and rate of the stretch (m/s).
     """
     tension = min(max(control, 0.0), 1.0) * k * stretch * (1.0 + d * rate)
     return tension, rate if control > MIN_ENGAGING_CONTROL else -stretch / relaxation
 
 
-def _at_least_zero(name: str) -> Number:
-    return Number(name, lambda value: value >= 0.0, "is less than 0; give it one that is not")
+def _require_nonnegative(name: str) -> Number:
+    return Number(name, lambda value: value >= 0.0, "is negative; give it a value of at least 0")
 
 
 register_force_type(
@@ -78,20 +94,30 @@ register_force_type(
         inputs=("rate",),
         outputs=("tension", "stretch_rate"),
         parameters=(
-            _at_least_zero("stiffness"),
-            _at_least_zero("dissipation"),
-            positive("relaxation_time_constant"),
+            _require_nonnegative("stiffness"),
+            _require_nonnegative("dissipation"),
+            require_positive("relaxation_time_constant"),
         ),
-        controlled=True,
+        has_control=True,
         states=(State("stretch", lambda spring: spring.initial_stretch),),
         labels={"{name}": "tension"},
-        goes_on=True,
+        states_change_when_off=True,
     )
 )
 
 
 def compute_ligament(length: float, l0: float, force: float, curve: Floats) -> tuple[float, float]:
-    """Tension, and length over resting length."""
+    """Return the tension of a ligament, which is a force times a curve of the normalized length.
+
+    Args:
+        length: length of the path, m.
+        l0: resting length, m.
+        force: PCSA force, N.
+        curve: factor over length / resting length.
+
+    Returns:
+        Tension (N), which is 0 up to the resting length, and length over resting length.
+    """
     ratio = length / l0
     if not length > l0:
         return 0.0, ratio
@@ -102,7 +128,7 @@ def compute_ligament(length: float, l0: float, force: float, curve: Floats) -> t
 def _compute_ligament_energy(force: DeclaredForce, record: Sequence[float]) -> float:
     l0, largest, curve = force.values
     ratio = record[1]
-    return float(largest * l0 * integral(curve, 1.0, ratio)) if ratio > 1.0 else 0.0
+    return float(largest * l0 * integrate(curve, 1.0, ratio)) if ratio > 1.0 else 0.0
 
 
 register_force_type(
@@ -112,9 +138,9 @@ register_force_type(
         compute_ligament,
         inputs=("length",),
         outputs=("tension", "ratio"),
-        parameters=(positive("resting_length"), "pcsa_force", Curve("force_length_curve")),
+        parameters=(require_positive("resting_length"), "pcsa_force", Curve("force_length_curve")),
         labels={"{name}": "tension"},
-        stored=_compute_ligament_energy,
+        compute_energy=_compute_ligament_energy,
     )
 )
 
@@ -122,7 +148,20 @@ register_force_type(
 def compute_blankevoort_ligament(
     length: float, rate: float, l0: float, k: float, e1: float, c: float
 ) -> tuple[float, float, float, float, float, float, float, float]:
-    """Tension and its two parts, length and strain with their rates, energy."""
+    """Return the tension of a ligament by Blankevoort and Huiskes, with its parts.
+
+    Args:
+        length: length of the path, m.
+        rate: lengthening speed, m/s.
+        l0: slack length, m.
+        k: linear stiffness, N.
+        e1: transition strain.
+        c: damping coefficient, N.s (per strain rate).
+
+    Returns:
+        Tension and its elastic and damping parts (N), length (m) and rate (m/s), strain and its rate
+        (1/s), energy (J).
+    """
     tension = blankevoort_tension(length, rate, l0, k, e1, c)
     elastic = blankevoort_tension(length, 0.0, l0, k, e1, c)
     energy = blankevoort_energy(length, l0, k, e1)
@@ -145,7 +184,7 @@ register_force_type(
             "energy",
         ),
         parameters=(
-            positive("slack_length"),
+            require_positive("slack_length"),
             "linear_stiffness",
             "transition_strain",
             "damping_coefficient",
@@ -172,7 +211,17 @@ def compute_expression_tension(
     constants: Floats,
     registers: Floats,
 ) -> float:
-    """Tension."""
+    """Return the tension (N) by an expression of stretch and lengthening speed; the energy is unknown.
+
+    Args:
+        length: length of the path, m.
+        rate: lengthening speed, m/s.
+        l0: resting length, m.
+        clamped: above 0 if a negative stretch counts as 0.
+        steps: steps of the expression.
+        constants: its constants.
+        registers: its registers.
+    """
     return of_two(stretch(length, l0, clamped > 0.0), rate, steps, constants, registers)
 
 

@@ -18,7 +18,16 @@ from osimlite.simulation.elements.registry import register_force_type
 
 
 def compute_point_spring(length: float, k: float, l0: float) -> tuple[float, float]:
-    """Tension and energy."""
+    """Return tension (N) and energy (J) of a spring between two points.
+
+    Args:
+        length: distance of the points, m.
+        k: stiffness, N/m.
+        l0: rest length, m.
+
+    Returns:
+        Tension (N) and energy (J).
+    """
     return point_spring_tension(length, k, l0), spring_energy(length - l0, k)
 
 
@@ -46,18 +55,20 @@ register_force_type(
 
 
 class PrescribedLoad(GivenLoad):
-    """A frame, and functions; other than three functions count as none, as in OpenSim."""
+    """Load of a PrescribedForce; as in OpenSim, a set that does not have three functions is ignored."""
 
     def read(self, builder: ElementBuilder, force: Any) -> Load:
-        """The load of a force."""
-        frame = builder.target(force, "socket_frame", force.socket_frame)
-        placed, ground = builder.placement(frame), FramePlacement(GROUND, np.eye(4))
+        """Return the load of a force."""
+        frame = builder.resolve_target(force, "socket_frame", force.socket_frame)
+        placed, ground = builder.find_placement(frame), FramePlacement(GROUND, np.eye(4))
         given = []
         for what in ("forceFunctions", "pointFunctions", "torqueFunctions"):
             functions = getattr(force, what).objects
             given.append(
                 tuple(
-                    builder.function(force, item, what) for item in functions if len(functions) == 3
+                    builder.read_function(force, item, what)
+                    for item in functions
+                    if len(functions) == 3
                 )
             )
         start = f"{'ground' if force.forceIsGlobal else frame.name}_{force.name}"

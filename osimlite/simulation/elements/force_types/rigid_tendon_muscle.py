@@ -7,26 +7,32 @@ from osimlite.mechanics.kernels.functions import value_at
 from osimlite.mechanics.kernels.pointers import Floats
 from osimlite.mechanics.laws.muscles import MuscleInputs
 from osimlite.schema.muscles import RigidTendonMuscle
-from osimlite.simulation.elements.muscle import height, muscle
-from osimlite.simulation.elements.parameters import Curve, Fields, Number, Together, positive
+from osimlite.simulation.elements.muscle import compute_height, define_muscle
+from osimlite.simulation.elements.parameters import (
+    Curve,
+    Fields,
+    Number,
+    Together,
+    require_positive,
+)
 from osimlite.simulation.elements.registry import register_force_type
 
 MAX_PARALLEL_HEIGHT_M = 2.0**-26
-"""Fibers that are no higher (m) are in line with the tendon: Simbody's SqrtEps."""
+"""Fibers of at most this height (m) are parallel to the tendon: Simbody's SqrtEps."""
 
 
 class RigidTendonFields(NamedTuple):
-    """The numbers of a muscle."""
+    """Numbers of a muscle with a rigid tendon."""
 
     strength: float  # max_isometric_force, N
     optimal: float  # optimal_fiber_length, m
     slack: float  # tendon_slack_length, m
     fastest: float  # max_contraction_velocity, 1/s
-    height: float  # of the fibers across the tendon, m
+    height: float  # height of the fibers across the tendon, m
 
 
 class RigidTendonCurves(NamedTuple):
-    """Active and passive force over length (the latter kept from 0 to 10), and a factor over velocity, normalized."""
+    """Curves: active and passive force over length (the latter limited to 0 to 10), factor over velocity, normalized."""
 
     active: Floats
     passive: Floats
@@ -36,10 +42,18 @@ class RigidTendonCurves(NamedTuple):
 def compute_rigid_tendon_muscle(
     now: MuscleInputs, m: RigidTendonFields, curves: RigidTendonCurves
 ) -> tuple[float, float, float, float, float, float, float, float, float]:
-    """The muscle at a moment; see RigidTendonMuscle of OpenSim, which takes the path's rate for the fibers' velocity.
+    """Return the quantities of a muscle with a rigid tendon.
 
-    Returns: Tension (N), activation, fiber length (m), cosine of pennation, factors of the active
-        force by length and by velocity, active and passive fiber force (N), fiber velocity (m/s).
+    As OpenSim's RigidTendonMuscle, it uses the rate of the path as the fiber velocity.
+
+    Args:
+        now: path, excitation and states.
+        m: numbers of the muscle.
+        curves: curves of the muscle.
+
+    Returns:
+        Tension (N), activation, fiber length (m), cosine of pennation, force-length and force-velocity
+        factors, active and passive fiber force (N), fiber velocity (m/s).
     """
     along = max(now.length - m.slack, 0.0)
     fiber_length, cos = along, 1.0
@@ -66,13 +80,13 @@ def compute_rigid_tendon_muscle(
 
 
 def compute_full_force(now: MuscleInputs, m: RigidTendonFields, curves: RigidTendonCurves) -> float:
-    """Force (N) of fully active fibers along the tendon."""
+    """Return the force (N) of fully active fibers along the tendon."""
     _, _, _, cos, active, factor, _, _, _ = compute_rigid_tendon_muscle(now, m, curves)
     return m.strength * active * factor * cos
 
 
 register_force_type(
-    muscle(
+    define_muscle(
         RigidTendonMuscle,
         compute_rigid_tendon_muscle,
         ("fiber_velocity",),
@@ -80,11 +94,11 @@ register_force_type(
             RigidTendonFields,
             (
                 Number("max_isometric_force"),
-                positive("optimal_fiber_length"),
+                require_positive("optimal_fiber_length"),
                 Number("tendon_slack_length"),
-                positive("max_contraction_velocity"),
+                require_positive("max_contraction_velocity"),
             ),
-            height,
+            compute_height,
         ),
         Together(
             RigidTendonCurves,
@@ -94,6 +108,6 @@ register_force_type(
                 Curve("force_velocity_curve"),
             ),
         ),
-        rigid=compute_full_force,
+        rigid_law=compute_full_force,
     )
 )

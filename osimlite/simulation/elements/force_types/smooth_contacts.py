@@ -33,7 +33,26 @@ def compute_smooth_contact(
     vt: float,
     bv: float,
 ) -> tuple[float, float, float, float]:
-    """Force on the sphere, and energy."""
+    """Return the force on a sphere that touches a half space smoothly.
+
+    Args:
+        d: depth, m.
+        radius: radius of the sphere, m.
+        n: outward unit normal of the half space.
+        v: velocity of the half space relative to the sphere, m/s.
+        E: stiffness, Pa.
+        cf: constant_contact_force, which keeps roots away from 0, m^2 and m^2/s^2.
+        bd: sharpness of the onset over the depth, 1/m.
+        c: dissipation, s/m.
+        us: static friction.
+        ud: dynamic friction.
+        uv: viscous friction, s/m.
+        vt: transition velocity, m/s.
+        bv: sharpness of the release over the speed, s/m.
+
+    Returns:
+        Components of the force (N) and energy (J).
+    """
     hertz = smooth_hertz(d, radius, E, cf, bd)
     fx, fy, fz = smooth_contact_force(hertz, c, us, ud, uv, vt, cf, bv, n, v)
     return fx, fy, fz, smooth_contact_energy(hertz, d)

@@ -17,22 +17,26 @@ from osimlite.mechanics.laws.smooth_muscles import (
 from osimlite.schema.muscles import DeGrooteFregly2016Muscle, MeyerFregly2016Muscle
 from osimlite.simulation.elements.builder import ElementBuilder
 from osimlite.simulation.elements.force_type import State
-from osimlite.simulation.elements.muscle import PENNATION, SPRING, height, muscle
-from osimlite.simulation.elements.parameters import Fields, Number, positive
+from osimlite.simulation.elements.muscle import PENNATION, SPRING, compute_height, define_muscle
+from osimlite.simulation.elements.parameters import Fields, Number, require_positive
 from osimlite.simulation.elements.registry import register_force_type
 
 ACTIVATION = State("activation")
 
 
-def smooth_fields(
+def define_smooth_fields(
     timed: Callable[[ElementBuilder, Any], Any] = lambda builder, force: force,
 ) -> Fields:
-    """The numbers of such a muscle; `timed` gives the one that has its constants of activation."""
+    """Return the parameter with the numbers of a smooth muscle.
+
+    Args:
+        timed: function that returns the muscle whose activation constants are used.
+    """
 
     def others(builder: ElementBuilder, force: Any) -> tuple[float, ...]:
         first = timed(builder, force)
         return (
-            *height(builder, force),
+            *compute_height(builder, force),
             not force.ignore_passive_fiber_force,
             not force.ignore_activation_dynamics,
             first.activation_time_constant,
@@ -44,9 +48,9 @@ def smooth_fields(
         SmoothMuscle,
         (
             Number("max_isometric_force"),
-            positive("optimal_fiber_length"),
+            require_positive("optimal_fiber_length"),
             Number("tendon_slack_length"),
-            positive("max_contraction_velocity"),
+            require_positive("max_contraction_velocity"),
             Number("active_force_width_scale", lambda x: x >= 1.0, "is less than 1"),
             Number("fiber_damping", lambda x: x >= 0.0, "is less than 0"),
         ),
@@ -55,27 +59,27 @@ def smooth_fields(
 
 
 def check_smooth(builder: ElementBuilder, force: Any) -> None:
-    """Refuse such a muscle as OpenSim does.
+    """Raise an error if OpenSim refuses the muscle.
 
     Raises:
-        ModelError: a property has no meaning; it is named.
+        ModelError: a property has no meaning; the message names it.
     """
     times = (
         "activation_time_constant",
         "deactivation_time_constant",
         "activation_dynamics_smoothing",
     )
-    for number in (PENNATION, *map(positive, (*times, "default_activation"))):
+    for number in (PENNATION, *map(require_positive, (*times, "default_activation"))):
         number.read(builder, force)
 
 
 def _find_activation_owner(
     builder: ElementBuilder, force: DeGrooteFregly2016Muscle
 ) -> DeGrooteFregly2016Muscle:
-    """The muscle whose constants of activation count.
+    """Return the muscle whose activation constants count.
 
-    OpenSim keeps them in variables of the process, so that those of the first muscle that it
-    computes are those of all: of the first in the model, if the process computes no other.
+    OpenSim stores them in static variables, so that all muscles use those of the first muscle that the
+    process computes: the first in the model, if the process computes no other.
     """
     muscles = [] if builder.own_times else builder.model.components(DeGrooteFregly2016Muscle)
     return next((muscle for muscle in muscles if not muscle.ignore_activation_dynamics), force)
@@ -83,7 +87,7 @@ def _find_activation_owner(
 
 def _check_degroote(builder: ElementBuilder, force: DeGrooteFregly2016Muscle) -> None:
     check_smooth(builder, force)
-    positive("tendon_strain_at_one_norm_force").read(builder, force)
+    require_positive("tendon_strain_at_one_norm_force").read(builder, force)
     words = f"is not from 0 to {LARGEST_FORCE:g}"
     Number("default_normalized_tendon_force", lambda x: 0.0 <= x <= LARGEST_FORCE, words).read(
         builder, force
@@ -102,37 +106,39 @@ def _read_tendon_fields(
 
 
 register_force_type(
-    muscle(
+    define_muscle(
         DeGrooteFregly2016Muscle,
         degroote,
         ("activation_rate", "normalized_tendon_force_rate", "fiber_velocity", SPRING, "energy"),
-        smooth_fields(_find_activation_owner),
+        define_smooth_fields(_find_activation_owner),
         Fields(
-            SmoothTendon, (positive("passive_fiber_strain_at_one_norm_force"),), _read_tendon_fields
+            SmoothTendon,
+            (require_positive("passive_fiber_strain_at_one_norm_force"),),
+            _read_tendon_fields,
         ),
         states=(
             ACTIVATION,
             State("normalized_tendon_force"),
         ),
         equilibrium=degroote_equilibrium,
-        settled=("normalized_tendon_force",),
-        rigid=degroote_rigid,
+        solved_states=("normalized_tendon_force",),
+        rigid_law=degroote_rigid,
         check=_check_degroote,
-        shares=True,
-        goes_on=True,
+        shares_numbers=True,
+        states_change_when_off=True,
     )
 )
 
 
 register_force_type(
-    muscle(
+    define_muscle(
         MeyerFregly2016Muscle,
         meyer,
         ("activation_rate", "fiber_velocity", SPRING),
-        smooth_fields(),
+        define_smooth_fields(),
         states=(ACTIVATION,),
-        rigid=meyer_rigid,
+        rigid_law=meyer_rigid,
         check=check_smooth,
-        goes_on=True,
+        states_change_when_off=True,
     )
 )

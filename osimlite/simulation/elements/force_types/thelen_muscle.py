@@ -15,14 +15,14 @@ from osimlite.mechanics.laws.thelen2003 import (
 from osimlite.schema.muscles import Thelen2003Muscle
 from osimlite.simulation.elements.builder import ElementBuilder
 from osimlite.simulation.elements.force_type import DeclaredForce, State
-from osimlite.simulation.elements.muscle import muscle, require
-from osimlite.simulation.elements.parameters import Fields, Number, positive
+from osimlite.simulation.elements.muscle import check_muscle, define_muscle
+from osimlite.simulation.elements.parameters import Fields, Number, require_positive
 from osimlite.simulation.elements.registry import register_force_type
 
 
 def _check_muscle(builder: ElementBuilder, force: Thelen2003Muscle) -> None:
     flags = "ignore_tendon_compliance", "ignore_activation_dynamics"
-    require(
+    check_muscle(
         builder,
         force,
         *(
@@ -30,7 +30,7 @@ def _check_muscle(builder: ElementBuilder, force: Thelen2003Muscle) -> None:
             for flag in flags
         ),
         Number("minimum_activation", lambda x: x >= 0.01, "is less than 0.01"),
-        *map(positive, ("FmaxTendonStrain", "FmaxMuscleStrain")),
+        *map(require_positive, ("FmaxTendonStrain", "FmaxMuscleStrain")),
         Number("KshapePassive", lambda x: 1e-9 < x < 700.0, "is not between 1e-9 and 700"),
         Number(
             "fv_linear_extrap_threshold", lambda x: x * force.Flen > 1.0, "is not above 1 / Flen"
@@ -50,14 +50,14 @@ def _read_derived_fields(builder: ElementBuilder, force: Thelen2003Muscle) -> tu
 
 
 def _compute_energy(force: DeclaredForce, record: Sequence[float]) -> float:
-    known = force.known(record)
+    known = force.named_values(record)
     return thelen2003_energy(
         force.values[1], known["length"], known["fiber_length"], known["cos_pennation"]
     )
 
 
 register_force_type(
-    muscle(
+    define_muscle(
         Thelen2003Muscle,
         thelen2003,
         ("activation_rate", "fiber_velocity"),
@@ -65,14 +65,14 @@ register_force_type(
             Thelen2003,
             (
                 Number("max_isometric_force"),
-                positive("optimal_fiber_length"),
-                positive("tendon_slack_length"),
-                positive("max_contraction_velocity"),
-                positive("activation_time_constant"),
-                positive("deactivation_time_constant"),
+                require_positive("optimal_fiber_length"),
+                require_positive("tendon_slack_length"),
+                require_positive("max_contraction_velocity"),
+                require_positive("activation_time_constant"),
+                require_positive("deactivation_time_constant"),
                 Number("minimum_activation"),
-                positive("KshapeActive"),
-                positive("Af"),
+                require_positive("KshapeActive"),
+                require_positive("Af"),
                 Number("Flen", lambda x: x > 1.0, "is not above 1"),
                 Number("fv_linear_extrap_threshold"),
             ),
@@ -83,9 +83,9 @@ register_force_type(
             State("fiber_length", output="fiber_velocity"),
         ),
         equilibrium=thelen2003_equilibrium,
-        settled=("fiber_length",),
-        rigid=thelen2003_rigid,
-        stored=_compute_energy,
+        solved_states=("fiber_length",),
+        rigid_law=thelen2003_rigid,
+        compute_energy=_compute_energy,
         check=_check_muscle,
     )
 )

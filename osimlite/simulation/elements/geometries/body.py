@@ -1,4 +1,4 @@
-"""Bodies that are pushed at points or turned: the geometries of actuators and of contact with the ground."""
+"""Geometries of actuators on bodies, and of contact of a station with the ground."""
 
 from __future__ import annotations
 
@@ -29,19 +29,22 @@ from osimlite.mechanics.laws.vectors import (
 )
 from osimlite.mechanics.multibody.links import Places
 from osimlite.mechanics.multibody.mechanism import GROUND
-from osimlite.simulation.elements.builder import ElementBuilder, Triple, triple
+from osimlite.simulation.elements.builder import ElementBuilder, Triple, as_triple
 from osimlite.simulation.elements.geometries.geometry import Geometry
 
 
 def turn_bodies(model: Ints, data: Floats, g: Ints, gp: Floats, torque: float) -> None:
-    """Turn a body about an axis, and another the other way."""
+    """Apply a torque about an axis to one body, and the opposite torque to another."""
     axis = direction(model, data, g[2], vector(gp, 0))
     apply_torque(model, data, g[0], times(torque, axis))
     apply_torque(model, data, g[1], times(-torque, axis))
 
 
-def turning_speed(model: Ints, data: Floats, g: Ints, gp: Floats) -> float:
-    """How fast a body turns against another about an axis (rad/s), which OpenSim takes for one of ground."""
+def compute_turning_speed(model: Ints, data: Floats, g: Ints, gp: Floats) -> float:
+    """Return the angular velocity of one body relative to another about an axis, rad/s.
+
+    As in OpenSim, the axis is read as an axis of ground.
+    """
     return dot(
         vector(gp, 3),
         minus(angular_velocity(model, data, g[0]), angular_velocity(model, data, g[1])),
@@ -49,7 +52,7 @@ def turning_speed(model: Ints, data: Floats, g: Ints, gp: Floats) -> float:
 
 
 def push_along(model: Ints, data: Floats, g: Ints, gp: Floats, force: float) -> None:
-    """Push a body along a direction at a point."""
+    """Apply a force along a direction at a point of a body."""
     apply_force(
         model,
         data,
@@ -59,13 +62,13 @@ def push_along(model: Ints, data: Floats, g: Ints, gp: Floats, force: float) -> 
     )
 
 
-def station_speed(model: Ints, data: Floats, g: Ints, gp: Floats) -> float:
-    """How fast a station moves (m/s), in whatever direction, which is what OpenSim takes."""
+def compute_station_speed(model: Ints, data: Floats, g: Ints, gp: Floats) -> float:
+    """Return the magnitude of the velocity of a station (m/s), as OpenSim does, whatever its direction."""
     return norm(velocity(model, data, g[2], station(model, data, g[2], vector(gp, 3))))
 
 
 def push_apart(model: Ints, data: Floats, g: Ints, gp: Floats, force: float) -> None:
-    """Push two points apart."""
+    """Apply opposite forces to two points along the line between them."""
     point = station(model, data, g[2], vector(gp, 0))
     between = minus(point, station(model, data, g[3], vector(gp, 3)))
     length = norm(between)
@@ -74,8 +77,8 @@ def push_apart(model: Ints, data: Floats, g: Ints, gp: Floats, force: float) -> 
     apply_force(model, data, g[1], point, times(-size, between))
 
 
-def parting_speed(model: Ints, data: Floats, g: Ints, gp: Floats) -> float:
-    """How fast two points part, m/s."""
+def compute_parting_speed(model: Ints, data: Floats, g: Ints, gp: Floats) -> float:
+    """Return the rate of the distance between two points, m/s."""
     one, two = station(model, data, g[2], vector(gp, 0)), station(model, data, g[3], vector(gp, 3))
     between, parting = (
         minus(one, two),
@@ -88,7 +91,7 @@ def parting_speed(model: Ints, data: Floats, g: Ints, gp: Floats) -> float:
 def push_body(
     model: Ints, data: Floats, g: Ints, gp: Floats, torque: Vector, force: Vector
 ) -> None:
-    """Turn a body, and push it at a point; torque and force are along three axes, which are given by rows."""
+    """Apply a torque to a body and a force at a point of it, given along three axes that are rows of `gp`."""
     apply_torque(model, data, g[0], direction(model, data, g[2], turned_back(at(gp, 3), torque)))
     point = station(model, data, g[1], vector(gp, 0))
     apply_force(
@@ -96,28 +99,33 @@ def push_body(
     )
 
 
-def station_motion(
-    model: Ints, data: Floats, g: Ints, gp: Floats, room: Floats
+def compute_station_motion(
+    model: Ints, data: Floats, g: Ints, gp: Floats, work: Floats
 ) -> tuple[float, float, float, float]:
-    """Height of a station in ground, and its velocity; its place goes into the record."""
+    """Return the height and velocity of a station in ground; its position goes into the record.
+
+    Returns:
+        Height (m) and the three components of the velocity (m/s).
+    """
     point = station(model, data, g[0], vector(gp, 0))
-    put(room, 0, point)
+    put(work, 0, point)
     vx, vy, vz = velocity(model, data, g[0], point)
-    return room[1], vx, vy, vz
+    return work[1], vx, vy, vz
 
 
-def push_station(model: Ints, data: Floats, g: Ints, room: Floats, force: Vector) -> None:
-    """Push a station; the record then has the force."""
-    apply_force(model, data, g[0], vector(room, 0), force)
-    put(room, 0, force)
+def push_station(model: Ints, data: Floats, g: Ints, work: Floats, force: Vector) -> None:
+    """Apply a force to a station; the record then has the force."""
+    apply_force(model, data, g[0], vector(work, 0), force)
+    put(work, 0, force)
 
 
 class Anchors(NamedTuple):
-    """What an actuator acts on.
+    """Bodies that an actuator acts on, with the points and directions that define how.
 
     Attributes:
-        bodies: that it pushes or turns.
-        vectors: points (m) and directions, each with the body that it is fixed in.
+        bodies: bodies that receive the force or torque.
+        points: points (m), each with the body that it is fixed to.
+        directions: directions, each with the body that it is fixed to.
     """
 
     bodies: tuple[int, ...]
@@ -126,62 +134,69 @@ class Anchors(NamedTuple):
 
 
 class OnBodies(Geometry):
-    """Bodies, and points and directions that are fixed in them or in ground."""
+    """Base of geometries with bodies, and points and directions fixed to them or to ground."""
 
-    def pack(self, place: Anchors, places: Places) -> tuple[Sequence[int], Sequence[float]]:
-        """Links of the bodies, then of what is fixed; the vectors in these."""
-        links = [places.placement(body).link for body in place.bodies]
+    def pack(self, location: Anchors, places: Places) -> tuple[Sequence[int], Sequence[float]]:
+        """Return the links of the bodies, points and directions, and the vectors in these links.
+
+        Returns:
+            Integers and numbers.
+        """
+        links = [places.placement(body).link for body in location.bodies]
         numbers: list[float] = []
-        for body, point in place.points:
+        for body, point in location.points:
             link, result = places.station(body, point)
             links.append(link)
             numbers += result
-        for body, along in place.directions:
+        for body, along in location.directions:
             links.append(places.placement(body).link)
             numbers += places.direction(body, along)
         return links, numbers
 
 
 class AboutAxis(OnBodies):
-    """An axis of ground or of the first of two bodies: the output `torque` (N.m) turns the first against the other."""
+    """Axis fixed to ground or the first of two bodies: the output `torque` (N.m) turns the first against the second."""
 
     inputs = ("speed",)
     speed = "speed"
-    before = ("speed = turning_speed(model, data, g, gp)",)
-    after = ("turn_bodies(model, data, g, gp, torque)",)
-    calls = (turning_speed, turn_bodies)
+    setup_code = ("speed = compute_turning_speed(model, data, g, gp)",)
+    apply_code = ("turn_bodies(model, data, g, gp, torque)",)
+    called_functions = (compute_turning_speed, turn_bodies)
 
     def read(self, builder: ElementBuilder, force: Any) -> Anchors:
-        """The bodies and the axis of an actuator."""
+        """Return the bodies and the axis of an actuator."""
         (one, placed), (two, _) = (
-            builder.placement(builder.target(force, field, getattr(force, field)))
+            builder.find_placement(builder.resolve_target(force, field, getattr(force, field)))
             for field in ("bodyA", "bodyB")
         )
-        axis = as_given = _unit(builder, force, force.axis)
+        axis = as_given = _normalize_direction(builder, force, force.axis)
         if not force.torque_is_global:
-            axis = triple(placed[:3, :3] @ axis)
+            axis = as_triple(placed[:3, :3] @ axis)
         return Anchors(
             (one, two), (), ((GROUND if force.torque_is_global else one, axis), (GROUND, as_given))
         )
 
 
 class AtPoint(OnBodies):
-    """A point of a body and a direction: the output `force` (N) pushes the body."""
+    """Point of a body and a direction: the output `force` (N) pushes the body."""
 
     inputs = ("speed",)
     speed = "speed"
-    before = ("speed = station_speed(model, data, g, gp)",)
-    after = ("push_along(model, data, g, gp, force)",)
-    calls = (station_speed, push_along)
+    setup_code = ("speed = compute_station_speed(model, data, g, gp)",)
+    apply_code = ("push_along(model, data, g, gp, force)",)
+    called_functions = (compute_station_speed, push_along)
 
     def read(self, builder: ElementBuilder, force: Any) -> Anchors:
-        """The body, the point and the direction of an actuator, the last two fixed in ground or in the body."""
-        body = builder.placement(builder.target(force, "body", force.body)).body
-        builder.check(force, force.point)
-        point = GROUND if force.point_is_global else body, triple(force.point)
-        along = GROUND if force.force_is_global else body, _unit(builder, force, force.direction)
-        # OpenSim's speed is that of the same numbers as a station of the body.
-        return Anchors((body,), (point, (body, triple(force.point))), (along,))
+        """Return the body, the point and the direction of an actuator; the last two are fixed to ground or the body."""
+        body = builder.find_placement(builder.resolve_target(force, "body", force.body)).body
+        builder.check_finite(force, force.point)
+        point = GROUND if force.point_is_global else body, as_triple(force.point)
+        along = (
+            GROUND if force.force_is_global else body,
+            _normalize_direction(builder, force, force.direction),
+        )
+        # OpenSim computes the speed of the same coordinates as a station of the body.
+        return Anchors((body,), (point, (body, as_triple(force.point))), (along,))
 
 
 class ApartPoints(OnBodies):
@@ -189,38 +204,42 @@ class ApartPoints(OnBodies):
 
     inputs = ("speed",)
     speed = "speed"
-    before = ("speed = parting_speed(model, data, g, gp)",)
-    after = ("push_apart(model, data, g, gp, force)",)
-    calls = (parting_speed, push_apart)
+    setup_code = ("speed = compute_parting_speed(model, data, g, gp)",)
+    apply_code = ("push_apart(model, data, g, gp, force)",)
+    called_functions = (compute_parting_speed, push_apart)
 
     def read(self, builder: ElementBuilder, force: Any) -> Anchors:
-        """The bodies and the points of an actuator, fixed in ground or in the bodies."""
+        """Return the bodies and the points of an actuator, which are fixed to ground or the bodies."""
         one, two = (
-            builder.placement(builder.target(force, field, getattr(force, field))).body
+            builder.find_placement(builder.resolve_target(force, field, getattr(force, field))).body
             for field in ("bodyA", "bodyB")
         )
-        builder.check(force, (*force.pointA, *force.pointB))
+        builder.check_finite(force, (*force.pointA, *force.pointB))
         first, second = (GROUND, GROUND) if force.points_are_global else (one, two)
-        return Anchors((one, two), ((first, triple(force.pointA)), (second, triple(force.pointB))))
+        return Anchors(
+            (one, two), ((first, as_triple(force.pointA)), (second, as_triple(force.pointB)))
+        )
 
 
 class OnBody(OnBodies):
-    """A body: the outputs tx, ty, tz (N.m) turn it, and fx, fy, fz (N) push it at a point."""
+    """Body: the outputs tx, ty, tz (N.m) are a torque on it, and fx, fy, fz (N) a force at a point."""
 
-    after = ("push_body(model, data, g, gp, (tx, ty, tz), (fx, fy, fz))",)
-    calls = (push_body,)
+    apply_code = ("push_body(model, data, g, gp, (tx, ty, tz), (fx, fy, fz))",)
+    called_functions = (push_body,)
 
     def read(self, builder: ElementBuilder, force: Any) -> Anchors:
-        """The body of an actuator, the point, and the axes along which torque and force are."""
-        body = builder.placement(builder.target(force, "socket_body", force.socket_body)).body
-        builder.check(force, force.point)
+        """Return the body of an actuator, the point, and the axes of torque and force."""
+        body = builder.find_placement(
+            builder.resolve_target(force, "socket_body", force.socket_body)
+        ).body
+        builder.check_finite(force, force.point)
         axes = GROUND if force.spatial_force_is_global else body
-        point = GROUND if force.point_is_global else body, triple(force.point)
-        return Anchors((body,), (point,), tuple((axes, triple(axis)) for axis in np.eye(3)))
+        point = GROUND if force.point_is_global else body, as_triple(force.point)
+        return Anchors((body,), (point,), tuple((axes, as_triple(axis)) for axis in np.eye(3)))
 
 
 class NamedStation(NamedTuple):
-    """A station of the model: its name, its body, and where it is there (m)."""
+    """Station of the model: its name, its body, and its position in the body (m)."""
 
     name: str
     body: int
@@ -228,43 +247,51 @@ class NamedStation(NamedTuple):
 
 
 class AtStation(Geometry):
-    """A station: its height y (m) and velocity in ground; the outputs fx, fy, fz (N) push it."""
+    """Station: its height y (m) and velocity in ground; the outputs fx, fy, fz (N) push it."""
 
     inputs = ("height", "vx", "vy", "vz")
-    before = ("height, vx, vy, vz = station_motion(model, data, g, gp, room)",)
-    after = ("push_station(model, data, g, room, (fx, fy, fz))",)
-    calls = (station_motion, push_station)
+    setup_code = ("height, vx, vy, vz = compute_station_motion(model, data, g, gp, work)",)
+    apply_code = ("push_station(model, data, g, work, (fx, fy, fz))",)
+    called_functions = (compute_station_motion, push_station)
 
     def read(self, builder: ElementBuilder, force: Any) -> NamedStation:
-        """The station that a force names."""
-        result = builder.target(force, "socket_station", force.socket_station)
-        body, placed = builder.placement(
-            builder.target(result, "socket_parent_frame", result.socket_parent_frame)
+        """Return the station that a force names."""
+        result = builder.resolve_target(force, "socket_station", force.socket_station)
+        body, placed = builder.find_placement(
+            builder.resolve_target(result, "socket_parent_frame", result.socket_parent_frame)
         )
-        point = triple(placed[:3, :3] @ result.location + placed[:3, 3])
-        builder.check(force, point)
+        point = as_triple(placed[:3, :3] @ result.location + placed[:3, 3])
+        builder.check_finite(force, point)
         return NamedStation(result.name, body, point)
 
-    def pack(self, place: NamedStation, places: Places) -> tuple[Sequence[int], Sequence[float]]:
-        """Link and point."""
-        link, point = places.station(place.body, place.point)
+    def pack(self, location: NamedStation, places: Places) -> tuple[Sequence[int], Sequence[float]]:
+        """Return the link of the station and the position in it.
+
+        Returns:
+            Integers and numbers.
+        """
+        link, point = places.station(location.body, location.point)
         return (link,), point
 
-    def room(self, place: Any) -> int:
-        """The force."""
+    def record_size(self, location: Any) -> int:
+        """Return the size of the force."""
         return 3
 
-    def columns(self, force: Any) -> tuple[str, ...]:
-        """The force on the station, in ground."""
-        return tuple(f"{force.name}.{force.place.name}.force.{axis}" for axis in "XYZ")
+    def list_columns(self, force: Any) -> tuple[str, ...]:
+        """Return the labels of the force on the station, in ground.
+
+        Returns:
+            Labels.
+        """
+        return tuple(f"{force.name}.{force.location.name}.force.{axis}" for axis in "XYZ")
 
 
 AXIS, POINT, POINTS, BODY, STATION = AboutAxis(), AtPoint(), ApartPoints(), OnBody(), AtStation()
 
 
-def _unit(builder: ElementBuilder, force: Any, along: Sequence[float]) -> Triple:
-    builder.check(force, along)
+def _normalize_direction(builder: ElementBuilder, force: Any, along: Sequence[float]) -> Triple:
+    builder.check_finite(force, along)
     size = float(np.linalg.norm(along))
     if size == 0.0:
         raise ModelError(f"'{builder.path(force)}' has a direction of length 0; give it one")
-    return triple(np.array(along) / size)
+    return as_triple(np.array(along) / size)

@@ -1,4 +1,4 @@
-"""A generalized force on a coordinate."""
+"""Geometry of a generalized force on a coordinate."""
 
 from __future__ import annotations
 
@@ -13,8 +13,18 @@ from osimlite.simulation.elements.builder import ElementBuilder
 from osimlite.simulation.elements.geometries.geometry import Geometry
 
 
-def coordinate(model: Ints, y: Floats, g: Ints, gp: Floats) -> tuple[float, float]:
-    """Value and speed of a coordinate, which has its own value if it is locked."""
+def get_coordinate(model: Ints, y: Floats, g: Ints, gp: Floats) -> tuple[float, float]:
+    """Return value and speed of a coordinate; a locked one has a constant value and speed 0.
+
+    Args:
+        model: integers of the model.
+        y: state vector.
+        g: index of the degree of freedom, -1 if the coordinate is locked.
+        gp: value of a locked coordinate, rad or m.
+
+    Returns:
+        Value (rad, m) and speed (rad/s, m/s).
+    """
     if g[0] < 0:
         return gp[0], 0.0
     return y[g[0]], y[model[MODEL.DOFS] + g[0]]
@@ -22,24 +32,28 @@ def coordinate(model: Ints, y: Floats, g: Ints, gp: Floats) -> tuple[float, floa
 
 @dataclass(frozen=True)
 class OnCoordinate(Geometry):
-    """A coordinate: value q (rad, m) and speed u; the output `force` is conjugate to the speed."""
+    """Coordinate: value q (rad, m) and speed u; the output `force` (N.m, N) is conjugate to the speed."""
 
-    field: str = "coordinate"  # that names the coordinate
+    field: str = "coordinate"  # property that names the coordinate
 
     inputs = ("q", "u")
     speed = "u"
-    along = "force", 1
-    before = ("q, u = coordinate(model, y, g, gp)",)
-    after = ("if g[0] >= 0:", "    f[model[MODEL.DOFS] + g[0]] += force")
-    calls = (coordinate,)
+    displacement_output = "force", 1
+    setup_code = ("q, u = get_coordinate(model, y, g, gp)",)
+    apply_code = ("if g[0] >= 0:", "    f[model[MODEL.DOFS] + g[0]] += force")
+    called_functions = (get_coordinate,)
 
     def read(self, builder: ElementBuilder, force: Any) -> int:
-        """Place of the coordinate in the mechanism."""
-        return builder.coordinate(force, self.field)
+        """Return the index of the coordinate in the mechanism."""
+        return builder.find_coordinate(force, self.field)
 
-    def pack(self, place: int, places: Places) -> tuple[Sequence[int], Sequence[float]]:
-        """Its degree of freedom (-1 if it is locked), and its value then."""
-        return (places.freedom(place),), (places.locked_value(place),)
+    def pack(self, location: int, places: Places) -> tuple[Sequence[int], Sequence[float]]:
+        """Return the degree of freedom (-1 if the coordinate is locked) and the value of a locked coordinate.
+
+        Returns:
+            Integers and numbers.
+        """
+        return (places.freedom(location),), (places.locked_value(location),)
 
 
 COORDINATE = OnCoordinate()

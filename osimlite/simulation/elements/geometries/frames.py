@@ -1,4 +1,4 @@
-"""Two frames that a bushing connects."""
+"""Geometry of a bushing between two frames."""
 
 from __future__ import annotations
 
@@ -24,27 +24,40 @@ from osimlite.mechanics.multibody.spatial import Array
 from osimlite.simulation.elements.builder import ElementBuilder
 from osimlite.simulation.elements.geometries.geometry import Geometry
 
-DEVIATIONS, LOADS, RATES, AXES, ROOM = 12, 18, 24, 30, 48
-"""Places in the record, after force and moment on the second frame and the origins of both; the axes are of both."""
+# Offsets in the record. Force and moment on the second frame (0 to 5) and the origins of both frames
+# (6 to 11) come first.
+DEVIATIONS = 12
+"""Offset of the six deviations: angles (rad), then translation (m)."""
+LOADS = 18
+"""Offset of the six loads: moments (N.m), then forces (N)."""
+RATES = 24
+"""Offset of the rates of the deviations, 1/s and m/s."""
+AXES = 30
+"""Offset of the axes of both frames in ground."""
+RECORD_SIZE = 48
+"""Size of the record of a bushing."""
 
 
-def deviate(model: Ints, data: Floats, g: Ints, gp: Floats, room: Floats) -> None:
-    """Deviations of the second frame from the first, and their rates, which go into the record."""
-    d, rates = at(room, DEVIATIONS), at(room, RATES)
+def compute_deviations(model: Ints, data: Floats, g: Ints, gp: Floats, work: Floats) -> None:
+    """Compute the deviations of the second frame from the first, and their rates, into the record.
+
+    The angles are body-fixed X-Y-Z angles of the second frame in the first.
+    """
+    d, rates = at(work, DEVIATIONS), at(work, RATES)
     for k in range(3):
-        put(room, AXES + 3 * k, direction(model, data, g[0], vector(gp, 3 * k)))
-        put(room, AXES + 9 + 3 * k, direction(model, data, g[1], vector(gp, 12 + 3 * k)))
-    one, two = at(room, AXES), at(room, AXES + 9)
+        put(work, AXES + 3 * k, direction(model, data, g[0], vector(gp, 3 * k)))
+        put(work, AXES + 9 + 3 * k, direction(model, data, g[1], vector(gp, 12 + 3 * k)))
+    one, two = at(work, AXES), at(work, AXES + 9)
     start, end = (
         station(model, data, g[0], vector(gp, 9)),
         station(model, data, g[1], vector(gp, 21)),
     )
-    put(room, 6, start)
-    put(room, 9, end)
+    put(work, 6, start)
+    put(work, 9, end)
     x, y, z = turned(one, vector(two, 0)), turned(one, vector(two, 3)), turned(one, vector(two, 6))
     put(d, 0, xyz_angles(x[0], y[0], z[0], x[1], y[1], z[1], z[2]))
     put(d, 3, turned(one, minus(end, start)))
-    # The moving frame is carried around by the other.
+    # The rate is that in the first frame, which itself rotates.
     put(
         rates,
         3,
@@ -56,32 +69,32 @@ def deviate(model: Ints, data: Floats, g: Ints, gp: Floats, room: Floats) -> Non
     put(rates, 0, xyz_rates(d[1], d[2], wx, wy, wz))
 
 
-def load_frames(model: Ints, data: Floats, g: Ints, room: Floats) -> None:
+def load_frames(model: Ints, data: Floats, g: Ints, work: Floats) -> None:
     """Apply the loads to both bodies; the record then has force and moment on the second frame."""
-    loads, d = at(room, LOADS), at(room, DEVIATIONS)
-    force = turned_back(at(room, AXES), vector(loads, 3))
-    moment = turned_back(at(room, AXES + 9), xyz_moment(d[1], d[2], loads[0], loads[1], loads[2]))
-    put(room, 0, force)
-    put(room, 3, moment)
-    apply_force(model, data, g[1], vector(room, 9), force)
-    apply_force(model, data, g[0], vector(room, 9), times(-1.0, force))
+    loads, d = at(work, LOADS), at(work, DEVIATIONS)
+    force = turned_back(at(work, AXES), vector(loads, 3))
+    moment = turned_back(at(work, AXES + 9), xyz_moment(d[1], d[2], loads[0], loads[1], loads[2]))
+    put(work, 0, force)
+    put(work, 3, moment)
+    apply_force(model, data, g[1], vector(work, 9), force)
+    apply_force(model, data, g[0], vector(work, 9), times(-1.0, force))
     apply_torque(model, data, g[1], moment)
     apply_torque(model, data, g[0], times(-1.0, moment))
 
 
-def damped(rate: float, damping: float) -> float:
-    """A rate, which may be infinite where nothing asks for it."""
+def mask_undamped_rate(rate: float, damping: float) -> float:
+    """Return the rate, or 0 without damping, because rates of angles may be infinite."""
     return rate if damping != 0.0 else 0.0
 
 
-def damp(loads: Floats, rates: Floats, damping: Floats) -> None:
-    """Turn what resists the deviations into loads, and add the damping."""
+def add_damping(loads: Floats, rates: Floats, damping: Floats) -> None:
+    """Replace resisting loads by applied loads, with damping: load = -load - damping * rate."""
     for k in range(6):
-        loads[k] = -loads[k] - damping[k] * damped(rates[k], damping[k])
+        loads[k] = -loads[k] - damping[k] * mask_undamped_rate(rates[k], damping[k])
 
 
 class Frame(NamedTuple):
-    """A frame of a bushing: its name, its body, and where it is in the body (4, 4)."""
+    """Frame of a bushing: its name, its body, and its placement in the body (4, 4)."""
 
     name: str
     body: int
@@ -90,57 +103,69 @@ class Frame(NamedTuple):
 
 @dataclass(frozen=True)
 class BetweenFrames(Geometry):
-    """Two frames: six deviations of the second from the first, angles (rad) before distances (m), and their rates.
+    """Two frames: deviations of the second from the first, three angles (rad) and a translation (m), and their rates.
 
-    The law fills `loads`: moments (N.m) of the angles and forces (N) of the distances on the second
+    The law fills `loads`: moments (N.m) of the angles and forces (N) of the translation on the second
     frame.
     """
 
-    # whether the torques of the record are about the origins of the bodies instead of the frames
+    # whether reported torques are about the origins of the bodies instead of the frames
     about_bodies: bool = False
 
     inputs = ("deviations", "rates", "loads")
-    before = (
-        "deviate(model, data, g, gp, room)",
-        f"deviations, rates, loads = at(room, {DEVIATIONS}), at(room, {RATES}), at(room, {LOADS})",
+    setup_code = (
+        "compute_deviations(model, data, g, gp, work)",
+        f"deviations, rates, loads = at(work, {DEVIATIONS}), at(work, {RATES}), at(work, {LOADS})",
     )
-    after = ("load_frames(model, data, g, room)",)
-    calls = (deviate, load_frames)
+    apply_code = ("load_frames(model, data, g, work)",)
+    called_functions = (compute_deviations, load_frames)
 
     def read(self, builder: ElementBuilder, force: Any) -> tuple[Frame, ...]:
-        """The two frames."""
+        """Return the two frames.
+
+        Returns:
+            The first and the second frame.
+        """
         frames = []
         for field in ("socket_frame1", "socket_frame2"):
-            frame = builder.target(force, field, getattr(force, field))
-            frames.append(Frame(frame.name, *builder.placement(frame)))
+            frame = builder.resolve_target(force, field, getattr(force, field))
+            frames.append(Frame(frame.name, *builder.find_placement(frame)))
         return tuple(frames)
 
     def pack(
-        self, place: tuple[Frame, ...], places: Places
+        self, location: tuple[Frame, ...], places: Places
     ) -> tuple[Sequence[int], Sequence[float]]:
-        """Links; axes and origin of each frame in its link."""
-        (one, first), (two, second) = (places.frame(frame.body, frame.placed) for frame in place)
+        """Return the links of the frames, and axes and origin of each frame in its link.
+
+        Returns:
+            Integers and numbers.
+        """
+        (one, first), (two, second) = (places.frame(frame.body, frame.placed) for frame in location)
         return (one, two), (*first, *second)
 
-    def room(self, place: Any) -> int:
-        """See the places above."""
-        return ROOM
+    def record_size(self, location: Any) -> int:
+        """Return the size of its part of the record."""
+        return RECORD_SIZE
 
-    def columns(self, force: Any) -> tuple[str, ...]:
-        """Force and torque on each of the frames."""
+    def list_columns(self, force: Any) -> tuple[str, ...]:
+        """Return the labels of force and torque on each of the frames.
+
+        Returns:
+            Labels.
+        """
         labels = [f"{kind}.{axis}" for kind in ("force", "torque") for axis in "XYZ"]
         return tuple(
-            f"{force.name}.{frame.name}.{label}" for frame in force.place for label in labels
+            f"{force.name}.{frame.name}.{label}" for frame in force.location for label in labels
         )
 
     def report(
         self, force: Any, record: Sequence[float], origins: Sequence[Sequence[float]]
     ) -> list[float]:
-        """Forces and torques in ground, about the origins of the frames or of their bodies."""
+        """Return forces and torques in ground, about the origins of the frames or of their bodies."""
         push, moment, start, end = np.array(record[:12], dtype=float).reshape(4, 3)
         first, second = start, end
         if self.about_bodies:
-            first, second = (np.array(origins[frame.body]) for frame in force.place)
+            first, second = (np.array(origins[frame.body]) for frame in force.location)
         row: list[Array] = [
             -push,
             -moment - np.cross(end - first, push),

@@ -1,4 +1,4 @@
-"""What a geometry is."""
+"""Base class of geometries, which say where a force acts."""
 
 from __future__ import annotations
 
@@ -11,60 +11,82 @@ from osimlite.simulation.elements.force_records import ForceRecord
 
 
 class Geometry:
-    """Where a force acts.
+    """Place where a force acts: it computes inputs of the law, and applies the law's outputs.
 
-    In the code of a kernel, `g` are the geometry's integers, `gp` its numbers and `room` its part
-    of the record; `model`, `reals`, `data`, `y`, `f` are as every kernel has them.
+    In the code of a kernel, `g` are the geometry's integers, `gp` its numbers and `work` its part
+    of the record; `model`, `reals`, `data`, `y`, `f` are the vectors that every kernel has.
     """
 
-    # what it computes for a law, in the code before the law is called
+    # arguments of the law that `setup_code` computes
     inputs: ClassVar[tuple[str, ...]] = ()
-    # name of the input with which an actuator's force, or its negative, makes a power
+    # input by which an actuator's force, or its negative, is multiplied for its power
     speed: ClassVar[str] = ""
-    before: ClassVar[tuple[str, ...]] = ()  # that code
-    again: ClassVar[
+    setup_code: ClassVar[tuple[str, ...]] = ()  # code before the call of the law
+    recorded_setup_code: ClassVar[
         tuple[str, ...]
-    ] = ()  # the same after an evaluation of the moment, if that is less
-    # the output that pushes along one displacement, which is the first input, its speed the second;
-    # and 1 if it does so, -1 if it pulls. Empty if there is no such thing.
-    along: ClassVar[tuple[str, int]] = ("", 0)
-    after: ClassVar[tuple[str, ...]] = ()  # the code that applies the outputs of the law
-    calls: ClassVar[tuple[Callable[..., Any], ...]] = ()  # the functions that both call
+    ] = ()  # cheaper setup code after an evaluation, if there is one
+    # output that acts along one displacement, and 1 if it pushes, -1 if it pulls; the displacement
+    # is the first input, its speed the second. "" if there is no such output.
+    displacement_output: ClassVar[tuple[str, int]] = ("", 0)
+    apply_code: ClassVar[tuple[str, ...]] = ()  # code that applies the outputs of the law
+    called_functions: ClassVar[tuple[Callable[..., Any], ...]] = ()  # functions that the code calls
 
-    def functions(self) -> dict[str, Callable[..., Any]]:
-        """What the code calls, by name."""
-        return {function.__name__: function for function in self.calls}
+    def list_functions(self) -> dict[str, Callable[..., Any]]:
+        """Return the functions that its code calls.
+
+        Returns:
+            The functions by name.
+        """
+        return {function.__name__: function for function in self.called_functions}
 
     def read(self, builder: ElementBuilder, force: Any) -> Any:
-        """Where a component acts, in terms of the mechanism.
+        """Return where a component acts, in terms of the mechanism.
+
+        Args:
+            builder: builder of the elements.
+            force: the component.
 
         Raises:
-            ModelError: it names what does not exist.
-            UnsupportedError: it acts where osimlite cannot compute it.
+            ModelError: it names something that does not exist.
+            UnsupportedError: osimlite cannot compute a force there.
         """
 
-    def parts(self, place: Any, places: Places) -> list[ForceRecord]:
-        """Items that the code calls; `item - g[0]` then is the place of the last of them."""
+    def make_parts(self, location: Any, places: Places) -> list[ForceRecord]:
+        """Return records that the code calls; `item - g[0]` is the offset of the last of them."""
         return []
 
-    def pack(self, place: Any, places: Places) -> tuple[Sequence[int], Sequence[float]]:
-        """Its integers and numbers, for what `read` gave."""
+    def pack(self, location: Any, places: Places) -> tuple[Sequence[int], Sequence[float]]:
+        """Return the integers and numbers of a location.
+
+        Args:
+            location: result of `read`.
+            places: placement of the bodies in the links of the tree.
+
+        Returns:
+            Integers and numbers.
+        """
         return (), ()
 
-    def room(self, place: Any) -> int:
-        """How many numbers of the record it fills."""
+    def record_size(self, location: Any) -> int:
+        """Return the size of its part of the record."""
         return 0
 
-    def columns(self, force: Any) -> tuple[str, ...]:
-        """Labels of its record, where a kind has none of its own."""
+    def list_columns(self, force: Any) -> tuple[str, ...]:
+        """Return the labels of its part of the record, for force types without labels."""
         return ()
 
     def report(
         self, force: Any, record: Sequence[float], origins: Sequence[Sequence[float]]
     ) -> list[float]:
-        """One row of these columns, from its part of the record; all of that."""
-        return list(record[: self.room(force.place)])
+        """Return one row of these columns, from its part of the record.
+
+        Args:
+            force: the element.
+            record: its part of the record.
+            origins: origin of each body in ground, m; ground's origin is the last.
+        """
+        return list(record[: self.record_size(force.location)])
 
 
 NOTHING = Geometry()
-"""The geometry of forces that push on nothing, and have states or outputs alone."""
+"""Geometry of forces that act on nothing, and have only states or outputs."""

@@ -1,4 +1,4 @@
-"""A force at a point of a body, and a torque, that are functions of time."""
+"""Geometry of prescribed loads: a force at a point of a body, and a torque, as functions of time."""
 
 from __future__ import annotations
 
@@ -16,102 +16,114 @@ from osimlite.mechanics.multibody.mechanism import FramePlacement
 from osimlite.simulation.elements.geometries.geometry import Geometry
 
 FRAME = 12
-"""Numbers of a frame: rotation by columns and origin in its link."""
+"""Number of values of a frame: rotation by columns, and origin in its link."""
 
 
-def apply_load(model: Ints, data: Floats, g: Ints, gp: Floats, room: Floats, t: float) -> None:
+def apply_load(model: Ints, data: Floats, g: Ints, gp: Floats, work: Floats, t: float) -> None:
     """Apply force and torque; the record has the force, the point in the first frame, and the torque.
 
-    The integers are the links of three frames (where the force acts, along whose axes force and
-    torque are, in which the point is), whether there are a force, a point and a torque, and the
-    places of nine tables.
+    The integers are the links of three frames (where the force acts, the axes of force and torque,
+    the frame of the point), whether there are a force, a point and a torque, and the offsets of nine
+    tables.
     """
-    find_load(g, gp, room, t)
+    evaluate_load(g, gp, work, t)
     link = g[0]
     if g[3] > 0:
-        turn_vector(model, data, g[1], at(gp, FRAME), room)
+        turn_vector(model, data, g[1], at(gp, FRAME), work)
         point = station(model, data, link, vector(gp, 9))
         if g[4] > 0:
             origin = point
-            turn_vector(model, data, g[2], at(gp, 2 * FRAME), at(room, 3))
-            point = plus(station(model, data, g[2], vector(gp, 33)), vector(room, 3))
+            turn_vector(model, data, g[2], at(gp, 2 * FRAME), at(work, 3))
+            point = plus(station(model, data, g[2], vector(gp, 33)), vector(work, 3))
             away = minus(point, origin)
             for k in range(3):
-                room[3 + k] = dot(direction(model, data, link, vector(gp, 3 * k)), away)
-        apply_force(model, data, link, point, vector(room, 0))
+                work[3 + k] = dot(direction(model, data, link, vector(gp, 3 * k)), away)
+        apply_force(model, data, link, point, vector(work, 0))
     if g[5] > 0:
-        turn_vector(model, data, g[1], at(gp, FRAME), at(room, 6))
-        apply_torque(model, data, link, vector(room, 6))
+        turn_vector(model, data, g[1], at(gp, FRAME), at(work, 6))
+        apply_torque(model, data, link, vector(work, 6))
 
 
-def find_load(g: Ints, gp: Floats, room: Floats, t: float) -> None:
-    """Leave what the tables of a load have at a time."""
+def evaluate_load(g: Ints, gp: Floats, work: Floats, t: float) -> None:
+    """Write the values of the tables of a load at time t into the record."""
     for k in range(9):
         if g[3 + k // 3] > 0:
-            room[k], _, _ = value_at(at(gp, g[6 + k]), t)
+            work[k], _, _ = value_at(at(gp, g[6 + k]), t)
 
 
 def turn_vector(model: Ints, data: Floats, link: int, axes: Floats, turning: Floats) -> None:
-    """From along the axes of a frame, which are given by columns in its link, to along those of ground."""
+    """Rotate a vector from the axes of a frame, given by columns in its link, to those of ground."""
     put(turning, 0, direction(model, data, link, turned_back(axes, vector(turning, 0))))
 
 
 class Load(NamedTuple):
-    """What acts, and where."""
+    """Load of a force: where it acts, and its functions of time."""
 
-    labels: tuple[str, str, str]  # of force, point and torque in the record; without the axes
-    # where the force acts, if no point is given, and in which the point is recorded
+    labels: tuple[str, str, str]  # labels of force, point and torque, without the axes
+    # frame whose origin receives a force without a point, and in which the point is reported
     frame: FramePlacement
-    force_frame: FramePlacement  # along whose axes force and torque are
-    point_frame: FramePlacement  # in which the point is
-    # three functions of time (N), or none; `point` (m) and `torque` (N.m) likewise
+    force_frame: FramePlacement  # frame of the components of force and torque
+    point_frame: FramePlacement  # frame of the point
+    # three functions of time in N, m and N.m; empty for a part that does not exist
     force: Sequence[Function]
     point: Sequence[Function]
     torque: Sequence[Function]
 
     @property
     def groups(self) -> tuple[Sequence[Function], Sequence[Function], Sequence[Function]]:
-        """Force, point and torque; a point without a force is none."""
+        """Functions of force, point and torque; a point without a force is ignored.
+
+        Returns:
+            Three groups, each of three functions or empty.
+        """
         return self.force, self.point if self.force else (), self.torque
 
 
 class GivenLoad(Geometry):
-    """A load that is given; there is no law."""
+    """Prescribed load; there is no law."""
 
-    after = ("apply_load(model, data, g, gp, room, data[WORK.TIME])",)
-    calls = (apply_load,)
+    apply_code = ("apply_load(model, data, g, gp, work, data[WORK.TIME])",)
+    called_functions = (apply_load,)
 
-    def pack(self, place: Load, places: Places) -> tuple[Sequence[int], Sequence[float]]:
-        """Frames, and tables of the functions."""
+    def pack(self, location: Load, places: Places) -> tuple[Sequence[int], Sequence[float]]:
+        """Return links and placements of the frames, and the tables of the functions.
+
+        Returns:
+            Integers and numbers.
+        """
         links: list[int] = []
         numbers: list[float] = []
-        for body, frame in (place.frame, place.force_frame, place.point_frame):
+        for body, frame in (location.frame, location.force_frame, location.point_frame):
             link, axes = places.frame(body, frame)
             links.append(link)
             numbers += axes
         tables: list[int] = []
-        for functions in place.groups:
+        for functions in location.groups:
             for function in functions or (None, None, None):
                 tables.append(len(numbers))
                 if function is not None:
-                    numbers += table_of_one(function, f"a function of {place.labels[0]}")
-        return (*links, *(int(bool(functions)) for functions in place.groups), *tables), numbers
+                    numbers += table_of_one(function, f"a function of {location.labels[0]}")
+        return (*links, *(int(bool(functions)) for functions in location.groups), *tables), numbers
 
-    def room(self, place: Any) -> int:
-        """Force, point, torque."""
+    def record_size(self, location: Any) -> int:
+        """Return the size of force, point and torque."""
         return 9
 
-    def columns(self, force: Any) -> tuple[str, ...]:
-        """Force and torque in ground, and the point in the frame that they act on; those that there are."""
-        load: Load = force.place
+    def list_columns(self, force: Any) -> tuple[str, ...]:
+        """Return the labels of the groups that exist: force and torque in ground, the point in its frame.
+
+        Returns:
+            Labels.
+        """
+        load: Load = force.location
         given = zip(load.labels, load.groups, strict=True)
         return tuple(f"{label}{axis}" for label, functions in given if functions for axis in "xyz")
 
     def report(
         self, force: Any, record: Sequence[float], origins: Sequence[Sequence[float]]
     ) -> list[float]:
-        """They."""
-        groups = force.place.groups
+        """Return the values of the groups that exist."""
+        groups = force.location.groups
         return [
             record[3 * number + axis] for number in range(3) if groups[number] for axis in range(3)
         ]

@@ -1,4 +1,4 @@
-"""A sphere and a half space that touch smoothly, at any distance."""
+"""Geometry of smooth contact of a sphere and a half space, at any distance."""
 
 from __future__ import annotations
 
@@ -13,73 +13,92 @@ from osimlite.mechanics.kernels.points import apply_force, direction, station, v
 from osimlite.mechanics.laws.vectors import Vector, along, dot, minus, put, times, vector
 from osimlite.mechanics.multibody.links import Places
 from osimlite.schema.contact import ContactHalfSpace, ContactSphere
-from osimlite.simulation.elements.builder import ElementBuilder, kind_of
-from osimlite.simulation.elements.contact import ContactSurface, surface_of
+from osimlite.simulation.elements.builder import ElementBuilder, get_class_name
+from osimlite.simulation.elements.contact import ContactSurface, read_surface
 from osimlite.simulation.elements.geometries.geometry import Geometry
 
 NO_MATERIAL = (0.0, 0.0, 0.0, 0.0, 0.0)
+"""Material of surfaces whose law has its own parameters."""
 
 
-def sphere_depth(
-    model: Ints, data: Floats, g: Ints, gp: Floats, room: Floats
+def compute_sphere_depth(
+    model: Ints, data: Floats, g: Ints, gp: Floats, work: Floats
 ) -> tuple[float, float, Vector]:
-    """Depth, radius and normal; the point of contact goes into the record."""
+    """Return depth, radius and normal; the point of contact goes into the record.
+
+    Returns:
+        Depth (m), radius (m), and outward unit normal of the half space in ground.
+    """
     o, n = station(model, data, g[0], vector(gp, 0)), direction(model, data, g[0], vector(gp, 3))
     center = station(model, data, g[1], vector(gp, 6))
     d = gp[9] - dot(minus(center, o), n)
-    # Half the depth is either surface's.
-    put(room, 3, along(center, 0.5 * d - gp[9], n))
+    # The point of contact is midway between the surfaces.
+    put(work, 3, along(center, 0.5 * d - gp[9], n))
     return d, gp[9], n
 
 
-def approach(model: Ints, data: Floats, g: Ints, room: Floats) -> Vector:
-    """Velocity of the half space relative to the sphere, at the point of contact."""
+def compute_approach_velocity(model: Ints, data: Floats, g: Ints, work: Floats) -> Vector:
+    """Return the velocity of the half space relative to the sphere at the point of contact, m/s."""
     return minus(
-        velocity(model, data, g[0], vector(room, 3)), velocity(model, data, g[1], vector(room, 3))
+        velocity(model, data, g[0], vector(work, 3)), velocity(model, data, g[1], vector(work, 3))
     )
 
 
-def push_both(model: Ints, data: Floats, g: Ints, room: Floats, force: Vector) -> None:
-    """Push the sphere and, the other way, the half space at the point of contact; the force goes into the record."""
-    put(room, 0, force)
-    apply_force(model, data, g[1], vector(room, 3), force)
-    apply_force(model, data, g[0], vector(room, 3), times(-1.0, force))
+def push_both(model: Ints, data: Floats, g: Ints, work: Floats, force: Vector) -> None:
+    """Apply a force to the sphere and its opposite to the half space at the point of contact.
+
+    The force goes into the record.
+    """
+    put(work, 0, force)
+    apply_force(model, data, g[1], vector(work, 3), force)
+    apply_force(model, data, g[0], vector(work, 3), times(-1.0, force))
 
 
 class SphereOnPlane(Geometry):
-    """A half space and a sphere: depth and radius (m), normal, and velocity of the half space relative to the sphere.
+    """Half space and sphere: depth and radius (m), normal, and velocity of the half space relative to the sphere.
 
     The outputs fx, fy, fz (N) push the sphere.
     """
 
     inputs = ("d", "radius", "n", "v")
-    before = (
-        "d, radius, n = sphere_depth(model, data, g, gp, room)",
-        "v = approach(model, data, g, room)",
+    setup_code = (
+        "d, radius, n = compute_sphere_depth(model, data, g, gp, work)",
+        "v = compute_approach_velocity(model, data, g, work)",
     )
-    after = ("push_both(model, data, g, room, (fx, fy, fz))",)
-    calls = (sphere_depth, approach, push_both)
+    apply_code = ("push_both(model, data, g, work, (fx, fy, fz))",)
+    called_functions = (compute_sphere_depth, compute_approach_velocity, push_both)
 
     def read(self, builder: ElementBuilder, force: Any) -> tuple[ContactSurface, ContactSurface]:
-        """The half space and the sphere that a force names."""
+        """Return the half space and the sphere that a force names.
+
+        Returns:
+            The surfaces of the half space and of the sphere.
+
+        Raises:
+            ModelError: a socket names another class.
+        """
         surfaces = []
         for field, wanted in (
             ("socket_half_space", ContactHalfSpace),
             ("socket_sphere", ContactSphere),
         ):
-            geometry = builder.target(force, field, getattr(force, field))
+            geometry = builder.resolve_target(force, field, getattr(force, field))
             if not isinstance(geometry, wanted):
                 raise ModelError(
-                    f"the '{field}' of '{builder.path(force)}' is a {kind_of(geometry)}; name a {wanted.__name__}"
+                    f"the '{field}' of '{builder.path(force)}' is a {get_class_name(geometry)}; name a {wanted.__name__}"
                 )
-            surfaces.append(surface_of(builder, force, geometry, NO_MATERIAL))
+            surfaces.append(read_surface(builder, force, geometry, NO_MATERIAL))
         return surfaces[0], surfaces[1]
 
     def pack(
-        self, place: tuple[ContactSurface, ContactSurface], places: Places
+        self, location: tuple[ContactSurface, ContactSurface], places: Places
     ) -> tuple[Sequence[int], Sequence[float]]:
-        """Links; a point of the plane and its normal, centre and radius of the sphere, each in its link."""
-        one, two = place
+        """Return the links, a point of the plane and its normal, and centre and radius of the sphere.
+
+        Returns:
+            Integers and numbers.
+        """
+        one, two = location
         first, on_plane = places.station(one.body, one.center)
         second, center = places.station(two.body, two.center)
         return (first, second), (
@@ -89,12 +108,16 @@ class SphereOnPlane(Geometry):
             two.radius,
         )
 
-    def room(self, place: Any) -> int:
-        """Force and point."""
+    def record_size(self, location: Any) -> int:
+        """Return the size of force and point."""
         return 6
 
-    def columns(self, force: Any) -> tuple[str, ...]:
-        """Force and torque on the body of the sphere, then on that of the half space."""
+    def list_columns(self, force: Any) -> tuple[str, ...]:
+        """Return the labels of force and torque on the body of the sphere, then on that of the half space.
+
+        Returns:
+            Labels.
+        """
         labels = [f"{kind}.{axis}" for kind in ("force", "torque") for axis in "XYZ"]
         return tuple(
             f"{force.name}.{surface}.{label}"
@@ -105,8 +128,8 @@ class SphereOnPlane(Geometry):
     def report(
         self, force: Any, record: Sequence[float], origins: Sequence[Sequence[float]]
     ) -> list[float]:
-        """Forces, and torques about the origins of the bodies, in ground."""
-        half_space, sphere = force.place
+        """Return forces, and torques about the origins of the bodies, in ground."""
+        half_space, sphere = force.location
         pushed, point = np.array(record[:3], dtype=float), np.array(record[3:6], dtype=float)
         row: list[float] = []
         for sign, body in ((1.0, sphere.body), (-1.0, half_space.body)):

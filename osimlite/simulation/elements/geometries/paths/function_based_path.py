@@ -1,4 +1,4 @@
-"""A path of which length, speed and moment arms are given as functions of coordinates."""
+"""Paths whose length, lengthening speed and moment arms are functions of coordinates."""
 
 from __future__ import annotations
 
@@ -27,28 +27,34 @@ from osimlite.simulation.elements.registry import register_path
 
 
 @dataclass(frozen=True)
-class OfCoordinates:
-    """A path that only pulls at coordinates."""
+class CoordinatePath:
+    """Path that acts on coordinates only."""
 
-    path: str  # of its owner
-    coordinates: tuple[int, ...]  # places in the mechanism of those that it depends on
-    length: Function | Formula  # of the path, as a function of them
-    # moment arms, as functions of them; the derivatives of the length times -1 if there are none
+    path: str  # path of its owner
+    coordinates: tuple[int, ...]  # indices in the mechanism of the coordinates that it depends on
+    length: Function | Formula  # length as a function of the coordinates
+    # moment arms as functions of the coordinates; if empty, the negative derivatives of the length
     arms: tuple[Function | Formula, ...] = ()
-    # as a function of their values and then their speeds; the rate that follows from the arms if
-    # None
+    # lengthening speed as a function of the values and then the speeds of the coordinates; if None,
+    # it follows from the moment arms
     speed: Function | Formula | None = None
 
     coupled: ClassVar[bool] = False
 
-    def items(self, places: Places) -> list[ForceRecord]:
-        """What pulls, the functions, and the path."""
+    def make_records(self, places: Places) -> list[ForceRecord]:
+        """Return records that pull, those of the functions, and that of the path."""
         values = [places.locked_value(coordinate) for coordinate in self.coordinates]
         freedoms = [places.freedom(coordinate) for coordinate in self.coordinates]
         speeds = [freedom + len(places.freedoms) if freedom >= 0 else -1 for freedom in freedoms]
-        of_values = [self._item(item, freedoms, values) for item in (self.length, *self.arms)]
+        of_values = [
+            self._make_function_record(item, freedoms, values) for item in (self.length, *self.arms)
+        ]
         of_speeds = (
-            [self._item(self.speed, freedoms + speeds, values + [0.0] * len(values))]
+            [
+                self._make_function_record(
+                    self.speed, freedoms + speeds, values + [0.0] * len(values)
+                )
+            ]
             if self.speed
             else []
         )
@@ -58,13 +64,16 @@ class OfCoordinates:
         ]
         arms = backs[2 : 2 + len(self.arms)] or [0] * len(values)
         ints = backs[0], len(values), backs[1], backs[-1] if of_speeds else 0, *freedoms, *arms
-        return [*parts, ForceRecord("function_path", ints, room=ARMS + len(values), is_part=True)]
+        return [
+            *parts,
+            ForceRecord("function_path", ints, record_size=ARMS + len(values), is_part=True),
+        ]
 
-    def _item(
+    def _make_function_record(
         self, function: Function | Formula, arguments: Sequence[int], values: Sequence[float]
     ) -> ForceRecord:
-        """A function of places in a state; where one is negative, of a value in its place."""
-        size, room = len(arguments), DERIVATIVES + len(arguments)
+        """Return the record of a function of states; a negative index stands for the value at that position."""
+        size, work = len(arguments), DERIVATIVES + len(arguments)
         if isinstance(function, Formula):
             formulas = [function, *(function.derivative(k) for k in range(size))]
             ints, numbers = [size, len(formulas), *arguments], [*values]
@@ -73,12 +82,16 @@ class OfCoordinates:
                 numbers += constants
             registers = size + max(len(item.steps) for item in formulas)
             return ForceRecord(
-                "formula", tuple(ints), tuple(numbers), room=room + registers, is_part=True
+                "formula", tuple(ints), tuple(numbers), record_size=work + registers, is_part=True
             )
         if size == 1:
             table = table_of_one(function, f"a function of the path of '{self.path}'")
             return ForceRecord(
-                "function_of_one", (1, 0, *arguments), (*values, *table), room=room, is_part=True
+                "function_of_one",
+                (1, 0, *arguments),
+                (*values, *table),
+                record_size=work,
+                is_part=True,
             )
         factor = 1.0
         while isinstance(function, Scaled):
@@ -89,19 +102,19 @@ class OfCoordinates:
             assert isinstance(function, MultivariatePolynomial)
             order, coefficients = max(map(sum, function.powers)), function.coefficients
         numbers = [*values, *(factor * coefficient for coefficient in coefficients)]
-        room += size * (order + 1) + 2 * size
+        work += size * (order + 1) + 2 * size
         return ForceRecord(
-            "polynomial", (size, order, *arguments), tuple(numbers), room=room, is_part=True
+            "polynomial", (size, order, *arguments), tuple(numbers), record_size=work, is_part=True
         )
 
 
 @register_path(FunctionBasedPath)
-def read_function_path(builder: ElementBuilder, owner: Any) -> OfCoordinates:
-    """The functions of an owner's path.
+def read_function_path(builder: ElementBuilder, owner: Any) -> CoordinatePath:
+    """Return the functions of an owner's path.
 
     Raises:
-        UnsupportedError: a function of an unknown class.
-        ModelError: there is no length or no coordinate, or functions and coordinates do not fit.
+        UnsupportedError: a function has an unknown class.
+        ModelError: there is no length or coordinate, or functions and coordinates do not match.
     """
     path = owner.geometry_path
     where = builder.path(path)
@@ -112,7 +125,7 @@ def read_function_path(builder: ElementBuilder, owner: Any) -> OfCoordinates:
         )
     coordinates = tuple(
         builder.mechanism.coordinate_index(
-            builder.path(builder.target(path, "coordinate_paths", name))
+            builder.path(builder.resolve_target(path, "coordinate_paths", name))
         )
         for name in named
     )
@@ -124,31 +137,31 @@ def read_function_path(builder: ElementBuilder, owner: Any) -> OfCoordinates:
     given = path.moment_arm_functions
     if given and len(given) != count:
         raise ModelError(
-            f"'{where}' has {len(given)} moment_arm_functions for {count} coordinates; give each one, or none"
+            f"'{where}' has {len(given)} moment_arm_functions for {count} coordinates; give one for each, or none"
         )
     arms = tuple(
-        _function(item, count, f"'moment_arm_functions[{number}]' of '{where}'")
+        _read_function(item, count, f"'moment_arm_functions[{number}]' of '{where}'")
         for number, item in enumerate(given)
     )
     speed = path.lengthening_speed_function
-    return OfCoordinates(
+    return CoordinatePath(
         builder.path(owner),
         coordinates,
-        _function(path.length_function, count, f"'length_function' of '{where}'"),
+        _read_function(path.length_function, count, f"'length_function' of '{where}'"),
         arms,
-        _function(speed, 2 * count, f"'lengthening_speed_function' of '{where}'")
+        _read_function(speed, 2 * count, f"'lengthening_speed_function' of '{where}'")
         if speed is not None
         else None,
     )
 
 
-def _function(function: Any, arguments: int, where: str) -> Function | Formula:
+def _read_function(function: Any, arguments: int, where: str) -> Function | Formula:
     inner = function
     while isinstance(inner, MultiplierFunction):
         inner = inner.function
     if isinstance(inner, Constant):
         raise ModelError(
-            f"{where} is a Constant, which has no arguments in OpenSim; take a LinearFunction"
+            f"{where} is a Constant, which has no arguments in OpenSim; use a LinearFunction"
         )
     if isinstance(function, ExpressionBasedFunction):
         if len(function.variables) != arguments:

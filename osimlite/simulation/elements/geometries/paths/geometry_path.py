@@ -1,6 +1,6 @@
-"""A path through points in bodies, around surfaces.
+"""Paths through points in bodies and around surfaces.
 
-The points are fixed, move along a coordinate, or come and go with one.
+A point is fixed in its body, moves with a coordinate, or is active in a range of a coordinate.
 """
 
 from __future__ import annotations
@@ -42,33 +42,43 @@ from osimlite.schema.paths import (
     PathPoint,
 )
 from osimlite.schema.wrapping import WrapCylinder, WrapEllipsoid, WrapObject, WrapSphere, WrapTorus
-from osimlite.simulation.elements.builder import ElementBuilder, kind_of
+from osimlite.simulation.elements.builder import ElementBuilder, get_class_name
 from osimlite.simulation.elements.force_records import ForceRecord
 from osimlite.simulation.elements.registry import register_path
 
 TOLERANCE = 1e-5
-"""A conditional point counts so far outside its range, in OpenSim."""
+"""As in OpenSim, a conditional point is active this far beyond its range, rad or m."""
 
 
 @dataclass(frozen=True, eq=False)
 class Node:
-    """A point of a path."""
+    """Point of a path."""
 
-    body: int  # that it is in
-    frame: Array  # (4, 4) in the body; the place is given there
-    location: Array  # in the frame, m; what functions give comes on top
-    kind: int = FIXED  # of the node
-    coordinate: int = -1  # place in the mechanism of that which it depends on, or -1
-    range: tuple[float, float] = (-inf, inf)  # of this coordinate
-    functions: tuple[Function, ...] = ()  # of it, that give the place
-    name: str = ""  # of the point, or of the surface that it is on
+    body: int  # body of the point
+    frame: Array  # frame (4, 4) of the location in the body
+    location: Array  # position in the frame, m, to which `functions` are added
+    kind: int = FIXED  # kind of the node
+    coordinate: int = -1  # index in the mechanism of the coordinate that it depends on, or -1
+    range: tuple[float, float] = (-inf, inf)  # range of this coordinate
+    functions: tuple[Function, ...] = ()  # functions of the coordinate for a moving location
+    name: str = ""  # name of the point, or of the surface that it is on
 
-    def packed(
+    def pack(
         self, places: Places, of: int, first: int, path: str, piece: int
     ) -> tuple[list[int], list[float]]:
-        """Its integers and numbers; these begin at `first`, and `of` is what the node belongs to.
+        """Return its integers and numbers.
 
-        Between two nodes in a row that are of one piece there is no line that pulls.
+        No line pulls between two consecutive nodes of the same piece.
+
+        Args:
+            places: placement of the bodies in the links of the tree.
+            of: index of the degree of freedom, or number of the surface, that the node belongs to.
+            first: offset of its numbers.
+            path: owner of the path, for messages.
+            piece: piece of the node.
+
+        Returns:
+            Integers and numbers.
         """
         link, frame = places.placement(self.body)
         frame = frame @ self.frame
@@ -84,61 +94,71 @@ class Node:
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """What a path wraps around."""
+    """Surface that a path wraps around."""
 
-    number: int  # tells it from other surfaces of the path
-    tangent: Node  # a node at its middle, with its axes
+    number: int  # number of the surface among those of the path
+    tangent: Node  # node at its center, with its axes
     law: str  # name of the law of the surface; empty if the surface is not active
-    curve: str  # name of the law that traces a path on it, which is no geodesic
-    numbers: tuple[float, ...]  # what the law is given, or those of `geodesic_starts`
-    first: int  # number of the first point between which and the last one the path may wrap
-    last: int  # number of the last one
-    begin: int = 0  # number of the first one of all pieces that the same PathWrap may bend
+    curve: str  # name of the law that traces a path on it, unless that is a geodesic
+    numbers: tuple[float, ...]  # parameters of the law, or those of `geodesic_starts`
+    first: int  # index of the first point of the range in which the path may wrap
+    last: int  # index of the last point of the range
+    begin: int = 0  # index of the first point of the complete range of the PathWrap
 
 
 @dataclass(frozen=True)
 class ThroughPoints:
-    """A path from point to point, around surfaces."""
+    """Path from point to point, around surfaces."""
 
-    path: str  # of its owner
-    points: tuple[Node, ...]  # that it runs through
-    # that it wraps around; along geodesics a surface for each point that a piece around it may
-    # begin at
+    path: str  # path of its owner
+    points: tuple[Node, ...]  # points in their order
+    # surfaces that it wraps around; with geodesics, one entry for each point at which a segment
+    # around the surface may begin
     surfaces: tuple[Surface, ...] = ()
-    geodesic: bool = False  # whether it does so along geodesics
+    geodesic: bool = False  # whether it wraps along geodesics
 
     coupled: ClassVar[bool] = True
 
     @property
     def trace(self) -> str:
-        """Name of the law that traces it."""
+        """Name of the law that traces the path."""
         return "trace_geodesics" if self.geodesic and self.surfaces else "trace_path"
 
     @property
     def curves(self) -> tuple[str, ...]:
-        """Names of the laws that trace it on its surfaces."""
+        """Names of the laws that trace the path on its surfaces.
+
+        Returns:
+            One name for each surface; none for geodesics.
+        """
         return () if self.geodesic else tuple(surface.curve for surface in self.surfaces)
 
     @property
     def corners(self) -> int:
-        """The most corners that it is traced with."""
+        """Maximum number of corners of its polyline."""
         return len(self.points) + len(self.surfaces) * (1 + int(MOST))
 
     @property
     def start(self) -> tuple[int, Array]:
-        """The body that it starts in, and where there (3,)."""
+        """Start of the path.
+
+        Returns:
+            The body of the first point, and the point's position in it (3,), m.
+        """
         first = self.points[0]
         return first.body, first.frame[:3, :3] @ first.location + first.frame[:3, 3]
 
-    def items(self, places: Places) -> list[ForceRecord]:
-        """What pulls, the surfaces, and the path."""
+    def make_records(self, places: Places) -> list[ForceRecord]:
+        """Return records that pull, those of the surfaces, and that of the path."""
         parts = [ForceRecord("pull_points", is_part=True)]
         wraps: list[int] = []
         behind = sum(bool(surface.law) for surface in self.surfaces)
         for surface in () if self.geodesic else self.surfaces:
             if surface.law:
                 parts.append(
-                    ForceRecord(surface.law, (), surface.numbers, room=SURFACE_WORK, is_part=True)
+                    ForceRecord(
+                        surface.law, (), surface.numbers, record_size=SURFACE_WORK, is_part=True
+                    )
                 )
                 wraps.append(ITEM.OWN * (behind + 2 - len(parts)))
             else:
@@ -148,15 +168,15 @@ class ThroughPoints:
         nodes += [(surface.tangent, surface.number) for surface in self.surfaces for _ in range(2)]
         ints, numbers = [ITEM.OWN * len(parts), len(self.points), len(self.surfaces)], list[float]()
         for number, (node, of) in enumerate(nodes):
-            # A geodesic path pulls along all lines, since a point may move in its body, but for
-            # chords of surfaces.
+            # With geodesics all lines pull except chords of surfaces, because points may move in
+            # their bodies.
             piece = (
                 node.body if not self.geodesic else (-1 - of if node.kind == TANGENT else number)
             )
-            own, more = node.packed(places, of, len(numbers), self.path, piece)
+            own, more = node.pack(places, of, len(numbers), self.path, piece)
             ints += own
             numbers += more
-        kernel, room = (
+        kernel, work = (
             "wrapped_path" if self.surfaces else "straight_path",
             ORDER + len(nodes) * (1 + NODE_WORK),
         )
@@ -165,29 +185,31 @@ class ThroughPoints:
                 wraps += len(numbers), surface.first, surface.last, surface.begin
                 numbers += surface.numbers
             most = max(Counter(surface.first for surface in self.surfaces).values())
-            slots, room = slots_and_room(most, len(self.surfaces), room)
+            slots, work = slots_and_room(most, len(self.surfaces), work)
             kernel, wraps = "geodesic_path", wraps + slots
         return [
             *parts,
-            ForceRecord(kernel, (*ints, *wraps), tuple(numbers), room=room, is_part=True),
+            ForceRecord(kernel, (*ints, *wraps), tuple(numbers), record_size=work, is_part=True),
         ]
 
 
 @register_path(GeometryPath)
 def read_path(builder: ElementBuilder, owner: Any) -> ThroughPoints:
-    """The points of an owner's path, and the surfaces that it wraps around.
+    """Return the points of an owner's path, and the surfaces that it wraps around.
 
     Raises:
-        UnsupportedError: there is a point or a surface of an unknown kind.
-        ModelError: there are less than two points, or something makes no sense.
+        UnsupportedError: a point or a surface has an unknown class.
+        ModelError: there are fewer than two points, or something has no meaning.
     """
     path = owner.geometry_path
     points = []
     for point in path.path_point_set.objects:
         if type(point) not in READERS:
-            raise builder.unsupported(owner, f" with the {kind_of(point)} '{point.name}'")
-        body, frame = builder.placement(
-            builder.target(point, "socket_parent_frame", point.socket_parent_frame)
+            raise builder.unsupported_error(
+                owner, f" with the {get_class_name(point)} '{point.name}'"
+            )
+        body, frame = builder.find_placement(
+            builder.resolve_target(point, "socket_parent_frame", point.socket_parent_frame)
         )
         points.append(READERS[type(point)](builder, point, body, frame))
     if len(points) < 2:
@@ -195,20 +217,23 @@ def read_path(builder: ElementBuilder, owner: Any) -> ThroughPoints:
             f"the path of '{builder.path(owner)}' has {len(points)} points; give it at least two"
         )
     wraps = path.path_wrap_set.objects
-    result = [builder.target(wrap, "wrap_object", wrap.wrap_object) for wrap in wraps]
+    result = [builder.resolve_target(wrap, "wrap_object", wrap.wrap_object) for wrap in wraps]
     numbers = {id(surface): number for number, surface in enumerate(result)}
     alone = float(len(wraps) == 1)
     surfaces = []
-    # Where a path runs through no point of a range, OpenSim does not look at the wraps that follow
-    # in that pose either.
+    # In a pose without an active point in the range of a wrap, OpenSim ignores the following wraps.
     may_leave = False
     for wrap, surface in zip(wraps, result, strict=True):
         if type(surface) not in LAWS:
-            raise builder.unsupported(owner, f" around the {kind_of(surface)} '{surface.name}'")
-        surfaces.append(_surface(builder, wrap, surface, numbers[id(surface)], alone, len(points)))
+            raise builder.unsupported_error(
+                owner, f" around the {get_class_name(surface)} '{surface.name}'"
+            )
+        surfaces.append(
+            _read_surface(builder, wrap, surface, numbers[id(surface)], alone, len(points))
+        )
         first, last = surfaces[-1].first, surfaces[-1].last
         if surface.active and first > last and not builder.geodesic:
-            # OpenSim goes no further: it does not even look at the wraps that follow.
+            # OpenSim stops here: it ignores the following wraps.
             break
         if surface.active and first <= last and last >= len(points) and not may_leave:
             raise ModelError(
@@ -235,20 +260,21 @@ def read_path(builder: ElementBuilder, owner: Any) -> ThroughPoints:
     return ThroughPoints(builder.path(owner), tuple(points), tuple(surfaces), builder.geodesic)
 
 
-def _surface(
+def _read_surface(
     builder: ElementBuilder, wrap: Any, surface: Any, number: int, alone: float, points: int
 ) -> Surface:
     law, curve, fields = LAWS[type(surface)]
     sizes = [float(size) for name in fields for size in np.atleast_1d(getattr(surface, name))]
-    builder.check(surface, (*sizes, *surface.translation, *surface.xyz_body_rotation))
+    builder.check_finite(surface, (*sizes, *surface.translation, *surface.xyz_body_rotation))
     side, method = SIDES.get(surface.quadrant.lower()), METHODS.get(wrap.method.lower())
     if side is None:
         raise ModelError(
-            f"the quadrant of '{builder.path(surface)}' is '{surface.quadrant}'; take x, -y, all or such"
+            f"the quadrant of '{builder.path(surface)}' is '{surface.quadrant}'; "
+            "use x, y or z, with or without a minus sign, or all"
         )
     if method is None:
         raise ModelError(
-            f"the method of '{builder.path(wrap)}' is '{wrap.method}'; take hybrid, midpoint or axial"
+            f"the method of '{builder.path(wrap)}' is '{wrap.method}'; use hybrid, midpoint or axial"
         )
     if min(sizes) < 0.0 or (min(sizes) == 0.0 and isinstance(surface, WrapEllipsoid | WrapTorus)):
         raise ModelError(
@@ -261,19 +287,19 @@ def _surface(
     frame = surface
     while not isinstance(frame, PhysicalFrame):
         frame = builder.tree.parent_of(frame)
-    body, placed = builder.placement(frame)
+    body, placed = builder.find_placement(frame)
     placed = placed @ make_offset(surface.translation, surface.xyz_body_rotation)
     tangent = Node(body, placed, np.zeros(3), TANGENT, name=surface.name)
     numbers = (*side, method, alone, *sizes)
     if builder.geodesic:
-        numbers = (*side, *_geodesic(surface))
+        numbers = (*side, *_list_geodesic_numbers(surface))
     is_none = not surface.active or (builder.geodesic and min(sizes) == 0.0)
     law, curve = ("", "") if is_none else (law, curve)
     return Surface(number, tangent, law, curve, numbers, first, last)
 
 
-def _geodesic(surface: WrapObject) -> tuple[float, ...]:
-    """Half the length of a surface, and its numbers in :mod:`osimlite.mechanics.kernels.cable_surfaces`."""
+def _list_geodesic_numbers(surface: WrapObject) -> tuple[float, ...]:
+    """Return half the length of a surface, and its numbers in :mod:`osimlite.mechanics.kernels.cable_surfaces`."""
     if isinstance(surface, WrapCylinder):
         return surface.length / 2.0, CYLINDER, surface.radius, surface.radius**2, 1.0, 1.0, 0.0
     if isinstance(surface, WrapSphere):
@@ -284,27 +310,29 @@ def _geodesic(surface: WrapObject) -> tuple[float, ...]:
     return inf, TORUS, surface.outer_radius, surface.inner_radius, 0.0, 0.0, 0.0
 
 
-def _fixed(builder: ElementBuilder, point: Any, body: int, frame: Array) -> Node:
-    builder.check(point, point.location)
+def _read_fixed_point(builder: ElementBuilder, point: Any, body: int, frame: Array) -> Node:
+    builder.check_finite(point, point.location)
     return Node(body, frame, np.array(point.location), name=point.name)
 
 
-def _conditional(builder: ElementBuilder, point: Any, body: int, frame: Array) -> Node:
-    builder.check(point, (*point.location, *point.range))
+def _read_conditional_point(builder: ElementBuilder, point: Any, body: int, frame: Array) -> Node:
+    builder.check_finite(point, (*point.location, *point.range))
     low, high = point.range
-    coordinate = builder.coordinate(point, "socket_coordinate")
+    coordinate = builder.find_coordinate(point, "socket_coordinate")
     within = low - TOLERANCE, high + TOLERANCE
     return Node(
         body, frame, np.array(point.location), CONDITIONAL, coordinate, within, name=point.name
     )
 
 
-def _moving(builder: ElementBuilder, point: Any, body: int, frame: Array) -> Node:
+def _read_moving_point(builder: ElementBuilder, point: Any, body: int, frame: Array) -> Node:
     functions = [
-        builder.function(point, getattr(point, f"{axis}_location"), f"{axis}_location")
+        builder.read_function(point, getattr(point, f"{axis}_location"), f"{axis}_location")
         for axis in "xyz"
     ]
-    coordinate, *others = (builder.coordinate(point, f"socket_{axis}_coordinate") for axis in "xyz")
+    coordinate, *others = (
+        builder.find_coordinate(point, f"socket_{axis}_coordinate") for axis in "xyz"
+    )
     if others != [coordinate, coordinate]:
         raise ModelError(
             f"the three coordinates of '{builder.path(point)}' differ; name the same one in all sockets"
@@ -314,9 +342,9 @@ def _moving(builder: ElementBuilder, point: Any, body: int, frame: Array) -> Nod
 
 
 READERS: dict[type[AbstractPathPoint], Callable[[ElementBuilder, Any, int, Array], Node]] = {
-    PathPoint: _fixed,
-    ConditionalPathPoint: _conditional,
-    MovingPathPoint: _moving,
+    PathPoint: _read_fixed_point,
+    ConditionalPathPoint: _read_conditional_point,
+    MovingPathPoint: _read_moving_point,
 }
 
 LAWS: dict[type[WrapObject], tuple[str, str, tuple[str, ...]]] = {

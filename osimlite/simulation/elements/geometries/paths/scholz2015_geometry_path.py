@@ -55,27 +55,34 @@ from osimlite.schema.contact import (
     ContactTorus,
 )
 from osimlite.schema.scholz_paths import Scholz2015GeometryPath, Scholz2015GeometryPathPoint
-from osimlite.simulation.elements.builder import ElementBuilder, kind_of
+from osimlite.simulation.elements.builder import ElementBuilder, get_class_name
 from osimlite.simulation.elements.force_records import ForceRecord
 from osimlite.simulation.elements.registry import register_path
 
 FIRST_STEP = 1e-10
-"""Of the first integration of a geodesic, m."""
+"""First step of the integration of a geodesic, m."""
 
 
 @dataclass(frozen=True, eq=False)
 class Point:
-    """A point of a cable."""
+    """Point of a cable."""
 
-    body: int  # that it is in
+    body: int  # body of the point
     runs: Array  # station in the body that the cable runs through, m
-    pulls: Array  # station in the body that it pulls at, m
+    pulls: Array  # station in the body at which the force acts, m
 
-    work: ClassVar[int] = POINT_WORK
+    size: ClassVar[int] = POINT_WORK
     is_obstacle: ClassVar[bool] = False
 
-    def packed(self, places: Places) -> tuple[int, list[float]]:
-        """Its link and numbers."""
+    def pack(self, places: Places) -> tuple[int, list[float]]:
+        """Return its link and numbers.
+
+        Args:
+            places: placement of the bodies in the links of the tree.
+
+        Returns:
+            The link, and the stations of the cable and of its force in it.
+        """
         link, runs = places.station(self.body, self.runs.tolist())
         _, pulls = places.station(self.body, self.pulls.tolist())
         return link, [*runs, *pulls]
@@ -83,18 +90,25 @@ class Point:
 
 @dataclass(frozen=True, eq=False)
 class Obstacle:
-    """A surface that a cable may touch."""
+    """Surface that a cable may touch."""
 
-    body: int  # that it is in
-    frame: Array  # (4, 4) of the surface in the body
-    surface: tuple[float, ...]  # its numbers
-    begin: Array  # how the cable is on it before a search
+    body: int  # body of the surface
+    frame: Array  # placement (4, 4) of the surface in the body
+    surface: tuple[float, ...]  # numbers of the surface
+    begin: Array  # initial guess of the contact with the cable
 
-    work: ClassVar[int] = OBSTACLE_WORK
+    size: ClassVar[int] = OBSTACLE_WORK
     is_obstacle: ClassVar[bool] = True
 
-    def packed(self, places: Places) -> tuple[int, list[float]]:
-        """Its link and numbers."""
+    def pack(self, places: Places) -> tuple[int, list[float]]:
+        """Return its link and numbers.
+
+        Args:
+            places: placement of the bodies in the links of the tree.
+
+        Returns:
+            The link, and placement, initial contact and shape of the surface.
+        """
         link, placed = places.placement(self.body)
         frame = placed @ self.frame
         return link, [
@@ -107,9 +121,9 @@ class Obstacle:
 
 @dataclass(frozen=True)
 class Cable:
-    """A path over obstacles."""
+    """Path over obstacles."""
 
-    # points and obstacles in the order in which it passes them
+    # points and obstacles in the order of the path
     elements: tuple[Point | Obstacle, ...]
 
     coupled: ClassVar[bool] = True
@@ -118,45 +132,54 @@ class Cable:
 
     @property
     def corners(self) -> int:
-        """The most corners that it is traced with."""
+        """Maximum number of corners of its polyline."""
         return sum(1 + int(MOST) * element.is_obstacle for element in self.elements)
 
     @property
     def start(self) -> tuple[int, Array]:
-        """The body that it starts in, and where there (3,)."""
+        """Start of the cable.
+
+        Returns:
+            The body of the first point, and the point's position in it (3,), m.
+        """
         first = self.elements[0]
         assert isinstance(first, Point)
         return first.body, first.runs
 
-    def items(self, places: Places) -> list[ForceRecord]:
-        """What pulls, and the path."""
+    def make_records(self, places: Places) -> list[ForceRecord]:
+        """Return the record that pulls, and that of the cable."""
         most = together = 0
         ints, numbers, work = list[int](), list[float](), FIRST
         for element in self.elements:
             together = together + 1 if element.is_obstacle else 0
             most = max(most, together)
-            link, own = element.packed(places)
+            link, own = element.pack(places)
             ints += int(element.is_obstacle), link, len(numbers), work
             numbers += own
-            work += element.work
+            work += element.size
         head = ITEM.OWN, len(self.elements), work
         path = ForceRecord(
             "cable_path",
             (*head, *ints),
             tuple(numbers),
-            room=work + solver_room(most),
+            record_size=work + solver_room(most),
             is_part=True,
         )
         return [ForceRecord("pull_cable", is_part=True), path]
 
-    def found(self, mechanism: Mechanism, q: Array) -> Cable | None:
-        """The same, which begins with what it is at a pose; None if it is none there."""
+    def solve_at(self, mechanism: Mechanism, q: Array) -> Cable | None:
+        """Return the cable that starts from its solution in a pose; None if there is no solution.
+
+        Args:
+            mechanism: the mechanism.
+            q: values of the coordinates, rad or m.
+        """
         state = mechanism.at(q)
         placements = [
             Placement(GROUND, state.transform(body)) for body in range(len(mechanism.bodies))
         ]
-        _, path = self.items(Places(mechanism, {}, placements))
-        ints, work = np.array([0] * ITEM.OWN + list(path.ints)), np.zeros(path.room)
+        _, path = self.make_records(Places(mechanism, {}, placements))
+        ints, work = np.array([0] * ITEM.OWN + list(path.ints)), np.zeros(path.record_size)
         cable_path(ints, np.array(path.numbers), work, np.zeros(1), np.zeros(1), 0)
         if np.isnan(work[LENGTH]):
             return None
@@ -180,42 +203,45 @@ def read_cable(builder: ElementBuilder, owner: Any) -> Cable:
         ModelError: the path does not begin and end with a point, or something makes no sense.
     """
     elements = tuple(
-        _point(builder, item)
+        _read_point(builder, item)
         if isinstance(item, Scholz2015GeometryPathPoint)
-        else _obstacle(builder, owner, item)
+        else _read_obstacle(builder, owner, item)
         for item in owner.geometry_path.path_elements
     )
     if len(elements) < 2 or elements[0].is_obstacle or elements[-1].is_obstacle:
         raise ModelError(
-            f"the path of '{builder.path(owner)}' does not begin and end with a point; let it"
+            f"the path of '{builder.path(owner)}' must begin and end with a point; add the missing one"
         )
-    # OpenSim finds it where the model is as it is written, and then assembled.
+    # OpenSim solves it in the written default pose, and again after the assembly.
     written, assembled = builder.mechanism.values({}), builder.mechanism.default_state()[0]
-    cable = Cable(elements).found(builder.mechanism, written)
+    cable = Cable(elements).solve_at(builder.mechanism, written)
     if cable and not np.array_equal(written, assembled):
-        cable = cable.found(builder.mechanism, assembled)
+        cable = cable.solve_at(builder.mechanism, assembled)
     if cable is None:
         raise ModelError(
-            f"the path of '{builder.path(owner)}' has no way over its obstacles where the model starts: a point or "
+            f"the path of '{builder.path(owner)}' cannot be laid over its obstacles in the default pose: a point or "
             "another obstacle is inside one, or a contact_hint leads nowhere; move them apart"
         )
     return cable
 
 
-def check(builder: ElementBuilder, owner: Any) -> None:
-    """Check whether OpenSim can lay a path over its obstacles, and name the point where one is inside.
+def check_cable(builder: ElementBuilder, owner: Any) -> None:
+    """Check whether OpenSim can lay a path over its obstacles, and name a point that is inside one.
 
-    Raises: UnsupportedError: there is an obstacle of a kind that a cable cannot run over, and
-        OpenSim may. ModelError: a point is inside an obstacle, a contact hint is where no point of
-        the surface is nearest, or the search fails.
+    Raises:
+        UnsupportedError: osimlite cannot compute a cable over one of the obstacles, but OpenSim may.
+        ModelError: a point is inside an obstacle, a contact hint has no nearest point on the surface,
+            or the search fails.
     """
     items = list(owner.geometry_path.path_elements)
     for index, item in enumerate(items):
         if isinstance(item, Scholz2015GeometryPathPoint):
             continue
-        geometry = builder.target(item, "socket_contact_geometry", item.socket_contact_geometry)
-        # OpenSim compares an obstacle with its neighbours, and with points beyond only if it
-        # touches none between.
+        geometry = builder.resolve_target(
+            item, "socket_contact_geometry", item.socket_contact_geometry
+        )
+        # OpenSim compares an obstacle with its neighbours; it reaches points beyond them only if the
+        # cable touches no obstacle between.
         for other in items[max(index - 1, 0) : index + 2]:
             if isinstance(other, Scholz2015GeometryPathPoint) and _is_enclosed(
                 builder, other, geometry
@@ -223,7 +249,7 @@ def check(builder: ElementBuilder, owner: Any) -> None:
                 name = other.name or other.path_point.name
                 raise ModelError(
                     f"the point '{name}' of the path of '{builder.path(owner)}' is inside the "
-                    f"obstacle '{geometry.name}' where the model starts; move it out"
+                    f"obstacle '{geometry.name}' in the default pose; move it out"
                 )
     read_cable(builder, owner)
 
@@ -232,12 +258,14 @@ def _is_enclosed(builder: ElementBuilder, point_item: Any, geometry: ContactGeom
     """Return whether a point of a path is inside an obstacle in a pose that OpenSim starts from."""
     mechanism = builder.mechanism
     poses = [mechanism.values({})]
-    # Another rule reports constraints that no pose meets.
+    # Another rule reports constraints that no pose satisfies.
     with suppress(OsimliteError):
         poses.append(mechanism.default_state()[0])
-    point = _point(builder, point_item)
-    body, _ = builder.placement(builder.target(geometry, "socket_frame", geometry.socket_frame))
-    surface = _surface(geometry)
+    point = _read_point(builder, point_item)
+    body, _ = builder.find_placement(
+        builder.resolve_target(geometry, "socket_frame", geometry.socket_frame)
+    )
+    surface = _list_surface_numbers(geometry)
     if surface is None and not isinstance(geometry, ContactHalfSpace):
         return False
     for q in poses:
@@ -252,22 +280,24 @@ def _is_enclosed(builder: ElementBuilder, point_item: Any, geometry: ContactGeom
     return False
 
 
-def _point(builder: ElementBuilder, item: Any) -> Point:
+def _read_point(builder: ElementBuilder, item: Any) -> Point:
     point = item.path_point
-    builder.check(point, point.location)
-    body, frame = builder.placement(
-        builder.target(point, "socket_parent_frame", point.socket_parent_frame)
+    builder.check_finite(point, point.location)
+    body, frame = builder.find_placement(
+        builder.resolve_target(point, "socket_parent_frame", point.socket_parent_frame)
     )
     runs = np.array(point.location)
     return Point(body, runs, frame[:3, :3] @ runs + frame[:3, 3])
 
 
-def _obstacle(builder: ElementBuilder, owner: Any, item: Any) -> Obstacle:
-    geometry = builder.target(item, "socket_contact_geometry", item.socket_contact_geometry)
-    surface = _surface(geometry)
+def _read_obstacle(builder: ElementBuilder, owner: Any, item: Any) -> Obstacle:
+    geometry = builder.resolve_target(item, "socket_contact_geometry", item.socket_contact_geometry)
+    surface = _list_surface_numbers(geometry)
     if surface is None:
-        raise builder.unsupported(owner, f" over the {kind_of(geometry)} '{geometry.name}'")
-    builder.check(geometry, (*surface, *geometry.location, *geometry.orientation))
+        raise builder.unsupported_error(
+            owner, f" over the {get_class_name(geometry)} '{geometry.name}'"
+        )
+    builder.check_finite(geometry, (*surface, *geometry.location, *geometry.orientation))
     if min(surface[1:3]) <= 0.0 or min(surface) < 0.0:
         raise ModelError(
             f"'{builder.path(geometry)}' has a size that is not positive; give it a positive one"
@@ -275,8 +305,10 @@ def _obstacle(builder: ElementBuilder, owner: Any, item: Any) -> Obstacle:
     hint = np.array(item.contact_hint)
     has_hint = not np.isnan(hint).all()
     if has_hint:
-        builder.check(item, hint.tolist())
-    body, _ = builder.placement(builder.target(geometry, "socket_frame", geometry.socket_frame))
+        builder.check_finite(item, hint.tolist())
+    body, _ = builder.find_placement(
+        builder.resolve_target(geometry, "socket_frame", geometry.socket_frame)
+    )
     begin = np.zeros(TOUCH_NUMBERS)
     begin[STATE] = LIFTED
     if has_hint:
@@ -287,15 +319,15 @@ def _obstacle(builder: ElementBuilder, owner: Any, item: Any) -> Obstacle:
                 f"the contact_hint of the obstacle '{geometry.name}' of the path of '{builder.path(owner)}' is in the "
                 "middle of the surface, so that no point of it is nearest; move it off the middle"
             )
-        near = _nearest(surface, hint)
+        near = _find_nearest_point(surface, hint)
         for end in (START, END):
             begin[GEODESIC + end + POINT : GEODESIC + end + POINT + 3] = near
     begin[GEODESIC + STEP] = FIRST_STEP
     return Obstacle(body, make_offset(geometry.location, geometry.orientation), surface, begin)
 
 
-def _surface(geometry: ContactGeometry) -> tuple[float, ...] | None:
-    """The numbers of a surface."""
+def _list_surface_numbers(geometry: ContactGeometry) -> tuple[float, ...] | None:
+    """Return the numbers of a surface; None if a cable cannot run over it."""
     if isinstance(geometry, ContactSphere):
         return SPHERE, geometry.radius, geometry.radius**2, 1.0, 1.0, 1.0
     if isinstance(geometry, ContactCylinder):
@@ -321,15 +353,15 @@ def _is_middle(surface: tuple[float, ...], hint: Array) -> bool:
     return not (np.array(weights) * hint).any()
 
 
-def _nearest(surface: tuple[float, ...], hint: Array) -> Array:
-    """The point of a surface that is nearest to another one."""
+def _find_nearest_point(surface: tuple[float, ...], hint: Array) -> Array:
+    """Return the point of a surface that is nearest to another point."""
     kind, radius, square, *weights = surface
     if kind == TORUS:
         ring = hint * (1.0, 1.0, 0.0)
         ring *= radius / np.linalg.norm(ring)
         return ring + square * (hint - ring) / np.linalg.norm(hint - ring)
     k = np.array(weights)
-    # What is nearest is where x (1 + t k) = hint.
+    # The nearest point x satisfies x (1 + t k) = hint.
     t, nearest = 0.0, hint
     for _ in range(50):
         t += float((k @ nearest**2 - square) / (2.0 * (k**2 / (1.0 + t * k)) @ nearest**2))
