@@ -158,7 +158,7 @@ class _KernelRewriter(Kernel, ast.NodeTransformer):
     def compile_function(self) -> Any:
         """Return the rewritten function."""
         tree = self.tree
-        body = [part for item in self.body for part in self._as_list(self.visit(item))]
+        body = [part for item in self.body for part in self._wrap_list(self.visit(item))]
         clear = [
             ast.Assign([_store_name(name)], _load_name("unset_"))
             for name in sorted(self.branch_variables - set(self.given))
@@ -179,7 +179,7 @@ class _KernelRewriter(Kernel, ast.NodeTransformer):
         )
 
     @staticmethod
-    def _as_list(node: Any) -> list[ast.stmt]:
+    def _wrap_list(node: Any) -> list[ast.stmt]:
         """Return one statement or several as a list."""
         return node if isinstance(node, list) else [node]
 

@@ -203,10 +203,10 @@ def _make_binary_operation(
     """Return an operation on two numbers; CasADi's operators need eight times as long to check their types."""
     binary = SX.binary
 
-    def joined(a: Any, b: Any) -> Any:
+    def apply_operation(a: Any, b: Any) -> Any:
         return binary(number, a, b) if isinstance(a, SX) or isinstance(b, SX) else operation(a, b)
 
-    return joined
+    return apply_operation
 
 
 plus = _make_binary_operation(operator.add, casadi.OP_ADD)

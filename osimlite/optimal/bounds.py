@@ -150,6 +150,7 @@ def find_state_bounds(
             default = speeds
         elif what == "normalized_tendon_force" and isinstance(owner, DeGrooteFregly2016Muscle):
             default = MIN_TENDON_FORCE, MAX_TENDON_FORCE
+        # Moco bounds activations by excitations, those of muscles only if the phase says so.
         elif what == "activation" and isinstance(owner, ActivationCoordinateActuator):
             default = owner.min_control, owner.max_control
         elif (

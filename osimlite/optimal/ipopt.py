@@ -144,8 +144,10 @@ def run_ipopt(
         "ipopt": _make_options(program)
         | (WARM_START_OPTIONS if near else {})
         | {"print_level": 0, "sb": "yes", "option_file_name": ""},
+        # Values of bad trial points are normal in a line search; progress comes from the callback.
         "print_time": False,
         "show_eval_warnings": False,
+        # The multipliers and gradients of the result are not used.
         "no_nlp_grad": True,
         "calc_lam_p": False,
         "calc_lam_x": False,
@@ -172,6 +174,7 @@ def run_ipopt(
     if not np.isfinite(np.array(solution["f"])).all() or status == "Invalid_Number_Detected":
         raise SimulationError(_describe_invalid_number(program, guess))
     w = search.unscale(np.array(solution["x"]).ravel())
+    # The last iterate of an unfinished search is often worse than an earlier one.
     if not stats["success"] and search.best is not None:
         w = search.best
     return SolverResult(w, status, bool(stats["success"]), int(stats["iter_count"]), took)
@@ -355,6 +358,7 @@ class _SearchCallbacks:
         objective = float(f[0])
         worst = find_violations(self.program, self.unscale(x), rows, most=1)
         size = worst[0].size if worst else 0.0
+        # Among feasible iterates the objective decides, among others the violation.
         rank = (size, np.inf) if size > FEASIBILITY_TOLERANCE else (0.0, objective)
         if rank < self._best:
             self.best, self._best = self.unscale(x), rank

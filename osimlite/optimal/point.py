@@ -88,14 +88,14 @@ class Point:
     known: Formula
     projections: Formula = field(default_factory=lambda: casadi.SX(0, 1))
     linear_systems: list[tuple[Formula, Formula]] = field(default_factory=list)
-    _kept: dict[str, Any] = field(default_factory=dict)
+    _outputs: dict[str, Any] = field(default_factory=dict)
 
     @cached_property
     def before_projection(self) -> Point:
         """The same point with the values and speeds before projection."""
         size = self.projections.numel()
         x = casadi.vertcat(self.projections, self.x[size:])
-        return replace(self, x=x, _kept={}) if size else self
+        return replace(self, x=x, _outputs={}) if size else self
 
     def state(self, path: str) -> Formula:
         """Return the state with a path."""
@@ -131,12 +131,13 @@ class Point:
             Formula of each output by its label.
         """
         functions = self.problem.functions
-        if not self._kept:
+        # All outputs come from one call, whose results are cached for further goals.
+        if not self._outputs:
             values = functions.outputs(self.t, self.x, self.u, self.p)
             values = values if isinstance(values, tuple) else (values,)
-            self._kept.update(zip(functions.outputs.name_out(), values, strict=True))
+            self._outputs.update(zip(functions.outputs.name_out(), values, strict=True))
         labels = functions.output_names[name]
-        return {label: self._kept[name][place] for place, label in enumerate(labels)}
+        return {label: self._outputs[name][place] for place, label in enumerate(labels)}
 
     def frame(self, path: str) -> Frame:
         """Return the pose and velocity of a frame of the model."""

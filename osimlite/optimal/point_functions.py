@@ -74,6 +74,7 @@ class PointFormula:
         s, z = SX.sym("s", layout.shared), SX.sym("z", size)
         fraction, known = SX.sym("fraction"), SX.sym("known", program.known_size)
         point = program.point(s, z, fraction, known, number)
+        # Rates are per fraction of the motion, as the duration may vary.
         duration = s[1] - s[0]
         names, residuals = problem.dynamics.compute_residuals(point)
         rows, labels, limits = [residuals], [*names], [(0.0, 0.0)] * len(names)
@@ -86,6 +87,7 @@ class PointFormula:
         rows.append(errors)
         labels += names
         limits += [read_range(problem.phase.kinematic_constraint_bounds) or (0.0, 0.0)] * len(names)
+        # The order of the results: rates, rates before projection, rows, integrands.
         rates = [problem.dynamics.correct_rates(point)]
         if self.projected:
             rates.append(point.before_projection.rates[: self.projected])
@@ -160,6 +162,7 @@ class PointFormula:
             hessian = casadi.substitute(
                 directions.T @ hessian @ directions, adjoints, adjoint_values
             )
+        # Ipopt reads the upper triangle only.
         hessian = casadi.triu(hessian)
         function = self._make_function(
             "H", [*self._inputs, multipliers], casadi.vertcat(*hessian.nonzeros())

@@ -70,7 +70,7 @@ def read_position_motion(part: PositionMotion, model: Model) -> Motion | str:
 
 
 class PrescribedMotion:
-    """Model along a prescribed motion, in the place of a :class:`~osimlite.derivatives.functions.CasadiModel`.
+    """Model along a prescribed motion, instead of a :class:`~osimlite.derivatives.functions.CasadiModel`.
 
     Args:
         model: model without the PositionMotion.

@@ -104,6 +104,7 @@ class Problem(StudyContext):
         self.tables, self._scaled = tables or {}, scaled or {}
         self._factors: dict[str, str] = {}
         self.study = study
+        # Invalid values are reported with their line, before a conversion could fail on them.
         self.check_values(study)
         self.phase = study.problem.phases
         self.time_functions: list[TimeFunction] = []
@@ -114,6 +115,7 @@ class Problem(StudyContext):
             raise self.unsupported_error(study.solver, "only MocoCasADiSolver is supported")
         self.solver: MocoCasADiSolver = study.solver
         self.model = self._process_model()
+        # A PositionMotion makes the coordinates functions of time, so that only actuators vary.
         motion = motion or self._remove_motion()
         self.components = {
             part.path: part for part in self.model.walk() if isinstance(part, Component)
@@ -133,6 +135,7 @@ class Problem(StudyContext):
             parameter.name: read_range(parameter.moco_bounds) or FREE
             for parameter in self.phase.parameters
         }
+        # A parameter may stand for several equal numbers of the model.
         self.parameter_owners = [index for index, owned in enumerate(paths.values()) for _ in owned]
         self._add_scale_factors()
         # OpenSim has no controls of actuators that do not act.
@@ -142,20 +145,12 @@ class Problem(StudyContext):
         self.states = find_state_bounds(
             self.phase, self.functions.states, self.components, self.controls
         )
-        self.times: tuple[Range, Range] = (
-            read_range(self.phase.time_initial_bounds) or FREE,
-            read_range(self.phase.time_final_bounds) or FREE,
-        )
-        if self.times[1][1] <= self.times[0][0]:
-            ends = self.times[1][1], self.times[0][0]
-            message = "the latest final time, {:g} s, is not after the earliest initial time, {:g} s".format(
-                *ends
-            )
-            raise self.invalid_error(self.phase.time_final_bounds, message)
+        self.times = self._read_times()
         self.constraint_names = self._name_constraints()
         self.grid = Grid.from_mesh(make_scheme(self.solver.transcription_scheme), self._make_mesh())
         self.dynamics = Dynamics(self) if motion is None else PrescribedDynamics(self)
         self._check_settings()
+        # Goals and constraints are built last, as they need states, controls and dynamics.
         self.goals: list[tuple[MocoGoal, GoalTerms]] = [
             *((goal, self._build_terms(goal)) for goal in self.phase.goals if goal.enabled),
             *self._make_solver_costs(),
@@ -231,8 +226,24 @@ class Problem(StudyContext):
             raise self.invalid_error(processor, "a model or a filepath is required")
         return process_model(processor, self.folder)
 
+    def _read_times(self) -> tuple[Range, Range]:
+        """Return the ranges of the initial and the final time, s.
+
+        Raises:
+            DocumentError: the motion cannot end after its start.
+        """
+        initial = read_range(self.phase.time_initial_bounds) or FREE
+        final = read_range(self.phase.time_final_bounds) or FREE
+        if final[1] <= initial[0]:
+            raise self.invalid_error(
+                self.phase.time_final_bounds,
+                f"the latest final time, {final[1]:g} s, is not after the earliest initial time, "
+                f"{initial[0]:g} s",
+            )
+        return initial, final
+
     def _remove_motion(self) -> Motion | None:
-        """Remove an enabled PositionMotion from the model and return its motion; None if there is none."""
+        """Remove an enabled PositionMotion from the model and return its motion, or None."""
         for part in list(self.model.components(PositionMotion)):
             if part.default_enabled:
                 path = part.path

@@ -24,6 +24,9 @@ from osimlite.optimal.problem import Problem
 from osimlite.optimal.sparse import SparseMatrix
 
 SX: Any = casadi.SX
+"""Type of CasADi's symbolic scalar expressions."""
+MAX_CACHED_TIMES = 8
+"""Number of sets of times for which the data of functions of time are cached."""
 
 
 class Program:
@@ -42,7 +45,7 @@ class Program:
 
     def __init__(self, problem: Problem) -> None:
         self.problem, self.layout = problem, Layout(problem)
-        self._found: dict[bytes, Array] = {}
+        self._time_data: dict[bytes, Array] = {}
         self._compute_rows = cache_last(
             lambda w: self._a @ w + self._b @ self._evaluate_groups("value", w)
         )
@@ -128,10 +131,10 @@ class Program:
             value = SX(terms.value(ends))
             if (goal.mode or terms.modes[0]) == "cost":
                 value = value**2 if terms.modes[0] != "cost" else value
-                costs.append(goal.weight * casadi.sum1(self._divided(goal, value, ends)))
+                costs.append(goal.weight * casadi.sum1(self._divide_value(goal, value, ends)))
                 self.costs.append(goal.name)
                 continue
-            rows.append(self._divided(goal, value, ends))
+            rows.append(self._divide_value(goal, value, ends))
             bounds = [read_range(each) or (0.0, 0.0) for each in goal.moco_constraint_info.bounds]
             count = rows[-1].numel()
             if bounds and len(bounds) != count:
@@ -170,7 +173,7 @@ class Program:
         self.lower = np.append(self.lower, [low for low, _ in limits])
         self.upper = np.append(self.upper, [high for _, high in limits])
 
-    def _divided(self, goal: Any, value: Any, ends: Endpoints) -> Any:
+    def _divide_value(self, goal: Any, value: Any, ends: Endpoints) -> Any:
         """Return the value of a goal after its divisions by displacement, duration and mass."""
         if goal.divide_by_displacement:
             value = value / casadi.norm_2(ends.end.mass_center() - ends.start.mass_center())
@@ -383,15 +386,16 @@ class Program:
         )
 
     # ------------------------------------------------------------------------------------------------- numbers
-    def _known(self, times: Array) -> Array:
+    def _sample_time_functions(self, times: Array) -> Array:
         """Return the data of the functions of time (n, 3 k + 1) at times (n,)."""
         key = times.tobytes()
-        if key not in self._found:
-            if len(self._found) >= 8:
-                self._found.clear()
+        if key not in self._time_data:
+            # Ipopt's line search alternates between few sets of times.
+            if len(self._time_data) >= MAX_CACHED_TIMES:
+                self._time_data.clear()
             values = (np.asarray(series.values(times)) for series in self.problem.time_functions)
-            self._found[key] = np.vstack([times[None], *values]).T
-        return self._found[key]
+            self._time_data[key] = np.vstack([times[None], *values]).T
+        return self._time_data[key]
 
     def _point_arguments(self, group: PointGroup, w: Array) -> list[Array]:
         """Return the arguments of F for a group of points."""
@@ -401,7 +405,7 @@ class Program:
         """Return the arguments of F at fractions of time (n,) with variables z (n, ...)."""
         s = w[: self.layout.shared]
         times = w[0] + fractions * (w[1] - w[0])
-        return [np.tile(s, len(fractions)), z, fractions, self._known(times)]
+        return [np.tile(s, len(fractions)), z, fractions, self._sample_time_functions(times)]
 
     def _evaluate_groups(self, name: str, w: Array) -> Array:
         """Return the results of a function of all groups in one array."""
@@ -414,7 +418,7 @@ class Program:
 
     def _end_arguments(self, w: Array, totals: Array) -> list[Array]:
         """Return the arguments of E."""
-        known = self._known(w[:2])
+        known = self._sample_time_functions(w[:2])
         first, last = self.layout.point_indices[0], self.layout.point_indices[-1]
         return [w[: self.layout.shared], w[first], w[last], totals, known[0], known[1]]
 

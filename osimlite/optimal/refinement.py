@@ -172,6 +172,7 @@ def estimate_errors(program: Program, w: Array) -> Array:
         actual = np.array(group.evaluate(program, w, starts + fraction * grid.lengths, z))[
             :, :count
         ]
+        # Difference between the rate of the polynomial and the equations of motion.
         missing = np.abs(np.einsum("j,kji->ki", row, rates) - actual)
         result += weight * grid.lengths * (missing / sizes).max(axis=1)
     return result
@@ -190,6 +191,7 @@ def split_intervals(grid: Grid, error: Array, tolerance: float) -> Array:
     order = 1 + int(grid.scheme.rates.any(axis=0).sum())
     parts = np.ones(len(error), dtype=int)
     large = error > tolerance
+    # The error of an interval of length h is proportional to h ** order.
     parts[large] = np.clip(np.ceil((error[large] / tolerance) ** (1.0 / order)), 2, MAX_PARTS)
     lengths = np.repeat(grid.lengths / parts, parts)
     return np.concatenate([[0.0], np.cumsum(lengths)[:-1], [1.0]])
@@ -210,6 +212,7 @@ def interpolate_solution(program: Program, w: Array, finer: Program) -> Array:
     values = _SolutionPolynomials(program, w).evaluate(
         (fractions - starts[interval]) / grid.lengths[interval], interval
     )
+    # Variables without a polynomial keep the default guess; slacks vanish at a solution.
     result = layout.make_guess()
     result[: layout.shared] = w[: layout.shared]
     for kind in VARIABLE_KINDS:

@@ -42,6 +42,7 @@ def make_scheme(name: str) -> Scheme:
             name, np.array([0.0, 1.0]), half, np.array([[-1.0, 1.0]]), -half[None], np.zeros((0, 2))
         )
     if name == "hermite-simpson":
+        # Rows: the midpoint on Hermite's interpolant, and Simpson's rule over the interval.
         between = [-0.5, 1.0, -0.5]
         simpson = np.array([1.0, 4.0, 1.0]) / 6.0
         states = np.array([between, [-1.0, 0.0, 1.0]])
@@ -70,6 +71,7 @@ def _make_legendre_scheme(name: str, degree: int, is_radau: bool) -> Scheme:
         last = np.zeros((1, count))
         last[0, : degree + 1], last[0, -1] = -end.ravel(), 1.0
         states, rates = np.vstack([states, last]), np.vstack([rates, np.zeros((1, count))])
+    # The quadrature is over the collocation points; the start of the interval has no weight.
     mean = np.zeros(count)
     mean[1 : degree + 1] = weights.ravel()
     inner = fractions[1:-1]
