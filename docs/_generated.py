@@ -19,9 +19,9 @@ from osimlite.cli import COMMANDS, app
 from osimlite.lint.pages import format_group_page
 from osimlite.lint.registry import all_rules, rule_groups
 from osimlite.schema.base import Object
-from osimlite.schema.descriptions import described, meaning_of, value_of
+from osimlite.schema.descriptions import describe_class, describe_property, describe_value
 from osimlite.schema.fields import Held, Value
-from osimlite.schema.registry import class_for, tags
+from osimlite.schema.registry import find_class, list_tags
 from osimlite.schema.specs import FieldSpec
 
 WIDTH = 80
@@ -77,8 +77,8 @@ def _help(command: str) -> str:
 def components() -> str:
     """Every class with its properties, by the area of OpenSim that it belongs to."""
     areas: dict[str, list[type[Object]]] = defaultdict(list)
-    for tag in tags():
-        cls = class_for(tag)
+    for tag in list_tags():
+        cls = find_class(tag)
         assert cls is not None
         areas[cls.__module__.removeprefix("osimlite.schema.").replace(".", ": ")].append(cls)
     parts = [
@@ -93,14 +93,14 @@ def components() -> str:
 
 
 def _component(cls: type[Object]) -> str:
-    lines = [f"### {cls.tag}", "", _text(described(cls))]
+    lines = [f"### {cls.tag}", "", _text(describe_class(cls))]
     specs = [spec for spec in cls.field_specs().values() if spec.tag != "components"]
     if specs:
         lines += ["", "| property | holds | default | meaning |", "|---|---|---|---|"]
         for spec in specs:
-            meaning = _cell(meaning_of(spec))
+            meaning = _cell(describe_property(spec))
             lines.append(
-                f"| `{spec.tag}` | {_cell(value_of(spec))} | {_default(spec)} | {meaning} |"
+                f"| `{spec.tag}` | {_cell(describe_value(spec))} | {_default(spec)} | {meaning} |"
             )
     return "\n".join(lines)
 

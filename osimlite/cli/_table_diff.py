@@ -23,7 +23,7 @@ def table_differences(old: Path, new: Path) -> list[str]:
     require("numpy", extra="sim", purpose="comparing tables")
     import numpy as np
 
-    from osimlite.io.document.lexical import shortest
+    from osimlite.io.document.lexical import format_shortest
     from osimlite.io.tables.storage import StoTable, read_sto
 
     before, after = (
@@ -47,7 +47,7 @@ def table_differences(old: Path, new: Path) -> list[str]:
                 np.argmax(np.where(other, np.nan_to_num(np.abs(now - was), nan=np.inf), -1.0))
             )
             rows = f"{np.count_nonzero(other)} of {len(times)} rows differ"
-            change = f"{shortest(float(was[most]))} -> {shortest(float(now[most]))}"
+            change = f"{format_shortest(float(was[most]))} -> {format_shortest(float(now[most]))}"
             lines.append(
                 f"  {column}: {change} at {times[most]:g} s, where it differs most; {rows}"
             )

@@ -37,7 +37,7 @@ def diff(
     from osimlite.errors import OsimliteError
     from osimlite.io.document.reader import read_any
     from osimlite.lint.project_files import is_table
-    from osimlite.schema.difference import differences
+    from osimlite.schema.difference import find_differences
     from osimlite.schema.model import Model
 
     if git:
@@ -59,7 +59,7 @@ def diff(
     else:
         read = [None if str(file) == "/dev/null" else read_any(file) for file in (old, new)]
         kind = next((type(top) for top in read if top is not None), Model)
-        lines = described(differences(*(kind() if top is None else top for top in read)))
+        lines = described(find_differences(*(kind() if top is None else top for top in read)))
     if git:
         say(f"--- {title}")
         say(f"+++ {title}")
@@ -92,9 +92,9 @@ def described(found: list[Difference]) -> list[str]:
 
 def _words(value: Any) -> str:
     if isinstance(value, float):
-        from osimlite.io.document.lexical import shortest
+        from osimlite.io.document.lexical import format_shortest
 
-        return shortest(value)
+        return format_shortest(value)
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, tuple):

@@ -32,7 +32,7 @@ def format(
     from osimlite.base.files import write_atomically
     from osimlite.cli._console import complain, print_diff, say
     from osimlite.errors import OsimliteError
-    from osimlite.io.document.printer import formatted
+    from osimlite.io.document.printer import format_document
     from osimlite.io.document.source import Source
     from osimlite.lint.project_files import DOCUMENTS, find_project_files
 
@@ -40,7 +40,7 @@ def format(
     for path in find_project_files(paths, (".osim", *DOCUMENTS), only_ours=only_ours):
         try:
             source = Source.of_file(path)
-            after = formatted(source)
+            after = format_document(source)
         except OsimliteError as error:
             complain(error)
             worst = max(worst, error.exit_code)

@@ -53,7 +53,7 @@ def ik(
     from osimlite.fitting.marker_data import MarkerData
     from osimlite.fitting.orientation_data import holds_orientations
     from osimlite.io.document.reader import read
-    from osimlite.io.tables.old_storage import UNITS, printed
+    from osimlite.io.tables.old_storage import UNITS, format_old_table
     from osimlite.io.tables.storage import write_sto
     from osimlite.schema.markers import Marker
 
@@ -72,7 +72,9 @@ def ik(
     )
     folder = options.results_folder(file, output)
     make_folder(folder)
-    write_atomically(folder / "ik.mot", "".join(printed(create_motion_table(motion), f"\n{UNITS}")))
+    write_atomically(
+        folder / "ik.mot", "".join(format_old_table(create_motion_table(motion), f"\n{UNITS}"))
+    )
     what, names, errors = "marker", motion.markers, motion.marker_errors
     if of_sensors:
         what, names, errors = "orientation", motion.sensors, motion.orientation_errors

@@ -145,10 +145,10 @@ def _table(file: Path, everything: bool) -> None:
 
 def _files(top: Object, folder: Path) -> Iterator[tuple[str, str]]:
     """The properties of a document that name files and folders, with what they say and whether that is there."""
-    from osimlite.schema.specs import reference_specs
+    from osimlite.schema.specs import get_reference_specs
 
     for item in top.walk():
-        for spec in reference_specs(type(item)):
+        for spec in get_reference_specs(type(item)):
             value = getattr(item, spec.name)
             if not spec.reference.target.endswith(("file", "folder")):
                 continue
@@ -195,13 +195,13 @@ def _listed(title: str, items: Sequence[str], everything: bool) -> None:
 def _coordinates(model: Model) -> Iterator[str]:
     """A line for each joint and one for each coordinate below it, with units."""
     from osimlite.schema.joints import Joint
-    from osimlite.schema.states import motions_of
+    from osimlite.schema.states import list_motions
 
     joints = [joint for joint in model.components(Joint) if joint.coordinates]
     width = max(len(coordinate.name) for joint in joints for coordinate in joint.coordinates)
     for joint in joints:
         yield f"  {joint.name} ({type(joint).__name__})"
-        motions = motions_of(joint)
+        motions = list_motions(joint)
         for coordinate in joint.coordinates:
             unit = {"rotational": "rad", "translational": "m"}.get(
                 motions.get(coordinate.name, ""), ""

@@ -14,7 +14,7 @@ from osimlite.fitting.fitted_motion import FittedMotion
 from osimlite.fitting.inverse_kinematics import check_weight, find_marker_stations, fit_motion
 from osimlite.fitting.marker_data import MarkerData
 from osimlite.fitting.pose_layout import CoordinateTarget
-from osimlite.io.tables.storage import StoTable, both_of, read_sto
+from osimlite.io.tables.storage import StoTable, expect_time_range, read_sto
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.smoothing_spline import smoothing_spline
@@ -130,7 +130,7 @@ def run_inverse_kinematics(
     Raises:
         OsimliteError: as for :func:`collect_targets`.
     """
-    first, last = both_of(tool.time_range)
+    first, last = expect_time_range(tool.time_range)
     frames = data.select_times(first, last)
     mechanism = build_mechanism(model)
     tasks = collect_targets(model, mechanism, tool.ik_task_set.objects, frames, coordinates)

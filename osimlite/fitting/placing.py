@@ -14,7 +14,7 @@ from osimlite.fitting.ik_tool import collect_targets
 from osimlite.fitting.inverse_kinematics import fit_motion
 from osimlite.fitting.marker_data import MarkerData
 from osimlite.fitting.measuring import select_frames
-from osimlite.io.tables.old_storage import printed
+from osimlite.io.tables.old_storage import format_old_table
 from osimlite.io.tables.storage import StoTable
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.schema.markers import Marker
@@ -128,4 +128,4 @@ def format_pose(model: Model, placed: MarkerPlacement) -> str:
     own = [f"{info.path}/{what}" for info in mechanism.coordinates for what in ("value", "speed")]
     paths = in_model_order(model, [*own, *named])
     row = np.array([[columns[path] for path in paths]])
-    return "".join(printed(StoTable("static pose", motion.times, tuple(paths), row)))
+    return "".join(format_old_table(StoTable("static pose", motion.times, tuple(paths), row)))

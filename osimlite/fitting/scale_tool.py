@@ -16,10 +16,10 @@ from osimlite.fitting.marker_data import MarkerSource as Markers
 from osimlite.fitting.measuring import ScaleFactorFinder, ScaleFactors, create_scale_set
 from osimlite.fitting.placing import MarkerPlacement, format_pose, place_markers
 from osimlite.fitting.scaling import scale_model
-from osimlite.io.document.cache import read_anew
+from osimlite.io.document.cache import read_copy
 from osimlite.io.document.printer import to_text
 from osimlite.io.document.reader import read_any
-from osimlite.io.tables.storage import both_of
+from osimlite.io.tables.storage import expect_time_range
 from osimlite.schema.base import Object
 from osimlite.schema.frames import PhysicalFrame
 from osimlite.schema.markers import MarkerSet
@@ -186,7 +186,7 @@ def compute_scaled_model(tool: ScaleTool, folder: Path) -> ScaledModel:
         raise SettingError(
             "the setup names no model; put its file into model_file of GenericModelMaker"
         )
-    result = ScaledModel(read_anew(folder / maker.model_file, Model))
+    result = ScaledModel(read_copy(folder / maker.model_file, Model))
     model = result.model
     if scaler.apply:
         result.unknown = describe_unknown(model, UNSCALED)
@@ -201,7 +201,7 @@ def compute_scaled_model(tool: ScaleTool, folder: Path) -> ScaledModel:
     if placer.apply and placer.marker_file not in NO_FILE:
         data = MarkerData.from_source(folder / placer.marker_file)
         coordinates = read_coordinate_table(placer.coordinate_file, folder)
-        first, last = both_of(placer.time_range)
+        first, last = expect_time_range(placer.time_range)
         result.placed = place_markers(
             model, data, placer.ik_task_set.objects, first, last, coordinates
         )
@@ -223,7 +223,7 @@ def _scale_by_setup(tool: ScaleTool, model: Model, folder: Path) -> ScaleFactors
                 )
             data = MarkerData.from_source(folder / scaler.marker_file)
             measuring.apply_measurements(
-                scaler.measurement_set.objects, data, *both_of(scaler.time_range)
+                scaler.measurement_set.objects, data, *expect_time_range(scaler.time_range)
             )
         elif word == MANUAL_SCALE:
             measuring.apply_factors(scaler.scale_set.objects)

@@ -50,8 +50,8 @@ def validate(
         a finding. OsimliteError: no rule has a code in `select` or `ignore`, or a class is declared
         wrongly.
     """
-    from osimlite.io.document.plugins import used
-    from osimlite.io.document.reader import collector_paused
+    from osimlite.io.document.plugins import classes_in_use
+    from osimlite.io.document.reader import pause_collector
     from osimlite.io.document.source import Source
     from osimlite.lint.engine import check_source, run_rules
     from osimlite.lint.subject import Subject
@@ -62,7 +62,7 @@ def validate(
         named = [classes] if isinstance(classes, str | os.PathLike) else classes
         files = tuple(map(os.path.abspath, named))
         config = Config(parse_codes(select), parse_codes(ignore), mesh_paths=meshes, classes=files)
-    with used(config.classes):
+    with classes_in_use(config.classes):
         if isinstance(model, Model):
             return run_rules(Subject(model, config))
         if not isinstance(model, Source) and os.path.isdir(model):
@@ -75,7 +75,7 @@ def validate(
             )
             report.passed = passed
             return report
-        with collector_paused():
+        with pause_collector():
             return check_source(
                 model if isinstance(model, Source) else Source.of_file(model), config
             )

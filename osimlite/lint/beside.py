@@ -7,7 +7,7 @@ from pathlib import Path
 
 from osimlite.base.files import read_at_most, read_file
 from osimlite.errors import OsimliteError
-from osimlite.io.document.cache import top_at, while_unchanged
+from osimlite.io.document.cache import cache_by_file, get_object
 from osimlite.lint.project_files import DOCUMENTS, is_opensim_file
 from osimlite.lint.table import Table
 from osimlite.schema.model import Model
@@ -16,14 +16,14 @@ from osimlite.schema.tree import Tree
 _LARGEST_NEIGHBOUR = 2_000_000
 
 
-@while_unchanged(4)
+@cache_by_file(4)
 def read_tree(path: str) -> Tree | None:
     """The component tree of a model; None if it cannot be read."""
-    top = top_at(path)
+    top = get_object(path)
     return Tree(top) if isinstance(top, Model) else None
 
 
-@while_unchanged(8)
+@cache_by_file(8)
 def read_table(path: str) -> Table | None:
     """A table; None if it cannot be read."""
     try:
@@ -45,7 +45,7 @@ def list_folders(folder: Path) -> list[Path]:
         return []
 
 
-@while_unchanged(256)
+@cache_by_file(256)
 def list_documents(folder: str) -> list[str]:
     """The documents in a folder that may be OpenSim's, other than models."""
     try:

@@ -163,11 +163,11 @@ def _digest(subject: Subject) -> str:
 
 
 def _try_construction(subject: Subject) -> list[Obstacle]:
-    from osimlite.schema.tree import lent
+    from osimlite.schema.tree import lend_tree
 
     assert subject.model is not None
     try_construction = import_module("osimlite.lint.measuring.construction").try_construction
-    with lent(subject.tree):
+    with lend_tree(subject.tree):
         try:
             result: list[Obstacle]
             result, subject.cache[MECHANISM] = try_construction(subject.model, subject.folder)

@@ -6,9 +6,9 @@ from collections.abc import Callable
 
 from osimlite.base.text import join_words
 from osimlite.errors import SpecialFileError
-from osimlite.io.document.reader import collector_paused
+from osimlite.io.document.reader import pause_collector
 from osimlite.io.document.source import Source
-from osimlite.io.document.survey import Survey, survey
+from osimlite.io.document.survey import Survey, survey_source
 from osimlite.lint.checked import CheckTarget
 from osimlite.lint.config import Config
 from osimlite.lint.construction import CONSTRUCTION
@@ -20,7 +20,7 @@ from osimlite.lint.subject import Subject
 from osimlite.lint.suppressions import Suppression
 from osimlite.schema.base import Object
 from osimlite.schema.model import Model
-from osimlite.schema.registry import let_count
+from osimlite.schema.registry import register_plugin_classes
 
 
 def check_source(source: Source, config: Config | None = None) -> Report:
@@ -32,7 +32,7 @@ def check_source(source: Source, config: Config | None = None) -> Report:
     return report
 
 
-@collector_paused()
+@pause_collector()
 def make_subject(source: Source, config: Config | None = None) -> CheckTarget:
     """A text to check; what it is, the name of its file tells."""
     use_classes(config)
@@ -41,7 +41,7 @@ def make_subject(source: Source, config: Config | None = None) -> CheckTarget:
 
         return Table(source.data, source.file, config)
     return _make_document_subject(
-        survey(source, of=Object if is_document(source.file) else Model), config
+        survey_source(source, of=Object if is_document(source.file) else Model), config
     )
 
 
@@ -56,11 +56,11 @@ def load_subject(file: str, config: Config | None = None) -> CheckTarget:
 def use_classes(config: Config | None) -> None:
     """Let the classes of plug-ins count that a configuration names, and no others."""
     if config is None or not config.classes:
-        let_count({})
+        register_plugin_classes({})
         return
-    from osimlite.io.document.plugins import use
+    from osimlite.io.document.plugins import use_classes
 
-    use(config.classes)
+    use_classes(config.classes)
 
 
 def _make_document_subject(found: Survey, config: Config | None) -> Subject:
@@ -73,7 +73,7 @@ def _make_document_subject(found: Survey, config: Config | None) -> Subject:
     return Setup(found, config)
 
 
-@collector_paused()
+@pause_collector()
 def run_rules(subject: CheckTarget, *, measure: bool = True, recall: bool = False) -> Report:
     """Run every rule that is wanted, and return all findings sorted by place.
 

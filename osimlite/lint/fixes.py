@@ -7,7 +7,7 @@ from collections.abc import Iterable
 
 from osimlite.errors import OsimliteError
 from osimlite.io.document.source import Position, Source
-from osimlite.io.document.xml_text import escape
+from osimlite.io.document.xml_text import escape_text
 from osimlite.lint.diagnostic import Edit, Finding, Fix, Report
 from osimlite.lint.project_files import is_table
 
@@ -29,9 +29,11 @@ def replace_name(
     if source is None or not isinstance(named, str) or "'" in text or '"' in text:
         return None
     start = source.line_start(place.line) + place.column - 1
-    if source.text[start : start + place.length] != escape(named.strip()):
+    if source.text[start : start + place.length] != escape_text(named.strip()):
         return None
-    return replace_text(source, place, escape(text), safe=certain or text.lower() == named.lower())
+    return replace_text(
+        source, place, escape_text(text), safe=certain or text.lower() == named.lower()
+    )
 
 
 def rename_tag(

@@ -10,7 +10,7 @@ from osimlite.base.text import join_words
 from osimlite.errors import OsimliteError
 from osimlite.schema.base import Object
 from osimlite.schema.model import CURRENT_VERSION
-from osimlite.schema.specs import FieldSpec, field_specs
+from osimlite.schema.specs import FieldSpec, get_field_specs
 
 NEWEST = "4.6"
 """The release whose classes osimlite has."""
@@ -69,7 +69,7 @@ def find_new_properties(cls: type[Object], release: str) -> list[NewProperty]:
     later = load_later_changes(release).properties
     names = {
         spec: (f"{spec.declared_in.tag}.{tag}", f"{cls.tag}.{tag}")
-        for tag, spec in field_specs(cls).items()
+        for tag, spec in get_field_specs(cls).items()
     }
     told = ((spec, later.get(base) or later.get(own)) for spec, (base, own) in names.items())
     return [

@@ -24,7 +24,7 @@ from osimlite.base.require import find_missing_packages
 from osimlite.base.text import join_words
 from osimlite.base.writing import write_cached
 from osimlite.errors import OsimliteError
-from osimlite.schema.specs import lineage
+from osimlite.schema.specs import get_class_names
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -181,7 +181,7 @@ def measure_subject(subject: Subject, *, anew: bool = True) -> str:
         subject: with the model.
         anew: whether more is done than to recall what was measured before.
     """
-    from osimlite.schema.tree import lent
+    from osimlite.schema.tree import lend_tree
 
     compiles = sum(1 for _ in subject.find_by_class("PathWrap")) > MAX_WRAPS_UNCOMPILED
     missing = find_missing_packages("numpy")
@@ -211,7 +211,7 @@ def measure_subject(subject: Subject, *, anew: bool = True) -> str:
             if parts is None or known is None
             else (known.measures, known.select_unchanged(parts))
         )
-        with lent(subject.tree):
+        with lend_tree(subject.tree):
             result = measured(subject.model, compiles=compiles, known=known_of, mechanism=mechanism)
     except NoMachineCodeError as error:
         subject.needs_remeasuring = True
@@ -277,7 +277,7 @@ def digest_parts(subject: Subject) -> TextParts | None:
     places: list[tuple[int, int, str]] = []
     for cls, items in subject.by_class.items():
         has_path = "geometry_path" in cls.model_fields
-        if not has_path and _INDEPENDENT_CLASSES.isdisjoint(lineage(cls)):
+        if not has_path and _INDEPENDENT_CLASSES.isdisjoint(get_class_names(cls)):
             continue
         for item in items:
             if item._index is not None:

@@ -6,7 +6,7 @@ import re
 from typing import Final, NamedTuple
 
 from osimlite.schema.base import Object
-from osimlite.schema.specs import field_specs
+from osimlite.schema.specs import get_field_specs
 
 
 class Successor(NamedTuple):
@@ -122,7 +122,7 @@ _CONNECTEE = re.compile(r"(?:socket|connector)_(\w+?)(?:_connectee_name)?s?")
 
 def successor(cls: type[Object], tag: str) -> Successor | None:
     """What stands for an old tag in objects of a class; None of a tag that no format had."""
-    specs = field_specs(cls)
+    specs = get_field_specs(cls)
     for base in cls.__mro__:
         known = _OLD.get(base.__name__, {}).get(tag)
         if known is not None and (known.tag is None or known.tag in specs):

@@ -11,7 +11,7 @@ from osimlite.lint.setup import Setup
 from osimlite.lint.subject import Subject, cached_per_subject
 from osimlite.lint.table import Table
 from osimlite.mechanics.laws.vectors import Vector
-from osimlite.schema.states import motions_of
+from osimlite.schema.states import list_motions
 from osimlite.schema.tree import is_a
 
 
@@ -21,7 +21,7 @@ def find_angles(setup: Setup) -> set[str]:
     return {
         name
         for joint in joints
-        for name, motion in motions_of(joint).items()
+        for name, motion in list_motions(joint).items()
         if motion == "rotational"
     }
 

@@ -93,11 +93,11 @@ def _is_property(owner: str, tag: str) -> bool:
     name = _class_name(owner)
     if name is None or not (_COMPOUND.search(name) or _COMPOUND.search(tag)):
         return False
-    from osimlite.schema.registry import class_for
-    from osimlite.schema.specs import field_specs
+    from osimlite.schema.registry import find_class
+    from osimlite.schema.specs import get_field_specs
 
-    cls = class_for(name)
-    return cls is not None and tag in field_specs(cls)
+    cls = find_class(name)
+    return cls is not None and tag in get_field_specs(cls)
 
 
 DOCUMENTS = (".xml", ".omoco")

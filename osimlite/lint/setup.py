@@ -13,7 +13,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
 
-from osimlite.io.document.cache import top_at
+from osimlite.io.document.cache import get_object
 from osimlite.io.document.survey import Survey
 from osimlite.lint.beside import list_documents, list_folders, read_beginning, read_table, read_tree
 from osimlite.lint.config import Config
@@ -24,7 +24,13 @@ from osimlite.lint.table import Table
 from osimlite.schema.base import Object
 from osimlite.schema.fields import Reference
 from osimlite.schema.model import Model
-from osimlite.schema.specs import FieldSpec, file_specs, member_specs, name_spec, naming_specs
+from osimlite.schema.specs import (
+    FieldSpec,
+    get_file_specs,
+    get_member_specs,
+    get_name_spec,
+    get_naming_specs,
+)
 from osimlite.schema.tree import Tree, Use, is_a
 
 NO_FILE_CONSEQUENCE = "OpenSim rejects it unless a program or the GUI supplies one"
@@ -141,7 +147,7 @@ class Setup(Subject):
 
     def read_document(self, name: str) -> Object | None:
         """The top of a document that is named here; None if there is none, or it cannot be read."""
-        return top_at(self.resolve_path(name.strip())) if is_given(name) else None
+        return get_object(self.resolve_path(name.strip())) if is_given(name) else None
 
     # ------------------------------------------------------------------------------------------------- context
 
@@ -160,7 +166,7 @@ class Setup(Subject):
         for folder in dict.fromkeys(folders):
             self._looked_at[str(folder)] = None
             for file in (list_documents(str(folder)) or [])[:_MAX_NEIGHBOURS]:
-                top = top_at(file) if _NAMES_MODEL.search(read_beginning(file)) else None
+                top = get_object(file) if _NAMES_MODEL.search(read_beginning(file)) else None
                 if top is not None and _find_model_file(top) is not None:
                     result.append((file, top))
                     self._looked_at[file] = None
@@ -220,12 +226,12 @@ class Setup(Subject):
             owner: Any = item if self.tree is None else self.tree.model
             names = named.get(id(item))
             if item.name and (names is not None or cls.name_reference is not None):
-                result.append(Use(item, owner, name_spec(cls, names), item.name))
-            for spec in member_specs(cls):
+                result.append(Use(item, owner, get_name_spec(cls, names), item.name))
+            for spec in get_member_specs(cls):
                 held = getattr(item, spec.name)
                 members = held if isinstance(held, list) else getattr(held, "objects", ())
                 named |= dict.fromkeys(map(id, members), spec.names)
-            for spec in naming_specs(cls):
+            for spec in get_naming_specs(cls):
                 if names is not None and spec.reference.rule == names.rule:
                     spec = spec._replace(kind=names)
                 value = getattr(item, spec.name)
@@ -277,7 +283,7 @@ class Setup(Subject):
         names = [*getattr(top, "force_set_files", ()), getattr(top, "marker_set_file", "")]
         names.append(getattr(getattr(top, "generic_model_maker", None), "marker_set_file", ""))
         files = filter(None, map(self._resolve_tool_path, names))
-        return [(file, added) for file in files if (added := top_at(file)) is not None]
+        return [(file, added) for file in files if (added := get_object(file)) is not None]
 
     def find_writer(self, path: str) -> str | None:
         """The other setup of the project that writes a file, which need not be there yet; None if none does."""
@@ -318,7 +324,7 @@ def get_content_type(spec: FieldSpec) -> str:
 
 def list_files(item: Object, rule: str) -> Iterator[tuple[FieldSpec, str]]:
     """Every file that an object names by a rule."""
-    for spec in file_specs(type(item), rule):
+    for spec in get_file_specs(type(item), rule):
         value = getattr(item, spec.name)
         for name in value if isinstance(value, tuple) else (value,):
             if isinstance(name, str) and is_given(name):

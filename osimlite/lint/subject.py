@@ -20,7 +20,7 @@ from osimlite.lint.measures import MEASURES, has_measures, measure_subject
 from osimlite.lint.words import describe_object
 from osimlite.schema.base import Component, Object, Unknown
 from osimlite.schema.model import Model
-from osimlite.schema.specs import FieldSpec, file_specs, lineage
+from osimlite.schema.specs import FieldSpec, get_class_names, get_file_specs
 from osimlite.schema.tree import Resolution, Tree, Use
 
 if TYPE_CHECKING:
@@ -144,7 +144,7 @@ class Subject(CheckTarget):
         """
         result: dict[str, list[list[Object]]] = {}
         for cls, items in self.by_class.items():
-            for name in lineage(cls):
+            for name in get_class_names(cls):
                 result.setdefault(name, []).append(items)
         return result
 
@@ -303,7 +303,7 @@ class Subject(CheckTarget):
         places.append(os.getcwd())
         result: dict[str, None] = {}
         for cls, items in self.by_class.items():
-            for spec in file_specs(cls, "file"):
+            for spec in get_file_specs(cls, "file"):
                 for item in items:
                     name = getattr(item, spec.name)
                     if name:

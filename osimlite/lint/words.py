@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from osimlite.base.text import find_nearest, join_words
-from osimlite.io.document.lexical import shortest
+from osimlite.io.document.lexical import format_shortest
 from osimlite.schema.base import Object, Unknown
 
 
@@ -24,7 +24,7 @@ def format_quantity(value: float | tuple[float, ...], unit: str | None = None) -
     """A number, or several, in few digits and with the unit."""
     values = value if isinstance(value, tuple) else (value,)
     text = " ".join(
-        f"{item:.6g}" if item == item and abs(item) != float("inf") else shortest(item)
+        f"{item:.6g}" if item == item and abs(item) != float("inf") else format_shortest(item)
         for item in values
     )
     return f"{text} {unit}" if unit else text

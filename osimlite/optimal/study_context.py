@@ -12,12 +12,12 @@ from typing import Any
 from osimlite.base.files import read_file
 from osimlite.base.text import join_words, suggest_name
 from osimlite.errors import DocumentError, OsimliteError, UnsupportedError
-from osimlite.io.tables.storage import beside
+from osimlite.io.tables.storage import merge_tables
 from osimlite.schema.base import Component, Object, Unknown
-from osimlite.schema.fields import Value, domain_test
+from osimlite.schema.fields import Value, make_domain_test
 from osimlite.schema.patterns import Pattern, PatternError, UnsupportedPatternError
 from osimlite.schema.registry import MODULES
-from osimlite.schema.specs import FieldSpec, value_specs
+from osimlite.schema.specs import FieldSpec, get_value_specs
 
 
 @contextmanager
@@ -52,7 +52,7 @@ class StudyContext:
 
     def locate_file(self, name: str) -> Path:
         """Return the path of a file that the study names, looked for in its folder, then in the current one."""
-        return beside(self.folder, name.strip())
+        return merge_tables(self.folder, name.strip())
 
     def _locate_part(self, part: Object) -> dict[str, Any]:
         """Return file and line of a part of the study: objects know no lines, but their tags and names are in the text."""
@@ -113,7 +113,7 @@ class StudyContext:
                     suggest_name(part.class_name, MODULES) if part.class_name not in MODULES else ""
                 )
                 raise self.invalid_error(part, f"objects of this class are not allowed here{near}")
-            for spec in value_specs(type(part)):
+            for spec in get_value_specs(type(part)):
                 value = getattr(part, spec.name)
                 for word in value if isinstance(value, tuple) else (value,):
                     if spec.name in part.model_fields_set and (
@@ -161,7 +161,7 @@ def _describe_invalid_value(spec: FieldSpec, word: Any) -> str:
         return f"; expected {join_words(map(repr, kind.choices))}{suggest_name(str(word), map(str, kind.choices))}"
     if isinstance(word, float) and word != word:
         return ", which is not a number"
-    if kind.domain and kind.scalar in ("double", "int") and not domain_test(kind.domain)(word):
+    if kind.domain and kind.scalar in ("double", "int") and not make_domain_test(kind.domain)(word):
         return f"; expected {kind.domain}"
     return ""
 

@@ -11,7 +11,7 @@ import numpy as np
 from osimlite.base.files import make_folder, open_atomically
 from osimlite.base.records import dataclass, field
 from osimlite.errors import DocumentError
-from osimlite.io.tables.storage import StoTable, adapter_lines, read_sto
+from osimlite.io.tables.storage import StoTable, format_adapter_table, read_sto
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.optimal.layout import Layout
 
@@ -153,4 +153,4 @@ class MocoTrajectory:
         """
         make_folder(Path(path).parent)
         with open_atomically(path) as stream:
-            stream.writelines(line.encode() for line in adapter_lines(self.table()))
+            stream.writelines(line.encode() for line in format_adapter_table(self.table()))

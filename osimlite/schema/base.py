@@ -20,26 +20,37 @@ from typing import (
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from osimlite.errors import MissingNameError, ModelError
-from osimlite.schema.complaints import explained, misspelt, unnamed
+from osimlite.schema.complaints import (
+    describe_unknown_property,
+    describe_unnamed_value,
+    describe_validation_error,
+)
 from osimlite.schema.facts import Contradiction, Facts
 from osimlite.schema.fields import Many, ObjectList, Reference, Tag, note_change
 from osimlite.schema.layout import Home, Layout
-from osimlite.schema.specs import FieldSpec, checks, defaults, field_specs, holding, numeric_names
+from osimlite.schema.specs import (
+    FieldSpec,
+    get_defaults,
+    get_field_specs,
+    get_numeric_names,
+    list_holding_properties,
+    make_checks,
+)
 
 
-def same(left: Any, right: Any) -> bool:
+def are_equal(left: Any, right: Any) -> bool:
     """Equality of stored values; NaN equals NaN, and a component given as a reference counts by its name."""
     if left is right:
         return True
     if isinstance(left, dict):
         return left.keys() == right.keys() and all(
-            same(value, right[key]) for key, value in left.items()
+            are_equal(value, right[key]) for key, value in left.items()
         )
     if isinstance(left, (tuple, list)):
         return (
             isinstance(right, (tuple, list))
             and len(left) == len(right)
-            and all(same(one, other) for one, other in zip(left, right, strict=True))
+            and all(are_equal(one, other) for one, other in zip(left, right, strict=True))
         )
     if isinstance(left, float) and isinstance(right, float):
         return left == right or (left != left and right != right)
@@ -86,9 +97,9 @@ class ObjectType(ModelMetaclass):  # noqa: D101
         own: str | None = cls.__dict__.get("__doc__")
         if not issubclass(cls, Object) or not own:
             return own
-        from osimlite.schema.descriptions import with_properties
+        from osimlite.schema.descriptions import add_properties
 
-        return with_properties(cls, own)
+        return add_properties(cls, own)
 
 
 class Object(BaseModel, metaclass=ObjectType):
@@ -132,11 +143,11 @@ class Object(BaseModel, metaclass=ObjectType):
 
     def __init__(self, *positional: Any, **properties: Any) -> None:
         if positional:
-            raise ModelError(unnamed(type(self), positional[0]))
+            raise ModelError(describe_unnamed_value(type(self), positional[0]))
         for given in properties.keys() - type(self).model_fields.keys():
-            spec = field_specs(type(self)).get(given)
+            spec = get_field_specs(type(self)).get(given)
             if spec is None or spec.name in properties:
-                raise MissingNameError(partial(misspelt, type(self), given))
+                raise MissingNameError(partial(describe_unknown_property, type(self), given))
             properties[spec.name] = properties.pop(given)
         values = _check_values(type(self), properties)
         if values is not None:
@@ -149,7 +160,7 @@ class Object(BaseModel, metaclass=ObjectType):
             try:
                 super().__init__(**properties)
             except ValidationError as error:
-                raise ModelError(explained(type(self), error)) from None
+                raise ModelError(describe_validation_error(type(self), error)) from None
         _set(self, "_model", None)
         _set(self, "_index", None)
         _set(self, "_layout", None)
@@ -170,7 +181,7 @@ class Object(BaseModel, metaclass=ObjectType):
         """
         # Default objects and lists are made when someone asks for them, see `__getattr__`: most are
         # never asked for.
-        state = defaults(cls)[0].copy()
+        state = get_defaults(cls)[0].copy()
         state.update(values)
         self = _new(cls)
         _put_state(self, state)
@@ -190,7 +201,7 @@ class Object(BaseModel, metaclass=ObjectType):
     @classmethod
     def field_specs(cls) -> dict[str, FieldSpec]:
         """The properties by XML tag, in the order OpenSim prints them."""
-        return field_specs(cls)
+        return get_field_specs(cls)
 
     @property
     def source_index(self) -> Any:
@@ -206,7 +217,7 @@ class Object(BaseModel, metaclass=ObjectType):
         """Every object this one owns, with the property that holds it, in printing order."""
         held: list[tuple[FieldSpec, Object]] = []
         state = self.__dict__
-        for spec, name, is_list, _ in holding(type(self)):
+        for spec, name, is_list, _ in list_holding_properties(type(self)):
             # A list that no one has asked for is empty.
             value: Any = state[name] if name in state else () if is_list else getattr(self, name)
             if is_list or isinstance(value, list):
@@ -225,7 +236,7 @@ class Object(BaseModel, metaclass=ObjectType):
         while pending:
             item = pending.pop()
             yield item
-            if holding(type(item)):
+            if list_holding_properties(type(item)):
                 pending += [held for _, held in item.objects_held()][::-1]
 
     def copy_deep(self) -> Self:
@@ -234,24 +245,24 @@ class Object(BaseModel, metaclass=ObjectType):
 
     def __getattr__(self, name: str) -> Any:
         if not name.startswith("_"):
-            factory = defaults(type(self))[1].get(name)
+            factory = get_defaults(type(self))[1].get(name)
             if factory is not None:
                 made = self.__dict__[name] = factory()
                 _adopt(made, self._model)
                 return made
-            spec = field_specs(type(self)).get(name)
+            spec = get_field_specs(type(self)).get(name)
             if spec is not None:
                 return getattr(self, spec.name)
-            raise MissingNameError(partial(misspelt, type(self), name))
+            raise MissingNameError(partial(describe_unknown_property, type(self), name))
         raise AttributeError(name)
 
     def __setattr__(self, name: str, value: Any) -> None:
         if name not in type(self).model_fields:
-            spec = field_specs(type(self)).get(name)
+            spec = get_field_specs(type(self)).get(name)
             if spec is None:
-                raise MissingNameError(partial(misspelt, type(self), name))
+                raise MissingNameError(partial(describe_unknown_property, type(self), name))
             name = spec.name
-        note_change(self._model, numbers_only=name in numeric_names(type(self)))
+        note_change(self._model, numbers_only=name in get_numeric_names(type(self)))
         values = _check_values(type(self), {name: value})
         if values is not None:
             self.__dict__.update(values)
@@ -260,7 +271,7 @@ class Object(BaseModel, metaclass=ObjectType):
         try:
             super().__setattr__(name, value)
         except ValidationError as error:
-            raise ModelError(explained(type(self), error)) from None
+            raise ModelError(describe_validation_error(type(self), error)) from None
 
     def assign(self, name: str, value: Any) -> None:
         """Set a property to a value that is already of the stored form, without validation.
@@ -272,7 +283,7 @@ class Object(BaseModel, metaclass=ObjectType):
             name: of the property in Python.
             value: of the stored form, not an object.
         """
-        note_change(self._model, numbers_only=name in numeric_names(type(self)))
+        note_change(self._model, numbers_only=name in get_numeric_names(type(self)))
         self.__dict__[name] = value
         self.model_fields_set.add(name)
 
@@ -280,7 +291,9 @@ class Object(BaseModel, metaclass=ObjectType):
         if type(self) is not type(other):
             return NotImplemented
         assert isinstance(other, Object)
-        return same(_whole(self), _whole(other)) and _unknown(self) == _unknown(other)
+        return are_equal(_get_all_values(self), _get_all_values(other)) and _list_unknown(
+            self
+        ) == _list_unknown(other)
 
     __hash__ = None  # type: ignore[assignment]
 
@@ -296,7 +309,7 @@ class Object(BaseModel, metaclass=ObjectType):
         outermost = _NAMING not in memo
         naming: list[tuple[dict[str, Any], str]] = memo.setdefault(_NAMING, [])
         home = Home() if outermost and self.is_root else None
-        clone = _cloned(self, memo, naming, home)
+        clone = _clone(self, memo, naming, home)
         if home is not None:
             home.model = cast("Model", clone)
         if outermost:
@@ -321,7 +334,7 @@ class Object(BaseModel, metaclass=ObjectType):
     def __repr_args__(self) -> Iterator[tuple[str | None, Any]]:
         if self.name:
             yield "name", self.name
-        for spec in field_specs(type(self)).values():
+        for spec in get_field_specs(type(self)).values():
             value = getattr(self, spec.name)
             if spec.name in self.model_fields_set and not isinstance(value, (list, Object)):
                 yield spec.name, value
@@ -405,7 +418,7 @@ _set = object.__setattr__
 
 def _check_values(cls: type[Object], properties: dict[str, Any]) -> dict[str, Any] | None:
     """Return properties in the form that is stored; None if pydantic has to look at them, or to say what is wrong."""
-    known = checks(cls)
+    known = make_checks(cls)
     if known is None or not properties.keys() <= known.keys():
         return None
     try:
@@ -419,21 +432,21 @@ _NAMING = -1
 _PLAIN = frozenset((str, float, int, bool, type(None)))
 
 
-def _cloned(
+def _clone(
     item: T, memo: dict[int, Any], naming: list[tuple[dict[str, Any], str]], home: Home | None
 ) -> T:
     """A copy of an object and of all that it owns; what names components is noted, to be seen to at the end."""
     if id(item) in memo:
         return cast("T", memo[id(item)])
-    state, owned = item.__dict__.copy(), _owning(type(item))
+    state, owned = item.__dict__.copy(), _list_owned_fields(type(item))
     for name, value in state.items():
         kind = type(value)
         if kind in _PLAIN or (kind is tuple and _PLAIN.issuperset(map(type, value))):
             continue
         if kind is ObjectList:
-            state[name] = ObjectList(_cloned(each, memo, naming, home) for each in value)
+            state[name] = ObjectList(_clone(each, memo, naming, home) for each in value)
         elif name in owned and isinstance(value, Object):
-            state[name] = _cloned(value, memo, naming, home)
+            state[name] = _clone(value, memo, naming, home)
         elif isinstance(value, Component) or kind is tuple:
             naming.append((state, name))
         else:
@@ -450,8 +463,8 @@ def _cloned(
 
 
 @cache
-def _owning(cls: type[Object]) -> frozenset[str]:
-    return frozenset(name for _, name, _, _ in holding(cls))
+def _list_owned_fields(cls: type[Object]) -> frozenset[str]:
+    return frozenset(name for _, name, _, _ in list_holding_properties(cls))
 
 
 def _adopt(value: Any, owner: Any) -> None:
@@ -463,16 +476,16 @@ def _adopt(value: Any, owner: Any) -> None:
             _adopt(item, owner)
     elif isinstance(value, Object):
         put_model(value, owner)
-        for _, name, _, _ in holding(type(value)):
+        for _, name, _, _ in list_holding_properties(type(value)):
             _adopt(value.__dict__.get(name), owner)
 
 
-def _whole(item: Object) -> dict[str, Any]:
+def _get_all_values(item: Object) -> dict[str, Any]:
     """The values of an object by field name, those included that no one has asked for yet."""
-    for name in defaults(type(item))[1]:
+    for name in get_defaults(type(item))[1]:
         getattr(item, name)
     return item.__dict__
 
 
-def _unknown(item: Object) -> list[str]:
+def _list_unknown(item: Object) -> list[str]:
     return item.layout.unknown if item.layout is not None else []

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from osimlite.schema.base import Object
 
 
-def misspelt(cls: type[Object], name: str) -> str:
+def describe_unknown_property(cls: type[Object], name: str) -> str:
     """There is no property of this name; with the nearest ones."""
     from osimlite.base.text import suggest_name
 
@@ -26,7 +26,7 @@ def misspelt(cls: type[Object], name: str) -> str:
     return f"{cls.__name__} has no property '{name}'{better}"
 
 
-def explained(cls: type[Object], error: ValidationError) -> str:
+def describe_validation_error(cls: type[Object], error: ValidationError) -> str:
     """What pydantic found wrong with a value, in one line."""
     first = error.errors()[0]
     place = ".".join(str(part) for part in first["loc"]) or "?"
@@ -39,7 +39,7 @@ def explained(cls: type[Object], error: ValidationError) -> str:
     return f"{cls.__name__}.{place}: {reason}{hint}"
 
 
-def unnamed(cls: type[Object], given: object) -> str:
+def describe_unnamed_value(cls: type[Object], given: object) -> str:
     """Properties have names."""
     example = repr(given) if isinstance(given, str) else "..."
     return f"{cls.__name__} takes its properties by name, as in {cls.__name__}(name={example})"

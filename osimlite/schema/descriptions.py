@@ -10,16 +10,18 @@ from importlib import import_module
 
 from osimlite.schema.base import Object
 from osimlite.schema.fields import Held, Reference, Value
-from osimlite.schema.specs import FieldSpec, field_specs
+from osimlite.schema.specs import FieldSpec, get_field_specs
 
 
-def meaning_of(spec: FieldSpec) -> str:
+def describe_property(spec: FieldSpec) -> str:
     """What a property means: the text below its declaration; "" if there is none, or no source to read it from."""
-    texts = (_described(cls.__module__).get((cls.__name__, spec.name)) for cls in spec.declarers)
+    texts = (
+        _read_descriptions(cls.__module__).get((cls.__name__, spec.name)) for cls in spec.declarers
+    )
     return next(filter(None, texts), "")
 
 
-def value_of(spec: FieldSpec) -> str:
+def describe_value(spec: FieldSpec) -> str:
     """What may stand in a property, in a few words: ``one number in N/m, > 0``."""
     kind = spec.kind
     if isinstance(kind, Value):
@@ -36,28 +38,30 @@ def value_of(spec: FieldSpec) -> str:
     return f"objects of class {tag}" if kind.form == "list" else f"one {tag}"
 
 
-def described(cls: type[Object]) -> str:
+def describe_class(cls: type[Object]) -> str:
     """What a class is: its docstring."""
     return inspect.cleandoc(cls.__dict__.get("__doc__") or "")
 
 
 @cache
-def with_properties(cls: type[Object], own: str) -> str:
+def add_properties(cls: type[Object], own: str) -> str:
     """A docstring with a section on the properties of the class, as ``help()`` shows it."""
     rows = [inspect.cleandoc(own), "", "Properties, in the order of a file:", "    name: a text"]
-    for spec in field_specs(cls).values():
-        given = "" if isinstance(spec.kind, Held) else f"; {_shown(spec.default)} by default"
-        meaning = " ".join(meaning_of(spec).split())
-        text = f"{spec.name}: {value_of(spec)}{given}" + (f". {meaning}" if meaning else "")
+    for spec in get_field_specs(cls).values():
+        given = (
+            "" if isinstance(spec.kind, Held) else f"; {_format_property(spec.default)} by default"
+        )
+        meaning = " ".join(describe_property(spec).split())
+        text = f"{spec.name}: {describe_value(spec)}{given}" + (f". {meaning}" if meaning else "")
         rows.append(textwrap.fill(text, 100, initial_indent="    ", subsequent_indent="        "))
     return "\n".join(rows)
 
 
-def _shown(value: object) -> str:
+def _format_property(value: object) -> str:
     if value is None or value == "" or value == ():
         return "nothing"
     if isinstance(value, tuple):
-        return " ".join(map(_shown, value))
+        return " ".join(map(_format_property, value))
     return (
         f"{value:g}"
         if isinstance(value, float)
@@ -68,7 +72,7 @@ def _shown(value: object) -> str:
 
 
 @cache
-def _described(module: str) -> dict[tuple[str, str], str]:
+def _read_descriptions(module: str) -> dict[tuple[str, str], str]:
     """The texts below the declarations of a module, by class and property. Python itself drops them."""
     result: dict[tuple[str, str], str] = {}
     try:

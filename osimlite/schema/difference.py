@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 from osimlite.schema.base import Component, Object, Unknown
 from osimlite.schema.fields import Held, Reference
 from osimlite.schema.model import Model
-from osimlite.schema.specs import FieldSpec, field_specs
+from osimlite.schema.specs import FieldSpec, get_field_specs
 from osimlite.schema.tree import Tree, Use
 
 
@@ -30,7 +30,7 @@ class Difference(NamedTuple):
     new: Any
 
 
-def differences(old: Object, new: Object) -> list[Difference]:
+def find_differences(old: Object, new: Object) -> list[Difference]:
     """Every change of meaning from `old` to `new`, in tree order; what only takes or loses its default is none."""
     if isinstance(old, Model) and isinstance(new, Model):
         return list(_Comparison(old.tree(), new.tree()).run())
@@ -46,19 +46,19 @@ class _Comparison:
 
     def run(self) -> Iterator[Difference]:
         assert self.old is not None and self.new is not None
-        for path in _only_in(self.old, self.new):
-            yield Difference(path, "", _kind(self.old.by_path[path]), None)
+        for path in _describe_missing(self.old, self.new):
+            yield Difference(path, "", _describe_type(self.old.by_path[path]), None)
         for path, component in self.new.by_path.items():
             before = self.old.by_path.get(path)
             if before is not None:
                 yield from self._object(path, "", before, component)
-        for path in _only_in(self.new, self.old):
-            yield Difference(path, "", None, _kind(self.new.by_path[path]))
+        for path in _describe_missing(self.new, self.old):
+            yield Difference(path, "", None, _describe_type(self.new.by_path[path]))
 
     def _object(self, path: str, way: str, old: Object, new: Object) -> Iterator[Difference]:
         """Compare two objects that stand in the same place; `way` is the property that leads to them."""
-        if _kind(old) != _kind(new):
-            yield Difference(path, way or "class", _kind(old), _kind(new))
+        if _describe_type(old) != _describe_type(new):
+            yield Difference(path, way or "class", _describe_type(old), _describe_type(new))
             if way:
                 return
         if isinstance(old, Unknown) or isinstance(new, Unknown):
@@ -67,13 +67,15 @@ class _Comparison:
             return
         # Of components of two classes, what both have.
         for spec in [
-            spec for tag, spec in field_specs(type(new)).items() if tag in field_specs(type(old))
+            spec
+            for tag, spec in get_field_specs(type(new)).items()
+            if tag in get_field_specs(type(old))
         ]:
             place = f"{way}.{spec.tag}" if way else spec.tag
             one, other = getattr(old, spec.name), getattr(new, spec.name)
             if isinstance(spec.kind, Held):
                 yield from self._held(
-                    path, place, spec.kind.form == "list", _listed(one), _listed(other)
+                    path, place, spec.kind.form == "list", _as_list(one), _as_list(other)
                 )
             elif isinstance(spec.kind, Reference):
                 names = (
@@ -82,7 +84,7 @@ class _Comparison:
                 )
                 if names[0] != names[1]:
                     yield Difference(path, place, *names)
-            elif not _equal(one, other):
+            elif not _are_equal(one, other):
                 yield Difference(path, place, one, other)
 
     def _held(
@@ -94,8 +96,8 @@ class _Comparison:
         if (
             self.old is None
             and named
-            and (old_names := _unique(before))
-            and (new_names := _unique(after))
+            and (old_names := _index_by_name(before))
+            and (new_names := _index_by_name(after))
         ):
             # Outside of models members have no paths: they go by their names.
             for name in dict.fromkeys([*old_names, *new_names]):
@@ -117,7 +119,7 @@ class _Comparison:
         if old is not None and new is not None:
             yield from self._object(path, place, old, new)
         elif old is not None or new is not None:
-            yield Difference(path, place, old and _kind(old), new and _kind(new))
+            yield Difference(path, place, old and _describe_type(old), new and _describe_type(new))
 
     def _names(self, tree: Tree | None, holder: Object, spec: FieldSpec, value: Any) -> Any:
         """What a reference says, in one spelling: the path of the component where it leads to one."""
@@ -153,7 +155,7 @@ def _compare_contents(path: str, way: str, old: str, new: str) -> Iterator[Diffe
     before, after = _flatten_content(old), _flatten_content(new)
     for place in dict.fromkeys([*before, *after]):
         one, other = before.get(place), after.get(place)
-        if one is None or other is None or not _same_words(one, other):
+        if one is None or other is None or not _have_same_words(one, other):
             what = f"{way}.{place}" if way and place else way or place or "content"
             yield Difference(path, what, one, other)
 
@@ -203,13 +205,13 @@ class _Level:
         self.counts: dict[str, int] = {}
 
 
-def _same_words(one: str, other: str) -> bool:
+def _have_same_words(one: str, other: str) -> bool:
     """Return whether two texts have the same words, or numbers."""
     words, others = one.split(), other.split()
-    return len(words) == len(others) and all(map(_same_word, words, others))
+    return len(words) == len(others) and all(map(_are_same_word, words, others))
 
 
-def _same_word(one: str, other: str) -> bool:
+def _are_same_word(one: str, other: str) -> bool:
     if one == other:
         return True
     try:
@@ -218,37 +220,37 @@ def _same_word(one: str, other: str) -> bool:
         return False
 
 
-def _listed(value: Any) -> list[Object]:
+def _as_list(value: Any) -> list[Object]:
     return value if isinstance(value, list) else [] if value is None else [value]
 
 
-def _unique(items: list[Object]) -> dict[str, Object]:
+def _index_by_name(items: list[Object]) -> dict[str, Object]:
     """The objects by name; none if a name is missing, or there twice."""
     result = {item.name: item for item in items}
     return result if len(result) == len(items) and "" not in result else {}
 
 
-def _kind(item: Object) -> str:
+def _describe_type(item: Object) -> str:
     return item.class_name if isinstance(item, Unknown) else item.tag
 
 
-def _equal(one: Any, other: Any) -> bool:
+def _are_equal(one: Any, other: Any) -> bool:
     return bool(one == other) or repr(one) == repr(other)
 
 
-def _only_in(tree: Tree, other: Tree) -> Iterator[str]:
+def _describe_missing(tree: Tree, other: Tree) -> Iterator[str]:
     """Paths of a tree that the other has not, and that are not below another of them, nor parts of a class."""
     given = {path for path in tree.by_path if path not in other.by_path}
     for path, component in tree.by_path.items():
         if (
             path in given
             and not tree.is_internal(component)
-            and not any(above in given for above in _above(path))
+            and not any(above in given for above in _get_parent_path(path))
         ):
             yield path
 
 
-def _above(path: str) -> Iterator[str]:
+def _get_parent_path(path: str) -> Iterator[str]:
     while "/" in path[1:]:
         path = path.rsplit("/", 1)[0]
         yield path

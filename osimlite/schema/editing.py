@@ -20,7 +20,7 @@ _OF_INPUT = Reference("socket", "Component")
 """How the text of an input names a component, before the bar and the output."""
 
 
-def rename(model: Model, component: Component, name: str) -> None:
+def rename_component(model: Model, component: Component, name: str) -> None:
     """Give a component another name and rewrite every reference that leads to it, or through it.
 
     A reference keeps its form (relative stays relative) where the new text still leads to the same
@@ -40,21 +40,23 @@ def rename(model: Model, component: Component, name: str) -> None:
     taken = tree.by_path.get(wanted)
     if parent is not None and taken is not None and taken is not component:
         raise ModelError(f"cannot rename '{path}': its parent has a '{name}' already")
-    texts = [(use, named_by(tree, use)) for use in tree.uses() if isinstance(use.value, str)]
+    texts = [
+        (use, find_named_component(tree, use)) for use in tree.uses() if isinstance(use.value, str)
+    ]
     component.name = name
     tree = model.tree()
     for use, target in texts:
-        if target is None or named_by(tree, use) is target:
+        if target is None or find_named_component(tree, use) is target:
             continue
         assert isinstance(use.value, str)
         if use.reference.rule == "input":
             _, bar, output = use.value.partition("|")
-            _assign(use, f"{tree.text_for(use.owner, _OF_INPUT, target)}{bar}{output}")
+            _set_value(use, f"{tree.text_for(use.owner, _OF_INPUT, target)}{bar}{output}")
         else:
-            _assign(use, tree.text_for(use.owner, use.reference, target))
+            _set_value(use, tree.text_for(use.owner, use.reference, target))
 
 
-def remove(model: Model, component: Component) -> None:
+def remove_component(model: Model, component: Component) -> None:
     """Take a component, and all below it, out of the model.
 
     Raises: ModelError: it is not in the model, has a fixed place (the ground, a set), or others
@@ -83,7 +85,7 @@ def remove(model: Model, component: Component) -> None:
     raise ModelError(f"cannot remove '{path}': every model has one")
 
 
-def named_by(tree: Tree, use: Use) -> Component | None:
+def find_named_component(tree: Tree, use: Use) -> Component | None:
     """What a reference names; of an input, the component that has the output."""
     if use.reference.rule in _NAME_NOTHING:
         return None
@@ -101,7 +103,7 @@ def _path_in(model: Model, component: Object) -> str:
 
 
 def _target_path(tree: Tree, use: Use) -> str | None:
-    target = named_by(tree, use)
+    target = find_named_component(tree, use)
     return None if target is None else tree.path_of(target)
 
 
@@ -110,7 +112,7 @@ def _is_at_or_below(path: str | None, top: str) -> bool:
     return path is not None and (path == top or path.startswith(top + "/"))
 
 
-def _assign(use: Use, text: str) -> None:
+def _set_value(use: Use, text: str) -> None:
     value: Any = text
     if use.position is not None:
         words = list(getattr(use.holder, use.spec.name))

@@ -39,7 +39,7 @@ class Kind:
         raise NotImplementedError
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> core_schema.CoreSchema:
-        accepts = class_in(source)
+        accepts = find_class(source)
         return core_schema.no_info_plain_validator_function(
             lambda value: self.check(value, accepts)
         )
@@ -274,12 +274,12 @@ for _name in ("__iadd__", "__imul__"):
     setattr(ObjectList, _name, _noting(_name))
 
 
-def class_in(annotation: Any) -> type[Object] | None:
+def find_class(annotation: Any) -> type[Object] | None:
     """The component class inside an annotation such as ``list[Body]`` or ``Function | None``."""
     if isinstance(annotation, type) and hasattr(annotation, "field_specs"):
         return annotation
     for argument in getattr(annotation, "__args__", ()):
-        result = class_in(argument)
+        result = find_class(argument)
         if result is not None:
             return result
     return None
@@ -368,11 +368,11 @@ LegacyMany = Annotated[list[T], Held("list", legacy=True)]
 LegacyOptional = Annotated[T | None, Held("optional", legacy=True)]
 
 
-def domain_test(domain: str) -> Callable[[float], bool]:
+def make_domain_test(domain: str) -> Callable[[float], bool]:
     """The test that a domain such as ``"> 0"``, ``">= 1"``, ``"0 to 1"`` or ``">= 0 or -1"`` stands for."""
     domain, _, besides = domain.partition(" or ")
     if besides:
-        inside, alone = domain_test(domain), float(besides)
+        inside, alone = make_domain_test(domain), float(besides)
         return lambda value: value == alone or inside(value)
     between = re.fullmatch(r"(\S+) to (\S+)", domain)
     if between:

@@ -15,10 +15,10 @@ from importlib import import_module
 from typing import Any
 
 from osimlite.schema.base import Object, Unknown
-from osimlite.schema.descriptions import meaning_of
+from osimlite.schema.descriptions import describe_property
 from osimlite.schema.fields import Held, Reference, Value
 from osimlite.schema.registry import MODULES
-from osimlite.schema.specs import FieldSpec, field_specs
+from osimlite.schema.specs import FieldSpec, get_field_specs
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
@@ -40,7 +40,7 @@ def json_schema(tag: str = "Model") -> dict[str, Any]:
     for cls in {
         spec.accepts
         for each in classes
-        for spec in field_specs(each).values()
+        for spec in get_field_specs(each).values()
         if spec.accepts is not None
     }:
         if cls.abstract:
@@ -68,7 +68,7 @@ def _definition(cls: type[Object], classes: list[type[Object]]) -> dict[str, Any
     properties: dict[str, Any] = {"class": {"const": cls.tag}, "name": {"type": "string"}}
     if cls.tag == "Model":
         properties["$schema"] = {"type": "string"}
-    for spec in field_specs(cls).values():
+    for spec in get_field_specs(cls).values():
         properties[spec.name] = _property(spec, classes)
     properties["unknown"] = {
         "description": "Elements that no class knows, as XML.",
@@ -120,7 +120,7 @@ def _held(spec: FieldSpec, kind: Held, classes: list[type[Object]]) -> dict[str,
     one = _one(spec.accepts, classes)
     if kind.form == "list":
         return {"type": "array", "items": one}
-    members = field_specs(spec.accepts).get("objects")
+    members = get_field_specs(spec.accepts).get("objects")
     if members is None:
         return one
     # A set that is nothing but its members may be given as the list of them.
@@ -162,7 +162,7 @@ def _text(spec: FieldSpec) -> str:
         words = f"names a {spec.kind.target}, {spec.kind.rule}"
     elif isinstance(spec.kind, Value):
         words = ", ".join(word for word in (spec.kind.unit, spec.kind.domain) if word)
-    return " ".join(part for part in (meaning_of(spec), words and f"({words})") if part)
+    return " ".join(part for part in (describe_property(spec), words and f"({words})") if part)
 
 
 def _summary(cls: type[Object]) -> str:

@@ -137,9 +137,9 @@ class Model(ModelComponent):
         Raises:
             ModelError: the component is not in the model, the name is illegal, or a sibling has it.
         """
-        from osimlite.schema.editing import rename
+        from osimlite.schema.editing import rename_component
 
-        rename(self, component, name)
+        rename_component(self, component, name)
 
     def remove(self, component: Component) -> None:
         """Take a component, and all below it, out of the model.
@@ -147,9 +147,9 @@ class Model(ModelComponent):
         Raises:
             ModelError: it is not in the model, has a fixed place, or other components name it.
         """
-        from osimlite.schema.editing import remove
+        from osimlite.schema.editing import remove_component
 
-        remove(self, component)
+        remove_component(self, component)
 
     def add(self, *components: C) -> C:
         """Add components to the sets they belong in, in order, and return the first of them.
@@ -165,12 +165,12 @@ class Model(ModelComponent):
                     and spec.name != "component_set"
                     and isinstance(component, members.accepts)  # type: ignore[arg-type]
                 ):
-                    _append(cast("Any", holder).objects, component)
+                    _append_member(cast("Any", holder).objects, component)
                     break
             else:
                 if not isinstance(component, ModelComponent):
                     raise ModelError(f"a model has no place for a {type(component).__name__}")
-                _append(self.component_set.objects, component)
+                _append_member(self.component_set.objects, component)
             if isinstance(component, Joint) and "coordinates" not in component.model_fields_set:
                 # As in OpenSim's API: a file that leaves them out would call them all alike.
                 for number, coordinate in enumerate(component.coordinates):
@@ -197,7 +197,7 @@ def expect_model(given: object) -> None:
     )
 
 
-def _append(members: list[Any], component: Component) -> None:
+def _append_member(members: list[Any], component: Component) -> None:
     for member in members:
         if member is component:
             raise ModelError(

@@ -186,12 +186,12 @@ _further: dict[str, type[Object]] = {}
 callbacks_of_changes: list[Callable[[], None]] = []
 
 
-def further_classes() -> Mapping[str, type[Object]]:
+def get_plugin_classes() -> Mapping[str, type[Object]]:
     """The classes of plug-ins that count now, by their tags."""
     return _further.copy()
 
 
-def let_count(classes: Mapping[str, type[Object]]) -> None:
+def register_plugin_classes(classes: Mapping[str, type[Object]]) -> None:
     """Let tags stand for further classes from now on, and no more for those that counted before."""
     if classes != _further:
         _further.clear()
@@ -200,20 +200,20 @@ def let_count(classes: Mapping[str, type[Object]]) -> None:
             forget()
 
 
-def forgotten_with_classes(forget: Callable[[], None]) -> None:
+def on_class_change(forget: Callable[[], None]) -> None:
     """Call a function whenever other classes count than before."""
     callbacks_of_changes.append(forget)
 
 
-def by_tags(function: Callable[..., T]) -> Callable[..., T]:
+def cache_by_tags(function: Callable[..., T]) -> Callable[..., T]:
     """Keep what a function makes of tags as long as these stand for the same classes."""
     kept = cache(function)
-    forgotten_with_classes(kept.cache_clear)
+    on_class_change(kept.cache_clear)
     return kept
 
 
-@by_tags
-def class_for(tag: str) -> type[Object] | None:
+@cache_by_tags
+def find_class(tag: str) -> type[Object] | None:
     """The class that an XML element `tag` stands for, or None if no class has it."""
     further = _further.get(tag)
     if further is not None:
@@ -225,16 +225,16 @@ def class_for(tag: str) -> type[Object] | None:
     return None if result.abstract or result.tag != tag else result
 
 
-@by_tags
-def tags() -> tuple[str, ...]:
+@cache_by_tags
+def list_tags() -> tuple[str, ...]:
     """Every tag that stands for a class in a file, sorted."""
     renamed = {name: tag for tag, name in _TAGS.items()}
     known = (renamed.get(name, name) for name in (*MODULES, *_further))
-    return tuple(sorted(tag for tag in known if class_for(tag) is not None))
+    return tuple(sorted(tag for tag in known if find_class(tag) is not None))
 
 
-@by_tags
-def classes_mentioning(word: str) -> tuple[type[Object], ...]:
+@cache_by_tags
+def find_classes_mentioning(word: str) -> tuple[type[Object], ...]:
     """Return the classes, abstract ones too, in whose modules a word stands, and those of plug-ins.
 
     A property is declared in such a module. Only these modules are imported, and only their classes
@@ -263,7 +263,7 @@ def _text_of(module: str) -> str | None:
     return read_source(module) if read_source is not None else None
 
 
-@by_tags
-def tags_of(cls: type[Object]) -> tuple[str, ...]:
+@cache_by_tags
+def list_class_tags(cls: type[Object]) -> tuple[str, ...]:
     """The tags, sorted, of a class and of those derived from it."""
-    return tuple(tag for tag in tags() if issubclass(class_for(tag) or type(None), cls))
+    return tuple(tag for tag in list_tags() if issubclass(find_class(tag) or type(None), cls))

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from osimlite.schema.base import Component, Object
 from osimlite.schema.patterns import Pattern, PatternError, UnsupportedPatternError
-from osimlite.schema.states import variables
+from osimlite.schema.states import find_variables
 
 if TYPE_CHECKING:
     from osimlite.schema.tree import Tree
@@ -39,15 +39,15 @@ class Resolution(NamedTuple):
 
 def is_a(component: Object, target: str) -> bool:
     """Whether the component's class is `target` or derives from it."""
-    return _derives(type(component), target)
+    return _derives_from(type(component), target)
 
 
 @cache
-def _derives(cls: type[Object], target: str) -> bool:
+def _derives_from(cls: type[Object], target: str) -> bool:
     return any(base.__name__ == target for base in cls.__mro__)
 
 
-def normalised(path: str) -> str | None:
+def normalize_path(path: str) -> str | None:
     """An absolute path without doubled slashes, ``.`` and ``..``; None if it climbs above the root."""
     parts: list[str] = []
     for part in path.split("/"):
@@ -62,12 +62,12 @@ def normalised(path: str) -> str | None:
     return "/" + "/".join(parts)
 
 
-def last_name(path: str) -> str:
+def get_last_name(path: str) -> str:
     """The name at the end of a path."""
     return path.rsplit("/", 1)[1] or "/"
 
 
-def _socket(tree: Tree, text: str, owner: Component, target: str) -> Resolution:
+def _resolve_socket(tree: Tree, text: str, owner: Component, target: str) -> Resolution:
     if _is_no_path(text):
         return Resolution(None, "illegal")
     if target == "Frame":
@@ -90,7 +90,7 @@ def _is_no_path(text: str) -> bool:
     """Whether OpenSim cannot even read the text as a path, which it does of every socket when it loads the file."""
     if not _NEVER_IN_PATHS.isdisjoint(text):
         return True
-    return text.startswith("/") and normalised(text) is None
+    return text.startswith("/") and normalize_path(text) is None
 
 
 def _model_path(tree: Tree, text: str, owner: Component, target: str) -> Resolution:
@@ -112,7 +112,7 @@ def _path_or_member(*set_paths: str) -> Callable[[Tree, str, Component, str], Re
     return rule
 
 
-def _bare(
+def _resolve_bare_name(
     members: Callable[[Tree, Component, str], dict[str, Component]],
 ) -> Callable[..., Resolution]:
     """A bare name among `members`; a path is no name."""
@@ -129,13 +129,13 @@ def _bare(
     return rule
 
 
-def _variable(tree: Tree, text: str, owner: Component, target: str) -> Resolution:
+def _resolve_variable(tree: Tree, text: str, owner: Component, target: str) -> Resolution:
     """The name of a state, a control or a generalized force."""
-    result = variables(tree, target).get(text)
+    result = find_variables(tree, target).get(text)
     return Resolution(result, None if result is not None else "missing" if text else "empty")
 
 
-def _pattern(tree: Tree, text: str, owner: Component, target: str) -> Resolution:
+def _resolve_pattern(tree: Tree, text: str, owner: Component, target: str) -> Resolution:
     """A regular expression that the whole name of one at least must match."""
     try:
         pattern = Pattern(text)
@@ -145,7 +145,8 @@ def _pattern(tree: Tree, text: str, owner: Component, target: str) -> Resolution
     except PatternError:
         return Resolution(None, "illegal")
     result = next(
-        (item for name, item in variables(tree, target).items() if pattern.fullmatch(name)), None
+        (item for name, item in find_variables(tree, target).items() if pattern.fullmatch(name)),
+        None,
     )
     return Resolution(result, None if result is not None else "missing")
 
@@ -164,21 +165,31 @@ EVERYWHERE = frozenset(
 """The rules by which a bare name leads to the same component from everywhere."""
 
 RULES: dict[str, Callable[[Tree, str, Component, str], Resolution]] = {
-    "socket": _socket,
-    "owner-path": _socket,
+    "socket": _resolve_socket,
+    "owner-path": _resolve_socket,
     "model-path": _model_path,
-    "coordinate-name": _bare(lambda tree, owner, target: tree.of_class("Coordinate")),
-    "body-name": _bare(lambda tree, owner, target: tree.members("/bodyset", "Body")),
-    "body-name-or-com": _bare(lambda tree, owner, target: tree.members("/bodyset", "Body")),
-    "joint-name": _bare(lambda tree, owner, target: tree.members("/jointset", "Joint")),
-    "actuator-name": _bare(lambda tree, owner, target: tree.members("/forceset", "Actuator")),
-    "muscle-name": _bare(lambda tree, owner, target: tree.members("/forceset", "Muscle")),
-    "wrap-object-name": _bare(lambda tree, owner, target: tree.of_class("WrapObject")),
-    "own-joint-coordinate": _bare(
+    "coordinate-name": _resolve_bare_name(lambda tree, owner, target: tree.of_class("Coordinate")),
+    "body-name": _resolve_bare_name(lambda tree, owner, target: tree.members("/bodyset", "Body")),
+    "body-name-or-com": _resolve_bare_name(
+        lambda tree, owner, target: tree.members("/bodyset", "Body")
+    ),
+    "joint-name": _resolve_bare_name(
+        lambda tree, owner, target: tree.members("/jointset", "Joint")
+    ),
+    "actuator-name": _resolve_bare_name(
+        lambda tree, owner, target: tree.members("/forceset", "Actuator")
+    ),
+    "muscle-name": _resolve_bare_name(
+        lambda tree, owner, target: tree.members("/forceset", "Muscle")
+    ),
+    "wrap-object-name": _resolve_bare_name(lambda tree, owner, target: tree.of_class("WrapObject")),
+    "own-joint-coordinate": _resolve_bare_name(
         lambda tree, owner, target: tree.members(tree.path_of(owner) or "/", "Coordinate")
     ),
-    "marker-name": _bare(lambda tree, owner, target: tree.members("/markerset", "Marker")),
-    "set-member": _bare(
+    "marker-name": _resolve_bare_name(
+        lambda tree, owner, target: tree.members("/markerset", "Marker")
+    ),
+    "set-member": _resolve_bare_name(
         lambda tree, owner, target: tree.members(tree.path_of(owner) or "/", "Component")
     ),
     "frame-path-or-body-name": _path_or_member("/bodyset"),
@@ -190,8 +201,8 @@ RULES: dict[str, Callable[[Tree, str, Component, str], Resolution]] = {
     "input-folder": nothing_to_resolve,
     "output-folder": nothing_to_resolve,
     "column": nothing_to_resolve,
-    "state-path": _variable,
-    "pattern": _pattern,
+    "state-path": _resolve_variable,
+    "pattern": _resolve_pattern,
     "external-force-name": nothing_to_resolve,
     "positional": nothing_to_resolve,
     "point-index": nothing_to_resolve,

@@ -16,7 +16,7 @@ from osimlite.schema.fields import (
     Reference,
     Tag,
     Value,
-    class_in,
+    find_class,
 )
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ class FieldSpec(NamedTuple):
 
 
 @cache
-def field_specs(cls: type[Object]) -> dict[str, FieldSpec]:
+def get_field_specs(cls: type[Object]) -> dict[str, FieldSpec]:
     """The properties of `cls` by XML tag, in the order OpenSim prints them (first-system properties last)."""
     specs = []
     for name, info in cls.model_fields.items():
@@ -68,7 +68,7 @@ def field_specs(cls: type[Object]) -> dict[str, FieldSpec]:
         if any(isinstance(item, Legacy) for item in info.metadata):
             kind = replace(kind, legacy=True)
         held = isinstance(kind, Held)
-        accepts = class_in(info.annotation) if held else None
+        accepts = find_class(info.annotation) if held else None
         tag = (
             accepts.tag
             if accepts is not None and isinstance(kind, Held) and kind.form == "unnamed"
@@ -88,7 +88,7 @@ def field_specs(cls: type[Object]) -> dict[str, FieldSpec]:
 
 
 @cache
-def checks(cls: type[Object]) -> dict[str, Callable[[Any], Any]] | None:
+def make_checks(cls: type[Object]) -> dict[str, Callable[[Any], Any]] | None:
     """Return what checks the value of each property, by attribute, as pydantic's validator of the class would.
 
     To build that validator takes milliseconds for every class, to call these functions nothing.
@@ -108,7 +108,7 @@ def checks(cls: type[Object]) -> dict[str, Callable[[Any], Any]] | None:
         return None
     result = {
         spec.name: partial(spec.kind.check, accepts=spec.accepts)
-        for spec in field_specs(cls).values()
+        for spec in get_field_specs(cls).values()
     }
     texts = (
         name
@@ -125,9 +125,9 @@ def _check_text(value: Any) -> str:
 
 
 @cache
-def object_specs(cls: type[Object]) -> tuple[FieldSpec, ...]:
+def get_object_specs(cls: type[Object]) -> tuple[FieldSpec, ...]:
     """The properties of `cls` that hold objects."""
-    return tuple(spec for spec in field_specs(cls).values() if isinstance(spec.kind, Held))
+    return tuple(spec for spec in get_field_specs(cls).values() if isinstance(spec.kind, Held))
 
 
 class Holding(NamedTuple):
@@ -144,11 +144,11 @@ class Holding(NamedTuple):
 
 
 @cache
-def holding(cls: type[Object]) -> tuple[Holding, ...]:
+def list_holding_properties(cls: type[Object]) -> tuple[Holding, ...]:
     """The properties of `cls` that hold objects."""
     return tuple(
         Holding(spec, spec.name, spec.factory is ObjectList, _is_plain(spec))
-        for spec in object_specs(cls)
+        for spec in get_object_specs(cls)
     )
 
 
@@ -156,11 +156,11 @@ def _is_plain(spec: FieldSpec) -> bool:
     made: Object | list[Any] | None = spec.factory() if spec.factory is not None else None
     if made is None or isinstance(made, list):
         return False
-    return not any(item.is_component or reference_specs(type(item)) for item in made.walk())
+    return not any(item.is_component or get_reference_specs(type(item)) for item in made.walk())
 
 
 @cache
-def lineage(cls: type[Object]) -> tuple[str, ...]:
+def get_class_names(cls: type[Object]) -> tuple[str, ...]:
     """The names of a class and of those it derives from, as far as :class:`Object`."""
     from osimlite.schema.base import Object
 
@@ -168,43 +168,43 @@ def lineage(cls: type[Object]) -> tuple[str, ...]:
 
 
 @cache
-def reference_specs(cls: type[Object]) -> tuple[FieldSpec, ...]:
+def get_reference_specs(cls: type[Object]) -> tuple[FieldSpec, ...]:
     """The properties of `cls` that name other components."""
-    return tuple(spec for spec in field_specs(cls).values() if isinstance(spec.kind, Reference))
+    return tuple(spec for spec in get_field_specs(cls).values() if isinstance(spec.kind, Reference))
 
 
 @cache
-def numeric_names(cls: type[Object]) -> frozenset[str]:
+def get_numeric_names(cls: type[Object]) -> frozenset[str]:
     """The attributes of `cls` with numbers and switches: no path and no reference of a model depends on them."""
-    values = (spec for spec in field_specs(cls).values() if isinstance(spec.kind, Value))
+    values = (spec for spec in get_field_specs(cls).values() if isinstance(spec.kind, Value))
     return frozenset(spec.name for spec in values if cast("Value", spec.kind).scalar != "string")
 
 
 @cache
-def file_specs(cls: type[Object], rule: str) -> tuple[FieldSpec, ...]:
+def get_file_specs(cls: type[Object], rule: str) -> tuple[FieldSpec, ...]:
     """The properties of `cls` that name files by a rule: ``file``, ``output-file`` or ``output-folder``."""
-    return tuple(spec for spec in reference_specs(cls) if spec.reference.rule == rule)
+    return tuple(spec for spec in get_reference_specs(cls) if spec.reference.rule == rule)
 
 
 @cache
-def naming_specs(cls: type[Object]) -> tuple[FieldSpec, ...]:
+def get_naming_specs(cls: type[Object]) -> tuple[FieldSpec, ...]:
     """The properties of `cls` whose words are names of something, each with the reference as its kind."""
     return tuple(
         spec if spec.names is None else spec._replace(kind=spec.names)
-        for spec in field_specs(cls).values()
+        for spec in get_field_specs(cls).values()
         if isinstance(spec.kind, Reference)
         or (spec.names is not None and isinstance(spec.kind, Value))
     )
 
 
 @cache
-def member_specs(cls: type[Object]) -> tuple[FieldSpec, ...]:
+def get_member_specs(cls: type[Object]) -> tuple[FieldSpec, ...]:
     """The properties of `cls` that hold objects, or a table, with the names of something."""
-    return tuple(spec for spec in object_specs(cls) if spec.names is not None)
+    return tuple(spec for spec in get_object_specs(cls) if spec.names is not None)
 
 
 @cache
-def name_spec(cls: type[Object], names: Reference | None = None) -> FieldSpec:
+def get_name_spec(cls: type[Object], names: Reference | None = None) -> FieldSpec:
     """The name of an object that is the name of something else, as a property with tag ``@name``.
 
     What it names is said by its class, or by the property that holds it.
@@ -215,13 +215,13 @@ def name_spec(cls: type[Object], names: Reference | None = None) -> FieldSpec:
 
 
 @cache
-def value_specs(cls: type[Object]) -> tuple[FieldSpec, ...]:
+def get_value_specs(cls: type[Object]) -> tuple[FieldSpec, ...]:
     """The properties of `cls` that are numbers, switches or texts."""
-    return tuple(spec for spec in field_specs(cls).values() if isinstance(spec.kind, Value))
+    return tuple(spec for spec in get_field_specs(cls).values() if isinstance(spec.kind, Value))
 
 
 @cache
-def defaults(cls: type[Object]) -> tuple[dict[str, Any], dict[str, Callable[[], Any]]]:
+def get_defaults(cls: type[Object]) -> tuple[dict[str, Any], dict[str, Callable[[], Any]]]:
     """Default values by field name, and the factories of the fields whose default is an object or a list."""
     plain: dict[str, Any] = {}
     factories: dict[str, Any] = {}

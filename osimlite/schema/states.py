@@ -6,7 +6,7 @@ from functools import cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from osimlite.schema.base import Component
-from osimlite.schema.specs import lineage
+from osimlite.schema.specs import get_class_names
 
 if TYPE_CHECKING:
     from osimlite.schema.joints import Joint, MotionType
@@ -21,7 +21,7 @@ class Output(NamedTuple):
 
 
 @cache
-def outputs_of(cls: type[Component]) -> dict[str, Output]:
+def list_outputs(cls: type[Component]) -> dict[str, Output]:
     """The outputs of a class by name."""
     result: dict[str, Output] = {}
     for base in cls.__mro__:
@@ -32,7 +32,7 @@ def outputs_of(cls: type[Component]) -> dict[str, Output]:
     return result
 
 
-def states_of(component: Component) -> list[str]:
+def list_states(component: Component) -> list[str]:
     """The names of the state variables of one component, in OpenSim's order."""
     known = (
         base.__dict__["facts"].states
@@ -47,7 +47,7 @@ def states_of(component: Component) -> list[str]:
     ]
 
 
-def motions_of(joint: Joint) -> dict[str, MotionType]:
+def list_motions(joint: Joint) -> dict[str, MotionType]:
     """How the joint moves with each of its coordinates, by their names.
 
     A coordinate of a CustomJoint is rotational or translational if it drives an axis with a slope
@@ -69,21 +69,21 @@ def motions_of(joint: Joint) -> dict[str, MotionType]:
     return result
 
 
-def variables(tree: Tree, kind: str) -> dict[str, Component]:
+def find_variables(tree: Tree, kind: str) -> dict[str, Component]:
     """The components of a model by the names of their variables.
 
     Args: tree: that of the model. kind: ``state variable``, ``control``, ``state or control
         variable``, ``generalized force`` or ``output``; of a class of components their paths.
     """
-    return tree.named(f"variables: {kind}", lambda: _variables(tree, kind))
+    return tree.named(f"variables: {kind}", lambda: _iterate_variables(tree, kind))
 
 
-def _variables(tree: Tree, kind: str) -> Any:
+def _iterate_variables(tree: Tree, kind: str) -> Any:
     for component in tree.components:
         path = tree.path_of(component)
-        classes = lineage(type(component))
+        classes = get_class_names(type(component))
         if kind.startswith("state"):
-            yield from ((f"{path}/{name}", component) for name in states_of(component))
+            yield from ((f"{path}/{name}", component) for name in list_states(component))
         if kind.endswith(("control", "control variable")) and "Actuator" in classes:
             # A body actuator has one control for each component of torque and force.
             yield from (
@@ -93,11 +93,11 @@ def _variables(tree: Tree, kind: str) -> Any:
             )
         if kind == "generalized force" and "Joint" in classes:
             joint: Any = component
-            motions = motions_of(joint)
+            motions = list_motions(joint)
             for coordinate in joint.coordinates:
                 ending = "moment" if motions[coordinate.name] == "rotational" else "force"
                 yield f"{coordinate.name}_{ending}", coordinate
         if kind == "output":
-            yield from ((f"{path}|{name}", component) for name in outputs_of(type(component)))
+            yield from ((f"{path}|{name}", component) for name in list_outputs(type(component)))
         if kind in classes:
             yield path, component

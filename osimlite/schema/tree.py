@@ -17,19 +17,18 @@ from osimlite.base.text import suggest_name
 from osimlite.errors import ModelError
 from osimlite.schema.base import Component, Object, put_model
 from osimlite.schema.fields import Held, ObjectList, Reference
-from osimlite.schema.resolution import EVERYWHERE, PATH_RULES, RULES, last_name
+from osimlite.schema.resolution import EVERYWHERE, PATH_RULES, RULES, get_last_name, normalize_path
 from osimlite.schema.resolution import ILLEGAL_CHARACTERS as ILLEGAL_CHARACTERS
 from osimlite.schema.resolution import Failure as Failure
 from osimlite.schema.resolution import Resolution as Resolution
 from osimlite.schema.resolution import is_a as is_a
-from osimlite.schema.resolution import normalised as normalised
 from osimlite.schema.specs import (
     FieldSpec,
     Holding,
-    field_specs,
-    holding,
-    name_spec,
-    reference_specs,
+    get_field_specs,
+    get_name_spec,
+    get_reference_specs,
+    list_holding_properties,
 )
 
 if TYPE_CHECKING:
@@ -37,7 +36,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class Renamed:
+class RenamedComponent:
     """A component that OpenSim renames because a sibling has the same name."""
 
     component: Component
@@ -69,7 +68,7 @@ class Use(NamedTuple):
 
 
 @contextmanager
-def lent(tree: Tree) -> Iterator[None]:
+def lend_tree(tree: Tree) -> Iterator[None]:
     """Let the model of a tree have it as its own for a while, so that it makes none."""
     if getattr(tree.model, "_tree", None) is not None:
         yield
@@ -104,7 +103,7 @@ class Tree:
         Left out are the parts that OpenSim makes for itself, and default objects that no one has
         asked for, unless something in them has a path or names another.
         """
-        self.renamed: list[Renamed] = []
+        self.renamed: list[RenamedComponent] = []
         self._paths: dict[int, str] = {}
         self._parents: dict[int, Component] = {}
         self._owners: dict[int, Component] = {}
@@ -176,9 +175,13 @@ class Tree:
 
     def at(self, path: str) -> Component:
         """The component at `path`, absolute or from the model; ModelError with the nearest path if none is there."""
-        result = self.by_path.get(normalised(path if path.startswith("/") else "/" + path) or "")
+        result = self.by_path.get(
+            normalize_path(path if path.startswith("/") else "/" + path) or ""
+        )
         if result is None:
-            named = [known for known in self.by_path if last_name(known) == last_name(f"/{path}")]
+            named = [
+                known for known in self.by_path if get_last_name(known) == get_last_name(f"/{path}")
+            ]
             better = f"; did you mean '{named[0]}'?" if named else suggest_name(path, self.by_path)
             raise ModelError(f"no component at '{path}'{better}")
         return result
@@ -188,11 +191,11 @@ class Tree:
         for holder, owner in self._naming:
             cls = type(holder)
             if cls.name_reference is not None and holder.name:
-                yield Use(holder, owner, name_spec(cls), holder.name)
+                yield Use(holder, owner, get_name_spec(cls), holder.name)
             # Plain values are in the dictionary of their object; through getattr they would cost
             # several times as much.
             state = holder.__dict__
-            for spec in reference_specs(cls):
+            for spec in get_reference_specs(cls):
                 value = state[spec.name]
                 if isinstance(value, tuple):
                     for position, word in enumerate(value):
@@ -225,7 +228,7 @@ class Tree:
         Raises:
             ModelError: it leads nowhere.
         """
-        spec = field_specs(type(owner))[name]
+        spec = get_field_specs(type(owner))[name]
         use = Use(owner, owner, spec, value)
         result = self.resolve(use).target
         if result is None:
@@ -271,7 +274,7 @@ class Tree:
         """By the name at the end of its path, the first component of each class."""
         result: dict[str, dict[type[Component], Component]] = {}
         for component in self.components:
-            result.setdefault(last_name(self._paths[id(component)]), {}).setdefault(
+            result.setdefault(get_last_name(self._paths[id(component)]), {}).setdefault(
                 type(component), component
             )
         return {name: list(components.values()) for name, components in result.items()}
@@ -320,7 +323,7 @@ class Tree:
                 while (unique := f"{name}_{number}") in taken:
                     number += 1
                 counts[name] = number + 1
-                self.renamed.append(Renamed(child, unique, taken[name]))
+                self.renamed.append(RenamedComponent(child, unique, taken[name]))
             taken[unique] = child
             below.append(child)
             self._parents[id(child)] = component
@@ -343,7 +346,7 @@ class Tree:
         shelf = self._shelves.get(cls)
         if shelf is None:
             items = self.by_class[cls] = []
-            shelf = self._shelves[cls] = items, _names_others(cls), holding(cls)
+            shelf = self._shelves[cls] = items, _names_others(cls), list_holding_properties(cls)
         items, names_others, holds = shelf
         items.append(holder)
         if holder is not owner:
@@ -396,7 +399,7 @@ class Tree:
         plain = self.by_path.get(path or "")
         if plain is not None:
             return self._typed(plain, target)
-        path = normalised(path or "")
+        path = normalize_path(path or "")
         if path is None:
             return Resolution(None, "illegal")
         return self._typed(self.by_path.get(path), target)
@@ -415,7 +418,7 @@ class Tree:
     def of_class(self, target: str) -> dict[str, Component]:
         """The components of a class by name, of equal names the first."""
         return self.named(
-            target, lambda: ((last_name(self._paths[id(c)]), c) for c in self._all_of(target))
+            target, lambda: ((get_last_name(self._paths[id(c)]), c) for c in self._all_of(target))
         )
 
     def _all_of(self, target: str) -> list[Component]:
@@ -433,7 +436,7 @@ class Tree:
         def below() -> Iterator[tuple[str, Component]]:
             for component in self._below.get(id(holder), ()):
                 if is_a(component, target):
-                    yield last_name(self._paths[id(component)]), component
+                    yield get_last_name(self._paths[id(component)]), component
 
         return self.named(f"{path}:{target}", below)
 
@@ -441,7 +444,7 @@ class Tree:
 @cache
 def _names_others(cls: type[Object]) -> bool:
     """Whether an object of this class can name a component."""
-    return cls.name_reference is not None or bool(reference_specs(cls))
+    return cls.name_reference is not None or bool(get_reference_specs(cls))
 
 
 def _name_in_tree(spec: FieldSpec, item: Component) -> str:

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from osimlite.base.files import make_folder, open_atomically
 from osimlite.base.records import dataclass, field
 from osimlite.io.tables.storage import StoTable, write_sto
-from osimlite.io.tables.writers import control_set
+from osimlite.io.tables.writers import format_control_set
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.smoothing_spline import derivatives_of_samples
@@ -80,7 +80,7 @@ class MuscleForces(StoTable):
                 has_missing=has_missing,
             )
         with open_atomically(paths[-1]) as stream:
-            stream.writelines(line.encode() for line in control_set(self))
+            stream.writelines(line.encode() for line in format_control_set(self))
         return paths
 
 

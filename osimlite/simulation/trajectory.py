@@ -15,7 +15,7 @@ from osimlite.base.files import make_folder, write_atomically
 from osimlite.base.lazy import make_notebook_repr
 from osimlite.base.require import require
 from osimlite.base.text import format_json
-from osimlite.io.tables.storage import StoTable, sto_text
+from osimlite.io.tables.storage import StoTable, format_sto
 from osimlite.io.tables.tabular import Tabular
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.spatial import Array
@@ -203,7 +203,7 @@ class Trajectory(Tabular):
     def forces_text(self) -> str:
         """The text of forces.sto, with the labels of OpenSim's ForceReporter."""
         labels, table = self._force_table
-        return sto_text(
+        return format_sto(
             "ModelForces", self.times.tolist(), label_as_opensim(labels), table.tolist()
         )
 
@@ -211,7 +211,7 @@ class Trajectory(Tabular):
         """The text of probes.sto, with the labels of OpenSim's ProbeReporter; empty if there are no probes."""
         labels, table = self._probe_table
         return (
-            sto_text("ModelProbes", self.times.tolist(), labels, table.tolist()) if labels else ""
+            format_sto("ModelProbes", self.times.tolist(), labels, table.tolist()) if labels else ""
         )
 
     def write(self, folder: str | Path) -> list[Path]:
@@ -238,7 +238,7 @@ class Trajectory(Tabular):
 
 def text_of(table: StoTable) -> str:
     """The text of a table's file."""
-    return sto_text(
+    return format_sto(
         table.name, table.times.tolist(), table.columns, table.rows.tolist(), header=table.header
     )
 

@@ -16,7 +16,7 @@ from osimlite.schema.actuators import Actuator
 from osimlite.schema.base import Object
 from osimlite.schema.controller_types import CorrectionController, PrescribedController
 from osimlite.schema.model import Model
-from osimlite.schema.specs import file_specs
+from osimlite.schema.specs import get_file_specs
 from osimlite.schema.tools.dynamics import AbstractTool
 from osimlite.simulation.initial_state import columns_of_states, starting
 from osimlite.simulation.inverse_dynamics import add_forces
@@ -129,7 +129,7 @@ def _resolve_files(job: Job, item: Object) -> Any:
         The object.
     """
     for part in item.walk():
-        for spec in file_specs(type(part), "file"):
+        for spec in get_file_specs(type(part), "file"):
             path = job.resolve_name(str(getattr(part, spec.name) or ""))
             if path is not None:
                 part.assign(spec.name, str(path.absolute()))

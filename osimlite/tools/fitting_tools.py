@@ -18,7 +18,7 @@ from osimlite.fitting.scale_tool import compute_scaled_model
 from osimlite.fitting.sensors import place_sensors
 from osimlite.io.document.printer import to_text
 from osimlite.io.tables.old_storage import UNITS
-from osimlite.io.tables.storage import StoTable, both_of, read_sto
+from osimlite.io.tables.storage import StoTable, expect_time_range, read_sto
 from osimlite.schema.frames import PhysicalFrame
 from osimlite.schema.tools.inverse_kinematics import (
     IKMarkerTask,
@@ -162,7 +162,7 @@ def run_imu_inverse_kinematics_tool(job: Job, outcome: Outcome) -> None:
     model, file = job.read_model(), job.require_path("orientations_file")
     data = (
         OrientationData.from_source(file)
-        .select_times(*both_of(setup.time_range))
+        .select_times(*expect_time_range(setup.time_range))
         .rotate_ground(setup.sensor_to_opensim_rotations)
     )
     frames = {frame.name for frame in model.components(PhysicalFrame)} & {*data.names}

@@ -9,7 +9,7 @@ import numpy as np
 
 from osimlite.base.records import replace
 from osimlite.base.text import join_words, suggest_name
-from osimlite.io.tables.storage import StoTable, both_of
+from osimlite.io.tables.storage import StoTable, expect_time_range
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.mechanics.multibody.kinematics import Kinematics
 from osimlite.mechanics.multibody.mechanism import Mechanism
@@ -52,7 +52,7 @@ def run_inverse_dynamics_tool(job: Job, outcome: Outcome) -> None:
     if cutoff >= 0.0:
         # OpenSim takes what its filter adds for part of the motion.
         recorded = recorded.lowpassed(cutoff, continued=True)
-    recorded = recorded.between(*both_of(setup.time_range))
+    recorded = recorded.between(*expect_time_range(setup.time_range))
     exclude_forces(model, map(str, setup.forces_to_exclude))
     loads = job.find_path("external_loads_file")
     forces = force_elements(model, recorded.mechanism, external_loads=loads, folder=None)

@@ -8,7 +8,7 @@ from typing import Any
 
 from osimlite.base.records import dataclass
 from osimlite.errors import DocumentError, UnsupportedError
-from osimlite.io.document.cache import read_anew
+from osimlite.io.document.cache import read_copy
 from osimlite.io.document.reader import read_document
 from osimlite.io.document.source import Source
 from osimlite.schema.model import Model
@@ -82,7 +82,7 @@ class Job:
         Raises:
             DocumentError: the setup names no model, or osimlite cannot read it.
         """
-        return read_anew(self.require_path("model_file"), Model)
+        return read_copy(self.require_path("model_file"), Model)
 
     def read_object(self, path: Path, cls: type) -> Any:
         """Read the object of a document; ignore unknown properties, as OpenSim does.

@@ -18,7 +18,7 @@ from osimlite.base.records import dataclass, field
 from osimlite.base.text import format_count, join_words
 from osimlite.base.writing import write_into
 from osimlite.errors import OsimliteError
-from osimlite.io.document.cache import top_at
+from osimlite.io.document.cache import get_object
 from osimlite.schema.model import Model
 from osimlite.schema.sets import Set
 from osimlite.tools.named_files import find_named_files
@@ -84,7 +84,7 @@ def find_setups(words: Iterable[str | Path]) -> list[Path]:
         if has_magic(word) and not os.path.exists(word):
             matches = find_files(word)
             setups = [
-                Path(match) for match in matches if not isinstance(top_at(match), Model | Set)
+                Path(match) for match in matches if not isinstance(get_object(match), Model | Set)
             ]
             if not setups:
                 raise OsimliteError(f"no {'setup' if matches else 'file'} matches '{word}'")
@@ -450,7 +450,7 @@ def _find_needs(setups: Sequence[Path]) -> dict[Path, list[Path]]:
     makers: dict[str, Path] = {}
     tools = list_runnable()
     for setup in setups:
-        if type(top_at(str(setup))).__name__ not in tools:
+        if type(get_object(str(setup))).__name__ not in tools:
             continue
         makers.update(
             (os.path.realpath(name), setup) for name in find_named_files(str(setup), "output-file")

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from osimlite.base.records import dataclass, field, replace
 from osimlite.base.text import format_count, suggest_name
 from osimlite.errors import SettingError
-from osimlite.io.tables.headers import suffixes
+from osimlite.io.tables.headers import list_suffixes
 from osimlite.io.tables.storage import StoTable
 from osimlite.mechanics.kernels.layout import STAGE
 from osimlite.mechanics.multibody.smoothing_spline import derivatives_of_samples
@@ -391,7 +391,7 @@ class AnalysisTables:
             rows: values (t, m); a value may take several columns.
             kind: type of the values, for example ``"Vec3"``.
         """
-        labels = tuple(f"{column}{end}" for column in columns for end in suffixes(kind))
+        labels = tuple(f"{column}{end}" for column in columns for end in list_suffixes(kind))
         path = self.job.get_results_path(f"{self.job.setup.name}_{suffix}")
         self.outcome.add_typed_table(path, StoTable("", self.times, labels, rows, kind=kind))
 

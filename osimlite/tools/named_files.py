@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from osimlite.errors import DocumentError
-from osimlite.io.document.cache import while_unchanged
+from osimlite.io.document.cache import cache_by_file
 from osimlite.lint.checked import CheckTarget
 from osimlite.lint.config import Config
 from osimlite.lint.engine import load_subject
@@ -21,7 +21,7 @@ Real setups name about ten.
 """
 
 
-@while_unchanged(64)
+@cache_by_file(64)
 def read_subject(path: str) -> CheckTarget:
     """Return a document as the linter reads it; cached until its file changes.
 

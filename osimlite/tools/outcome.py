@@ -14,8 +14,8 @@ from osimlite.base.records import dataclass, field, replace
 from osimlite.base.text import join_words
 from osimlite.base.writing import ResultWriter
 from osimlite.errors import DocumentError, SettingError, SimulationError
-from osimlite.io.tables.old_storage import PRECISION, printed
-from osimlite.io.tables.storage import StoTable, adapter_lines
+from osimlite.io.tables.old_storage import PRECISION, format_old_table
+from osimlite.io.tables.storage import StoTable, format_adapter_table
 from osimlite.lint.diagnostic import Finding
 from osimlite.tools.evidence import Evidence
 from osimlite.tools.named_files import find_inputs
@@ -74,7 +74,7 @@ class Outcome:
         if (missing := self._note_missing(path, table)) and "NaN" not in description:
             description = f"{description}\n{missing}" if description else f"\n{missing}\n"
         self.tables[path.name] = replace(table, file=str(path))
-        self._texts[path] = printed(table, description, max(precision, 0))
+        self._texts[path] = format_old_table(table, description, max(precision, 0))
 
     def add_typed_table(self, path: Path, table: StoTable) -> None:
         """Add a table to write in the format of OpenSim's TimeSeriesTable.
@@ -88,7 +88,7 @@ class Outcome:
         ):
             table = replace(table, header={**table.header, "missing": missing})
         self.tables[path.name] = replace(table, file=str(path))
-        self._texts[path] = adapter_lines(table)
+        self._texts[path] = format_adapter_table(table)
 
     def add_text(self, path: Path, content: str) -> None:
         """Add a text to write."""

@@ -16,7 +16,7 @@ from osimlite.base.records import replace
 from osimlite.base.text import join_words
 from osimlite.errors import OsimliteError
 from osimlite.fitting.fitted_motion import MARKER_ERROR_LIMITS_M
-from osimlite.io.document.cache import top_at
+from osimlite.io.document.cache import get_object
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.spatial import Array
@@ -172,7 +172,7 @@ def _render_trials(trials: Sequence[TrialOutcomes]) -> Iterator[str]:
 def _render_verdicts(outcomes: Mapping[str | Path, Outcome]) -> Iterator[str]:
     """Yield the HTML of the results' quality by published limits."""
     written = [file for outcome in outcomes.values() for file in outcome.files]
-    setups = [setup for setup in outcomes if type(top_at(str(setup))).__name__ in SETUPS]
+    setups = [setup for setup in outcomes if type(get_object(str(setup))).__name__ in SETUPS]
     try:
         result = check_trial(*setups, written=written) if setups else None
     except OsimliteError:

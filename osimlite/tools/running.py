@@ -11,7 +11,7 @@ from osimlite.base.files import get_relative_path
 from osimlite.base.text import format_count, join_words
 from osimlite.base.writing import ResultWriter
 from osimlite.errors import DocumentError, MissingFileError, OsimliteError, SettingError
-from osimlite.io.document.reader import collector_paused, read_any
+from osimlite.io.document.reader import pause_collector, read_any
 from osimlite.lint.config import Config
 from osimlite.lint.diagnostic import Finding, Report, merge_reports
 from osimlite.lint.engine import load_subject
@@ -23,7 +23,7 @@ from osimlite.lint.setup import Setup
 from osimlite.mechanics.multibody.extremes import any_numbers
 from osimlite.schema.base import Object
 from osimlite.schema.registry import MODULES
-from osimlite.schema.specs import file_specs
+from osimlite.schema.specs import get_file_specs
 from osimlite.tools.job import Job, NotRunnable
 from osimlite.tools.named_files import limit_documents, read_subject
 from osimlite.tools.outcome import Outcome
@@ -56,7 +56,7 @@ class FaultySetup(DocumentError):
         self.report = report
 
 
-@collector_paused()
+@pause_collector()
 @any_numbers
 def run(
     setup: str | Path,
@@ -170,7 +170,7 @@ def substitute_inputs(top: Object, folder: Path, substitutes: Mapping[str, str])
         return new
 
     for item in top.walk() if substitutes else ():
-        for spec in file_specs(type(item), "file"):
+        for spec in get_file_specs(type(item), "file"):
             value = getattr(item, spec.name)
             if isinstance(value, str):
                 setattr(item, spec.name, substitute(value))

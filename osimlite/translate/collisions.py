@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from osimlite.errors import ModelError
-from osimlite.io.meshes.unit_shapes import ball
+from osimlite.io.meshes.unit_shapes import make_ball
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.spatial import Array, make_offset
 from osimlite.schema.contact import (
@@ -90,7 +90,7 @@ def _shape(
             )
             return Box(SLAB), here
         case ContactEllipsoid() if min(geometry.radii) > 0.0:
-            file = mesh_files.stretched("ellipsoid", ball(), geometry.radii)
+            file = mesh_files.stretched("ellipsoid", make_ball(), geometry.radii)
             told("an ellipsoid, and its material", "a collision shape in a mesh file", file)
             return MeshFile(file), here
         case ContactMesh():

@@ -26,7 +26,7 @@ from osimlite.schema.markers import Marker
 from osimlite.schema.model import Model
 from osimlite.schema.muscles import Muscle
 from osimlite.schema.paths import AbstractGeometryPath, GeometryPath
-from osimlite.schema.specs import field_specs
+from osimlite.schema.specs import get_field_specs
 from osimlite.schema.tree import Use
 from osimlite.simulation.elements.builder import OPENSIM, ElementBuilder
 from osimlite.simulation.elements.geometries.path import PATH
@@ -161,7 +161,7 @@ class _Collector:
                     path,
                     "markers",
                     body,
-                    unit_shapes.ball(),
+                    unit_shapes.make_ball(),
                     _make_stretch((_MARKER_RADIUS,) * 3, point),
                     color,
                 )
@@ -226,36 +226,38 @@ class _Collector:
         """A unit shape, and what makes the shape of it (4, 4)."""
         match shape:
             case geometry.Brick():
-                return unit_shapes.cube(), _make_stretch(2.0 * np.array(shape.half_lengths))
+                return unit_shapes.make_cube(), _make_stretch(2.0 * np.array(shape.half_lengths))
             case geometry.Sphere() | contact.ContactSphere() | wrapping.WrapSphere():
-                return unit_shapes.ball(), _make_stretch((shape.radius,) * 3)
+                return unit_shapes.make_ball(), _make_stretch((shape.radius,) * 3)
             case geometry.Ellipsoid() | contact.ContactEllipsoid():
-                return unit_shapes.ball(), _make_stretch(shape.radii)
+                return unit_shapes.make_ball(), _make_stretch(shape.radii)
             case wrapping.WrapEllipsoid():
-                return unit_shapes.ball(), _make_stretch(shape.dimensions)
+                return unit_shapes.make_ball(), _make_stretch(shape.dimensions)
             case geometry.Cylinder():
-                return unit_shapes.tube(), _TO_Z @ _make_stretch(
+                return unit_shapes.make_cylinder(), _TO_Z @ _make_stretch(
                     (shape.radius, shape.radius, 2.0 * shape.half_height)
                 )
             case contact.ContactCylinder() | wrapping.WrapCylinder():
                 length = getattr(shape, "length", _ENDLESS)
-                return unit_shapes.tube(), _make_stretch((shape.radius, shape.radius, length))
-            case contact.ContactTorus() if shape.torus_radius > 0.0:
-                return unit_shapes.ring(shape.tube_radius / shape.torus_radius), _make_stretch(
-                    (shape.torus_radius,) * 3
+                return unit_shapes.make_cylinder(), _make_stretch(
+                    (shape.radius, shape.radius, length)
                 )
+            case contact.ContactTorus() if shape.torus_radius > 0.0:
+                return unit_shapes.make_torus(
+                    shape.tube_radius / shape.torus_radius
+                ), _make_stretch((shape.torus_radius,) * 3)
             case wrapping.WrapTorus() if shape.outer_radius > 0.0:
                 # In spite of their names: the radius of the tube, and that of the circle in its
                 # middle.
-                return unit_shapes.ring(shape.inner_radius / shape.outer_radius), _make_stretch(
-                    (shape.outer_radius,) * 3
-                )
+                return unit_shapes.make_torus(
+                    shape.inner_radius / shape.outer_radius
+                ), _make_stretch((shape.outer_radius,) * 3)
             case geometry.Mesh() | contact.ContactMesh():
                 return self._mesh(
                     shape.mesh_file if isinstance(shape, geometry.Mesh) else shape.filename
                 ), np.eye(4)
             case contact.ContactHalfSpace():
-                return unit_shapes.sheet(), np.eye(4)
+                return unit_shapes.make_square(), np.eye(4)
         raise UnsupportedError(f"is a {type(shape).__name__}, which osimlite does not draw")
 
     def _path(self, path: AbstractGeometryPath, name: str) -> None:
@@ -295,7 +297,7 @@ class _Collector:
                     path, force, ("socket_frame1", (0, 0, 0)), ("socket_frame2", (0, 0, 0))
                 )
             case HuntCrossleyForce() | contact_forces.ElasticFoundationForce():
-                spec = field_specs(type(force).ContactParameters)["geometry"]
+                spec = get_field_specs(type(force).ContactParameters)["geometry"]
                 for parameters in force.contact_parameters.objects:
                     for index, word in enumerate(parameters.geometry):
                         result = self.tree.resolve(Use(parameters, force, spec, word, index)).target

@@ -16,7 +16,7 @@ import numpy as np
 
 from osimlite import __version__
 from osimlite.base.files import write_atomically
-from osimlite.io.meshes.unit_shapes import normals_of, tube
+from osimlite.io.meshes.unit_shapes import compute_normals, make_cylinder
 from osimlite.mechanics.multibody.spatial import Array, quaternion_of
 from osimlite.view.motion import Motion, at_times, values_of
 from osimlite.view.picture import FORCE
@@ -29,7 +29,7 @@ RATE = 60.0
 _FLOAT, _UINT32 = 5126, 5125
 _VERTICES, _CORNERS = 34962, 34963
 _KINDS = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}
-_ROUND = tube(8)
+_ROUND = make_cylinder(8)
 
 
 def write_glb(scene: Scene, q: Array, motion: Motion | None, path: str | Path) -> Path:
@@ -201,7 +201,7 @@ class _Writer:
         geometry = ("geometry", id(surface))
         if geometry not in self._known:
             self._known[geometry] = self._accessor(surface.points, bounds=True, target=_VERTICES)
-            self._accessor(normals_of(surface), target=_VERTICES)
+            self._accessor(compute_normals(surface), target=_VERTICES)
             self._accessor(surface.triangles.reshape(-1, 1), _UINT32, target=_CORNERS)
         first = self._known[geometry]
         primitive = {

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from osimlite.errors import OsimliteError
-from osimlite.io.document.lexical import formatter
+from osimlite.io.document.lexical import make_formatter
 from osimlite.lint.diagnostic import Finding
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.schema.base import Component, Object, Unknown
@@ -17,7 +17,7 @@ from osimlite.schema.fields import Held, Reference
 from osimlite.schema.joints import Joint
 from osimlite.schema.model import Model
 from osimlite.schema.paths import AbstractGeometryPath, PathPoint
-from osimlite.schema.specs import field_specs
+from osimlite.schema.specs import get_field_specs
 from osimlite.schema.tree import Tree
 from osimlite.view.scene import Scene
 
@@ -67,7 +67,7 @@ def _list_properties(tree: Tree, item: Object, way: str) -> Iterator[tuple[str, 
     if isinstance(item, Unknown):
         yield f"{way}content", item.content, True
         return
-    for spec in field_specs(type(item)).values():
+    for spec in get_field_specs(type(item)).values():
         value = getattr(item, spec.name)
         given = spec.name in item.model_fields_set
         if isinstance(spec.kind, Held):
@@ -82,7 +82,7 @@ def _list_properties(tree: Tree, item: Object, way: str) -> Iterator[tuple[str, 
         elif isinstance(spec.kind, Reference):
             yield way + spec.tag, _named(tree, item, spec.kind, value), given
         else:
-            yield way + spec.tag, formatter(spec.kind, "shortest")(value).strip(), given
+            yield way + spec.tag, make_formatter(spec.kind, "shortest")(value).strip(), given
 
 
 def _named(tree: Tree, item: Object, reference: Reference, value: Any) -> str:

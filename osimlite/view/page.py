@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from osimlite.io.meshes.surface import Surface
-from osimlite.io.meshes.unit_shapes import normals_of
+from osimlite.io.meshes.unit_shapes import compute_normals
 from osimlite.lint.diagnostic import Finding
 from osimlite.mechanics.multibody.constraints import Coupler, Lock, Prescribed
 from osimlite.mechanics.multibody.extremes import any_numbers
@@ -177,7 +177,7 @@ def _drawn(scene: Scene) -> dict[str, Any]:
 
 
 def _describe_surface(surface: Surface) -> dict[str, str]:
-    normals = np.rint(127.0 * np.clip(normals_of(surface), -1.0, 1.0)).astype(np.int8)
+    normals = np.rint(127.0 * np.clip(compute_normals(surface), -1.0, 1.0)).astype(np.int8)
     return {
         "points": text_of(surface.points.astype("<f4")),
         "normals": text_of(normals),

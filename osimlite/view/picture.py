@@ -150,16 +150,18 @@ def _fill_background(
         if line.visible and line.layer in scene.shown:
             color = style.colors.get(line.path, line.color)
             for start, end in pairwise(corners):
-                heap.put(unit_shapes.tube(8), _make_cylinder(start, end, line.radius), color)
+                heap.put(
+                    unit_shapes.make_cylinder(8), _make_cylinder(start, end, line.radius), color
+                )
             for corner in corners:
-                heap.put(unit_shapes.ball(8, 4), _sized(corner, line.radius), color)
+                heap.put(unit_shapes.make_ball(8, 4), _sized(corner, line.radius), color)
     if "frames" in scene.shown:
         for axes in scene.axes:
             placed = bodies.matrix(axes.body, axes.matrix)
             for axis in range(3):
                 end = placed[:3, 3] + axes.length * placed[:3, axis]
                 heap.put(
-                    unit_shapes.tube(8),
+                    unit_shapes.make_cylinder(8),
                     _make_cylinder(placed[:3, 3], end, 0.002),
                     tuple(np.eye(3)[axis].tolist()),
                 )
@@ -172,10 +174,12 @@ def _fill_background(
             arrow.point + arrow.vector,
             arrow.point + arrow.vector * max(0.0, 1.0 - 5.0 * thick / length),
         )
-        heap.put(unit_shapes.tube(), _make_cylinder(arrow.point, end, thick), FORCE, front=True)
+        heap.put(
+            unit_shapes.make_cylinder(), _make_cylinder(arrow.point, end, thick), FORCE, front=True
+        )
         head = _make_cylinder(end, tip, 2.6 * thick)
         head[:3, 3] = end
-        heap.put(unit_shapes.spike(), head, FORCE, front=True)
+        heap.put(unit_shapes.make_cone(), head, FORCE, front=True)
 
 
 def _lay_floor(heap: _Heap, scene: Scene, height: float) -> None:
@@ -194,7 +198,10 @@ def _lay_floor(heap: _Heap, scene: Scene, height: float) -> None:
         for ends in (one, other):
             start, end = (x * across + z * along + height * up for x, z in ends)
             heap.put(
-                unit_shapes.tube(4), _make_cylinder(start, end, 0.0012 * half), FLOOR, lit=False
+                unit_shapes.make_cylinder(4),
+                _make_cylinder(start, end, 0.0012 * half),
+                FLOOR,
+                lit=False,
             )
 
 
@@ -208,7 +215,7 @@ def _cut_open(heap: _Heap, placed: Array) -> None:
     far = 4.0 * max(camera.half)
     start = placed[:3, 3] + along * float(along @ (camera.center - placed[:3, 3]))
     heap.put(
-        unit_shapes.tube(4),
+        unit_shapes.make_cylinder(4),
         _make_cylinder(start - far * along, start + far * along, 0.004 * camera.half[1]),
         INK,
         lit=False,
@@ -216,7 +223,7 @@ def _cut_open(heap: _Heap, placed: Array) -> None:
     below = np.eye(4)
     below[:3, :3] = np.column_stack((camera.towards, far * inward, 2.0 * far * along))
     below[:3, 3] = start + 0.5 * far * inward - 1e3 * camera.towards
-    heap.put(unit_shapes.sheet(), below, EARTH, lit=False)
+    heap.put(unit_shapes.make_square(), below, EARTH, lit=False)
 
 
 class _Heap:
@@ -248,7 +255,7 @@ class _Heap:
             # Normals follow the cofactors, which also serve what is stretched or flat.
             turn = matrix[:3, :3]
             cofactors = np.cross(turn[[1, 2, 0]], turn[[2, 0, 1]])
-            normals = unit_shapes.normals_of(surface) @ cofactors.T @ self._axes.T
+            normals = unit_shapes.compute_normals(surface) @ cofactors.T @ self._axes.T
             lengths = np.linalg.norm(normals, axis=1, keepdims=True)
             normals = normals / np.where(lengths > 0.0, lengths, 1.0)
             normals *= np.where(normals[:, 2:] < 0.0, -1.0, 1.0)

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from osimlite.errors import DocumentError
-from osimlite.io.document.printer import formatted, to_text
+from osimlite.io.document.printer import format_document, to_text
 from osimlite.io.document.reader import read_document
 from osimlite.io.document.source import Source
 from osimlite.schema.base import Object
@@ -19,7 +19,7 @@ from tests.conftest import CorpusModel
 def layout(corpus_model: CorpusModel) -> str:
     """The text of a real file in our layout; the test is skipped if it holds no model."""
     try:
-        return formatted(Source.of_file(corpus_model.path))
+        return format_document(Source.of_file(corpus_model.path))
     except DocumentError as fault:
         assert "file is empty" in fault.message or "not a <Model>" in fault.message
         pytest.skip("the file holds no model")
@@ -38,7 +38,7 @@ def test_the_same_is_said_and_nothing_changes_twice(corpus_model: CorpusModel) -
     # What is included lies beside the file.
     again = Source(text.encode(), str(corpus_model.path))
     assert words(again) == words(Source.of_file(corpus_model.path))
-    assert formatted(again) == text
+    assert format_document(again) == text
 
 
 @pytest.mark.oracle

@@ -8,7 +8,7 @@ import json
 import pytest
 
 from osimlite.io.document.source import Source
-from osimlite.io.document.survey import survey
+from osimlite.io.document.survey import survey_source
 from osimlite.lint.placement import compute_default_poses
 from osimlite.lint.subject import Subject
 from osimlite.mechanics.laws.rotations import transposed
@@ -20,7 +20,7 @@ from tests.conftest import ROUNDED, CorpusModel
 def test_default_poses_are_opensims(corpus_model: CorpusModel) -> None:
     if corpus_model.converted is None:
         pytest.skip("OpenSim cannot load this file")
-    subject = Subject(survey(Source(gzip.decompress(corpus_model.converted.read_bytes()))))
+    subject = Subject(survey_source(Source(gzip.decompress(corpus_model.converted.read_bytes()))))
     if next(subject.find_instances(Constraint), None) is not None:
         pytest.skip("OpenSim assembles this model, which moves it")
     truth = json.loads(gzip.decompress(corpus_model.truth.read_bytes()))["default_pose"][

@@ -16,10 +16,10 @@ import pytest
 import osimlite
 from osimlite.errors import DocumentError, OsimliteError, SimulationError
 from osimlite.io.document.source import Source
-from osimlite.io.document.spans import blank_remarks
-from osimlite.io.meshes.surface import triangulated
+from osimlite.io.document.spans import blank_comments
+from osimlite.io.meshes.surface import triangulate
 from osimlite.io.meshes.vtp import read_vtp
-from osimlite.io.tables.storage import StoTable, adapter_lines, sto_text, write_sto
+from osimlite.io.tables.storage import StoTable, format_adapter_table, format_sto, write_sto
 from osimlite.lint.engine import check_source
 from osimlite.studies.reflexes.parameters import read_par
 from osimlite.studies.reflexes.settings import read_settings
@@ -191,7 +191,7 @@ def test_polygons_of_many_corners(count: int) -> None:
     radii = 1.0 + np.random.default_rng(1).random(count)
     points = np.stack([radii * np.cos(angles), radii * np.sin(angles), 0.0 * angles], axis=1)
     begin = time.process_time()
-    assert len(triangulated(points, np.arange(count), np.array([count]))) == count - 2
+    assert len(triangulate(points, np.arange(count), np.array([count]))) == count - 2
     assert time.process_time() - begin < 10.0
 
 
@@ -240,7 +240,7 @@ def test_the_time_of_a_text_is_that_of_its_length(word: str, fixtures: Path) -> 
     ],
 )
 def test_remarks_are_blanked(text: str, blank: str) -> None:
-    assert blank_remarks(text) == blank
+    assert blank_comments(text) == blank
 
 
 # ------------------------------------------------------------------------------------- data, settings, classes
@@ -320,15 +320,15 @@ def test_classes_that_make_no_sense(tmp_path: Path, text: str) -> None:
 
 @pytest.mark.parametrize("name", ["a\tb", "a\nb", "a\nendheader\nb", "a\r", "a\u2028b", "a\x0b"])
 def test_names_do_not_break_tables(tmp_path: Path, name: str) -> None:
-    from osimlite.io.tables.old_storage import printed
+    from osimlite.io.tables.old_storage import format_old_table
 
     times, rows = np.zeros(1), np.zeros((1, 1))
     for make in (
-        lambda: sto_text("t", [0.0], [name], [[0.0]]),
+        lambda: format_sto("t", [0.0], [name], [[0.0]]),
         lambda: write_sto(tmp_path / "t.sto", name, [0.0], ["c"], [[0.0]]),
-        lambda: [*printed(StoTable("t", times, (name,), rows))],
-        lambda: [*adapter_lines(StoTable("", times, (name,), rows))],
-        lambda: [*adapter_lines(StoTable("", times, ("c",), rows, header={"k": name}))],
+        lambda: [*format_old_table(StoTable("t", times, (name,), rows))],
+        lambda: [*format_adapter_table(StoTable("", times, (name,), rows))],
+        lambda: [*format_adapter_table(StoTable("", times, ("c",), rows, header={"k": name}))],
     ):
         with pytest.raises(OsimliteError, match="a tab or a line end"):
             make()

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from osimlite.io.document.source import Source
 from osimlite.lint.rules.classes import find_set
-from osimlite.schema.registry import class_for
+from osimlite.schema.registry import find_class
 
 FIXTURES = Path(__file__).resolve().parents[2] / "fixtures" / "lint"
 SKELETON, LIMB = FIXTURES / "skeleton.osim", FIXTURES / "limb.osim"
@@ -64,7 +64,7 @@ def _placed(text: str, wrapped: Source, number: int, end: int) -> str:
     result = _found(text, wrapped, number)
     if result is not None:
         return text[: source.spans[result].start] + element + text[source.spans[result].end :]
-    holder = find_set(class_for(tag))
+    holder = find_set(find_class(tag))
     if holder is None:
         return _at_the_end(text, element)
     model = source.child(0, "Model")

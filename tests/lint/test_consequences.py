@@ -5,8 +5,8 @@ from __future__ import annotations
 from osimlite.lint.rules.domains import describe_consequence
 from osimlite.schema.facts import NAN, REFUSED, Facts
 from osimlite.schema.fields import Value
-from osimlite.schema.registry import MODULES, class_for
-from osimlite.schema.specs import field_specs
+from osimlite.schema.registry import MODULES, find_class
+from osimlite.schema.specs import get_field_specs
 from tests.cases import of_each
 
 
@@ -27,15 +27,15 @@ def known_class(name):
 @of_each([*entries()])
 def test_an_entry_is_a_property_with_a_domain(entry):
     cls, name = entry
-    spec = next(spec for spec in field_specs(known_class(cls)).values() if spec.name == name)
+    spec = next(spec for spec in get_field_specs(known_class(cls)).values() if spec.name == name)
     assert isinstance(spec.kind, Value) and (
         spec.kind.domain or name in known_class(cls).facts.domains
     )
 
 
 def test_a_derived_class_inherits_and_zero_differs_from_less():
-    thelen = class_for("Thelen2003Muscle")
-    limit = class_for("CoordinateLimitForce")
+    thelen = find_class("Thelen2003Muscle")
+    limit = find_class("CoordinateLimitForce")
     assert describe_consequence(thelen, "minimum_activation", 0.0) == (REFUSED, True)
     assert describe_consequence(limit, "transition", 0.0) == (REFUSED, True)
     assert describe_consequence(limit, "transition", -1.0) == ("", False)

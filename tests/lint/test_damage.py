@@ -26,7 +26,7 @@ from osimlite.lint.engine import check_source, load_subject, run_rules
 from osimlite.lint.project_files import is_table
 from osimlite.lint.reporters import render
 from osimlite.schema.base import Object
-from osimlite.schema.difference import differences
+from osimlite.schema.difference import find_differences
 from osimlite.simulation import read_sto
 from tests.suite import choose
 
@@ -203,7 +203,7 @@ def check(folder: Path, name: str, data: bytes) -> None:
         return
     text = to_text(top)
     again = read_document(Source(text.encode(), name), of=Object).top
-    assert to_text(again) == text and not differences(top, again)
+    assert to_text(again) == text and not find_differences(top, again)
     assert _unknown(again) == _unknown(top)
 
 

@@ -14,7 +14,7 @@ from osimlite.io.document.source import Source
 from osimlite.lint import Config, validate
 from osimlite.lint.engine import check_source
 from osimlite.lint.history import NEWEST, load_later_changes
-from osimlite.schema.registry import class_for
+from osimlite.schema.registry import find_class
 from tests.cli.command import run
 
 REPO = Path(__file__).resolve().parents[2]
@@ -130,7 +130,7 @@ def test_the_table_speaks_of_classes_and_properties_that_exist():
         and not load_later_changes(NEWEST).classes
     )
     for tag in TABLE["classes"]:
-        assert class_for(tag) is not None, tag
+        assert find_class(tag) is not None, tag
     assert {first for first, *_ in TABLE["properties"].values()} | set(
         TABLE["classes"].values()
     ) < set(TABLE["formats"])

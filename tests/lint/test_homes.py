@@ -4,21 +4,21 @@ from __future__ import annotations
 
 from osimlite.lint.rules.structure import list_homes
 from osimlite.schema.base import Object
-from osimlite.schema.registry import class_for, tags
-from osimlite.schema.specs import field_specs
+from osimlite.schema.registry import find_class, list_tags
+from osimlite.schema.specs import get_field_specs
 
 
 def find_homes(tag: str, package: str) -> list[str]:
     """Return the classes of a package that declare a property, by looking into all classes."""
-    specs = (field_specs(class_for(name) or Object).get(tag) for name in tags())
+    specs = (get_field_specs(find_class(name) or Object).get(tag) for name in list_tags())
     declaring = {spec.declared_in for spec in specs if spec is not None}
     return sorted(cls.__name__ for cls in declaring if cls.__module__.rpartition(".")[0] == package)
 
 
 def test_every_property_is_found_in_the_classes_that_declare_it() -> None:
-    classes = [class_for(name) or Object for name in tags()]
+    classes = [find_class(name) or Object for name in list_tags()]
     owners = {cls.__module__.rpartition(".")[0]: cls for cls in classes}
-    properties = {tag for cls in classes for tag in field_specs(cls)}
+    properties = {tag for cls in classes for tag in get_field_specs(cls)}
     assert len(owners) == 3 and len(properties) > 700
     for tag in sorted(properties):
         for package, owner in owners.items():

@@ -116,7 +116,7 @@ def test_it_is_kept_beside_the_findings(fixtures, tmp_path, asked, monkeypatch, 
     path.write_text(text)
     result = check_files([str(path)], Config()).codes
     (kept,) = findings_cache.glob("*/measured/*.json")
-    subject = Subject(osimlite.io.document.survey.survey(Source(text.encode())))
+    subject = Subject(osimlite.io.document.survey.survey_source(Source(text.encode())))
     own = measures.digest_parts(subject)
     measures.remembered.clear()
     known = measures.recall_measures(own, kept.parents[1])
@@ -137,7 +137,7 @@ def test_it_is_kept_beside_the_findings(fixtures, tmp_path, asked, monkeypatch, 
 
 def measures_of(text):
     measures.remembered.clear()
-    subject = Subject(osimlite.io.document.survey.survey(Source(text.encode())))
+    subject = Subject(osimlite.io.document.survey.survey_source(Source(text.encode())))
     assert not subject.measure()
     return measures.get_measures(subject)
 
@@ -145,6 +145,7 @@ def measures_of(text):
 def test_a_model_whose_classes_stand_elsewhere_has_no_parts(fixtures):
     text = (fixtures / "lint" / "OSIM632" / "fail-02-two-coordinates.osim").read_text()
     subject = Subject(
-        osimlite.io.document.survey.survey(Source(text.encode())), Config(classes=("x.toml",))
+        osimlite.io.document.survey.survey_source(Source(text.encode())),
+        Config(classes=("x.toml",)),
     )
     assert measures.digest_parts(subject) is None

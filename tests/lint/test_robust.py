@@ -15,8 +15,8 @@ from osimlite.lint.reporters import render
 from osimlite.schema.fields import Held
 from osimlite.schema.path_forces import PathSpring
 from osimlite.schema.paths import GeometryPath, PathPoint, PathWrap
-from osimlite.schema.registry import class_for, tags
-from osimlite.schema.specs import field_specs
+from osimlite.schema.registry import find_class, list_tags
+from osimlite.schema.specs import get_field_specs
 
 ROOT = Path(__file__).resolve().parents[2]
 TEXTS = [
@@ -156,8 +156,8 @@ def test_what_opensim_leaves_out_has_findings_too(scrap):
 
 SLOTS = [
     (tag, spec.tag)
-    for tag in sorted(tags())
-    for spec in field_specs(class_for(tag)).values()
+    for tag in sorted(list_tags())
+    for spec in get_field_specs(find_class(tag)).values()
     if tag != "Model" and isinstance(spec.kind, Held) and spec.kind.form in ("single", "optional")
 ]
 

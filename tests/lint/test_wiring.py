@@ -14,7 +14,7 @@ from osimlite.lint.axes import refuses_axes
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.custom_joint import CustomJoint
 from osimlite.schema.registry import MODULES
-from osimlite.schema.states import outputs_of
+from osimlite.schema.states import list_outputs
 
 HERE = Path(__file__).resolve().parent
 _spec = importlib.util.spec_from_file_location("skeleton", HERE / "skeleton.py")
@@ -40,7 +40,7 @@ def test_outputs_are_those_of_the_catalogue():
         expected = {
             item["name"]: (item["type"], item["list"]) for item in known.get("outputs") or []
         }
-        assert {word: tuple(output) for word, output in outputs_of(cls).items()} == expected, name
+        assert {word: tuple(output) for word, output in list_outputs(cls).items()} == expected, name
         seen += bool(expected)
     assert seen > 60
 

@@ -9,7 +9,7 @@ import pytest
 
 import osimlite
 from osimlite.schema import registry
-from osimlite.schema.states import outputs_of, states_of, variables
+from osimlite.schema.states import find_variables, list_outputs, list_states
 from osimlite.simulation.elements.registry import FORCE_TYPES
 
 TEXT = """<?xml version="1.0" encoding="UTF-8"?>
@@ -73,9 +73,9 @@ def test_it_is_read_and_written(file, straight_muscle):
 
 def test_states_and_outputs_have_their_names(file, straight_muscle):
     model = osimlite.read(file)
-    assert states_of(model["/forceset/biceps"]) == ["activation"]
-    assert "/forceset/biceps/activation" in variables(model.tree(), "state variable")
-    assert "spare_force" in outputs_of(straight_muscle) and "fiber_force" in outputs_of(
+    assert list_states(model["/forceset/biceps"]) == ["activation"]
+    assert "/forceset/biceps/activation" in find_variables(model.tree(), "state variable")
+    assert "spare_force" in list_outputs(straight_muscle) and "fiber_force" in list_outputs(
         straight_muscle
     )
 

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 from osimlite.io.document.source import Source
-from osimlite.schema.registry import tags
+from osimlite.schema.registry import list_tags
 
 VERSIONS: tuple[int, ...] = (
     10500,
@@ -353,7 +353,7 @@ def _class(text: Text, draw: random.Random) -> tuple[str, str] | None:
         (
             draw.choice(like),
             draw.choice(sorted(text.by_tag)),
-            draw.choice(sorted(tags())),
+            draw.choice(sorted(list_tags())),
             draw.choice([e.tag for e in text.siblings(element)] or like),
             tag[:at] + tag[at + 1 :] or "x",
             tag.lower(),

@@ -14,7 +14,7 @@ import pytest
 import osimlite
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.schema.functions import SimmSpline
-from osimlite.schema.registry import class_for
+from osimlite.schema.registry import find_class
 from osimlite.simulation import read_sto
 from osimlite.simulation.elements import force_elements
 from osimlite.simulation.engines.compiled import CompiledEngine
@@ -128,7 +128,7 @@ def made(case, control):
     """A block that hangs on an actuator of random numbers."""
     name, bounds, more = CASES[case]
     rng = np.random.default_rng(len(case))
-    component = class_for(name)
+    component = find_class(name)
     if "geometry_path" in component.model_fields:
         more = {**more, "geometry_path": line()}
     numbers = {name: rng.uniform(*ends) for name, ends in bounds.items()}
@@ -225,7 +225,7 @@ def test_constants_of_the_first_muscle_count_for_all(tmp_path):
         "deactivation_time_constant": 0.12,
         "activation_dynamics_smoothing": 5.0,
     }
-    first = class_for("DeGrooteFregly2016Muscle")(name="first", geometry_path=line(), **slow)
+    first = find_class("DeGrooteFregly2016Muscle")(name="first", geometry_path=line(), **slow)
     model.force_set.objects.insert(0, first)
     osimlite.write(model, tmp_path / "model.osim")
     program = """

@@ -18,7 +18,7 @@ from typing import NamedTuple
 import pytest
 
 from osimlite.io.document.source import Source
-from osimlite.io.document.survey import survey
+from osimlite.io.document.survey import survey_source
 from osimlite.lint import validate
 from osimlite.lint.subject import Subject
 from tests.conftest import CorpusModel
@@ -77,7 +77,7 @@ class Victim(NamedTuple):
 
 def places_of(source: Source) -> Iterator[Place]:
     """Every reference in a document that stands in its text."""
-    subject = Subject(survey(source))
+    subject = Subject(survey_source(source))
     seen = set()
     for use in subject.uses:
         if use.reference.rule in ("file", "column", "positional", "point-index", "input"):
@@ -102,7 +102,7 @@ def places_of(source: Source) -> Iterator[Place]:
 
 def targets_of(source: Source) -> Iterator[Target]:
     """Every component of a document that a reference leads to and that has a name in the text."""
-    subject = Subject(survey(source))
+    subject = Subject(survey_source(source))
     seen = set()
     for use in subject.uses:
         target = subject.resolution(use).target

@@ -12,7 +12,7 @@ import pytest
 import osimlite
 from osimlite.fitting.modifying.operators import process_model
 from osimlite.fitting.modifying.path_fitting import fit_paths
-from osimlite.schema.difference import differences
+from osimlite.schema.difference import find_differences
 from osimlite.schema.tools import processors as p
 
 pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
@@ -61,7 +61,7 @@ def changed(folder: Path, model: Path, operators: list[Any]) -> list[Any]:
     )
     osimlite.write(process_model(processor, folder), folder / "ours.osim")
     ours, theirs = (osimlite.read(folder / f"{name}.osim") for name in ("ours", "theirs"))
-    return [str(item) for item in differences(ours, theirs)]
+    return [str(item) for item in find_differences(ours, theirs)]
 
 
 @pytest.mark.parametrize("case", CASES)

@@ -14,7 +14,7 @@ from osimlite.io.tables.storage import read_sto
 from osimlite.models.jumper import jumper
 from osimlite.schema.model import Model
 from osimlite.schema.muscles import Millard2012AccelerationMuscle
-from osimlite.schema.states import outputs_of
+from osimlite.schema.states import list_outputs
 from osimlite.tools.job import NotRunnable
 from osimlite.tools.outputs import LAW_OUTPUTS
 from tests.oracle.test_muscle_analysis import with_muscles_of
@@ -52,7 +52,7 @@ def outputs(model: Model) -> list[str]:
         refused = NOT_YET | (WITH_MASS if name == "Millard2012AccelerationMuscle" else set())
         for component in {id(one): one for one in (components[0], components[-1])}.values():
             path = "" if component is model else tree.path_of(component)
-            for output, kind in outputs_of(type(component)).items():  # type: ignore[arg-type]
+            for output, kind in list_outputs(type(component)).items():  # type: ignore[arg-type]
                 plain = kind.type in ("double", "Vec3", "SpatialVec") and not kind.channels
                 if (
                     plain

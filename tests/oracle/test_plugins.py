@@ -12,7 +12,7 @@ import pytest
 
 import osimlite
 from osimlite.schema.fields import Reference
-from osimlite.schema.specs import field_specs
+from osimlite.schema.specs import get_field_specs
 
 pytestmark = pytest.mark.oracle
 
@@ -39,7 +39,7 @@ def test_what_opensim_declares_is_what_the_classes_are(tmp_path):
     ours = osimlite.classes_in(tmp_path / "ours.json")
     for name in CLASSES:
         theirs = getattr(osimlite, name)
-        wanted, result = field_specs(theirs), field_specs(ours[f"Our{name}"])
+        wanted, result = get_field_specs(theirs), get_field_specs(ours[f"Our{name}"])
         assert list(result) == list(wanted), name
         plain, made = theirs(), ours[f"Our{name}"]()
         for tag, spec in wanted.items():

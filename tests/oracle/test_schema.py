@@ -12,8 +12,8 @@ import osimlite
 from osimlite.schema.base import Component, Object
 from osimlite.schema.fields import Held, Reference, Value
 from osimlite.schema.model import Model
-from osimlite.schema.registry import class_for, tags
-from osimlite.schema.specs import field_specs
+from osimlite.schema.registry import find_class, list_tags
+from osimlite.schema.specs import get_field_specs
 from tests.schema.test_catalogue import UNREGISTERED
 
 pytestmark = pytest.mark.oracle
@@ -21,7 +21,7 @@ opensim = pytest.importorskip("opensim")
 
 COMMENT_LINE = re.compile(r"[ \t]*<!--.*?-->\n", re.DOTALL)
 
-KNOWN = [(tag, class_for(tag) or Object) for tag in tags()]
+KNOWN = [(tag, find_class(tag) or Object) for tag in list_tags()]
 COMPONENTS = [
     tag for tag, cls in KNOWN if tag != "Model" and issubclass(cls, Component) and not cls.since
 ]
@@ -31,7 +31,7 @@ OTHERS = [tag for tag, cls in KNOWN if not issubclass(cls, Component) and not cl
 def filled(cls: type[Object]) -> Object:
     """An instance with a value of its own in every text and number; what it owns stays as it is."""
     values: dict[str, Any] = {"name": "filled"}
-    for number, spec in enumerate(field_specs(cls).values()):
+    for number, spec in enumerate(get_field_specs(cls).values()):
         kind = spec.kind
         if isinstance(kind, Reference):
             values[spec.name] = ("one", "two") if kind.shape == "list" else "one"
@@ -56,7 +56,7 @@ def filled(cls: type[Object]) -> Object:
 
 @pytest.mark.parametrize("tag", COMPONENTS)
 def test_opensim_prints_the_same(tag: str, tmp_path: Path) -> None:
-    cls = class_for(tag)
+    cls = find_class(tag)
     assert cls is not None
     model = Model(name="m")
     component = filled(cls)
@@ -77,7 +77,7 @@ def test_opensim_prints_the_same(tag: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("tag", OTHERS)
 def test_opensim_prints_the_same_document(tag: str, tmp_path: Path) -> None:
-    cls = class_for(tag)
+    cls = find_class(tag)
     assert cls is not None
     ours, theirs = tmp_path / "ours.xml", tmp_path / "theirs.xml"
     osimlite.write(filled(cls), ours, numbers="opensim")

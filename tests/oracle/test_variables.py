@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from osimlite import read
-from osimlite.schema.states import motions_of, variables
+from osimlite.schema.states import find_variables, list_motions
 
 opensim = pytest.importorskip("opensim")
 pytestmark = pytest.mark.oracle
@@ -31,11 +31,13 @@ def test_states_and_motions_are_opensims(corpus, name):
     theirs = opensim.Model(str(path))
     theirs.initSystem()
     names = theirs.getStateVariableNames()
-    assert set(variables(tree, "state variable")) == {names.get(k) for k in range(names.getSize())}
+    assert set(find_variables(tree, "state variable")) == {
+        names.get(k) for k in range(names.getSize())
+    }
     motions = {
         name: motion
         for joint in tree.of_class("Joint").values()
-        for name, motion in motions_of(joint).items()
+        for name, motion in list_motions(joint).items()
     }
     assert motions == {
         item.getName(): MOTIONS[item.getMotionType()] for item in theirs.getCoordinateSet()

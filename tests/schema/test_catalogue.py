@@ -10,11 +10,11 @@ from typing import Any
 
 import pytest
 
-from osimlite.io.document.lexical import formatter
+from osimlite.io.document.lexical import make_formatter
 from osimlite.schema.base import Object
 from osimlite.schema.fields import Held, Reference, Value
-from osimlite.schema.registry import MODULES, class_for, tags
-from osimlite.schema.specs import field_specs
+from osimlite.schema.registry import MODULES, find_class, list_tags
+from osimlite.schema.specs import get_field_specs
 from tests.cases import of_each
 
 SCHEMAS = Path(__file__).resolve().parents[2] / "schemas"
@@ -71,7 +71,7 @@ FILES = re.compile(r"\w+_files?|filepath|\w+_(directory|folder)|orientation_file
 
 def declared(tag: str) -> Any:
     """The class of an XML element; it must be there."""
-    cls = class_for(tag)
+    cls = find_class(tag)
     assert cls is not None, f"no class for <{tag}>"
     return cls
 
@@ -110,7 +110,7 @@ def printed(kind: Any, value: Any) -> str:
     # of these OpenSim prints six digits
     if kind.legacy and kind.shape == "list" and kind.scalar == "double":
         return " ".join(f"{number:g}" for number in value)
-    text = formatter(kind, "opensim")(value)
+    text = make_formatter(kind, "opensim")(value)
     return text.strip() if kind.legacy else text
 
 
@@ -123,7 +123,7 @@ def same_default_object(made: Object, wanted: dict, where: str) -> None:
     )
     overrides = wanted.get("overrides", {})
     plain = type(made)()
-    for spec in field_specs(type(made)).values():
+    for spec in get_field_specs(type(made)).values():
         value = getattr(made, spec.name)
         override = overrides.get(spec.tag)
         if isinstance(override, list):
@@ -137,14 +137,14 @@ def same_default_object(made: Object, wanted: dict, where: str) -> None:
         else:
             assert repr(value) == repr(getattr(plain, spec.name)), f"{where}/{spec.tag}"
     # Of a model that is a default, OpenSim has finished the ground already.
-    assert overrides.keys() - {"Ground"} <= field_specs(type(made)).keys()
+    assert overrides.keys() - {"Ground"} <= get_field_specs(type(made)).keys()
 
 
 @of_each(CONCRETE)
 def test_class_equals_the_catalogue(name: str) -> None:
     entry = CATALOGUE[name]
     cls = declared(entry["xml_tag"])
-    specs = field_specs(cls)
+    specs = get_field_specs(cls)
     assert list(specs) == [tag_of(prop) for prop in entry["properties"]]
     plain = cls()
     for prop in entry["properties"]:
@@ -214,7 +214,7 @@ def test_every_property_is_declared_where_opensim_declares_it(name: str) -> None
     cls = declared(entry["xml_tag"])
     for prop in entry["properties"]:
         if prop["declared_in"] in CATALOGUE and prop["name"] not in ("objects", "groups"):
-            assert field_specs(cls)[tag_of(prop)].declared_in.tag == prop["declared_in"], prop[
+            assert get_field_specs(cls)[tag_of(prop)].declared_in.tag == prop["declared_in"], prop[
                 "name"
             ]
 
@@ -272,10 +272,10 @@ def test_no_reference_is_forgotten() -> None:
 
 def test_the_registry_knows_exactly_the_classes_of_model_documents() -> None:
     """And, besides, those that say that OpenSim has them only later."""
-    known = [tag for tag in tags() if not declared(tag).since]
+    known = [tag for tag in list_tags() if not declared(tag).since]
     assert known == sorted({*(CATALOGUE[name]["xml_tag"] for name in CONCRETE), *UNREGISTERED})
     assert len(known) == 301
-    assert not {tag for tag in tags() if declared(tag).since} & {
+    assert not {tag for tag in list_tags() if declared(tag).since} & {
         entry.get("xml_tag") for entry in CATALOGUE.values()
     }
 
@@ -299,12 +299,15 @@ def test_bases_without_a_file_form_are_opensims_too() -> None:
 )
 def test_words_besides_names_and_the_fate_of_a_missing_name(entry: dict) -> None:
     cls = next(
-        base for tag in tags() for base in declared(tag).__mro__ if base.__name__ == entry["cls"]
+        base
+        for tag in list_tags()
+        for base in declared(tag).__mro__
+        if base.__name__ == entry["cls"]
     )
     kind = (
         cls.name_reference
         if entry["property"] == "@name"
-        else field_specs(cls)[entry["property"]].kind
+        else get_field_specs(cls)[entry["property"]].kind
     )
     if isinstance(kind, Reference):
         # Of tasks without a body the catalogue does not speak.

@@ -18,7 +18,7 @@ from osimlite.schema.base import Object, put_model
 from osimlite.schema.fields import Held, Integer, Number, Reference, Value, Vec3, vec3
 from osimlite.schema.model import Model
 from osimlite.schema.registry import MODULES
-from osimlite.schema.specs import defaults, field_specs
+from osimlite.schema.specs import get_defaults, get_field_specs
 from tests.cases import of_each
 
 CLASSES = {name: getattr(import_module(module), name) for name, module in MODULES.items()}
@@ -29,7 +29,7 @@ every_class = of_each(CLASSES.values(), lambda cls: cls.__name__)
 def filled(cls: type[Object]) -> Object:
     """An instance with another value than the default in every property."""
     values: dict[str, object] = {"name": "filled"}
-    for spec in field_specs(cls).values():
+    for spec in get_field_specs(cls).values():
         kind = spec.kind
         if isinstance(kind, Reference):
             values[spec.name] = ("one", "two") if kind.shape == "list" else "one"
@@ -60,11 +60,11 @@ def test_the_short_way_in_equals_the_validated_one(cls: type[Object]) -> None:
 
 @every_class
 def test_defaults_pass_their_own_validation(cls: type[Object]) -> None:
-    plain, _ = defaults(cls)
+    plain, _ = get_defaults(cls)
     again = cls(**plain)
     for name, value in plain.items():
         assert repr(getattr(again, name)) == repr(value), name
-    for spec in field_specs(cls).values():
+    for spec in get_field_specs(cls).values():
         value = getattr(cls(), spec.name)
         assert repr(spec.kind.check(value, spec.accepts)) == repr(value), spec.name
 
@@ -72,7 +72,7 @@ def test_defaults_pass_their_own_validation(cls: type[Object]) -> None:
 @every_class
 def test_two_instances_share_no_part(cls: type[Object]) -> None:
     one, other = cls(), cls()
-    for spec in field_specs(cls).values():
+    for spec in get_field_specs(cls).values():
         value = getattr(one, spec.name)
         if isinstance(value, (list, Object)):
             assert value is not getattr(other, spec.name), spec.name
@@ -111,14 +111,14 @@ def test_a_misspelt_property_is_told(cls: type[Object]) -> None:
 
 @every_class
 def test_a_value_of_the_wrong_kind_is_refused(cls: type[Object]) -> None:
-    for spec in field_specs(cls).values():
+    for spec in get_field_specs(cls).values():
         with pytest.raises(ModelError, match=spec.name):
             cls(**{spec.name: object()})
 
 
 @every_class
 def test_every_property_can_be_given_by_its_tag(cls: type[Object]) -> None:
-    for spec in field_specs(cls).values():
+    for spec in get_field_specs(cls).values():
         if spec.tag == spec.name or not spec.tag.isidentifier():
             continue
         value = getattr(cls(), spec.name)
@@ -210,7 +210,8 @@ def test_nearest_names_are_looked_for_only_if_the_message_is_read(monkeypatch):
     """`hasattr` and `getattr` with a default drop the error unread."""
     asked = []
     monkeypatch.setattr(
-        "osimlite.schema.base.misspelt", lambda cls, name: asked.append(name) or f"no '{name}'"
+        "osimlite.schema.base.describe_unknown_property",
+        lambda cls, name: asked.append(name) or f"no '{name}'",
     )
     body = CLASSES["Body"](name="b")
     assert not hasattr(body, "geometry_path") and getattr(body, "masss", None) is None
@@ -250,7 +251,7 @@ def test_the_docstring_has_every_property(cls):
     section = pydoc.render_doc(cls, renderer=pydoc.plaintext).split(
         "Properties, in the order of a file:"
     )[1]
-    for spec in field_specs(cls).values():
+    for spec in get_field_specs(cls).values():
         assert f" {spec.name}: " in section
 
 

@@ -12,7 +12,7 @@ import pytest
 
 import osimlite
 from osimlite.schema.base import Object
-from osimlite.schema.descriptions import meaning_of
+from osimlite.schema.descriptions import describe_property
 from osimlite.schema.json_schema import json_schema
 from osimlite.schema.registry import MODULES
 from osimlite.schema.specs import FieldSpec
@@ -39,7 +39,7 @@ def test_there_are_properties() -> None:
 
 @of_each(SPECS)
 def test_every_property_has_a_meaning(key: str) -> None:
-    meaning = meaning_of(SPECS[key])
+    meaning = describe_property(SPECS[key])
     assert len(meaning.split()) >= 2, f"write a line below the declaration of {key}"
     assert len(meaning) <= LONGEST
     assert meaning.endswith(".") and not meaning.endswith("..")
@@ -71,7 +71,7 @@ def test_what_is_written_in_ticks_exists(cls: type[Object]) -> None:
     }
     words = {"all", "path|output", "markers", "forces"}
     for spec in cls.field_specs().values():
-        ticked = meaning_of(spec).split("`")[1::2]
+        ticked = describe_property(spec).split("`")[1::2]
         assert set(ticked) <= known | variables | words, spec.name
 
 
@@ -79,23 +79,23 @@ def test_an_inherited_property_means_the_same() -> None:
     inherited = osimlite.PinJoint.field_specs()["socket_parent_frame"]
     assert inherited.declared_in is not osimlite.PinJoint
     assert (
-        meaning_of(inherited)
-        == meaning_of(osimlite.FreeJoint.field_specs()["socket_parent_frame"])
+        describe_property(inherited)
+        == describe_property(osimlite.FreeJoint.field_specs()["socket_parent_frame"])
         != ""
     )
 
 
 def test_help_says_it() -> None:
-    meaning = meaning_of(osimlite.Body.field_specs()["inertia"])
+    meaning = describe_property(osimlite.Body.field_specs()["inertia"])
     assert meaning in " ".join((osimlite.Body.__doc__ or "").split())
 
 
 def test_the_json_schema_says_it() -> None:
     properties = json_schema()["$defs"]["Body"]["properties"]
     mass = osimlite.Body.field_specs()["mass"]
-    assert properties["mass"]["description"] == f"{meaning_of(mass)} (kg, >= 0)"
+    assert properties["mass"]["description"] == f"{describe_property(mass)} (kg, >= 0)"
     wraps = osimlite.Body.field_specs()["WrapObjectSet"]
-    assert properties["wrap_object_set"]["description"] == meaning_of(wraps)
+    assert properties["wrap_object_set"]["description"] == describe_property(wraps)
 
 
 @pytest.mark.parametrize("compiled", [False, True])
@@ -113,14 +113,14 @@ def test_in_an_archive(compiled: bool, tmp_path: Path) -> None:
 import sys
 sys.path.insert(0, {str(archive)!r})
 import osimlite
-from osimlite.schema.descriptions import meaning_of
+from osimlite.schema.descriptions import describe_property
 assert osimlite.__file__.startswith({str(archive)!r})
 assert "mass: one number in kg, >= 0" in osimlite.Body.__doc__
-print(meaning_of(osimlite.Body.field_specs()["mass"]))
+print(describe_property(osimlite.Body.field_specs()["mass"]))
 """
     done = subprocess.run(
         [sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, check=True
     )
     assert done.stdout.strip() == (
-        "" if compiled else meaning_of(osimlite.Body.field_specs()["mass"])
+        "" if compiled else describe_property(osimlite.Body.field_specs()["mass"])
     )

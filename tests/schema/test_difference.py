@@ -9,7 +9,7 @@ import pytest
 
 import osimlite
 from osimlite.models.dynamic_walker import dynamic_walker
-from osimlite.schema.difference import Difference, differences
+from osimlite.schema.difference import Difference, find_differences
 from osimlite.schema.model import Model
 
 
@@ -19,13 +19,13 @@ def walker(fixtures: Path) -> Model:
 
 
 def test_a_model_does_not_differ_from_its_copies(walker: Model) -> None:
-    assert differences(walker, copy.deepcopy(walker)) == []
-    assert differences(walker, osimlite.read_text(osimlite.to_text(walker))) == []
+    assert find_differences(walker, copy.deepcopy(walker)) == []
+    assert find_differences(walker, osimlite.read_text(osimlite.to_text(walker))) == []
 
 
 def test_writing_defaults_down_and_spelling_paths_differently_change_nothing(walker: Model) -> None:
     """The file spells every frame's axes out; the model made in Python leaves them to their defaults."""
-    assert differences(walker, dynamic_walker()) == []
+    assert find_differences(walker, dynamic_walker()) == []
 
 
 def test_every_kind_of_change(walker: Model) -> None:
@@ -35,7 +35,7 @@ def test_every_kind_of_change(walker: Model) -> None:
     new["/contactgeometryset/RFootContact"].socket_frame = "/bodyset/RightThigh"
     new.remove(new["/forceset/LFootForce"])
     new.rename(new["/forceset/RHipLimitTorque"], "stop")
-    assert differences(walker, new) == [
+    assert find_differences(walker, new) == [
         Difference("/forceset/LFootForce", "", "HuntCrossleyForce", None),
         Difference("/forceset/RHipLimitTorque", "", "CoordinateLimitForce", None),
         Difference("/bodyset/Pelvis", "mass", 1.0, 2.0),
@@ -55,7 +55,7 @@ def test_of_another_class_counts_what_both_have() -> None:
     old, new = Model(name="m"), Model(name="m")
     old.add(osimlite.Thelen2003Muscle(name="soleus", max_isometric_force=100.0))
     new.add(osimlite.RigidTendonMuscle(name="soleus", max_isometric_force=200.0, min_control=0.01))
-    assert differences(old, new) == [
+    assert find_differences(old, new) == [
         Difference("/forceset/soleus", "class", "Thelen2003Muscle", "RigidTendonMuscle"),
         Difference("/forceset/soleus", "max_isometric_force", 100.0, 200.0),
     ]
@@ -63,7 +63,7 @@ def test_of_another_class_counts_what_both_have() -> None:
 
 def test_differences_are_symmetric(walker: Model) -> None:
     other = dynamic_walker(thigh_length=0.42)
-    there, back = differences(walker, other), differences(other, walker)
+    there, back = find_differences(walker, other), find_differences(other, walker)
     assert there and {(d.path, d.what, d.old, d.new) for d in there} == {
         (d.path, d.what, d.new, d.old) for d in back
     }

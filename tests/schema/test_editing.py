@@ -130,7 +130,7 @@ def test_inputs_follow_a_name() -> None:
     model.rename(model["/jointset/RightShankToThigh"], "knee")
     assert table.input_inputs == ("/jointset/knee/RKnee_rz|speed(flexion)", "/none|value")
     with pytest.raises(ModelError, match="RKneeLimitTorque and /table name it"):
-        osimlite.schema.editing.remove(model, model["/jointset/knee"])
+        osimlite.schema.editing.remove_component(model, model["/jointset/knee"])
 
 
 def test_a_model_takes_no_second_component_of_a_name(walker: Model) -> None:

@@ -11,7 +11,7 @@ import pytest
 from osimlite.io.document.data import to_data
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.schema.json_schema import json_schema
-from osimlite.schema.registry import tags
+from osimlite.schema.registry import list_tags
 
 jsonschema = pytest.importorskip("jsonschema")
 
@@ -31,7 +31,7 @@ def test_the_file_is_current(repo: Path) -> None:
 
 
 def test_every_class_has_its_definition() -> None:
-    assert set(tags()) <= json_schema()["$defs"].keys()
+    assert set(list_tags()) <= json_schema()["$defs"].keys()
 
 
 def test_a_document_of_another_class() -> None:

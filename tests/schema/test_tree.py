@@ -16,8 +16,9 @@ from osimlite.schema.frames import Body
 from osimlite.schema.geometry import Geometry
 from osimlite.schema.joints import PinJoint
 from osimlite.schema.model import Model
-from osimlite.schema.specs import field_specs
-from osimlite.schema.tree import Use, normalised
+from osimlite.schema.resolution import normalize_path
+from osimlite.schema.specs import get_field_specs
+from osimlite.schema.tree import Use
 
 
 @pytest.fixture
@@ -27,7 +28,7 @@ def walker(fixtures: Path) -> Model:
 
 def failure(model: Model, owner: str, tag: str, text: str) -> str | None:
     component = model.find(owner)
-    spec = field_specs(type(component))[tag]
+    spec = get_field_specs(type(component))[tag]
     return model.tree().resolve(Use(component, component, spec, text)).failure
 
 
@@ -194,7 +195,7 @@ def test_find_names_the_nearest_path(walker: Model) -> None:
     ("path", "expected"), [("/a/../b", "/b"), ("/a/./b//c/", "/a/b/c"), ("/..", None), ("/", "/")]
 )
 def test_paths_are_normalised(path: str, expected: str | None) -> None:
-    assert normalised(path) == expected
+    assert normalize_path(path) == expected
 
 
 def test_a_frame_takes_over_only_the_geometry_it_draws():

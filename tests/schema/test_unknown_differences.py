@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from osimlite.io.document.reader import read_text
-from osimlite.schema.difference import differences
+from osimlite.schema.difference import find_differences
 from tests.lint.verdict_cases import small_model
 
 LIGAMENT = (
@@ -17,7 +17,7 @@ LIGAMENT = (
 def compare(new: str) -> list[tuple[str, str | None, str | None]]:
     """Return what differs between two models with such an object."""
     old_model, new_model = (read_text(small_model(forces=text)) for text in (LIGAMENT, new))
-    return [(item.what, item.old, item.new) for item in differences(old_model, new_model)]
+    return [(item.what, item.old, item.new) for item in find_differences(old_model, new_model)]
 
 
 @pytest.mark.parametrize(
@@ -46,4 +46,4 @@ def test_a_format_of_a_real_case_is_no_difference(shared):
 
     folder = shared / "cases" / "model-24-diff-of-plugin-whitespace"
     old, new = (osimlite.read(folder / name) for name in ("plugin.osim", "f_plugin.osim"))
-    assert differences(old, new) == []
+    assert find_differences(old, new) == []

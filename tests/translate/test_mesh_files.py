@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from osimlite.errors import OsimliteError
-from osimlite.io.meshes.stl import binary_stl
+from osimlite.io.meshes.stl import format_binary_stl
 from osimlite.schema.contact import ContactMesh
 from osimlite.schema.geometry import Appearance, Mesh
 from osimlite.translate import to_urdf
@@ -108,7 +108,7 @@ def test_text_stl_becomes_binary_which_bullet_reads(bones):
     with in_bullet(urdf.text, urdf.files) as bullet:
         assert len(bullet.pb.getVisualShapeData(bullet.body, physicsClientId=bullet.client)) == 1
     # What is binary already keeps its triangles, and nothing else.
-    assert binary_stl(b"secret".ljust(80) + content[80:] + b"secret", "x.stl") == content
+    assert format_binary_stl(b"secret".ljust(80) + content[80:] + b"secret", "x.stl") == content
 
 
 @pytest.mark.parametrize(
@@ -121,7 +121,7 @@ def test_text_stl_becomes_binary_which_bullet_reads(bones):
 )
 def test_damaged_stl_files_are_refused(content):
     with pytest.raises(OsimliteError, match=r"bone\.stl: .*save it again"):
-        binary_stl(content, "bone.stl")
+        format_binary_stl(content, "bone.stl")
 
 
 def test_damaged_meshes_are_told(bones):

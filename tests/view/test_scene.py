@@ -39,12 +39,12 @@ def with_shape(shape, folders=None):
 @pytest.mark.parametrize(
     ("make", "volume"),
     [
-        (unit_shapes.ball, 4.0 / 3.0 * np.pi),
-        (lambda: unit_shapes.ball(8, 4), 4.0 / 3.0 * np.pi),
-        (unit_shapes.tube, np.pi),
-        (unit_shapes.spike, np.pi / 3.0),
-        (lambda: unit_shapes.ring(0.3), 2.0 * np.pi**2 * 0.09),
-        (unit_shapes.cube, 1.0),
+        (unit_shapes.make_ball, 4.0 / 3.0 * np.pi),
+        (lambda: unit_shapes.make_ball(8, 4), 4.0 / 3.0 * np.pi),
+        (unit_shapes.make_cylinder, np.pi),
+        (unit_shapes.make_cone, np.pi / 3.0),
+        (lambda: unit_shapes.make_torus(0.3), 2.0 * np.pi**2 * 0.09),
+        (unit_shapes.make_cube, 1.0),
     ],
 )
 def test_unit_shapes_are_closed_and_turned_outwards(make, volume):
@@ -81,7 +81,7 @@ def test_meshes_are_read_from_files_of_every_kind(repo: Path):
                 continue
             kinds.add(path.suffix.lower())
             assert surface.triangles.max() < len(surface.points)
-            assert np.linalg.norm(unit_shapes.normals_of(surface), axis=1).max() < 1.0 + 1e-5
+            assert np.linalg.norm(unit_shapes.compute_normals(surface), axis=1).max() < 1.0 + 1e-5
     assert ".vtp" in kinds
 
 

@@ -11,7 +11,7 @@ from osimlite.cli.language_server.cursor import Cursor, cursor_at
 from osimlite.cli.language_server.text import Text
 from osimlite.io.document.source import Position, Source
 from osimlite.io.document.spans import Span
-from osimlite.io.document.survey import survey
+from osimlite.io.document.survey import survey_source
 from osimlite.lint.checked import CheckTarget
 from osimlite.lint.config import Config
 from osimlite.lint.diagnostic import Report
@@ -23,7 +23,7 @@ from osimlite.lint.settings import load_settings
 from osimlite.lint.setup import Setup
 from osimlite.lint.subject import Subject
 from osimlite.schema.base import Component, Object
-from osimlite.schema.editing import named_by
+from osimlite.schema.editing import find_named_component
 from osimlite.schema.model import Model
 from osimlite.schema.tree import Tree, Use, is_a
 
@@ -131,7 +131,7 @@ class Analysis:
         meanwhile.
         """
         source = Source.of_characters(self.text.content, self.file)
-        return run_rules(Subject(survey(source, of=Model), self.config))
+        return run_rules(Subject(survey_source(source, of=Model), self.config))
 
     @property
     def is_checked(self) -> bool:
@@ -266,7 +266,7 @@ class Analysis:
             )
         if self.tree is None:
             return None
-        result = named_by(self.tree, use)
+        result = find_named_component(self.tree, use)
         if setup is None:
             return None if result is None else self._target(self.file, result)
         if result is not None and setup.tool is not None:

@@ -10,12 +10,12 @@ from osimlite.cli.language_server.analysis import Analysis
 from osimlite.cli.language_server.cursor import Cursor, Element, single_objects
 from osimlite.cli.language_server.hover import is_list
 from osimlite.cli.language_server.names import names, reference_of
-from osimlite.io.document.lexical import formatter
+from osimlite.io.document.lexical import make_formatter
 from osimlite.lint.project_files import is_document
-from osimlite.schema.descriptions import described, meaning_of, value_of
+from osimlite.schema.descriptions import describe_class, describe_property, describe_value
 from osimlite.schema.fields import Held, Reference, Value
-from osimlite.schema.registry import class_for, tags_of
-from osimlite.schema.specs import FieldSpec, field_specs
+from osimlite.schema.registry import find_class, list_class_tags
+from osimlite.schema.specs import FieldSpec, get_field_specs
 
 _TOPS = (
     "AnalyzeTool", "CMCTool", "CMC_TaskSet", "ContactGeometrySet", "ControlSet", "ExternalLoads", "ForceSet",
@@ -98,14 +98,14 @@ def _tags(
             for tag in _TOPS if is_document(analysis.file) else ("Model",):
                 yield _object(analysis, cursor, tag, bracket, "")
         elif around.spec is not None and is_list(around.spec) and around.spec.accepts is not None:
-            for tag in tags_of(around.spec.accepts):
+            for tag in list_class_tags(around.spec.accepts):
                 yield _object(analysis, cursor, tag, bracket, "")
         return
     given = _given_in(analysis, around)
-    for spec in field_specs(around.cls).values():
+    for spec in get_field_specs(around.cls).values():
         if spec in single_objects(around.cls):
             assert spec.accepts is not None
-            for tag in tags_of(spec.accepts):
+            for tag in list_class_tags(spec.accepts):
                 yield _object(analysis, cursor, tag, bracket, spec.tag)
         elif spec.tag not in given:
             yield _property(analysis, cursor, spec, bracket)
@@ -117,7 +117,9 @@ def _given_in(analysis: Analysis, around: Element) -> set[str]:
     if item is None:
         return set()
     return {
-        spec.tag for spec in field_specs(type(item)).values() if spec.name in item.model_fields_set
+        spec.tag
+        for spec in get_field_specs(type(item)).values()
+        if spec.name in item.model_fields_set
     }
 
 
@@ -130,16 +132,16 @@ def _property(
     else:
         default = ""
         if isinstance(spec.kind, Value) and spec.default is not None:
-            default = formatter(spec.kind, "shortest")(spec.default)
+            default = make_formatter(spec.kind, "shortest")(spec.default)
         choices = (
             ("true", "false") if isinstance(spec.kind, Value) and spec.kind.scalar == "bool" else ()
         )
         place = f"${{1|{','.join(choices)}|}}" if choices else f"${{1:{_escaped(default)}}}"
         text = f"{bracket}{spec.tag}>{place}</{spec.tag}>"
     item = _item(
-        analysis, cursor, spec.tag, text, types.CompletionItemKind.Property, value_of(spec)
+        analysis, cursor, spec.tag, text, types.CompletionItemKind.Property, describe_value(spec)
     )
-    item.documentation = meaning_of(spec) or None
+    item.documentation = describe_property(spec) or None
     item.insert_text_format = types.InsertTextFormat.Snippet
     return item
 
@@ -150,8 +152,8 @@ def _object(
     named = f'name="{name}"' if name else 'name="$1"'
     text = f"{bracket}{tag} {named}>\n\t$0\n</{tag}>"
     item = _item(analysis, cursor, tag, text, types.CompletionItemKind.Class, name)
-    cls = class_for(tag)
-    item.documentation = described(cls) if cls is not None else None
+    cls = find_class(tag)
+    item.documentation = describe_class(cls) if cls is not None else None
     item.insert_text_format = types.InsertTextFormat.Snippet
     return item
 

@@ -8,11 +8,11 @@ from __future__ import annotations
 import re
 from typing import Literal, NamedTuple
 
-from osimlite.io.document.spans import Markup, markup
+from osimlite.io.document.spans import Markup, find_markup
 from osimlite.schema.base import Object
 from osimlite.schema.fields import Held
-from osimlite.schema.registry import class_for
-from osimlite.schema.specs import FieldSpec, field_specs
+from osimlite.schema.registry import find_class
+from osimlite.schema.specs import FieldSpec, get_field_specs
 
 Kind = Literal["tag", "closing tag", "attribute", "text", "comment"]
 
@@ -63,7 +63,7 @@ def cursor_at(text: str, offset: int) -> Cursor:
     """What stands at an offset of a text."""
     stack: list[Element] = []
     count = behind = 0
-    for piece in markup(text[:offset]):
+    for piece in find_markup(text[:offset]):
         behind = piece.end
         if piece.kind == "open":
             stack.append(_element(text, piece.tag, piece.start, piece.end, count, stack))
@@ -143,13 +143,13 @@ def _meaning(
 ) -> tuple[type[Object] | None, FieldSpec | None]:
     """The class of the object that an element `tag` is, and the property that it is or that holds it."""
     if around is None or (around.tag == "OpenSimDocument" and around.cls is None):
-        return class_for(tag), None
+        return find_class(tag), None
     if around.cls is None:
         # A property that holds objects, or what is not known.
-        return class_for(tag), around.spec
-    spec = field_specs(around.cls).get(tag)
+        return find_class(tag), around.spec
+    spec = get_field_specs(around.cls).get(tag)
     if spec is None:
-        result = class_for(tag)
+        result = find_class(tag)
         return result, None if result is None else _holder(around.cls, result, name)
     if isinstance(spec.kind, Held) and spec.kind.form == "unnamed":
         return spec.accepts, spec
@@ -168,5 +168,5 @@ def _holder(owner: type[Object], held: type[Object], name: str) -> FieldSpec | N
 
 def single_objects(owner: type[Object]) -> list[FieldSpec]:
     """The properties that hold one object each without a tag of their own."""
-    specs = field_specs(owner).values()
+    specs = get_field_specs(owner).values()
     return [spec for spec in specs if isinstance(spec.kind, Held) and spec.kind.form == "single"]

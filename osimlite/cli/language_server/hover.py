@@ -10,10 +10,10 @@ from osimlite.base.files import get_relative_path
 from osimlite.cli.language_server.analysis import Analysis
 from osimlite.cli.language_server.cursor import Element
 from osimlite.cli.language_server.names import measured
-from osimlite.io.document.lexical import formatter
+from osimlite.io.document.lexical import make_formatter
 from osimlite.lint.setup import Setup
 from osimlite.schema.base import Object
-from osimlite.schema.descriptions import described, meaning_of, value_of
+from osimlite.schema.descriptions import describe_class, describe_property, describe_value
 from osimlite.schema.fields import Held, Value
 from osimlite.schema.specs import FieldSpec
 from osimlite.schema.tree import is_a
@@ -47,19 +47,21 @@ def hover(analysis: Analysis, offset: int) -> types.Hover | None:
 
 
 def _class(cls: type[Object]) -> str:
-    return f"**{cls.tag}**\n\n{described(cls)}"
+    return f"**{cls.tag}**\n\n{describe_class(cls)}"
 
 
 def _property(spec: FieldSpec, owner: type[Object] | None) -> str:
-    head = f"**{spec.tag}**: {value_of(spec)}"
+    head = f"**{spec.tag}**: {describe_value(spec)}"
     of = "" if owner is None else f"Property of {owner.tag}."
-    return "\n\n".join(part for part in (f"{head}{_default(spec)}", meaning_of(spec), of) if part)
+    return "\n\n".join(
+        part for part in (f"{head}{_default(spec)}", describe_property(spec), of) if part
+    )
 
 
 def _default(spec: FieldSpec) -> str:
     if not isinstance(spec.kind, Value) or spec.default in (None, "", ()):
         return ""
-    return f"; by default `{formatter(spec.kind, 'shortest')(spec.default)}`"
+    return f"; by default `{make_formatter(spec.kind, 'shortest')(spec.default)}`"
 
 
 def _led_to(analysis: Analysis, offset: int) -> str:

@@ -14,8 +14,8 @@ from osimlite.lint.beside import list_folders, read_beginning
 from osimlite.lint.setup import Setup
 from osimlite.schema.base import Component
 from osimlite.schema.fields import Reference
-from osimlite.schema.specs import FieldSpec, lineage
-from osimlite.schema.states import variables
+from osimlite.schema.specs import FieldSpec, get_class_names
+from osimlite.schema.states import find_variables
 from osimlite.schema.tree import Tree, Use
 
 _OPAQUE = (
@@ -61,7 +61,7 @@ def reference_of(cursor: Cursor) -> Reference | None:
         element.spec.names for element in reversed(cursor.around[-2:]) if element.spec is not None
     )
     said = next(filter(None, held), None)
-    after = (_NAMED_AFTER[name] for name in lineage(cls) if name in _NAMED_AFTER)
+    after = (_NAMED_AFTER[name] for name in get_class_names(cls) if name in _NAMED_AFTER)
     return said or cls.name_reference or next(after, None)
 
 
@@ -93,7 +93,7 @@ def names(
                 analysis.tree, reference, _owner(analysis, analysis.tree, holder)
             )
         elif reference.rule == "state-path":
-            for text, component in variables(analysis.tree, reference.target).items():
+            for text, component in find_variables(analysis.tree, reference.target).items():
                 yield Name(text, type(component).tag)
         else:
             yield from map(Name, sorted(reference.words))

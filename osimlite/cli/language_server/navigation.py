@@ -5,9 +5,9 @@ from __future__ import annotations
 from lsprotocol import types
 
 from osimlite.cli.language_server.analysis import Analysis
-from osimlite.io.document.spans import markup
+from osimlite.io.document.spans import find_markup
 from osimlite.schema.base import Object
-from osimlite.schema.specs import object_specs
+from osimlite.schema.specs import get_object_specs
 from osimlite.schema.tree import is_a
 
 _SYMBOLS = {
@@ -33,7 +33,7 @@ def outline(analysis: Analysis) -> list[types.DocumentSymbol]:
 def _symbols(analysis: Analysis, item: Object) -> list[types.DocumentSymbol]:
     """The symbol of an object, or those of its parts if the text does not give it."""
     inner: list[types.DocumentSymbol] = []
-    if object_specs(type(item)):
+    if get_object_specs(type(item)):
         for _, held in item.objects_held():
             inner += _symbols(analysis, held)
     if item._index is None:
@@ -60,7 +60,7 @@ def _symbols(analysis: Analysis, item: Object) -> list[types.DocumentSymbol]:
 def folds(analysis: Analysis) -> list[types.FoldingRange]:
     """Elements and comments of more than one line."""
     result, open_lines = [], []
-    for piece in markup(analysis.markup):
+    for piece in find_markup(analysis.markup):
         line = analysis.text.position(piece.start).line
         if piece.kind == "open":
             open_lines.append((piece.tag, line))

@@ -17,8 +17,8 @@ from osimlite.errors import ModelError, OsimliteError
 from osimlite.io.document.source import Source
 from osimlite.lint.beside import list_documents, list_folders
 from osimlite.schema.base import Component
-from osimlite.schema.editing import rename
-from osimlite.schema.resolution import ILLEGAL_CHARACTERS, last_name
+from osimlite.schema.editing import rename_component
+from osimlite.schema.resolution import ILLEGAL_CHARACTERS, get_last_name
 
 
 class Project:
@@ -172,7 +172,7 @@ def _renamed_in_model(
     target, model = twin.objects[item._index], twin.document.model
     assert isinstance(target, Component)
     own, uses = twin.name_of(item._index), twin.places
-    rename(model, target, name)
+    rename_component(model, target, name)
     edits = []
     for use, start, end in uses:
         value = getattr(use.holder, use.spec.name)
@@ -195,5 +195,5 @@ def _renamed_in_setup(analysis: Analysis, target: Target, path: str) -> list[typ
                 types.TextEdit(analysis.text.range(start, end), path + text[len(target.path) :])
             )
         elif target.is_same(led) and not text.startswith("/"):
-            edits.append(types.TextEdit(analysis.text.range(start, end), last_name(path)))
+            edits.append(types.TextEdit(analysis.text.range(start, end), get_last_name(path)))
     return edits

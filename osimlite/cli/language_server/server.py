@@ -33,7 +33,7 @@ from osimlite.cli.language_server.protocol import (
 )
 from osimlite.cli.language_server.text import Text
 from osimlite.errors import OsimliteError
-from osimlite.io.document.printer import formatted as formatted_text
+from osimlite.io.document.printer import format_document as formatted_text
 from osimlite.lint.settings import load_settings
 
 PAUSE = 0.02

@@ -11,7 +11,7 @@ from typing import Any
 
 from osimlite.base.text import suggest_name
 from osimlite.errors import ModelError, UnsupportedError
-from osimlite.io.document.cache import read_anew
+from osimlite.io.document.cache import read_copy
 from osimlite.io.document.reader import read_document
 from osimlite.io.document.source import Source
 from osimlite.mechanics.multibody import build_mechanism
@@ -341,7 +341,7 @@ def process_model(processor: ModelProcessor, folder: str | Path = ".") -> Model:
     """
     name = processor.filepath.strip()
     if name:
-        model = read_anew(Path(folder) / name, Model)
+        model = read_copy(Path(folder) / name, Model)
     elif processor.model is not None:
         model = processor.model.copy_deep()
     else:

@@ -10,24 +10,24 @@ from typing import Generic, TypeVar
 from osimlite.base.files import get_file_stamp
 from osimlite.base.text import find_nearest
 from osimlite.errors import DocumentError, OsimliteError
-from osimlite.io.document.objects import layout_of
+from osimlite.io.document.objects import get_layout
 from osimlite.io.document.reader import read_document
 from osimlite.io.document.source import Source
 from osimlite.schema.base import Object
-from osimlite.schema.registry import forgotten_with_classes
-from osimlite.schema.specs import field_specs
+from osimlite.schema.registry import on_class_change
+from osimlite.schema.specs import get_field_specs
 
 T = TypeVar("T")
 Top = TypeVar("Top", bound=Object)
 
 
-class Kept(Generic[T]):
+class FileCache(Generic[T]):
     """What was made of the last `size` files, as long as these do not change; None of one that is not there."""
 
     def __init__(self, make: Callable[[str], T], size: int) -> None:
         self._make, self._size = make, size
         self._kept: dict[str, tuple[int, T]] = {}
-        forgotten_with_classes(self._kept.clear)
+        on_class_change(self._kept.clear)
 
     def __call__(self, path: str) -> T | None:
         """What the file at a path makes."""
@@ -59,13 +59,13 @@ class Kept(Generic[T]):
             del self._kept[next(iter(self._kept))]
 
 
-def while_unchanged(size: int) -> Callable[[Callable[[str], T]], Kept[T]]:
+def cache_by_file(size: int) -> Callable[[Callable[[str], T]], FileCache[T]]:
     """Keep what a function makes of the last `size` files."""
-    return lambda make: Kept(make, size)
+    return lambda make: FileCache(make, size)
 
 
-@while_unchanged(256)
-def top_at(path: str) -> Object | None:
+@cache_by_file(256)
+def get_object(path: str) -> Object | None:
     """The top of a document; None if it cannot be read."""
     try:
         return read_document(Source.of_file(path), of=Object).top
@@ -73,32 +73,32 @@ def top_at(path: str) -> Object | None:
         return None
 
 
-@while_unchanged(256)
-def _is_whole(path: str) -> bool:
+@cache_by_file(256)
+def _has_no_include(path: str) -> bool:
     """Whether no part of a document is in another file, which nobody would see change."""
-    top = top_at(path)
+    top = get_object(path)
     return top is not None and not any(
         item.layout is not None and item.layout.include for item in top.walk()
     )
 
 
-def read_anew(path: str | Path, of: type[Top]) -> Top:
+def read_copy(path: str | Path, of: type[Top]) -> Top:
     """The top of a document, of a class, for whoever changes it: a copy, if it is known from before.
 
     Raises:
         DocumentError: the file is missing or holds something else; with line and column.
     """
-    from osimlite.io.document.plugins import used
+    from osimlite.io.document.plugins import classes_in_use
 
     file = str(path)
-    with used(()):
-        top = top_at(file) if top_at.has(file) and _is_whole(file) else None
+    with classes_in_use(()):
+        top = get_object(file) if get_object.has(file) and _has_no_include(file) else None
         if not isinstance(top, of):
             document = read_document(Source.of_file(path), of=of)
             assert isinstance(document.top, of)
             return document.top
         copied = top.copy_deep()
-        layout_of(copied).file = file
+        get_layout(copied).file = file
         return copied
 
 
@@ -118,7 +118,7 @@ def read_object(path: str | Path, cls: type[AnyObject]) -> AnyObject:
         if (
             note.kind == "unknown-tag"
             and note.owner
-            and (near := find_nearest(note.word, field_specs(type(note.owner))))
+            and (near := find_nearest(note.word, get_field_specs(type(note.owner))))
         ):
             message = f"<{note.word}> means nothing in this document; did you mean <{near}>?"
             raise document.source.fault(DocumentError, message, document.source.of_tag(note.number))

@@ -18,15 +18,15 @@ from osimlite.base.files import read_file, write_atomically
 from osimlite.base.require import require
 from osimlite.base.text import suggest_name
 from osimlite.errors import DocumentError, MissingFileError, ModelError
-from osimlite.io.document.lexical import Unclean, real
-from osimlite.io.document.objects import layout_of
+from osimlite.io.document.lexical import UncleanText, parse_real
+from osimlite.io.document.objects import get_layout
 from osimlite.io.document.printer import has_content
 from osimlite.schema.base import Component, Object, Unknown
 from osimlite.schema.fields import Held, ObjectList, Reference, Value
 from osimlite.schema.layout import Remark
 from osimlite.schema.model import Model
-from osimlite.schema.registry import class_for, tags, tags_of
-from osimlite.schema.specs import FieldSpec, field_specs
+from osimlite.schema.registry import find_class, list_class_tags, list_tags
+from osimlite.schema.specs import FieldSpec, get_field_specs
 
 SUFFIXES = (".json", ".yaml", ".yml")
 """How the names of data files end."""
@@ -48,9 +48,7 @@ def read_data(path: str | Path) -> Model:
         text = read_file(place).decode()
     except UnicodeDecodeError as error:
         raise MissingFileError(f"cannot read the file: {error}", file=str(path)) from None
-    data = (
-        _parsed_json(text, str(path)) if place.suffix == ".json" else parsed_yaml(text, str(path))
-    )
+    data = _parse_json(text, str(path)) if place.suffix == ".json" else parse_yaml(text, str(path))
     try:
         return from_data(data)
     except ModelError as error:
@@ -72,12 +70,12 @@ def write_data(model: Model, path: str | Path) -> None:
 
 def to_json(model: Model) -> str:
     """The model as JSON, a list of numbers on one line."""
-    return "".join(_json_lines(to_data(model), "")) + "\n"
+    return "".join(_format_json(to_data(model), "")) + "\n"
 
 
 def to_yaml(model: Model) -> str:
     """The model as YAML; MissingDependency if PyYAML is not installed."""
-    return _yaml().safe_dump(
+    return _import_yaml().safe_dump(
         to_data(model), sort_keys=False, default_flow_style=None, allow_unicode=True, width=120
     )
 
@@ -98,7 +96,7 @@ def from_data(data: Mapping[str, Any]) -> Model:
         ModelError: it describes none; the message says where and why.
     """
     if not isinstance(data, Mapping):
-        raise ModelError(f"a model is a mapping from properties to values, not {_kind_of(data)}")
+        raise ModelError(f"a model is a mapping from properties to values, not {_find_class(data)}")
     data = {key: value for key, value in data.items() if key != "$schema"}
     try:
         model = _Reader().object(data, Model, "model")
@@ -121,7 +119,7 @@ class _Writer:
         if isinstance(item, Unknown):
             return {**data, "class_name": item.class_name, "content": item.content}
         inherited = item.layout.inherited if item.layout is not None else frozenset()
-        for spec in field_specs(type(item)).values():
+        for spec in get_field_specs(type(item)).values():
             value = getattr(item, spec.name)
             if (
                 spec.name in item.model_fields_set
@@ -140,7 +138,11 @@ class _Writer:
             return None if value is None else self._owned(spec, value)
         if isinstance(spec.kind, Reference):
             return self._named(item, spec.kind, value)
-        return [_number(word) for word in value] if isinstance(value, tuple) else _number(value)
+        return (
+            [_format_number(word) for word in value]
+            if isinstance(value, tuple)
+            else _format_number(value)
+        )
 
     def _owned(self, spec: FieldSpec, value: Object) -> Any:
         data = self.object(value, spec.accepts)
@@ -173,14 +175,14 @@ class _Reader:
     def object(self, data: Any, accepts: type[Object], where: str, name: str = "") -> Object:
         """The object that `data` describes, where a property takes an `accepts`."""
         self._counted(10)
-        if isinstance(data, list) and "objects" in field_specs(accepts):
+        if isinstance(data, list) and "objects" in get_field_specs(accepts):
             data = {"objects": data}
         if not isinstance(data, Mapping):
             raise ModelError(
-                f"{where}: expected a mapping that describes a {accepts.tag}, not {_kind_of(data)}"
+                f"{where}: expected a mapping that describes a {accepts.tag}, not {_find_class(data)}"
             )
         cls = self._class(data, accepts, where)
-        specs = field_specs(cls)
+        specs = get_field_specs(cls)
         by_name = {spec.name: spec for spec in specs.values()}
         values: dict[str, Any] = {}
         for key, value in data.items():
@@ -190,7 +192,7 @@ class _Reader:
             if key == "name" or (cls is Unknown and key in ("class_name", "content")):
                 if not isinstance(value, str):
                     raise ModelError(
-                        f"{place}: expected a text, not {_kind_of(value)}; put it in quotation marks"
+                        f"{place}: expected a text, not {_find_class(value)}; put it in quotation marks"
                     )
                 values[key] = value
                 continue
@@ -210,7 +212,7 @@ class _Reader:
         if remarks:
             if not isinstance(remarks, list) or not all(isinstance(text, str) for text in remarks):
                 raise ModelError(f"{where}.unknown: expected a list of XML texts")
-            layout_of(item).before[None] = [Remark(text, True) for text in remarks]
+            get_layout(item).before[None] = [Remark(text, True) for text in remarks]
         return item
 
     def _class(self, data: Mapping[str, Any], accepts: type[Object], where: str) -> type[Object]:
@@ -218,15 +220,15 @@ class _Reader:
         if tag is None:
             if accepts.abstract:
                 raise ModelError(
-                    f"{where}: say the class of this {accepts.tag}, such as 'class: {tags_of(accepts)[0]}'"
+                    f"{where}: say the class of this {accepts.tag}, such as 'class: {list_class_tags(accepts)[0]}'"
                 )
             return accepts
         if tag == "Unknown":
             return Unknown
-        cls = class_for(tag) if isinstance(tag, str) else None
+        cls = find_class(tag) if isinstance(tag, str) else None
         if cls is None:
             raise ModelError(
-                f"{where}.class: there is no class '{tag}'{suggest_name(str(tag), tags())}"
+                f"{where}.class: there is no class '{tag}'{suggest_name(str(tag), list_tags())}"
             )
         if not issubclass(cls, accepts):
             raise ModelError(f"{where}.class: a {tag} cannot stand here, only a {accepts.tag}")
@@ -239,7 +241,7 @@ class _Reader:
             if kind.form == "list":
                 if not isinstance(data, list):
                     raise ModelError(
-                        f"{where}: expected a list of {spec.accepts.tag}, not {_kind_of(data)}"
+                        f"{where}: expected a list of {spec.accepts.tag}, not {_find_class(data)}"
                     )
                 members = (
                     self.object(item, spec.accepts, f"{where}[{i}]") for i, item in enumerate(data)
@@ -268,8 +270,8 @@ class _Reader:
         self._counted()
         if isinstance(data, str):
             try:
-                return real(data.strip())
-            except Unclean:
+                return parse_real(data.strip())
+            except UncleanText:
                 return data
         return data
 
@@ -281,13 +283,13 @@ class _Reader:
             )
 
 
-def _number(value: Any) -> Any:
+def _format_number(value: Any) -> Any:
     if isinstance(value, float) and not math.isfinite(value):
         return "NaN" if value != value else "Inf" if value > 0 else "-Inf"
     return value
 
 
-def _kind_of(data: Any) -> str:
+def _find_class(data: Any) -> str:
     names = {
         dict: "a mapping",
         list: "a list",
@@ -300,29 +302,29 @@ def _kind_of(data: Any) -> str:
     )
 
 
-def _json_lines(data: Any, indent: str) -> Iterator[str]:
+def _format_json(data: Any, indent: str) -> Iterator[str]:
     """JSON with one property a line, and what holds no further objects on one line."""
     if not isinstance(data, (dict, list)) or not any(
-        isinstance(part, (dict, list)) for part in _parts(data)
+        isinstance(part, (dict, list)) for part in _format_parts(data)
     ):
         yield json.dumps(data, ensure_ascii=False, allow_nan=False)
         return
     inner = indent + "  "
     opening, closing = "{}" if isinstance(data, dict) else "[]"
     yield opening
-    for number, part in enumerate(_parts(data)):
+    for number, part in enumerate(_format_parts(data)):
         yield ("," if number else "") + "\n" + inner
         if isinstance(data, dict):
             yield json.dumps(list(data)[number], ensure_ascii=False) + ": "
-        yield from _json_lines(part, inner)
+        yield from _format_json(part, inner)
     yield "\n" + indent + closing
 
 
-def _parts(data: dict[str, Any] | list[Any]) -> list[Any]:
+def _format_parts(data: dict[str, Any] | list[Any]) -> list[Any]:
     return list(data.values()) if isinstance(data, dict) else data
 
 
-def _parsed_json(text: str, file: str) -> Any:
+def _parse_json(text: str, file: str) -> Any:
     try:
         return json.loads(text)
     except json.JSONDecodeError as error:
@@ -335,14 +337,14 @@ def _parsed_json(text: str, file: str) -> Any:
         ) from None
 
 
-def parsed_yaml(text: str, file: str, *, with_lines: bool = False) -> Any:
+def parse_yaml(text: str, file: str, *, with_lines: bool = False) -> Any:
     """The data of a YAML text, or PyYAML's nodes, which know their lines.
 
     Raises:
         DocumentError: it is none; with line and column in the file.
         MissingDependency: PyYAML is not installed.
     """
-    yaml = _yaml()
+    yaml = _import_yaml()
     try:
         return yaml.compose(text, yaml.SafeLoader) if with_lines else yaml.safe_load(text)
     except yaml.YAMLError as error:
@@ -356,5 +358,5 @@ def parsed_yaml(text: str, file: str, *, with_lines: bool = False) -> Any:
         raise DocumentError("the YAML text cannot be read as a model", file=file, line=1) from None
 
 
-def _yaml() -> Any:
+def _import_yaml() -> Any:
     return require("yaml", extra="yaml", purpose="a model in YAML")

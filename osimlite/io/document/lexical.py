@@ -1,7 +1,7 @@
 """Text to value and back, by the lexical rules of OpenSim 4.6's reader and printer.
 
 OpenSim takes the longest part of a text that is a number (``1,5`` is 1) and drops what it cannot
-read without failing. The functions here read the same value, and raise :class:`Unclean` with it, so
+read without failing. The functions here read the same value, and raise :class:`UncleanText` with it, so
 that the reader can note what was lost.
 """
 
@@ -34,7 +34,7 @@ _SPECIAL = {
 _SPECIAL |= {"-inf": -math.inf, "-infinity": -math.inf}
 
 
-class Unclean(Exception):
+class UncleanText(Exception):
     """The text does not say what was meant, or says it in a way OpenSim cuts.
 
     Attributes:
@@ -50,7 +50,7 @@ class Unclean(Exception):
         self.value = value
 
 
-def real(word: str) -> float:
+def parse_real(word: str) -> float:
     """One number as OpenSim reads it; Unclean if only a part of the word, or nothing, is a number."""
     try:
         value = float(word)
@@ -69,136 +69,146 @@ def real(word: str) -> float:
         or math.isinf(float(prefix[0]))
         or ("e" not in prefix[0].lower() and word[prefix.end()] in "eE")
     ):
-        raise Unclean("unreadable", word)
-    raise Unclean("cut", word, float(prefix[0]))
+        raise UncleanText("unreadable", word)
+    raise UncleanText("cut", word, float(prefix[0]))
 
 
-def whole(word: str) -> int:
+def parse_integer(word: str) -> int:
     """One whole number; nothing may follow it."""
     if re.fullmatch(r"[+-]?[0-9]+", word) is None:
-        raise Unclean("unreadable", word)
+        raise UncleanText("unreadable", word)
     return int(word)
 
 
-def flag(word: str) -> bool:
+def parse_flag(word: str) -> bool:
     """A switch: true or false in any case, 1 or 0."""
     lowered = word.lower()
     if lowered in ("true", "1"):
         return True
     if lowered in ("false", "0"):
         return False
-    raise Unclean("unreadable", word)
+    raise UncleanText("unreadable", word)
 
 
-def legacy_flag(word: str) -> bool:
+def parse_legacy_flag(word: str) -> bool:
     """A switch of the first property system, where everything but ``true`` is false, ``1`` too."""
     lowered = word.lower()
     if lowered not in _PLAIN_FLAGS:
-        raise Unclean("ignored", word, False)
+        raise UncleanText("ignored", word, False)
     return _PLAIN_FLAGS[lowered]
 
 
-def _exact_flag(word: str) -> bool:
+def _parse_exact_flag(word: str) -> bool:
     """A switch in a list of the first property system, where everything but ``true`` in these letters is false."""
     if word not in _PLAIN_FLAGS:
-        raise Unclean("ignored", word, False)
+        raise UncleanText("ignored", word, False)
     return _PLAIN_FLAGS[word]
 
 
-def _entire(word: str) -> float:
+def _parse_complete_real(word: str) -> float:
     """A number in a list of the first property system: where anything is left over, OpenSim refuses the file."""
     try:
-        return real(word)
-    except Unclean:
-        raise Unclean("unreadable", word) from None
+        return parse_real(word)
+    except UncleanText:
+        raise UncleanText("unreadable", word) from None
 
 
-def text(raw: str) -> str:
+def parse_text(raw: str) -> str:
     """A text: white space trimmed, inner runs of it collapsed to one space."""
-    return " ".join(split(raw))
+    return " ".join(split_words(raw))
 
 
-def split(raw: str) -> list[str]:
+def split_words(raw: str) -> list[str]:
     """The words of a text. What separates them is ASCII white space: a no-break space is a letter for OpenSim."""
     return raw.split() if raw.isascii() else _OTHER.findall(raw)
 
 
 _OTHER = re.compile(r"[^ \t\n\r\f\v]+")
 _WORDS: dict[str, Callable[[str], Any]] = {
-    "double": real,
-    "int": whole,
-    "bool": flag,
+    "double": parse_real,
+    "int": parse_integer,
+    "bool": parse_flag,
     "string": str,
 }
 
 
 @cache
-def converter(kind: Kind) -> Callable[[str], Any]:
+def make_converter(kind: Kind) -> Callable[[str], Any]:
     """The function that reads the text of a property of this kind; it raises Unclean where OpenSim would not object."""
     if isinstance(kind, Reference):
-        return _words(str, 0, None) if kind.shape == "list" else text
+        return _make_list_converter(str, 0, None) if kind.shape == "list" else parse_text
     assert isinstance(kind, Value)
-    word = legacy_flag if kind.legacy and kind.scalar == "bool" else _WORDS[kind.scalar]
+    word = parse_legacy_flag if kind.legacy and kind.scalar == "bool" else _WORDS[kind.scalar]
     if kind.shape in ("single", "optional"):
         return (
-            text if kind.scalar == "string" else _one(word, kind.shape == "optional", kind.legacy)
+            parse_text
+            if kind.scalar == "string"
+            else _make_single_converter(word, kind.shape == "optional", kind.legacy)
         )
     if kind.size is not None:
-        return _exactly(kind.size)
+        return _make_vector_converter(kind.size)
     if kind.shape == "vector":
         # OpenSim keeps the default of a vector whose element is empty.
-        return _words(word, 1, None)
+        return _make_list_converter(word, 1, None)
     if kind.legacy and kind.scalar != "string":
-        return _legacy_list({"bool": _exact_flag, "double": _entire, "int": whole}[kind.scalar])
-    return _words(word, kind.least, kind.most)
+        return _make_legacy_converter(
+            {"bool": _parse_exact_flag, "double": _parse_complete_real, "int": parse_integer}[
+                kind.scalar
+            ]
+        )
+    return _make_list_converter(word, kind.least, kind.most)
 
 
 def reads_as(raw: str, kind: Kind, value: Any) -> bool:
     """Whether the text of a property of this kind is plainly a value."""
     try:
-        return bool(converter(kind)(raw) == value)
-    except Unclean:
+        return bool(make_converter(kind)(raw) == value)
+    except UncleanText:
         return False
 
 
-def _one(read: Callable[[str], Any], optional: bool, legacy: bool) -> Callable[[str], Any]:
+def _make_single_converter(
+    read: Callable[[str], Any], optional: bool, legacy: bool
+) -> Callable[[str], Any]:
     def convert(raw: str) -> Any:
         # Almost every text is one clean number or switch; what follows this is for the rest.
-        if read is real:
+        if read is parse_real:
             try:
                 value = float(raw)
                 if isfinite(value) and "_" not in raw and raw.isascii():
                     return value
             except ValueError:
                 pass
-        elif raw in _PLAIN_FLAGS and read is not whole:
+        elif raw in _PLAIN_FLAGS and read is not parse_integer:
             return _PLAIN_FLAGS[raw]
-        words = split(raw)
+        words = split_words(raw)
         if not words:
             if optional:
                 return None
-            if read is legacy_flag:
+            if read is parse_legacy_flag:
                 # OpenSim's first property system takes nothing for no.
-                raise Unclean("empty", "", False)
-            raise Unclean("empty", "")
+                raise UncleanText("empty", "", False)
+            raise UncleanText("empty", "")
         if len(words) == 1:
             return read(words[0])
         if not legacy:
             # OpenSim reads them all before it takes the first, and takes none if it cannot read
             # one.
-            _as_read(words[1:], read)
-        raise Unclean("too-many", raw.strip(), read(words[0]))
+            _parse_words(words[1:], read)
+        raise UncleanText("too-many", raw.strip(), read(words[0]))
 
     return convert
 
 
-def _as_read(words: list[str], read: Callable[[str], Any]) -> tuple[list[Any], Unclean | None]:
+def _parse_words(
+    words: list[str], read: Callable[[str], Any]
+) -> tuple[list[Any], UncleanText | None]:
     """What OpenSim reads of words, and the first that it cuts; Unclean if it can make nothing of one."""
     values, first = [], None
     for word in words:
         try:
             values.append(read(word))
-        except Unclean as unclean:
+        except UncleanText as unclean:
             if unclean.value is ABSENT:
                 raise
             values.append(unclean.value)
@@ -206,9 +216,9 @@ def _as_read(words: list[str], read: Callable[[str], Any]) -> tuple[list[Any], U
     return values, first
 
 
-def _exactly(size: int) -> Callable[[str], Any]:
+def _make_vector_converter(size: int) -> Callable[[str], Any]:
     def convert(raw: str) -> Any:
-        words = split(raw)
+        words = split_words(raw)
         try:
             values = tuple(map(float, words))
             if len(values) == size and isfinite(sum(values)) and "_" not in raw and raw.isascii():
@@ -216,46 +226,52 @@ def _exactly(size: int) -> Callable[[str], Any]:
         except ValueError:
             pass
         if not words:
-            raise Unclean("empty", "")
+            raise UncleanText("empty", "")
         if len(words) < size:
-            raise Unclean("too-few", raw.strip())
+            raise UncleanText("too-few", raw.strip())
         if len(words) % size:
-            raise Unclean("too-many", raw.strip())
-        cleanly, first = _as_read(words, real)
+            raise UncleanText("too-many", raw.strip())
+        cleanly, first = _parse_words(words, parse_real)
         if first is not None:
-            raise Unclean("unreadable", first.word, tuple(cleanly[:size]))
+            raise UncleanText("unreadable", first.word, tuple(cleanly[:size]))
         if len(words) > size:
-            raise Unclean("too-many", raw.strip(), tuple(cleanly[:size]))
+            raise UncleanText("too-many", raw.strip(), tuple(cleanly[:size]))
         return tuple(cleanly)
 
     return convert
 
 
-def _words(read: Callable[[str], Any], least: int, most: int | None) -> Callable[[str], Any]:
+def _make_list_converter(
+    read: Callable[[str], Any], least: int, most: int | None
+) -> Callable[[str], Any]:
     def convert(raw: str) -> Any:
-        words = split(raw)
-        if read in (real, _entire) and least <= len(words) and (most is None or len(words) <= most):
+        words = split_words(raw)
+        if (
+            read in (parse_real, _parse_complete_real)
+            and least <= len(words)
+            and (most is None or len(words) <= most)
+        ):
             try:
                 numbers = tuple(map(float, words))
                 if isfinite(sum(numbers)) and "_" not in raw and raw.isascii():
                     return numbers
             except ValueError:
                 pass
-        values, first = (words, None) if read is str else _as_read(words, read)
+        values, first = (words, None) if read is str else _parse_words(words, read)
         if len(values) < least:
-            raise Unclean("too-few" if values else "empty", raw.strip())
+            raise UncleanText("too-few" if values else "empty", raw.strip())
         if first is not None:
-            raise Unclean(first.trouble, first.word, tuple(values[:most]))
+            raise UncleanText(first.trouble, first.word, tuple(values[:most]))
         if most is not None and len(values) > most:
-            raise Unclean("too-many", raw.strip(), tuple(values[:most]))
+            raise UncleanText("too-many", raw.strip(), tuple(values[:most]))
         return tuple(values)
 
     return convert
 
 
-def _legacy_list(read: Callable[[str], Any]) -> Callable[[str], Any]:
+def _make_legacy_converter(read: Callable[[str], Any]) -> Callable[[str], Any]:
     """Lists of the first property system: blanks or commas between all words, one pair of brackets may surround."""
-    plain = _words(read, 0, None)
+    plain = _make_list_converter(read, 0, None)
 
     def convert(raw: str) -> Any:
         if "," not in raw and raw.lstrip()[:1] not in ("(", "[", "{"):
@@ -263,14 +279,14 @@ def _legacy_list(read: Callable[[str], Any]) -> Callable[[str], Any]:
         stripped = raw.strip()
         if stripped[:1] + stripped[-1:] in ("()", "[]", "{}"):
             stripped = stripped[1:-1]
-        if "," in stripped and any(len(split(word)) != 1 for word in stripped.split(",")):
-            raise Unclean("unreadable", raw.strip())
+        if "," in stripped and any(len(split_words(word)) != 1 for word in stripped.split(",")):
+            raise UncleanText("unreadable", raw.strip())
         return plain(stripped.replace(",", " "))
 
     return convert
 
 
-def shortest(value: float) -> str:
+def format_shortest(value: float) -> str:
     """The shortest decimal that reads back equal, in OpenSim's spelling of what is not finite."""
     if value == value and value not in (math.inf, -math.inf):
         words = repr(value)
@@ -278,26 +294,26 @@ def shortest(value: float) -> str:
     return "NaN" if value != value else "Inf" if value > 0 else "-Inf"
 
 
-def seventeen(value: float) -> str:
+def format_17_digits(value: float) -> str:
     """Seventeen significant digits, as OpenSim prints every number outside lists of the first property system."""
     if value == value and value not in (math.inf, -math.inf):
         return f"{value:.17g}"
-    return shortest(value)
+    return format_shortest(value)
 
 
-def six_if_enough(value: float) -> str:
+def format_6_digits(value: float) -> str:
     """OpenSim's six digits where they read back equal, all digits where they would not."""
     words = f"{value:g}"
-    return words if float(words) == value else seventeen(value)
+    return words if float(words) == value else format_17_digits(value)
 
 
-def formatter(kind: Kind, numbers: str) -> Callable[[Any], str]:
+def make_formatter(kind: Kind, numbers: str) -> Callable[[Any], str]:
     """The function that prints a value of this kind; `numbers` is ``"shortest"`` or ``"opensim"``."""
-    return _formatter(kind, numbers == "opensim")
+    return _build_formatter(kind, numbers == "opensim")
 
 
 @cache
-def _formatter(kind: Kind, like_opensim: bool) -> Callable[[Any], str]:
+def _build_formatter(kind: Kind, like_opensim: bool) -> Callable[[Any], str]:
     if isinstance(kind, Reference):
         if kind.shape == "list":
             lead = " " if kind.legacy else ""
@@ -305,11 +321,11 @@ def _formatter(kind: Kind, like_opensim: bool) -> Callable[[Any], str]:
         return str
     assert isinstance(kind, Value)
     if kind.scalar == "double":
-        word: Callable[[Any], str] = seventeen if like_opensim else shortest
+        word: Callable[[Any], str] = format_17_digits if like_opensim else format_shortest
         if like_opensim and kind.legacy and kind.shape == "list":
-            word = six_if_enough
+            word = format_6_digits
     elif kind.scalar == "bool":
-        word = _flag_word
+        word = _format_flag
     else:
         word = str
     if kind.shape in ("single", "optional"):
@@ -320,5 +336,5 @@ def _formatter(kind: Kind, like_opensim: bool) -> Callable[[Any], str]:
     return lambda values: lead + " ".join(map(word, values)) if values else ""
 
 
-def _flag_word(value: bool) -> str:
+def _format_flag(value: bool) -> str:
     return "true" if value else "false"

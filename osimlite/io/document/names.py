@@ -38,7 +38,7 @@ def as_written(name: str) -> str:
     return name.replace(_COLON, ":").replace(_XMLNS, "xmlns")
 
 
-def without_namespaces(data: bytes) -> bytes:
+def replace_colons(data: bytes) -> bytes:
     """UTF-8 text in which no name has a colon; every character keeps its line and column."""
     pieces, done = [], 0
     hidden: list[tuple[int, int]] | None = None
@@ -51,7 +51,7 @@ def without_namespaces(data: bytes) -> bytes:
         if tag < 0 or _TAG_SO_FAR.fullmatch(so_far) is None:
             continue
         if hidden is None:
-            hidden = _hidden(data)
+            hidden = _find_hidden_text(data)
         before = bisect_right(hidden, (tag, len(data))) - 1
         if before >= 0 and place < hidden[before][1]:
             continue
@@ -60,7 +60,7 @@ def without_namespaces(data: bytes) -> bytes:
     return b"".join([*pieces, data[done:]]) if pieces else data
 
 
-def _hidden(data: bytes) -> list[tuple[int, int]]:
+def _find_hidden_text(data: bytes) -> list[tuple[int, int]]:
     """Where text stands that may look like a tag and is none, in order."""
     result = []
     for opening, ending in _HIDING:

@@ -9,16 +9,16 @@ from typing import Any, NamedTuple, TypeVar
 
 from lxml import etree
 
-from osimlite.io.document.lexical import ABSENT, Unclean, converter
+from osimlite.io.document.lexical import ABSENT, UncleanText, make_converter
 from osimlite.io.document.names import as_parsed, as_written
 from osimlite.io.document.notes import Note, NoteKind
-from osimlite.io.document.xml_text import is_element, is_generated, xml_of
+from osimlite.io.document.xml_text import format_element, is_element, is_generated_comment
 from osimlite.schema.base import Object, Unknown
 from osimlite.schema.fields import Held, ObjectList
 from osimlite.schema.layout import Home, Include, Layout, Remark
 from osimlite.schema.model import Model
-from osimlite.schema.registry import by_tags, class_for
-from osimlite.schema.specs import FieldSpec, defaults, field_specs
+from osimlite.schema.registry import cache_by_tags, find_class
+from osimlite.schema.specs import FieldSpec, get_defaults, get_field_specs
 
 Read = TypeVar("Read", bound=Object)
 Included = Callable[[str, type[Object]], tuple[Object, Include, list[Note]] | str]
@@ -47,14 +47,14 @@ class Plan(NamedTuple):
 
 
 @cache
-def plan_for(cls: type[Object]) -> Plan:
+def get_reading_plan(cls: type[Object]) -> Plan:
     """The plan of a class, made once from its declaration."""
     steps: dict[Any, Step] = {}
     named: dict[str, FieldSpec] = {}
-    for tag, spec in field_specs(cls).items():
+    for tag, spec in get_field_specs(cls).items():
         tag = as_parsed(tag)
         if not isinstance(spec.kind, Held):
-            steps[tag] = Step(_TEXT, spec.name, converter(spec.kind), spec)
+            steps[tag] = Step(_TEXT, spec.name, make_converter(spec.kind), spec)
         elif spec.kind.form == "unnamed":
             steps[tag] = Step(_ONE, spec.name, str, spec)
         else:
@@ -67,7 +67,7 @@ def plan_for(cls: type[Object]) -> Plan:
 _Late = tuple[NoteKind, int, str, FieldSpec | None, Any]
 
 
-def _factory_of(spec: FieldSpec, values: Mapping[str, Any]) -> Any:
+def _find_factory(spec: FieldSpec, values: Mapping[str, Any]) -> Any:
     """The object of a property whose element holds none."""
     assert spec.factory is not None
     return spec.factory()
@@ -112,7 +112,9 @@ class ObjectReader:
         if block is not None:
             start = self.count
             self.count += 2 + sum(
-                size(node) for node in block.itersiblings(preceding=True) if is_element(node)
+                estimate_size(node)
+                for node in block.itersiblings(preceding=True)
+                if is_element(node)
             )
             result = self._block(block)
             self.count = start
@@ -120,7 +122,7 @@ class ObjectReader:
         if isinstance(top, Model):
             self.home.model = top
         if result:
-            layout_of(top).defaults = result
+            get_layout(top).defaults = result
         return top
 
     def object(
@@ -149,7 +151,7 @@ class ObjectReader:
         inherited = self._inherit(cls, values) if self.defaults else None
         built = cls.build(values, present, number, self.home)
         if inherited:
-            layout_of(built).inherited = inherited
+            get_layout(built).inherited = inherited
         return built if extra is None else self._finish(built, extra)
 
     def _children(
@@ -160,13 +162,13 @@ class ObjectReader:
         values: dict[str, Any],
     ) -> _Extra | None:
         """Read the children of an element into `values`, by field name; what they say beyond that is returned."""
-        steps, named = plan_for(cls)
+        steps, named = get_reading_plan(cls)
         extra: _Extra | None = None
         for child in element:
             step = steps.get(child.tag)
             if step is None:
                 if child is skip:
-                    self.count += size(child)
+                    self.count += estimate_size(child)
                 else:
                     extra = extra or _Extra()
                     self._indirect(child, named, values, extra)
@@ -193,14 +195,14 @@ class ObjectReader:
                 text = self._text_of(child, number, spec, extra)
             try:
                 values[field_name] = convert(text)
-            except Unclean as unclean:
+            except UncleanText as unclean:
                 extra = extra or _Extra()
                 values[field_name] = self._unclean(unclean, text, number, cls, spec, extra)
         return extra
 
     def _unclean(
         self,
-        unclean: Unclean,
+        unclean: UncleanText,
         text: str,
         number: int,
         cls: type[Object],
@@ -233,7 +235,7 @@ class ObjectReader:
             made = getattr(cls, "in_place_of_none", None)
             if made is None:
                 late.append(("empty", number, "", spec, None))
-            return (made or _factory_of)(spec, values), late
+            return (made or _find_factory)(spec, values), late
         # The object of a property is called as the property is, also in the long form.
         members[0].__dict__["name"] = spec.tag
         members[0].model_fields_set.add("name")
@@ -243,20 +245,20 @@ class ObjectReader:
         """Give an object what its element said beyond its properties."""
         extra.settle(None)
         if extra.before:
-            layout_of(built).before = extra.before
+            get_layout(built).before = extra.before
         if extra.raw:
-            layout_of(built).raw = extra.raw
+            get_layout(built).raw = extra.raw
         for kind, where, word, spec, value in extra.late:
             if kind in ("include", "unknown-attribute"):
-                layout_of(built).attributes[word] = value
+                get_layout(built).attributes[word] = value
             self.notes.append(Note(kind, where, word, built, spec, value))
         return built
 
     def _duplicate(self, element: etree._Element, spec: FieldSpec, extra: _Extra) -> None:
         """Keep a repeated property at the end, where OpenSim passes over it again."""
         extra.late.append(("duplicate-tag", self.count, spec.tag, spec, None))
-        extra.before.setdefault(None, []).append(Remark(xml_of(element), True))
-        self.count += size(element)
+        extra.before.setdefault(None, []).append(Remark(format_element(element), True))
+        self.count += estimate_size(element)
 
     def _owned(self, element: etree._Element, cls: Any, name: str | None = None) -> Object:
         """Read the object of a property, from another file if a ``file`` attribute says so."""
@@ -273,14 +275,14 @@ class ObjectReader:
                 for note in self.notes[known:]
             ]
             return empty
-        self.count += size(element)
+        self.count += estimate_size(element)
         item, include, notes = result
         for part in item.walk():
             object.__setattr__(part, "_index", number)
             object.__setattr__(part, "_model", self.home)
         if name:
             object.__setattr__(item, "__dict__", {**item.__dict__, "name": name})
-        layout_of(item).include = include
+        get_layout(item).include = include
         self.notes.append(Note("include", number, "file", item, None, str(file)))
         self.notes.extend(
             note._replace(number=number) for note in notes if note.kind != "include" or note.why
@@ -298,7 +300,7 @@ class ObjectReader:
         accepts = spec.accepts
         assert accepts is not None
         for child in wrapper:
-            cls = _accepted(child.tag, accepts)
+            cls = _find_accepted_class(child.tag, accepts)
             if cls is not None:
                 # OpenSim reads no other file for the members of a set.
                 member: Object = self.object(child, cls) if spec.legacy else self._owned(child, cls)
@@ -307,7 +309,7 @@ class ObjectReader:
                     member.tree()
             elif is_element(child):
                 tag = as_written(child.tag)
-                known = class_for(tag)
+                known = find_class(tag)
                 late.append(
                     (
                         "unknown-class" if known is None else "wrong-class",
@@ -319,14 +321,14 @@ class ObjectReader:
                 )
                 member = self._unknown(child)
             else:
-                remember(child, pending)
+                add_comment(child, pending)
                 continue
             if pending:
-                layout_of(member).comments.extend(remark.text for remark in pending)
+                get_layout(member).comments.extend(remark.text for remark in pending)
                 pending = []
             members.append(member)
         if pending and members:
-            layout_of(members[-1]).after.extend(pending)
+            get_layout(members[-1]).after.extend(pending)
         return ObjectList(members), late
 
     def _indirect(
@@ -338,22 +340,22 @@ class ObjectReader:
     ) -> None:
         """Read a child whose tag is no property: a comment, an object by its property's name, something unknown."""
         if not is_element(child):
-            remember(child, extra.pending)
+            add_comment(child, extra.pending)
             return
         tag = as_written(child.tag)
         name = child.get("name") or None
-        held = class_for(tag)
+        held = find_class(tag)
         spec = named.get(name) if name is not None else None
         if spec is None and name is None and held is not None:
             # OpenSim takes an acceptable object without a name for a property that has none yet.
             free = (
                 s
                 for s in named.values()
-                if s.name not in values and _accepted(child.tag, s.accepts)
+                if s.name not in values and _find_accepted_class(child.tag, s.accepts)
             )
             spec = next(free, None)
         if spec is not None and spec.name not in values:
-            accepted = _accepted(child.tag, spec.accepts)
+            accepted = _find_accepted_class(child.tag, spec.accepts)
             if accepted is not None:
                 extra.settle(spec.tag)
                 values[spec.name] = self._owned(child, accepted, spec.tag)
@@ -366,13 +368,13 @@ class ObjectReader:
             return
         else:
             extra.late.append(("unknown-tag", self.count, tag, None, held))
-        extra.pending.append(Remark(xml_of(child), True))
-        self.count += size(child)
+        extra.pending.append(Remark(format_element(child), True))
+        self.count += estimate_size(child)
 
     def _unknown(self, element: etree._Element) -> Unknown:
-        content = xml_of(element)
+        content = format_element(element)
         number = self.count
-        self.count += size(element)
+        self.count += estimate_size(element)
         name = element.get("name") or ""
         values = {"name": name, "class_name": as_written(element.tag), "content": content}
         return Unknown.build(values, {"name"} if name else set(), number, self.home)
@@ -382,7 +384,7 @@ class ObjectReader:
         inner = [node for node in element if is_element(node)]
         if inner:
             extra.late.append(("child-in-value", number, as_written(inner[0].tag), spec, None))
-            self.count += sum(size(node) for node in inner)
+            self.count += sum(estimate_size(node) for node in inner)
         elif (
             sum(
                 1
@@ -400,7 +402,7 @@ class ObjectReader:
         for child in block:
             if not is_element(child):
                 continue
-            cls = class_for(as_written(child.tag))
+            cls = find_class(as_written(child.tag))
             if cls is None:
                 result.append(self._unknown(child))
                 continue
@@ -412,7 +414,7 @@ class ObjectReader:
     def _default(self, cls: type[Object], name: str) -> Any:
         """The value of a text property that the file does not give."""
         block = self.defaults.get(cls)
-        return defaults(cls)[0][name] if block is None else getattr(block, name)
+        return get_defaults(cls)[0][name] if block is None else getattr(block, name)
 
     def _inherit(self, cls: type[Object], values: dict[str, Any]) -> frozenset[str]:
         """Take what the file does not give from the document's defaults; the names of the fields taken."""
@@ -425,21 +427,21 @@ class ObjectReader:
         return taken
 
 
-@by_tags
-def _accepted(tag: Any, accepts: type[Object] | None) -> type[Object] | None:
+@cache_by_tags
+def _find_accepted_class(tag: Any, accepts: type[Object] | None) -> type[Object] | None:
     """The class of a tag if it is one that a property for `accepts` may hold; a comment's tag is a function."""
-    cls = class_for(as_written(tag)) if isinstance(tag, str) else None
+    cls = find_class(as_written(tag)) if isinstance(tag, str) else None
     return cls if cls is not None and accepts is not None and issubclass(cls, accepts) else None
 
 
-def remember(node: etree._Element, remarks: list[Remark]) -> None:
+def add_comment(node: etree._Element, remarks: list[Remark]) -> None:
     """Add a comment to `remarks` unless OpenSim wrote it."""
     text = node.text or ""
-    if isinstance(node, etree._Comment) and not is_generated(text):
+    if isinstance(node, etree._Comment) and not is_generated_comment(text):
         remarks.append(Remark(text, False))
 
 
-def layout_of(item: Object) -> Layout:
+def get_layout(item: Object) -> Layout:
     """The layout of an object, made if it has none."""
     if item.layout is None:
         object.__setattr__(item, "_layout", Layout())
@@ -447,6 +449,6 @@ def layout_of(item: Object) -> Layout:
     return item.layout
 
 
-def size(element: etree._Element) -> int:
+def estimate_size(element: etree._Element) -> int:
     """Number of elements in a subtree, its root included."""
     return sum(1 for _ in element.iter(etree.Element))

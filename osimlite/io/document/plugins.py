@@ -14,11 +14,11 @@ from typing import Annotated, Any, ClassVar, cast
 from osimlite.base.files import get_file_stamp, read_file
 from osimlite.base.text import join_words, suggest_name, suggest_or_list
 from osimlite.errors import OsimliteError
-from osimlite.io.document.lexical import Unclean, converter
+from osimlite.io.document.lexical import UncleanText, make_converter
 from osimlite.schema.base import Component, Object, made, none
 from osimlite.schema.facts import Facts
 from osimlite.schema.fields import Held, Kind, Reference, Tag, Value
-from osimlite.schema.registry import MODULES, further_classes, let_count
+from osimlite.schema.registry import MODULES, get_plugin_classes, register_plugin_classes
 from osimlite.schema.resolution import RULES
 
 Paths = str | PathLike[str] | Iterable[str | PathLike[str]]
@@ -59,7 +59,7 @@ _ZEROS = {
 }
 
 
-def use(paths: Paths) -> None:
+def use_classes(paths: Paths) -> None:
     """Let the classes that files declare count from now on, and no others besides OpenSim's own.
 
     Raises:
@@ -67,18 +67,18 @@ def use(paths: Paths) -> None:
         MissingFileError: a file is not there.
     """
     names = [paths] if isinstance(paths, str | PathLike) else paths
-    let_count(classes_in(*names))
+    register_plugin_classes(classes_in(*names))
 
 
 @contextmanager
-def used(paths: Paths) -> Iterator[None]:
-    """Let the classes that files declare count for a while, and no others; raises as `use` does."""
-    before = further_classes()
-    use(paths)
+def classes_in_use(paths: Paths) -> Iterator[None]:
+    """Let the classes that files declare count for a while, and no others; raises as `use_classes` does."""
+    before = get_plugin_classes()
+    use_classes(paths)
     try:
         yield
     finally:
-        let_count(before)
+        register_plugin_classes(before)
 
 
 def classes_in(*paths: str | PathLike[str]) -> dict[str, type[Object]]:
@@ -89,12 +89,14 @@ def classes_in(*paths: str | PathLike[str]) -> dict[str, type[Object]]:
         MissingFileError: a file is not there.
     """
     return dict(
-        _declared(tuple((name, get_file_stamp(name)) for name in [fspath(path) for path in paths]))
+        _load_declarations(
+            tuple((name, get_file_stamp(name)) for name in [fspath(path) for path in paths])
+        )
     )
 
 
 @lru_cache(maxsize=16)
-def _declared(files: tuple[tuple[str, int | None], ...]) -> Mapping[str, type[Object]]:
+def _load_declarations(files: tuple[tuple[str, int | None], ...]) -> Mapping[str, type[Object]]:
     result: dict[str, type[Object]] = {}
     for path, _ in files:
         try:
@@ -218,7 +220,7 @@ class _Declarations:
             ):
                 # A class may give what it has from its base another default.
                 inside["__annotations__"][spec.name] = Annotated[Any, spec.kind, Tag(spec.tag)]
-                inside[spec.name] = self.default(name, row, spec.kind, _text(row["default"]))
+                inside[spec.name] = self.default(name, row, spec.kind, _expect_text(row["default"]))
         metaclass: Any = type(base)
         return cast(
             "type[Object]",
@@ -315,15 +317,19 @@ class _Declarations:
             held = held | None
             if default is None:
                 return held, kind, None
-        text = _ZEROS.get(typed, "") if default is None and shape == "single" else _text(default)
+        text = (
+            _ZEROS.get(typed, "")
+            if default is None and shape == "single"
+            else _expect_text(default)
+        )
         return held, kind, self.default(owner, row, kind, text)
 
     def default(self, owner: str, row: Any, kind: Kind, text: str) -> Any:
         """The value that the text of a default stands for."""
         name = row["name"]
         try:
-            return converter(kind)(text)
-        except Unclean:
+            return make_converter(kind)(text)
+        except UncleanText:
             words = kind.words() if isinstance(kind, Value) else "a text"
             raise self.error(
                 f"the default of '{name}' must be {words}, not '{text}'", owner, name, "default"
@@ -413,12 +419,12 @@ class _Declarations:
         return OsimliteError(message, file=self.path, line=self.text.count("\n", 0, place) + 1)
 
 
-def _text(value: Any) -> str:
+def _expect_text(value: Any) -> str:
     """A default as a document has it; in the file it may be written as JSON has it, too."""
     if isinstance(value, bool):
         return str(value).lower()
     return (
-        " ".join(map(_text, value))
+        " ".join(map(_expect_text, value))
         if isinstance(value, list)
         else ""
         if value is None

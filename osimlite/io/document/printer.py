@@ -11,15 +11,15 @@ from lxml import etree
 
 from osimlite.base.files import get_relative_path, write_atomically
 from osimlite.errors import NotWellFormedError
-from osimlite.io.document.lexical import formatter, split
-from osimlite.io.document.reader import document_of, parse, version_of
+from osimlite.io.document.lexical import make_formatter, split_words
+from osimlite.io.document.reader import parse_source, read_tree, read_version
 from osimlite.io.document.source import Source
-from osimlite.io.document.xml_text import escape, lines_of, quoted, relaid
+from osimlite.io.document.xml_text import escape_text, format_xml, list_lines, quote_attribute
 from osimlite.schema.base import Component, Object, Unknown
 from osimlite.schema.fields import Held, Reference, Value
 from osimlite.schema.layout import Include, Layout, Remark
 from osimlite.schema.model import CURRENT_VERSION, Model, expect_model
-from osimlite.schema.specs import FieldSpec, defaults, field_specs
+from osimlite.schema.specs import FieldSpec, get_defaults, get_field_specs
 
 Numbers = Literal["shortest", "opensim"]
 DECLARATION = '<?xml version="1.0" encoding="UTF-8" ?>'
@@ -36,7 +36,7 @@ def to_text(top: Object, *, numbers: Numbers = "shortest", comments: bool = True
     Raises:
         ModelError: a reference leads to a component outside the model.
     """
-    return _document(_Printer(top, numbers, comments))
+    return _format_document(_Printer(top, numbers, comments))
 
 
 def write(top: Object, path: str | Path, *, numbers: Numbers = "shortest") -> None:
@@ -45,10 +45,12 @@ def write(top: Object, path: str | Path, *, numbers: Numbers = "shortest") -> No
     What was read from a file of its own and is unchanged stays a reference to that file. Arguments
     and errors as `to_text`.
     """
-    write_atomically(path, _document(_Printer(top, numbers, True, Path(path).resolve().parent)))
+    write_atomically(
+        path, _format_document(_Printer(top, numbers, True, Path(path).resolve().parent))
+    )
 
 
-def _document(printer: _Printer) -> str:
+def _format_document(printer: _Printer) -> str:
     top = printer.top
     layout = top.layout or Layout()
     lines = printer.lines
@@ -88,12 +90,14 @@ class _Printer:
             self._unknown(item, depth)
         elif layout is not None and layout.include is not None and layout.include.held == item:
             self.lines.append(
-                f"{indent}<{item.tag} file={quoted(self._place_of(layout.include))} />"
+                f"{indent}<{item.tag} file={quote_attribute(self._place_of(layout.include))} />"
             )
         else:
-            head = f"{indent}<{item.tag}" + (f" name={quoted(name)}" if name else "")
+            head = f"{indent}<{item.tag}" + (f" name={quote_attribute(name)}" if name else "")
             if layout is not None:
-                head += "".join(f" {key}={quoted(text)}" for key, text in layout.attributes.items())
+                head += "".join(
+                    f" {key}={quote_attribute(text)}" for key, text in layout.attributes.items()
+                )
             self.lines.append(head + ">")
             if item is self.top and layout is not None and layout.defaults:
                 self._block(layout.defaults, depth + 1)
@@ -102,13 +106,13 @@ class _Printer:
             # What nobody has asked for is no part of the object yet, and need not become one to say
             # nothing.
             silent = (
-                defaults(type(item))[1].keys() - item.__dict__.keys() - present
+                get_defaults(type(item))[1].keys() - item.__dict__.keys() - present
                 if default is None
                 else set()
             )
             if silent:
-                silent &= _silent(type(item))
-            for spec in field_specs(type(item)).values():
+                silent &= _find_silent_properties(type(item))
+            for spec in get_field_specs(type(item)).values():
                 if layout is not None and layout.before and spec.tag in layout.before:
                     self._remarks(layout.before[spec.tag], depth + 1)
                 if spec.name in silent and (layout is None or spec.name not in layout.inherited):
@@ -145,7 +149,7 @@ class _Printer:
                 # Here OpenSim writes out all that a class has in its first property system.
                 item = copy(item)
                 item.model_fields_set.update(
-                    spec.name for spec in field_specs(type(item)).values() if spec.legacy
+                    spec.name for spec in get_field_specs(type(item)).values() if spec.legacy
                 )
             self.object(item, item.name, depth + 1)
         self.lines.append("\t" * depth + "</defaults>")
@@ -153,9 +157,11 @@ class _Printer:
 
     def _unknown(self, item: Unknown, depth: int) -> None:
         if item.content:
-            self.lines.extend(relaid(item.content, depth, comments=self.comments, name=item.name))
+            self.lines.extend(
+                format_xml(item.content, depth, comments=self.comments, name=item.name)
+            )
         else:
-            name = f" name={quoted(item.name)}" if item.name else ""
+            name = f" name={quote_attribute(item.name)}" if item.name else ""
             self.lines.append("\t" * depth + f"<{item.class_name}{name} />")
 
     def _place_of(self, include: Include) -> str:
@@ -178,7 +184,7 @@ class _Printer:
                 f"{indent}<{spec.tag} />" if short else f"{indent}<{spec.tag}>{text}</{spec.tag}>"
             )
         elif kind.form == "single" and not (
-            isinstance(value, Unknown) and value.class_name in field_specs(type(item))
+            isinstance(value, Unknown) and value.class_name in get_field_specs(type(item))
         ):
             self.object(value, spec.tag, depth)
         elif kind.form == "unnamed":
@@ -200,8 +206,8 @@ class _Printer:
         if layout is not None and spec.name in layout.raw:
             read_as, raw = layout.raw[spec.name]
             if read_as is value or read_as == value:
-                return escape(raw)
-        return escape(formatter(spec.kind, self.numbers)(value))
+                return escape_text(raw)
+        return escape_text(make_formatter(spec.kind, self.numbers)(value))
 
     def _named(self, item: Object, reference: Reference, value: Any) -> Any:
         if isinstance(value, Component):
@@ -219,7 +225,7 @@ class _Printer:
     def _remarks(self, remarks: list[Remark], depth: int) -> None:
         for remark in remarks:
             if remark.element:
-                self.lines.extend(relaid(remark.text, depth, comments=self.comments))
+                self.lines.extend(format_xml(remark.text, depth, comments=self.comments))
             else:
                 self.comment([remark.text], depth)
 
@@ -231,12 +237,12 @@ class _Printer:
 
 
 @cache
-def _silent(cls: type[Object]) -> frozenset[str]:
+def _find_silent_properties(cls: type[Object]) -> frozenset[str]:
     """The properties of a class whose objects and lists, as they are made for it, are not printed."""
-    made = defaults(cls)[1]
+    made = get_defaults(cls)[1]
     held = (
         spec
-        for spec in field_specs(cls).values()
+        for spec in get_field_specs(cls).values()
         if spec.name in made and isinstance(spec.kind, Held)
     )
     return frozenset(spec.name for spec in held if not has_content(made[spec.name](), spec))
@@ -258,7 +264,7 @@ def has_content(value: Any, spec: FieldSpec | None = None) -> bool:
     return any(has_content(held, inner) for inner, held in value.objects_held())
 
 
-def formatted(source: Source) -> str:
+def format_document(source: Source) -> str:
     """The text of a document in the layout in which it would be printed.
 
     A document of the current version is read and printed. One of another keeps its version and its
@@ -268,16 +274,18 @@ def formatted(source: Source) -> str:
         DocumentError: the text is not an OpenSim document; with line and column.
     """
     try:
-        root = parse(source)
+        root = parse_source(source)
     except NotWellFormedError as fault:
         from osimlite.io.document.repair import read_repaired
 
-        root, _ = read_repaired(source, fault, parse)
-    version = version_of(source, root)
+        root, _ = read_repaired(source, fault, parse_source)
+    version = read_version(source, root)
     if version == CURRENT_VERSION:
-        return to_text(document_of(source, root, version, Object).top)
+        return to_text(read_tree(source, root, version, Object).top)
     for element in root.iter(etree.Element):
         if not len(element):
-            element.text = " ".join(split(element.text or "")) or None
+            element.text = " ".join(split_words(element.text or "")) or None
     nodes = [*[*root.itersiblings(preceding=True)][::-1], root, *root.itersiblings()]
-    return "\n".join([DECLARATION, *(line for node in nodes for line in lines_of(node, 0))]) + "\n"
+    return (
+        "\n".join([DECLARATION, *(line for node in nodes for line in list_lines(node, 0))]) + "\n"
+    )

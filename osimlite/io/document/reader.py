@@ -23,17 +23,23 @@ from osimlite.errors import (
     SpecialFileError,
     VersionError,
 )
-from osimlite.io.document.names import as_written, without_namespaces
+from osimlite.io.document.names import as_written, replace_colons
 from osimlite.io.document.notes import Note
-from osimlite.io.document.objects import Included, ObjectReader, layout_of, remember, size
+from osimlite.io.document.objects import (
+    Included,
+    ObjectReader,
+    add_comment,
+    estimate_size,
+    get_layout,
+)
 from osimlite.io.document.source import Source
-from osimlite.io.document.syntax import expect_plain_doctype, place_of, plain_words
-from osimlite.io.document.xml_text import all_generated, is_element
+from osimlite.io.document.syntax import expect_plain_doctype, locate_error, rephrase_message
+from osimlite.io.document.xml_text import has_only_generated_comments, is_element
 from osimlite.schema.base import Object, put_index
 from osimlite.schema.layout import Include, Remark
 from osimlite.schema.model import CURRENT_VERSION, Model
-from osimlite.schema.registry import class_for, tags
-from osimlite.schema.specs import holding
+from osimlite.schema.registry import find_class, list_tags
+from osimlite.schema.specs import list_holding_properties
 
 if TYPE_CHECKING:
     from osimlite.io.document.plugins import Paths
@@ -112,9 +118,9 @@ def read(path: str | Path, *, classes: Paths = ()) -> Model:
     Raises: DocumentError: the file is missing or is not an OpenSim model document; with line and
         column. OsimliteError: a class is declared wrongly; with file and line.
     """
-    from osimlite.io.document.plugins import used
+    from osimlite.io.document.plugins import classes_in_use
 
-    with used(classes):
+    with classes_in_use(classes):
         return read_document(Source.of_file(path)).model
 
 
@@ -129,17 +135,17 @@ def read_any(path: str | Path, *, classes: Paths = ()) -> Object:
         DocumentError: the file is missing or is not an OpenSim document; with line and column.
         OsimliteError: a class is declared wrongly; with file and line.
     """
-    from osimlite.io.document.plugins import used
+    from osimlite.io.document.plugins import classes_in_use
 
-    with used(classes):
+    with classes_in_use(classes):
         return read_document(Source.of_file(path), of=Object).top
 
 
 def read_text(text: str | bytes, *, classes: Paths = ()) -> Model:
     """Read a model from the text of a document, with `classes` as for `read`; DocumentError if it is none."""
-    from osimlite.io.document.plugins import used
+    from osimlite.io.document.plugins import classes_in_use
 
-    with used(classes):
+    with classes_in_use(classes):
         return read_document(
             Source(text) if isinstance(text, bytes) else Source.of_characters(text)
         ).model
@@ -154,7 +160,7 @@ def read_document(source: Source, *, of: type[Object] = Model, to_check: bool = 
         and column.
     """
     try:
-        root = parse(source)
+        root = parse_source(source)
         if to_check:
             mixed = cast("list[etree._Element]", _MIXED(root))
             source.mixed = (
@@ -166,15 +172,15 @@ def read_document(source: Source, *, of: type[Object] = Model, to_check: bool = 
     except NotWellFormedError as fault:
         from osimlite.io.document.repair import read_repaired
 
-        root, notes = read_repaired(source, fault, parse)
-        document = document_of(source, root, version_of(source, root), of)
+        root, notes = read_repaired(source, fault, parse_source)
+        document = read_tree(source, root, read_version(source, root), of)
         document.notes[:0] = notes
         document.fault = fault
         return document
-    return document_of(source, root, version_of(source, root), of)
+    return read_tree(source, root, read_version(source, root), of)
 
 
-def document_of(
+def read_tree(
     source: Source, root: etree._Element, version: int, of: type[Object] = Model
 ) -> Document:
     """The document that an element tree stands for.
@@ -182,22 +188,24 @@ def document_of(
     Raises: DocumentError: there is no such object in it, or something that no rule carries over
         from an older version.
     """
-    with collector_paused():
+    with pause_collector():
         if version < CURRENT_VERSION:
             if root.tag != ROOT and has_newer_content(root, version):
                 # A model that OpenSim dumps has no <OpenSimDocument> around it, and no version.
-                wrapped = _upgraded(source, root, CURRENT_VERSION)
-                return _document(source, root, version, of, wrapped, is_known=True)
-            return _document(source, root, version, of, _upgraded(source, root, version))
+                wrapped = _upgrade_tree(source, root, CURRENT_VERSION)
+                return _build_document(source, root, version, of, wrapped, is_known=True)
+            return _build_document(source, root, version, of, _upgrade_tree(source, root, version))
         document = (
-            None if _class_of(_first(root)) is None else _document(source, root, version, of, None)
+            None
+            if _find_class(_find_first_element(root)) is None
+            else _build_document(source, root, version, of, None)
         )
         if document is None or any(note.kind in _NOT_KNOWN for note in document.notes):
             from osimlite.io.document.upgrade import rename_old_classes
 
             upgraded = rename_old_classes(root)
             if document is None or upgraded is not None:
-                document = _document(source, root, version, of, upgraded)
+                document = _build_document(source, root, version, of, upgraded)
     return document
 
 
@@ -218,10 +226,10 @@ def require_stated_version(source: Source) -> None:
     from osimlite.io.document.upgrade.newer import find_newer_content
 
     try:
-        root = parse(source)
+        root = parse_source(source)
     except NotWellFormedError:
         return
-    version = version_of(source, root)
+    version = read_version(source, root)
     newer = (
         None
         if root.tag != ROOT or version >= CURRENT_VERSION
@@ -235,10 +243,10 @@ def require_stated_version(source: Source) -> None:
         f"<{newer.parent}>, which came with version {newer.since}: one of them is wrong; write "
         f'Version="{CURRENT_VERSION}" if the model is in the current format'
     )
-    raise _unreadable(source, version, message, number)
+    raise _make_version_error(source, version, message, number)
 
 
-def _document(
+def _build_document(
     source: Source,
     root: etree._Element,
     version: int,
@@ -246,9 +254,9 @@ def _document(
     upgraded: UpgradeResult | None,
     is_known: bool = False,
 ) -> Document:
-    reader = ObjectReader(_included_by(source))
-    top = _top_in(source, root if upgraded is None else upgraded.root, reader, of)
-    layout_of(top).version, layout_of(top).file = version, source.file
+    reader = ObjectReader(_make_include_reader(source))
+    top = _read_top(source, root if upgraded is None else upgraded.root, reader, of)
+    get_layout(top).version, get_layout(top).file = version, source.file
     notes = reader.notes
     if upgraded is not None:
         notes = _renumber(source, top, notes, upgraded)
@@ -257,14 +265,14 @@ def _document(
     return Document(top, source, version, notes, upgraded)
 
 
-def _upgraded(source: Source, root: etree._Element, version: int) -> UpgradeResult:
+def _upgrade_tree(source: Source, root: etree._Element, version: int) -> UpgradeResult:
     """The tree in the current format; VersionError if something cannot be carried over."""
     from osimlite.io.document.upgrade import UpgradeError, upgrade
 
     try:
         return upgrade(root, version)
     except UpgradeError as error:
-        raise _unreadable(source, version, error.message, error.number) from None
+        raise _make_version_error(source, version, error.message, error.number) from None
 
 
 def _renumber(
@@ -276,11 +284,11 @@ def _renumber(
     if numbers is None:
         return notes
     # What no one has asked for yet has no place; to ask for it here would make it.
-    items: list[Object] = [top, *layout_of(top).defaults]
+    items: list[Object] = [top, *get_layout(top).defaults]
     for item in items:
         if item._index is not None:
             put_index(item, numbers[item._index])
-        for _, name, *_ in holding(type(item)):
+        for _, name, *_ in list_holding_properties(type(item)):
             held = item.__dict__.get(name)
             items += held if isinstance(held, list) else [] if held is None else [held]
     return [note._replace(number=numbers[note.number]) for note in notes]
@@ -296,17 +304,19 @@ def _refuse_leftovers(source: Source, version: int, notes: list[Note]) -> None:
         f"document version {version} is older than {OLDEST_KNOWN}, and no rule says what becomes of {tags}: that would "
         "be lost; take it out, or open and save the model with OpenSim 2"
     )
-    raise _unreadable(source, version, message, left[0].number)
+    raise _make_version_error(source, version, message, left[0].number)
 
 
-def _unreadable(source: Source, version: int, message: str, number: int = 0) -> VersionError:
+def _make_version_error(
+    source: Source, version: int, message: str, number: int = 0
+) -> VersionError:
     """The error that an element of a document of a version cannot be read."""
     fault = source.fault(VersionError, message, source.of_tag(number))
     fault.version = version
     return fault
 
 
-def parse(source: Source, *, recover: bool = False) -> etree._Element:
+def parse_source(source: Source, *, recover: bool = False) -> etree._Element:
     """The element tree of a text, without namespaces: see :mod:`osimlite.io.document.names`.
 
     With `recover` the parser goes on after what is not well-formed; the tree is then a guess.
@@ -315,7 +325,7 @@ def parse(source: Source, *, recover: bool = False) -> etree._Element:
         NotWellFormedError: the text is not well-formed (without `recover`), or declares entities.
     """
     data = source.data if source.encoding in ("utf-8", "utf-8-sig") else source.text.encode()
-    data = without_namespaces(data)
+    data = replace_colons(data)
     # OpenSim accepts blank lines before the XML declaration, with or without a byte-order mark
     # before them.
     unmarked = data.removeprefix(BOM_UTF8)
@@ -323,7 +333,7 @@ def parse(source: Source, *, recover: bool = False) -> etree._Element:
     if body.startswith(BOM_UTF8):
         body = data
     blank = data[: len(data) - len(body)].count(b"\n")
-    plain = all_generated(data)
+    plain = has_only_generated_comments(data)
     parser = etree.XMLParser(
         encoding="utf-8",
         resolve_entities=False,
@@ -341,7 +351,7 @@ def parse(source: Source, *, recover: bool = False) -> etree._Element:
                 "the file is empty", file=source.file, line=1, column=1
             ) from None
         message = str(error.msg or "the text is not XML")
-        raise _not_well_formed(
+        raise _make_syntax_error(
             source, error.position[0] + blank, error.position[1], message
         ) from None
     if root is None:
@@ -353,17 +363,17 @@ def parse(source: Source, *, recover: bool = False) -> etree._Element:
         for remark in parser.error_log.filter_types(etree.ErrorTypes.WAR_UNDECLARED_ENTITY):
             # With a DOCTYPE the parser takes it that the entity is declared elsewhere, and leaves
             # it out.
-            raise _not_well_formed(source, remark.line + blank, remark.column, remark.message)
+            raise _make_syntax_error(source, remark.line + blank, remark.column, remark.message)
     if not recover:
         source.elements = int(cast("float", _COUNT(root)))
         source.remarks = not plain
     return root
 
 
-def _not_well_formed(source: Source, line: int, column: int, message: str) -> NotWellFormedError:
+def _make_syntax_error(source: Source, line: int, column: int, message: str) -> NotWellFormedError:
     """The error for what the parser says of a place in the text that it was given."""
-    line, column, _ = place_of(source, line, column, message)
-    words = plain_words(message) if "<" in source.text else "there is no element in it"
+    line, column, _ = locate_error(source, line, column, message)
+    words = rephrase_message(message) if "<" in source.text else "there is no element in it"
     if source.file is not None and source.file.lower().endswith(TABLE_SUFFIXES):
         words += "; of tables, 'validate', 'info' and 'diff' know more"
     return NotWellFormedError(
@@ -371,7 +381,7 @@ def _not_well_formed(source: Source, line: int, column: int, message: str) -> No
     )
 
 
-def version_of(source: Source, root: etree._Element) -> int:
+def read_version(source: Source, root: etree._Element) -> int:
     """The version of the document.
 
     Raises:
@@ -387,14 +397,14 @@ def version_of(source: Source, root: etree._Element) -> int:
     if text is None and root.tag != ROOT:
         from osimlite.io.document.upgrade.class_names import RENAMED
 
-        if _class_of(root) is not None or root.tag in RENAMED:
+        if _find_class(root) is not None or root.tag in RENAMED:
             return OLDEST
     # Places cost a pass over the text, so they are computed for errors only.
     place = source.of_tag(0)
     if root.tag != ROOT:
         tag = as_written(root.tag)
         message = f"the root element is <{tag}>, not <OpenSimDocument>: this is no OpenSim document"
-        raise _meaning(source.fault(DocumentError, message, place), _root_meant(tag, root))
+        raise _with_suggestion(source.fault(DocumentError, message, place), _guess_root(tag, root))
     if number is None:
         result = (
             "has no Version"
@@ -408,10 +418,10 @@ def version_of(source: Source, root: etree._Element) -> int:
         f"document version {number} is none that OpenSim ever wrote (they begin at {OLDEST}); "
         f'write Version="{CURRENT_VERSION}" if the model is in the current format'
     )
-    raise _unreadable(source, number, message)
+    raise _make_version_error(source, number, message)
 
 
-def _meaning(fault: DocumentError, meant: str | None) -> DocumentError:
+def _with_suggestion(fault: DocumentError, meant: str | None) -> DocumentError:
     """A fault with the tag that was meant, if that is known."""
     if meant is not None:
         fault.meant = meant
@@ -419,31 +429,36 @@ def _meaning(fault: DocumentError, meant: str | None) -> DocumentError:
     return fault
 
 
-def _root_meant(tag: str, root: etree._Element) -> str | None:
+def _guess_root(tag: str, root: etree._Element) -> str | None:
     """What a root should be called: as that of a document, or as the class of a setup of old releases."""
     name = tag.rpartition(":")[2]
-    first = _first(root)
-    held = first is not None and find_nearest(as_written(first.tag), tags(), cutoff=85) is not None
+    first = _find_first_element(root)
+    held = (
+        first is not None
+        and find_nearest(as_written(first.tag), list_tags(), cutoff=85) is not None
+    )
     return (
         ROOT
         if held or find_nearest(name, [ROOT], cutoff=85) is not None
-        else find_nearest(name, tags(), cutoff=85)
+        else find_nearest(name, list_tags(), cutoff=85)
     )
 
 
-def _first(root: etree._Element) -> etree._Element | None:
+def _find_first_element(root: etree._Element) -> etree._Element | None:
     """The element of the one object of a document."""
     return next((child for child in root if is_element(child)), None)
 
 
-def _class_of(element: etree._Element | None) -> type[Object] | None:
-    return None if element is None else class_for(as_written(element.tag))
+def _find_class(element: etree._Element | None) -> type[Object] | None:
+    return None if element is None else find_class(as_written(element.tag))
 
 
-def _top_in(source: Source, root: etree._Element, reader: ObjectReader, of: type[Object]) -> Object:
+def _read_top(
+    source: Source, root: etree._Element, reader: ObjectReader, of: type[Object]
+) -> Object:
     """Read the one object of a document, with the comments around it."""
-    first = _first(root)
-    cls = _class_of(first)
+    first = _find_first_element(root)
+    cls = _find_class(first)
     if first is None or cls is None or not issubclass(cls, of):
         tag = ""
         if first is None:
@@ -458,14 +473,14 @@ def _top_in(source: Source, root: etree._Element, reader: ObjectReader, of: type
         meant = (
             None
             if first is None or cls is not None
-            else find_nearest(tag, tags() if of is Object else [of.tag])
+            else find_nearest(tag, list_tags() if of is Object else [of.tag])
         )
-        raise _meaning(source.fault(DocumentError, f"the document holds {what}", at), meant)
+        raise _with_suggestion(source.fault(DocumentError, f"the document holds {what}", at), meant)
     reader.count = 1
     top = reader.top(first, cls)
     for second in first.itersiblings(etree.Element):
         reader.notes.append(Note("second-object", reader.count, as_written(second.tag)))
-        reader.count += size(second)
+        reader.count += estimate_size(second)
     for place, nodes in (
         ("comments", [*first.itersiblings(preceding=True)][::-1]),
         ("after", first.itersiblings()),
@@ -474,15 +489,15 @@ def _top_in(source: Source, root: etree._Element, reader: ObjectReader, of: type
     ):
         remarks: list[Remark] = []
         for node in nodes:
-            remember(node, remarks)
+            add_comment(node, remarks)
         if remarks:
-            getattr(layout_of(top), place).extend(
+            getattr(get_layout(top), place).extend(
                 remarks if place == "after" else [remark.text for remark in remarks]
             )
     return top
 
 
-def _included_by(
+def _make_include_reader(
     source: Source, around: tuple[str, ...] = (), read: list[int] | None = None
 ) -> Included | None:
     """What reads the objects that ``file`` attributes of a text name, from files beside it.
@@ -508,14 +523,14 @@ def _included_by(
             inner = Source.of_file(place)
             total[0] += max(_LEAST_COUNTED, len(inner.data))
             expect_size(total[0], place)
-            root = parse(inner)
-            version = version_of(inner, root)
+            root = parse_source(inner)
+            version = read_version(inner, root)
             if version < CURRENT_VERSION:
-                root = _upgraded(inner, root, version).root
+                root = _upgrade_tree(inner, root, version).root
             top = next((child for child in root if is_element(child)), None)
             if top is None or top.tag != cls.tag:
                 return "holds none"
-            reader = ObjectReader(_included_by(inner, (*around, path), total))
+            reader = ObjectReader(_make_include_reader(inner, (*around, path), total))
             reader.count = 1
             item = reader.top(top, cls)
         except SpecialFileError as fault:
@@ -532,7 +547,7 @@ def _included_by(
 
 
 @contextmanager
-def collector_paused() -> Iterator[None]:
+def pause_collector() -> Iterator[None]:
     """Thousands of objects are made and none dropped: the garbage collector would look at them in vain."""
     enabled = gc.isenabled()
     gc.disable()

@@ -18,7 +18,7 @@ from osimlite.errors import NotWellFormedError
 from osimlite.io.document.names import ATTRIBUTE, as_written
 from osimlite.io.document.notes import Note, NoteKind
 from osimlite.io.document.source import Source
-from osimlite.io.document.spans import markup
+from osimlite.io.document.spans import find_markup
 from osimlite.io.document.syntax import expect_plain_doctype
 
 _MARK = re.compile(r"^(?:<{7}|>{7})(?=[ \r]|$).*", re.MULTILINE)
@@ -72,12 +72,12 @@ def read_repaired(
         raise source.fault(
             NotWellFormedError, f"an unfinished merge: {said}", source.position(mark.start())
         )
-    unended = _unended(source.text)
+    unended = _find_unended(source.text)
     if unended is not None:
         message = "not well-formed XML: what begins here with '<!' has no end"
         raise source.fault(NotWellFormedError, message, source.position(unended))
     expect_plain_doctype(source)
-    text, repairs = repaired(source.text)
+    text, repairs = repair_text(source.text)
     if not repairs or not source.spans:
         raise fault
     root = parse(Source(text.encode("utf-8", "replace"), source.file))
@@ -90,14 +90,14 @@ def read_repaired(
     notes = []
     repairs.sort(key=lambda repair: repair.offset)
     for repair, number in zip(
-        repairs, elements_at(source, [repair.offset for repair in repairs]), strict=True
+        repairs, find_elements_at(source, [repair.offset for repair in repairs]), strict=True
     ):
         line = source.position(repair.offset).line
         notes.append(Note(repair.kind, number, repair.word, value=repair.meant, line=line))
     return root, notes
 
 
-def elements_at(source: Source, offsets: Sequence[int]) -> Iterator[int]:
+def find_elements_at(source: Source, offsets: Sequence[int]) -> Iterator[int]:
     """Yield the number of the innermost element around each of some characters; 0, the root, outside all.
 
     Args:
@@ -117,7 +117,7 @@ def elements_at(source: Source, offsets: Sequence[int]) -> Iterator[int]:
         yield around[-1] if around else 0
 
 
-def repaired(text: str) -> tuple[str, list[Repair]]:
+def repair_text(text: str) -> tuple[str, list[Repair]]:
     """The text with everything mended whose meaning is certain, and what was mended."""
     repairs: list[Repair] = []
     for match in _BLANK_CONTROLS.finditer(text):
@@ -129,59 +129,63 @@ def repaired(text: str) -> tuple[str, list[Repair]]:
     unended = _OPEN_DECLARATION.match(text)
     if unended is not None:
         repairs.append(Repair("overlooked", unended.start(1), unended[1], "OpenSim passes over it"))
-        text = _blanked(unended[0]) + text[unended.end() :]
+        text = _replace_by_blanks(unended[0]) + text[unended.end() :]
     pieces: list[str] = []
     place = depth = 0
-    for kind, start, end, _ in markup(text, as_opensim=True):
+    for kind, start, end, _ in find_markup(text, as_opensim=True):
         gap, piece = text[place:start], text[start:end]
         pieces.append(
-            _outside(gap, place, repairs) if not depth else _ampersands(gap, place, repairs)
+            _repair_outside(gap, place, repairs)
+            if not depth
+            else _escape_ampersands(gap, place, repairs)
         )
         if kind == "comment":
-            piece = _comment(piece, start, repairs)
+            piece = _repair_comment(piece, start, repairs)
         elif kind == "instruction":
             if _DECLARATION.match(piece) and place > 0:
                 repairs.append(Repair("late-declaration", start, piece, ""))
-                piece = _blanked(piece)
+                piece = _replace_by_blanks(piece)
             elif _is_no_instruction(piece):
                 repairs.append(Repair("overlooked", start, piece, "OpenSim passes over it"))
-                piece = _blanked(piece)
+                piece = _replace_by_blanks(piece)
         elif kind in ("open", "empty"):
             depth += kind == "open"
-            piece = _quoted(
-                _ampersands(_attributes(piece, start, repairs), start, repairs), start, repairs
+            piece = _quote_attributes(
+                _escape_ampersands(_repair_attributes(piece, start, repairs), start, repairs),
+                start,
+                repairs,
             )
         elif kind == "close":
             if not depth:
                 repairs.append(Repair("overlooked", start, piece, "OpenSim passes over it"))
-                piece = _blanked(piece)
+                piece = _replace_by_blanks(piece)
             depth = max(0, depth - 1)
         pieces.append(piece)
         place = end
-    pieces.append(_outside(text[place:], place, repairs) if not depth else text[place:])
+    pieces.append(_repair_outside(text[place:], place, repairs) if not depth else text[place:])
     return "".join(pieces), repairs
 
 
-def _unended(text: str) -> int | None:
+def _find_unended(text: str) -> int | None:
     """Where a comment or its like begins that never ends."""
     place = 0
-    for _, _, end, _ in markup(text, as_opensim=True):
+    for _, _, end, _ in find_markup(text, as_opensim=True):
         place = end
     result = _SPECIAL.search(text, place)
     return None if result is None else result.start()
 
 
-def _blanked(text: str) -> str:
+def _replace_by_blanks(text: str) -> str:
     """As many spaces, the line ends kept."""
     return re.sub(r"[^\r\n]", " ", text)
 
 
-def _outside(text: str, offset: int, repairs: list[Repair]) -> str:
+def _repair_outside(text: str, offset: int, repairs: list[Repair]) -> str:
     """Text before or after the root: it belongs to nothing."""
     before, nul, _ = text.partition("\0")
     if offset and nul and not before.strip():
         repairs.append(Repair("overlooked", offset + len(before), nul, "OpenSim reads no further"))
-        return _blanked(text)
+        return _replace_by_blanks(text)
     stripped = text.strip("\ufeff \t\r\n")
     if offset and stripped.startswith("<?") and ">" not in stripped:
         repairs.append(
@@ -196,10 +200,10 @@ def _outside(text: str, offset: int, repairs: list[Repair]) -> str:
         repairs.append(Repair("byte-order-mark", offset + text.index("\ufeff"), "\ufeff", ""))
     else:
         return text
-    return _blanked(text)
+    return _replace_by_blanks(text)
 
 
-def _comment(piece: str, offset: int, repairs: list[Repair]) -> str:
+def _repair_comment(piece: str, offset: int, repairs: list[Repair]) -> str:
     """A comment may not have two hyphens in a row, nor end with one: dashes look the same."""
     inner = piece[4:-3]
     result = _HYPHENS.search(inner)
@@ -213,7 +217,7 @@ def _comment(piece: str, offset: int, repairs: list[Repair]) -> str:
     return f"<!--{_HYPHENS.sub(lambda match: _EN_DASH * len(match[0]), inner)}-->"
 
 
-def _attributes(piece: str, offset: int, repairs: list[Repair]) -> str:
+def _repair_attributes(piece: str, offset: int, repairs: list[Repair]) -> str:
     """Of an attribute that stands twice the last one counts, as for OpenSim."""
     given = list(ATTRIBUTE.finditer(piece))
     last = {match["name"]: match for match in given}
@@ -223,7 +227,7 @@ def _attributes(piece: str, offset: int, repairs: list[Repair]) -> str:
             repairs.append(
                 Repair("duplicate-attribute", offset + match.start(), match["name"], kept[0])
             )
-            piece = piece[: match.start()] + _blanked(match[0]) + piece[match.end() :]
+            piece = piece[: match.start()] + _replace_by_blanks(match[0]) + piece[match.end() :]
     return piece
 
 
@@ -236,7 +240,7 @@ def _is_no_instruction(piece: str) -> bool:
     return _NAMED.match(piece) is None or _XML_IN_CAPITALS.match(piece) is not None
 
 
-def _quoted(piece: str, offset: int, repairs: list[Repair]) -> str:
+def _quote_attributes(piece: str, offset: int, repairs: list[Repair]) -> str:
     """A start tag in which every value of an attribute stands in quotes and a blank before every name."""
 
     def quote(match: re.Match[str]) -> str:
@@ -259,7 +263,7 @@ def _quoted(piece: str, offset: int, repairs: list[Repair]) -> str:
     return _VALUE.sub(quote, _TOUCHING.sub(part, piece)) if "=" in piece else piece
 
 
-def _ampersands(text: str, offset: int, repairs: list[Repair]) -> str:
+def _escape_ampersands(text: str, offset: int, repairs: list[Repair]) -> str:
     """Text in which an ampersand that begins no reference stands for itself, as does what would end a CDATA section.
 
     HTML's references mean what they mean in HTML; of a number that is no character OpenSim keeps a

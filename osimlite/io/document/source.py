@@ -14,7 +14,7 @@ from typing import NamedTuple, TypeVar
 from osimlite.base.files import read_file
 from osimlite.errors import OsimliteError
 from osimlite.io.document.names import ATTRIBUTE
-from osimlite.io.document.spans import PlainSpans, Span, spans_of
+from osimlite.io.document.spans import PlainSpans, Span, find_spans
 
 Fault = TypeVar("Fault", bound=OsimliteError)
 
@@ -60,12 +60,12 @@ class Source:
     @cached_property
     def encoding(self) -> str:
         """The encoding of the bytes."""
-        return _encoding(self.data)
+        return _detect_encoding(self.data)
 
     @cached_property
     def text(self) -> str:
         """The characters."""
-        return _decoded(self.data, self.encoding)
+        return _decode_text(self.data, self.encoding)
 
     @classmethod
     def of_file(cls, path: str | Path) -> Source:
@@ -109,7 +109,7 @@ class Source:
             plain = PlainSpans(self.text, self.elements)
             if len(plain) == self.elements:
                 return plain
-        return spans_of(self.text, as_opensim=True)
+        return find_spans(self.text, as_opensim=True)
 
     @property
     def well_formed(self) -> bool:
@@ -240,7 +240,7 @@ _BYTEWISE = re.compile(
 )
 
 
-def _encoding(data: bytes) -> str:
+def _detect_encoding(data: bytes) -> str:
     """The encoding of the bytes: what the mark or the declaration says, UTF-8, or cp1252 where that fails."""
     name = next((name for mark, name in _MARKS.items() if data.startswith(mark)), None)
     if name is not None and name != "utf-8-sig":
@@ -257,17 +257,17 @@ def _encoding(data: bytes) -> str:
     return name or "utf-8"
 
 
-def _decoded(data: bytes, encoding: str) -> str:
+def _decode_text(data: bytes, encoding: str) -> str:
     """The text: cp1252 byte by byte where the rest is UTF-8, and a replacement character for half a character."""
     if encoding != "cp1252":
         return data.decode(encoding, "replace")
-    codecs.register_error("osimlite.cp1252", _as_windows)
+    codecs.register_error("osimlite.cp1252", _decode_windows)
     return data.decode(
         "utf-8-sig" if data.startswith(codecs.BOM_UTF8) else "utf-8", "osimlite.cp1252"
     )
 
 
-def _as_windows(error: UnicodeError) -> tuple[str, int]:
+def _decode_windows(error: UnicodeError) -> tuple[str, int]:
     assert isinstance(error, UnicodeDecodeError)
     byte = error.object[error.start : error.start + 1]
     try:

@@ -54,7 +54,7 @@ _INSTRUCTION_END = {False: "?>", True: ">"}
 """What ends an instruction, by whether the text is read as OpenSim reads it."""
 
 
-def markup(text: str, *, as_opensim: bool = False) -> Iterator[Markup]:
+def find_markup(text: str, *, as_opensim: bool = False) -> Iterator[Markup]:
     """Yield the markup of a text in order; it ends where a comment or its like has no end.
 
     Args: text: the text. as_opensim: whether an instruction ends at its first ``>``, as it does for
@@ -82,7 +82,7 @@ def markup(text: str, *, as_opensim: bool = False) -> Iterator[Markup]:
 _REMARK = re.compile(r"<(?P<special>!--|!\[CDATA\[|\?|!DOCTYPE)")
 
 
-def blank_remarks(text: str, character: str = " ") -> str:
+def blank_comments(text: str, character: str = " ") -> str:
     """Return a text in which each comment, CDATA section, instruction and DOCTYPE is one character as often.
 
     One that has no end stays as it is. An ending that was not found once is not looked for again,
@@ -108,8 +108,8 @@ def blank_remarks(text: str, character: str = " ") -> str:
     return "".join(pieces)
 
 
-def spans_of(text: str, *, as_opensim: bool = False) -> list[Span]:
-    """Every element of a text in document order, found by the rules of :func:`markup`.
+def find_spans(text: str, *, as_opensim: bool = False) -> list[Span]:
+    """Every element of a text in document order, found by the rules of :func:`find_markup`.
 
     An element that nothing ends is taken to be empty; an end that nothing began is passed over.
 

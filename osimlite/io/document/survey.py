@@ -12,10 +12,10 @@ from osimlite.io.document.names import as_written
 from osimlite.io.document.reader import (
     ROOT,
     Document,
-    document_of,
-    parse,
+    parse_source,
     read_document,
-    version_of,
+    read_tree,
+    read_version,
 )
 from osimlite.io.document.source import Source
 from osimlite.schema.base import Object
@@ -36,7 +36,7 @@ class Survey:
     sure_until: int | None = None
 
 
-def survey(source: Source, *, of: type[Object] = Model) -> Survey:
+def survey_source(source: Source, *, of: type[Object] = Model) -> Survey:
     """Read as much of `source` as can be read; raises nothing for what is wrong with the text.
 
     The object at the top is of a class or derived from it.
@@ -44,56 +44,56 @@ def survey(source: Source, *, of: type[Object] = Model) -> Survey:
     try:
         return Survey(source, read_document(source, of=of, to_check=True))
     except NotWellFormedError as fault:
-        return _recovered(source, fault, of)
+        return _survey_damaged(source, fault, of)
     except VersionError as fault:
         # Without a version the document is taken for a current one; an older format would give
         # false findings.
         if fault.version is not None:
             return Survey(source, None, [fault])
         try:
-            return _assembled(Survey(source, None, [fault]), parse(source), of)
+            return _add_document(Survey(source, None, [fault]), parse_source(source), of)
         except NotWellFormedError:
             return Survey(source, None, [fault])
     except DocumentError as fault:
         result = Survey(source, None, [fault])
         if fault.meant != ROOT:
             return result
-        root = parse(source)
+        root = parse_source(source)
         root.tag = ROOT
-        return _assembled(result, root, of)
+        return _add_document(result, root, of)
 
 
-def _recovered(source: Source, fault: NotWellFormedError, of: type[Object]) -> Survey:
+def _survey_damaged(source: Source, fault: NotWellFormedError, of: type[Object]) -> Survey:
     result = Survey(source, None, [fault], fault.line)
     unclosed = re.search(r"of line (\d+) is not closed", fault.message)
     if unclosed:
         result.sure_until = int(unclosed[1])
     try:
         # What the parser takes for a character in spite of all may be none that lxml can give back.
-        from osimlite.io.document.repair import repaired
+        from osimlite.io.document.repair import repair_text
 
-        mended, _ = repaired(source.text)
-        root = parse(Source(mended.encode("utf-8", "replace"), source.file), recover=True)
+        mended, _ = repair_text(source.text)
+        root = parse_source(Source(mended.encode("utf-8", "replace"), source.file), recover=True)
     except NotWellFormedError:
         return result
-    if root.tag != ROOT or not _same_elements(source, root, result.sure_until):
+    if root.tag != ROOT or not _has_same_elements(source, root, result.sure_until):
         return result
-    return _assembled(result, root, of)
+    return _add_document(result, root, of)
 
 
-def _assembled(found: Survey, root: etree._Element, of: type[Object]) -> Survey:
+def _add_document(found: Survey, root: etree._Element, of: type[Object]) -> Survey:
     try:
-        version = version_of(found.source, root)
+        version = read_version(found.source, root)
     except DocumentError:
         version = CURRENT_VERSION
     try:
-        found.document = document_of(found.source, root, version, of)
+        found.document = read_tree(found.source, root, version, of)
     except DocumentError as fault:
         found.faults.append(fault)
     return found
 
 
-def _same_elements(source: Source, root: etree._Element, sure_until: int | None) -> bool:
+def _has_same_elements(source: Source, root: etree._Element, sure_until: int | None) -> bool:
     """Whether the recovered tree numbers its elements as the text does, as far as that matters."""
     numbered = zip(source.spans, root.iter(etree.Element), strict=False)
     for number, (span, element) in enumerate(numbered):

@@ -7,7 +7,7 @@ import re
 from osimlite.errors import NotWellFormedError
 from osimlite.io.document.names import as_written
 from osimlite.io.document.source import Position, Source
-from osimlite.io.document.spans import markup
+from osimlite.io.document.spans import find_markup
 
 _PLAIN = (
     (
@@ -54,13 +54,15 @@ def expect_plain_doctype(source: Source) -> None:
     Raises:
         NotWellFormedError: there is one; with its place.
     """
-    start = next((piece.start for piece in markup(source.text) if piece.kind == "doctype"), None)
+    start = next(
+        (piece.start for piece in find_markup(source.text) if piece.kind == "doctype"), None
+    )
     if start is not None and _PLAIN_DOCTYPE.match(source.text, start) is None:
         message = "OpenSim takes the first '>' in a DOCTYPE for its end and cannot load the file; remove the DOCTYPE"
         raise source.fault(NotWellFormedError, message, source.position(start))
 
 
-def plain_words(message: str) -> str:
+def rephrase_message(message: str) -> str:
     """The parser's message without its place, and readable."""
     message = " ".join(as_written(re.sub(r", line \d+, column \d+$", "", message)).split())
     for pattern, words in _PLAIN:
@@ -70,7 +72,7 @@ def plain_words(message: str) -> str:
     return message
 
 
-def place_of(source: Source, line: int, column: int, message: str) -> Position:
+def locate_error(source: Source, line: int, column: int, message: str) -> Position:
     """Where in the text the parser gave up, when it says `line` and `column` of what it was given.
 
     After a wrong closing tag it stands behind it.

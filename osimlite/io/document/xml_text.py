@@ -14,7 +14,7 @@ from pathlib import Path
 from lxml import etree
 
 from osimlite.errors import ModelError
-from osimlite.io.document.names import as_written, without_namespaces
+from osimlite.io.document.names import as_written, replace_colons
 
 DIGEST_SIZE = 6
 
@@ -22,17 +22,19 @@ _COMMENT = re.compile(rb"<!--([^-]*+(?:-[^-]++)*+)-->")
 
 
 @lru_cache(maxsize=4096)
-def is_generated(text: str) -> bool:
+def is_generated_comment(text: str) -> bool:
     """Whether a comment is one that some version of OpenSim prints by itself."""
-    return digest(text) in _known()
+    return compute_digest(text) in _load_digests()
 
 
-def all_generated(data: bytes) -> bool:
+def has_only_generated_comments(data: bytes) -> bool:
     """Whether a UTF-8 text has no comment but OpenSim's own; half of the nodes of such a text are comments."""
-    return all(is_generated(text.decode(errors="replace")) for text in set(_COMMENT.findall(data)))
+    return all(
+        is_generated_comment(text.decode(errors="replace")) for text in set(_COMMENT.findall(data))
+    )
 
 
-def digest(text: str) -> bytes:
+def compute_digest(text: str) -> bytes:
     """Digest of a comment, white space and digits aside."""
     # The library behind it takes longer to load than most files do to read, and many have no
     # comments.
@@ -43,7 +45,7 @@ def digest(text: str) -> bytes:
 
 
 @cache
-def _known() -> frozenset[bytes]:
+def _load_digests() -> frozenset[bytes]:
     data = Path(__file__).with_name("generated_comments.bin").read_bytes()
     return frozenset(data[i : i + DIGEST_SIZE] for i in range(0, len(data), DIGEST_SIZE))
 
@@ -52,7 +54,7 @@ NO_XML = re.compile("[\\0-\\x08\\x0b\\x0c\\x0e-\\x1f\\ud800-\\udfff\\ufffe\\ufff
 """Characters that XML cannot hold."""
 
 
-def escape(text: str) -> str:
+def escape_text(text: str) -> str:
     """`text` as the content of an element; ModelError if XML cannot hold it."""
     if not text.isprintable() and (odd := NO_XML.search(text)):
         start = odd.start()
@@ -62,9 +64,9 @@ def escape(text: str) -> str:
     return text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
 
 
-def quoted(text: str) -> str:
+def quote_attribute(text: str) -> str:
     """`text` as the value of an attribute, with its quotation marks."""
-    inner = escape(text).replace("\n", "&#10;").replace("\r", "&#13;").replace("\t", "&#9;")
+    inner = escape_text(text).replace("\n", "&#10;").replace("\r", "&#13;").replace("\t", "&#9;")
     if '"' not in inner:
         return f'"{inner}"'
     return f"'{inner}'" if "'" not in inner else '"' + inner.replace('"', "&quot;") + '"'
@@ -75,12 +77,14 @@ def is_element(node: etree._Element) -> bool:
     return type(node.tag) is str
 
 
-def xml_of(element: etree._Element) -> str:
+def format_element(element: etree._Element) -> str:
     """The XML of an element in OpenSim's layout, from the left margin."""
-    return "\n".join(lines_of(element, 0))
+    return "\n".join(list_lines(element, 0))
 
 
-def relaid(xml: str, depth: int, *, comments: bool = True, name: str | None = None) -> list[str]:
+def format_xml(
+    xml: str, depth: int, *, comments: bool = True, name: str | None = None
+) -> list[str]:
     """The lines of an XML text in OpenSim's layout, `depth` tabs in; `name` replaces its name attribute.
 
     Raises:
@@ -88,7 +92,7 @@ def relaid(xml: str, depth: int, *, comments: bool = True, name: str | None = No
     """
     try:
         element = etree.fromstring(
-            without_namespaces(xml.encode()), etree.XMLParser(resolve_entities=False)
+            replace_colons(xml.encode()), etree.XMLParser(resolve_entities=False)
         )
     except etree.XMLSyntaxError as error:
         raise ModelError(
@@ -98,34 +102,36 @@ def relaid(xml: str, depth: int, *, comments: bool = True, name: str | None = No
         raise ModelError("the content of an unknown component has a DOCTYPE; leave it out")
     if name and element.get("name") != name:
         element.set("name", name)
-    return lines_of(element, depth, comments=comments)
+    return list_lines(element, depth, comments=comments)
 
 
-def lines_of(element: etree._Element, depth: int, *, comments: bool = True) -> list[str]:
+def list_lines(element: etree._Element, depth: int, *, comments: bool = True) -> list[str]:
     """The lines of an element in OpenSim's layout; where text and elements mix, white space stays as it was."""
     indent = "\t" * depth
     if not is_element(element):
         if isinstance(element, etree._Comment) and (
-            not comments or is_generated(element.text or "")
+            not comments or is_generated_comment(element.text or "")
         ):
             return []
         return [indent + etree.tostring(element, encoding="unicode", with_tail=False)]
     tag = as_written(element.tag)
     head = f"{indent}<{tag}" + "".join(
-        f" {key}={quoted(text)}" for key, text in _attributes(element)
+        f" {key}={quote_attribute(text)}" for key, text in _list_attributes(element)
     )
     texts = [element.text, *(child.tail for child in element)]
     if not len(element):
-        text = "" if element.text is None or element.text.isspace() else escape(element.text)
+        text = "" if element.text is None or element.text.isspace() else escape_text(element.text)
         return [f"{head}>{text}</{tag}>" if element.text is not None else f"{head} />"]
     if any(text and not text.isspace() for text in texts):
-        inner = escape(element.text or "")
+        inner = escape_text(element.text or "")
         for child in element:
-            inner += "\n".join(lines_of(child, 0, comments=comments)) + escape(child.tail or "")
+            inner += "\n".join(list_lines(child, 0, comments=comments)) + escape_text(
+                child.tail or ""
+            )
         return [f"{head}>{inner}</{tag}>"]
-    lines = [line for child in element for line in lines_of(child, depth + 1, comments=comments)]
+    lines = [line for child in element for line in list_lines(child, depth + 1, comments=comments)]
     return [f"{head}>", *lines, f"{indent}</{tag}>"] if lines else [f"{head} />"]
 
 
-def _attributes(element: etree._Element) -> list[tuple[str, str]]:
+def _list_attributes(element: etree._Element) -> list[tuple[str, str]]:
     return [(as_written(str(key)), str(text)) for key, text in element.items()]

@@ -50,7 +50,7 @@ class MeshFolders:
             OutsideError: there is such a file, but it is elsewhere.
         """
         elsewhere = None
-        for path in _candidates(name, self.searched):
+        for path in _list_candidates(name, self.searched):
             if self._holds(path):
                 return path
             elsewhere = elsewhere or path
@@ -70,13 +70,13 @@ class MeshFolders:
         return any(path.resolve().is_relative_to(root.resolve()) for root in roots)
 
 
-def _candidates(name: str, folders: Sequence[Path]) -> Iterator[Path]:
+def _list_candidates(name: str, folders: Sequence[Path]) -> Iterator[Path]:
     if Path(name).is_absolute():
         folders = (Path(),)
     yield from (folder / name for folder in folders if _is_file(folder / name))
     if not Path(name).is_absolute():
         parts = Path(name.replace("\\", "/")).parts
-        yield from (result for folder in folders for result in _descend(folder, parts))
+        yield from (result for folder in folders for result in _find_any_case(folder, parts))
 
 
 def _is_file(path: Path) -> bool:
@@ -87,14 +87,14 @@ def _is_file(path: Path) -> bool:
         return False
 
 
-def _descend(folder: Path, parts: Sequence[str]) -> Iterator[Path]:
+def _find_any_case(folder: Path, parts: Sequence[str]) -> Iterator[Path]:
     """The files below a folder whose path has these parts, in any capitals."""
     if not parts:
         if _is_file(folder):
             yield folder
         return
     if parts[0] == "..":
-        yield from _descend(folder / "..", parts[1:])
+        yield from _find_any_case(folder / "..", parts[1:])
         return
     try:
         entries = sorted(folder.iterdir())
@@ -102,7 +102,7 @@ def _descend(folder: Path, parts: Sequence[str]) -> Iterator[Path]:
         return
     for entry in entries:
         if entry.name.casefold() == parts[0].casefold():
-            yield from _descend(entry, parts[1:])
+            yield from _find_any_case(entry, parts[1:])
 
 
 def read_surface(path: Path) -> Surface:
@@ -115,7 +115,7 @@ def read_surface(path: Path) -> Surface:
     import numpy as np
 
     from osimlite.io.meshes.obj import read_obj
-    from osimlite.io.meshes.stl import stl_corners
+    from osimlite.io.meshes.stl import read_stl_corners
     from osimlite.io.meshes.surface import Surface
     from osimlite.io.meshes.vtp import read_vtp
 
@@ -124,7 +124,7 @@ def read_surface(path: Path) -> Surface:
         case ".vtp":
             return read_vtp(content, path.name)
         case ".stl":
-            points = stl_corners(content, path.name).reshape(-1, 3)
+            points = read_stl_corners(content, path.name).reshape(-1, 3)
             return Surface(points, np.arange(len(points)).reshape(-1, 3))
         case ".obj":
             return read_obj(content, path.name)

@@ -7,17 +7,17 @@ from contextlib import suppress
 import numpy as np
 
 from osimlite.errors import OsimliteError
-from osimlite.io.meshes.surface import Array, Indices, Polygons, Surface, triangulated
+from osimlite.io.meshes.surface import Array, Indices, Polygons, Surface, triangulate
 
 
 def read_obj(content: bytes, name: str) -> Surface:
     """The surface in an OBJ file, its polygons cut into triangles, with normals if every corner has one.
 
-    Arguments and errors as those of :func:`obj_polygons`.
+    Arguments and errors as those of :func:`read_obj_polygons`.
     """
-    polygons, normals, chosen = _parsed(content, name)
+    polygons, normals, chosen = _parse_lines(content, name)
     if normals is None:
-        return Surface(polygons.points, triangulated(*polygons))
+        return Surface(polygons.points, triangulate(*polygons))
     # A surface has one normal at each point: where faces disagree, the point is there once for each
     # of its normals.
     pairs, corners = np.unique(
@@ -27,11 +27,11 @@ def read_obj(content: bytes, name: str) -> Surface:
     lengths = np.linalg.norm(normals, axis=1, keepdims=True)
     unit = normals / np.where(lengths > 0.0, lengths, 1.0)
     return Surface(
-        points, triangulated(points, corners.reshape(-1), polygons.ends), unit[pairs[:, 1]]
+        points, triangulate(points, corners.reshape(-1), polygons.ends), unit[pairs[:, 1]]
     )
 
 
-def obj_polygons(content: bytes, name: str) -> Polygons:
+def read_obj_polygons(content: bytes, name: str) -> Polygons:
     """The polygons in an OBJ file.
 
     Args:
@@ -41,10 +41,10 @@ def obj_polygons(content: bytes, name: str) -> Polygons:
     Raises:
         OsimliteError: a point or a face is damaged, or there is no face; with the line.
     """
-    return _parsed(content, name)[0]
+    return _parse_lines(content, name)[0]
 
 
-def _parsed(content: bytes, name: str) -> tuple[Polygons, Array | None, Indices]:
+def _parse_lines(content: bytes, name: str) -> tuple[Polygons, Array | None, Indices]:
     """Polygons, normals (m, 3), None unless every corner has one, and which of them each corner has."""
     points: list[tuple[float, float, float]] = []
     normals: list[list[str]] = []
@@ -63,9 +63,9 @@ def _parsed(content: bytes, name: str) -> tuple[Polygons, Array | None, Indices]
             elif kind == "f":
                 for word in words:
                     point, _, normal = (*word.split("/"), "", "")[:3]
-                    corners.append(_place(point, len(points)))
+                    corners.append(_get_index(point, len(points)))
                     with suppress(ValueError):
-                        chosen.append(_place(normal, len(normals)))
+                        chosen.append(_get_index(normal, len(normals)))
                 ends.append(len(corners))
         except ValueError:
             raise OsimliteError(
@@ -81,10 +81,10 @@ def _parsed(content: bytes, name: str) -> tuple[Polygons, Array | None, Indices]
     polygons = Polygons(result, np.array(corners, dtype=np.int64), np.array(ends, dtype=np.int64))
     if len(chosen) < len(corners) or max(chosen) >= len(normals):
         return polygons, None, polygons.corners
-    return polygons, _vectors(normals), np.array(chosen, dtype=np.int64)
+    return polygons, _make_vectors(normals), np.array(chosen, dtype=np.int64)
 
 
-def _place(word: str, count: int) -> int:
+def _get_index(word: str, count: int) -> int:
     """From 0 on; numbers count from 1, negative ones back from the last so far.
 
     Raises:
@@ -97,7 +97,7 @@ def _place(word: str, count: int) -> int:
     return place
 
 
-def _vectors(rows: list[list[str]]) -> Array | None:
+def _make_vectors(rows: list[list[str]]) -> Array | None:
     """Rows of three finite numbers as an array; None if they are not."""
     try:
         result = np.array(rows, dtype=np.float64)

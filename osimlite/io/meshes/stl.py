@@ -17,7 +17,7 @@ _NUMBER = rb"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _CORNER = re.compile(rb"vertex\s+(%b)\s+(%b)\s+(%b)\s" % ((_NUMBER,) * 3), re.IGNORECASE)
 
 
-def binary_stl(content: bytes, name: str, signs: Sequence[float] = (1.0, 1.0, 1.0)) -> bytes:
+def format_binary_stl(content: bytes, name: str, signs: Sequence[float] = (1.0, 1.0, 1.0)) -> bytes:
     """The triangles of a text or binary STL file as a binary one.
 
     Args:
@@ -38,8 +38,8 @@ def binary_stl(content: bytes, name: str, signs: Sequence[float] = (1.0, 1.0, 1.
     return _HEAD + len(triangles).to_bytes(4, "little") + triangles.tobytes()
 
 
-def stl_corners(content: bytes, name: str) -> Array:
-    """The corners (t, 3, 3) of the triangles in a text or binary STL file; errors as those of :func:`binary_stl`."""
+def read_stl_corners(content: bytes, name: str) -> Array:
+    """The corners (t, 3, 3) of the triangles in a text or binary STL file; errors as those of :func:`format_binary_stl`."""
     binary = _from_binary(content, name)
     return _text_corners(content, name) if binary is None else binary["corners"].astype(np.float64)
 

@@ -65,7 +65,7 @@ triangles; a polygon of a million corners would take years.
 """
 
 
-def triangulated(points: Array, corners: Indices, ends: Indices) -> Indices:
+def triangulate(points: Array, corners: Indices, ends: Indices) -> Indices:
     """Triangles (t, 3) that cover polygons, turning the same way.
 
     Args: points: (n, 3). corners: of all polygons, one after the other (places of points). ends:
@@ -77,24 +77,24 @@ def triangulated(points: Array, corners: Indices, ends: Indices) -> Indices:
     parts = [corners[starts[sizes == 3][:, None] + np.arange(3)]]
     quads = corners[starts[sizes == 4][:, None] + np.arange(4)]
     if len(quads):
-        parts.append(_halves(points, quads))
+        parts.append(_split_quadrilaterals(points, quads))
     work = 0
     for start, end in zip(starts[sizes > 4].tolist(), ends[sizes > 4].tolist(), strict=True):
         polygon = corners[start:end]
         work += (end - start) ** 2
-        cut = _ears if work <= MAX_EAR_WORK else _fan
+        cut = _clip_ears if work <= MAX_EAR_WORK else _split_convex
         parts.append(polygon[cut(points[polygon])])
     return np.concatenate(parts).reshape(-1, 3)
 
 
-def strip_triangles(strip: Indices) -> Indices:
+def split_strips(strip: Indices) -> Indices:
     """Triangles (k - 2, 3) of a strip of k points, of which every second is turned the other way."""
     triangles = np.lib.stride_tricks.sliding_window_view(strip, 3).copy()
     triangles[1::2, :2] = triangles[1::2, 1::-1]
     return triangles
 
 
-def _halves(points: Array, quads: Indices) -> Indices:
+def _split_quadrilaterals(points: Array, quads: Indices) -> Indices:
     """Two triangles for each of k quadrilaterals (2 k, 3): cut where both halves turn the same way."""
     a, b, c, d = (points[quads[:, index]] for index in range(4))
     agreement = np.einsum("ij,ij->i", np.cross(b - a, c - a), np.cross(c - a, d - a))
@@ -102,13 +102,13 @@ def _halves(points: Array, quads: Indices) -> Indices:
     return np.take_along_axis(quads, cut, axis=1).reshape(-1, 3)
 
 
-def _fan(corners: Array) -> Indices:
+def _split_convex(corners: Array) -> Indices:
     """Return triangles (k - 2, 3) of a polygon of k corners (k, 3) from its first corner to all others."""
     others = np.arange(1, len(corners) - 1)
     return np.stack([np.zeros_like(others), others, others + 1], axis=1)
 
 
-def _ears(corners: Array) -> Indices:
+def _clip_ears(corners: Array) -> Indices:
     """Triangles (k - 2, 3) of a polygon of k corners (k, 3): corners are cut off that hold no other corner."""
     # Twice the area vector (Newell).
     normal: Array = np.cross(corners, np.roll(corners, -1, axis=0)).sum(axis=0)

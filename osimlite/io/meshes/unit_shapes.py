@@ -13,36 +13,38 @@ SLICES, STACKS = 48, 24
 
 
 @cache
-def ball(slices: int = SLICES, stacks: int = STACKS) -> Surface:
+def make_ball(slices: int = SLICES, stacks: int = STACKS) -> Surface:
     """A ball of radius 1 about the origin."""
     angles = np.linspace(-0.5 * np.pi, 0.5 * np.pi, stacks + 1)
     arc = np.column_stack((np.cos(angles), np.sin(angles)))
-    return _turned([np.hstack((arc, arc))], slices)
+    return _revolve_profile([np.hstack((arc, arc))], slices)
 
 
 @cache
-def tube(slices: int = SLICES) -> Surface:
+def make_cylinder(slices: int = SLICES) -> Surface:
     """A closed cylinder of radius 1 and length 1 along Z about the origin."""
-    caps = _strip((0, -0.5), (1, -0.5), (0, -1)), _strip((1, 0.5), (0, 0.5), (0, 1))
-    return _turned([caps[0], _strip((1, -0.5), (1, 0.5), (1, 0)), caps[1]], slices)
+    caps = _make_edge((0, -0.5), (1, -0.5), (0, -1)), _make_edge((1, 0.5), (0, 0.5), (0, 1))
+    return _revolve_profile([caps[0], _make_edge((1, -0.5), (1, 0.5), (1, 0)), caps[1]], slices)
 
 
 @cache
-def spike() -> Surface:
+def make_cone() -> Surface:
     """A closed cone of base radius 1 around the origin, and its tip at Z = 1."""
-    return _turned([_strip((0, 0), (1, 0), (0, -1)), _strip((1, 0), (0, 1), (0.5**0.5, 0.5**0.5))])
+    return _revolve_profile(
+        [_make_edge((0, 0), (1, 0), (0, -1)), _make_edge((1, 0), (0, 1), (0.5**0.5, 0.5**0.5))]
+    )
 
 
 @cache
-def ring(thickness: float) -> Surface:
+def make_torus(thickness: float) -> Surface:
     """A torus about Z whose middle line has radius 1, of a tube of radius `thickness`."""
     angles = np.linspace(0.0, 2.0 * np.pi, STACKS + 1)
     arc = np.column_stack((np.cos(angles), np.sin(angles)))
-    return _turned([np.hstack((thickness * arc + (1.0, 0.0), arc))])
+    return _revolve_profile([np.hstack((thickness * arc + (1.0, 0.0), arc))])
 
 
 @cache
-def cube() -> Surface:
+def make_cube() -> Surface:
     """A box with edges of length 1 about the origin."""
     points: list[Array] = []
     normals: list[Array] = []
@@ -64,19 +66,19 @@ def cube() -> Surface:
 
 
 @cache
-def sheet() -> Surface:
+def make_square() -> Surface:
     """A square with edges of length 1 in the plane X = 0 about the origin; its outside is towards -X."""
     points = np.array(((0, -0.5, -0.5), (0, 0.5, -0.5), (0, 0.5, 0.5), (0, -0.5, 0.5)))
     return Surface(points, np.array(((0, 2, 1), (0, 3, 2))), np.tile((-1.0, 0.0, 0.0), (4, 1)))
 
 
-def _strip(
+def _make_edge(
     start: tuple[float, float], end: tuple[float, float], normal: tuple[float, float]
 ) -> Array:
     return np.array(((*start, *normal), (*end, *normal)), dtype=float)
 
 
-def _turned(strips: Sequence[Array], slices: int = SLICES) -> Surface:
+def _revolve_profile(strips: Sequence[Array], slices: int = SLICES) -> Surface:
     """The surface that lines in a half plane sweep when they turn about Z.
 
     Args: strips: lines (k, 4), each row distance from Z, height, and the outward normal in the same
@@ -106,7 +108,7 @@ def _turned(strips: Sequence[Array], slices: int = SLICES) -> Surface:
     )
 
 
-def normals_of(surface: Surface) -> Array:
+def compute_normals(surface: Surface) -> Array:
     """Outward unit vectors at the points (n, 3): those that come with the surface, else the mean of the triangles'."""
     if surface.normals is not None:
         return surface.normals

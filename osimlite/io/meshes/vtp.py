@@ -25,15 +25,15 @@ from osimlite.io.meshes.surface import (
     Indices,
     Polygons,
     Surface,
-    strip_triangles,
-    triangulated,
+    split_strips,
+    triangulate,
 )
 
 MAX_BYTES = 400_000_000
 """Bytes of all numbers of a file, decompressed. A mesh of a million points has about 50 MB of them."""
 
 
-def _inflate(block: bytes, size: int) -> bytes:
+def _decompress_zlib(block: bytes, size: int) -> bytes:
     """Decompress a block of zlib to at most `size` bytes; raise ValueError for more."""
     stream = zlib.decompressobj()
     data = stream.decompress(block, size + 1)
@@ -42,7 +42,7 @@ def _inflate(block: bytes, size: int) -> bytes:
     return data
 
 
-def _expand(block: bytes, size: int) -> bytes:
+def _decompress_lzma(block: bytes, size: int) -> bytes:
     """Decompress a block of LZMA to at most `size` bytes; raise ValueError for more."""
     stream = lzma.LZMADecompressor(memlimit=MAX_BYTES)
     data = stream.decompress(block, size + 1)
@@ -52,8 +52,8 @@ def _expand(block: bytes, size: int) -> bytes:
 
 
 _DECOMPRESS: dict[str, Callable[[bytes, int], bytes]] = {
-    "vtkZLibDataCompressor": _inflate,
-    "vtkLZMADataCompressor": _expand,
+    "vtkZLibDataCompressor": _decompress_zlib,
+    "vtkLZMADataCompressor": _decompress_lzma,
 }
 
 _TYPES = {
@@ -78,21 +78,21 @@ def read_vtp(content: bytes, name: str) -> Surface:
     Raises: OsimliteError: it is not such a file, is damaged, or is compressed in a way that
         osimlite does not know.
     """
-    with _named(name):
+    with _find_named(name):
         return _File(content).surface()
 
 
-def vtp_polygons(content: bytes, name: str) -> Polygons:
+def read_vtp_polygons(content: bytes, name: str) -> Polygons:
     """The polygons in a ``.vtp`` file, with all digits of text that says it has single precision, as Simbody has them.
 
     Arguments and errors as those of :func:`read_vtp`.
     """
-    with _named(name):
+    with _find_named(name):
         return _File(content, all_digits=True).polygons()[0]
 
 
 @contextmanager
-def _named(name: str) -> Iterator[None]:
+def _find_named(name: str) -> Iterator[None]:
     try:
         # Nonsense in a damaged file is found by what it gives; numpy need not warn of it on the
         # way.
@@ -144,7 +144,7 @@ class _File:
 
     def surface(self) -> Surface:
         polygons, normals = self.polygons()
-        return Surface(polygons.points, triangulated(*polygons), normals)
+        return Surface(polygons.points, triangulate(*polygons), normals)
 
     def polygons(self) -> tuple[Polygons, Array | None]:
         """All polygons, those of strips among them, and the normals at the points if there are any."""
@@ -177,7 +177,7 @@ class _File:
         corners, ends = self._cells(piece, "Strips", count)
         for strip in np.split(corners, ends[:-1]) if len(ends) else []:
             if len(strip) >= 3:
-                triangles = strip_triangles(strip)
+                triangles = split_strips(strip)
                 yield triangles.ravel(), np.full(len(triangles), 3)
 
     def _cells(self, piece: etree._Element, tag: str, count: int) -> tuple[Indices, Indices]:
@@ -235,7 +235,7 @@ class _File:
                         (array.text or "").split(), dtype=np.float64 if exact else dtype
                     )
                 case "binary":
-                    data = self._payload(_base64((array.text or "").encode()))
+                    data = self._payload(_decode_base64((array.text or "").encode()))
                 case "appended":
                     data = self._payload(self._after(int(array.get("offset", "0"))))
                 case _:
@@ -256,7 +256,7 @@ class _File:
             raise ValueError
         end = next(place for place in self.offsets if place > offset)
         part = self.appended[offset:end]
-        return part if self.raw else _base64(part)
+        return part if self.raw else _decode_base64(part)
 
     def _take(self, count: int) -> None:
         """Count bytes of numbers; several arrays may be made of the same bytes of the file."""
@@ -296,7 +296,7 @@ class _File:
         return b"".join(parts)
 
 
-def _base64(text: bytes) -> bytes:
+def _decode_base64(text: bytes) -> bytes:
     """The bytes of base64 text, in which header and data may each be encoded, and padded, on their own."""
     parts = re.findall(rb"[^=]+=*", b"".join(text.split()))
     return b"".join(base64.b64decode(part, validate=True) for part in parts)

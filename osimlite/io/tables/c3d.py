@@ -47,7 +47,7 @@ def read_c3d_markers(path: str | Path) -> tuple[tuple[str, ...], Array, Array]:
         DocumentError: it is no .c3d file.
         MissingDependency: ezc3d is not installed.
     """
-    arrays = _read_apart(path, "markers")
+    arrays = _run_reader(path, "markers")
     return tuple(arrays["names"].tolist()), arrays["times"], arrays["positions"]
 
 
@@ -62,7 +62,7 @@ def read_c3d_forces(path: str | Path) -> StoTable:
         DocumentError: it is no .c3d file, or it has no force plates.
         MissingDependency: ezc3d is not installed.
     """
-    arrays = _read_apart(path, "forces")
+    arrays = _run_reader(path, "forces")
     if not len(arrays["names"]):
         raise DocumentError("the file has no force plates", file=str(path))
     return StoTable(
@@ -70,7 +70,7 @@ def read_c3d_forces(path: str | Path) -> StoTable:
     )
 
 
-def _read_apart(path: str | Path, what: str) -> dict[str, Array]:
+def _run_reader(path: str | Path, what: str) -> dict[str, Array]:
     """Return the arrays that a process of its own reads from a file.
 
     Damaged files make ezc3d 1.6 write beyond its memory (a process ends by SIGSEGV), or loop
@@ -123,12 +123,12 @@ def _read_apart(path: str | Path, what: str) -> dict[str, Array]:
             f"no process can be started that reads it: {error}", file=str(path)
         ) from None
     if done.returncode != 0:
-        raise DocumentError(f"the file cannot be read: {_reason(done)}", file=str(path))
+        raise DocumentError(f"the file cannot be read: {_find_reason(done)}", file=str(path))
     with np.load(io.BytesIO(done.stdout), allow_pickle=False) as arrays:
         return dict(arrays)
 
 
-def _reason(done: subprocess.CompletedProcess[bytes]) -> str:
+def _find_reason(done: subprocess.CompletedProcess[bytes]) -> str:
     """Return why a process has read nothing, by what it has left."""
     try:
         return str(json.loads(done.stdout)["error"])

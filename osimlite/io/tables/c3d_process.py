@@ -21,13 +21,13 @@ MAX_BYTES = 4_000_000_000
 """Memory of the process; a file of the largest size that is read takes about a third of it."""
 
 
-def serve() -> None:
+def run_process() -> None:
     """Read the file that the command names, and write its markers or its forces to the standard output.
 
     Of a file that cannot be read the reason is written as JSON, and the exit code is 1.
     """
     what, path, seconds = sys.argv[1:4]
-    _limit(int(seconds))
+    _limit_resources(int(seconds))
     try:
         arrays = READERS[what](path)
         if not all(np.isfinite(arrays["times"])):
@@ -54,7 +54,10 @@ def read_markers(path: str) -> dict[str, Array]:
         name for key, more in points.items() if key.startswith("LABELS") for name in more["value"]
     ]
     positions = np.moveaxis(result["data"]["points"][:3], (2, 1, 0), (0, 1, 2))
-    times = _start(result) + np.arange(len(positions)) / result["header"]["points"]["frame_rate"]
+    times = (
+        _compute_start(result)
+        + np.arange(len(positions)) / result["header"]["points"]["frame_rate"]
+    )
     names = names[: positions.shape[1]]
     if len(names) != positions.shape[1]:
         raise ValueError(f"it names {len(names)} of {positions.shape[1]} markers")
@@ -80,7 +83,9 @@ def read_forces(path: str) -> dict[str, Array]:
             "times": np.zeros(0),
             "rows": np.zeros((0, 0)),
         }
-    times = _start(result) + np.arange(len(rows[0])) / result["header"]["analogs"]["frame_rate"]
+    times = (
+        _compute_start(result) + np.arange(len(rows[0])) / result["header"]["analogs"]["frame_rate"]
+    )
     return {
         "names": np.array(columns, dtype=np.str_),
         "times": times,
@@ -94,13 +99,13 @@ READERS: dict[str, Callable[[str], dict[str, Array]]] = {
 }
 
 
-def _start(result: Any) -> float:
+def _compute_start(result: Any) -> float:
     """Return the time of the first frame, s."""
     points = result["header"]["points"]
     return float(points["first_frame"] / points["frame_rate"])
 
 
-def _limit(seconds: int) -> None:
+def _limit_resources(seconds: int) -> None:
     """Let the system end this process when it takes too much time or memory; Windows cannot."""
     try:
         import resource

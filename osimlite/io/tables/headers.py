@@ -47,7 +47,7 @@ _WORD = re.compile(r"\S+", re.ASCII)
 _BETWEEN_TABS = re.compile(r"[^\t\s][^\t]*(?<![\t\s])", re.ASCII)
 
 
-def suffixes(kind: str, file: str | None = None) -> tuple[str, ...]:
+def list_suffixes(kind: str, file: str | None = None) -> tuple[str, ...]:
     """The endings of the labels of one value of a kind (``DataType``).
 
     Raises:
@@ -114,7 +114,7 @@ class MarkerHeader:
     def words(self, number: int) -> list[Word]:
         """The words of a line, those without a letter left out; none if there is no such line."""
         return (
-            words(self.lines[number - 1], number, _BETWEEN_TABS)
+            split_header(self.lines[number - 1], number, _BETWEEN_TABS)
             if len(self.lines) >= number
             else []
         )
@@ -139,7 +139,7 @@ class StorageHeader:
         stop = end or labels
         self.lines = [_text(line) for line in head[: stop.start() if stop else 0].split(b"\n")]
         number = len(self.lines)
-        self.end = words(_text(end[0]), number)[0] if end else Word("", Position(number, 1))
+        self.end = split_header(_text(end[0]), number)[0] if end else Word("", Position(number, 1))
         self.entries: dict[str, Entry] = {}
         for count, line in enumerate(self.lines, 1):
             match = _KEY.match(line.rstrip())
@@ -157,7 +157,7 @@ class StorageHeader:
         # The newer of OpenSim's readers takes a label up to a tab, the older up to a blank.
         line = _text(data[max(start, mark) : min(self.rows, start + LONGEST_LINE)])
         self.has_tabs = "\t" in line
-        self.labels = words(
+        self.labels = split_header(
             line, self.label_line, _BETWEEN_TABS if self.is_strict and self.has_tabs else _WORD
         )
 
@@ -204,7 +204,7 @@ class StorageHeader:
         return self._is_motion or "degrees" in self.value("Angles")
 
 
-def words(line: str, number: int, pattern: re.Pattern[str] = _WORD) -> list[Word]:
+def split_header(line: str, number: int, pattern: re.Pattern[str] = _WORD) -> list[Word]:
     """The words of a line with this number."""
     return [_word(match, 0, number) for match in pattern.finditer(line)]
 

@@ -24,7 +24,9 @@ _BLOCK = 4096
 """So many numbers are written at once."""
 
 
-def printed(table: StoTable, description: str = "", precision: int = PRECISION) -> Iterator[str]:
+def format_old_table(
+    table: StoTable, description: str = "", precision: int = PRECISION
+) -> Iterator[str]:
     """The text of a table as OpenSim's ``Storage`` prints it, in parts.
 
     Args:
@@ -44,14 +46,14 @@ def printed(table: StoTable, description: str = "", precision: int = PRECISION) 
     cell = f"%{precision + _PADDING}.{precision}f"
     for start in range(0, len(rows), step):
         block = rows[start : start + step]
-        text = _decimals(block, cell, precision // 8) if precision in (8, 16) else None
+        text = _format_decimals(block, cell, precision // 8) if precision in (8, 16) else None
         if text is None:
             line = "\t".join([cell] * rows.shape[1]) + "\n"
             text = "".join([line % tuple(row) for row in block.tolist()])
         yield text
 
 
-def _decimals(rows: Array, cell: str, eights: int) -> str | None:
+def _format_decimals(rows: Array, cell: str, eights: int) -> str | None:
     """Lines of numbers with so many times eight decimals as the format of a cell writes them, all at once.
 
     None if one is wider than the others.
@@ -59,11 +61,11 @@ def _decimals(rows: Array, cell: str, eights: int) -> str | None:
     # What has more than four digits before the point is rare, and so is what is no number.
     plain = np.abs(rows) < 9999.0
     size = np.where(plain, np.abs(rows), 0.0)
-    digits = [size.astype(np.int64), *_eights(size - size.astype(np.int64), eights)]
+    digits = [size.astype(np.int64), *_format_8_digits(size - size.astype(np.int64), eights)]
     for before, eight in zip(digits[-2::-1], digits[:0:-1], strict=True):
         before += eight == 10**8
         eight[eight == 10**8] = 0
-    wholes, fours = _texts()
+    wholes, fours = _format_numbers()
     names = [f"{half}{number}" for number in range(eights) for half in ("first", "last")]
     # A number as text: up to the point, four decimals and four more each time, and what stands
     # behind it.
@@ -85,7 +87,7 @@ def _decimals(rows: Array, cell: str, eights: int) -> str | None:
     return cells.tobytes().decode()
 
 
-def _eights(part: Array, count: int) -> list[NDArray[np.int64]]:
+def _format_8_digits(part: Array, count: int) -> list[NDArray[np.int64]]:
     """Whole numbers of eight decimals each, one behind the other, of numbers from 0 up to 1.
 
     The last is rounded to the nearest, to the even of two, and may be 1e8. A product comes with
@@ -115,7 +117,7 @@ def _eights(part: Array, count: int) -> list[NDArray[np.int64]]:
 
 
 @cache
-def _texts() -> tuple[Array, Array]:
+def _format_numbers() -> tuple[Array, Array]:
     """What is before the decimals of numbers by sign and whole part (20000,), and all four decimals (10000,)."""
     numbers, blank = np.arange(10000)[:, None], ord(" ")
     digits = (numbers // (1000, 100, 10, 1) % 10 + ord("0")).astype("u1")

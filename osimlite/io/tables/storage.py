@@ -14,7 +14,7 @@ from osimlite.base.files import open_atomically
 from osimlite.base.records import dataclass, field
 from osimlite.base.text import format_count
 from osimlite.errors import OsimliteError, SettingError, SimulationError
-from osimlite.io.tables.headers import suffixes
+from osimlite.io.tables.headers import list_suffixes
 from osimlite.io.tables.table_stream import TableStream
 from osimlite.io.tables.tabular import Tabular
 from osimlite.mechanics.multibody.spatial import Array
@@ -56,7 +56,7 @@ class StoTable(Tabular):
         return {"time": self.times}, columns
 
 
-def sto_text(
+def format_sto(
     name: str,
     times: Iterable[float],
     columns: Sequence[str],
@@ -66,8 +66,8 @@ def sto_text(
     header: Mapping[str, str] = MappingProxyType({}),
 ) -> str:
     """Write a table as OpenSim 4.6 does, but with all digits of every number, and more in its header."""
-    lines = list(_lines(times, rows, 1))
-    first, *others = _header(name, columns, len(lines), in_degrees, "double")
+    lines = list(_format_lines(times, rows, 1))
+    first, *others = _format_header(name, columns, len(lines), in_degrees, "double")
     return "".join([first, *(f"{key}={value}\n" for key, value in header.items()), *others, *lines])
 
 
@@ -102,12 +102,14 @@ def write_sto(
     # How many rows there are stands before them.
     with tempfile.TemporaryFile("w+b") as body:
         count = 0
-        for line in _lines(times, rows, len(suffixes(kind)), () if has_missing else columns):
+        for line in _format_lines(
+            times, rows, len(list_suffixes(kind)), () if has_missing else columns
+        ):
             body.write(line.encode())
             count += 1
         body.seek(0)
         with open_atomically(path) as stream:
-            stream.write("".join(_header(name, columns, count, in_degrees, kind)).encode())
+            stream.write("".join(_format_header(name, columns, count, in_degrees, kind)).encode())
             shutil.copyfileobj(body, stream)
 
 
@@ -132,7 +134,7 @@ def read_sto(path: str | Path) -> StoTable:
         )
 
 
-def beside(folder: Path, name: str) -> Path:
+def merge_tables(folder: Path, name: str) -> Path:
     """Where a file is that a document names: looked for in the document's folder, then from where the program runs."""
     there, here = folder / name, Path(name)
     return there if there.is_file() or not here.is_file() else here
@@ -167,7 +169,7 @@ def expect_numbers(name: str, columns: Sequence[str], times: Array, rows: Array)
         )
 
 
-def _header(
+def _format_header(
     name: str, columns: Sequence[str], rows: int, in_degrees: bool, kind: str
 ) -> Iterator[str]:
     expect_plain_labels(name, columns)
@@ -180,7 +182,7 @@ def _header(
     yield "\t".join(("time", *columns)) + "\n"
 
 
-def _lines(
+def _format_lines(
     times: Iterable[float], rows: Iterable[Iterable[float]], size: int, columns: Sequence[str] = ()
 ) -> Iterator[str]:
     """Yield lines of numbers, `size` per value; numbers of named columns must be finite."""
@@ -195,15 +197,15 @@ def _lines(
                     f"a row has {len(words)} numbers, which makes no whole values of {size} each"
                 )
             words = [",".join(words[start : start + size]) for start in range(0, len(words), size)]
-        yield "\t".join((number_text(time), *words)) + "\n"
+        yield "\t".join((format_number(time), *words)) + "\n"
 
 
-def adapter_lines(table: StoTable) -> Iterator[str]:
+def format_adapter_table(table: StoTable) -> Iterator[str]:
     """The lines of a table as OpenSim's ``STOFileAdapter`` writes it, without the version of OpenSim."""
     expect_plain_labels("", (*table.columns, *table.header, *map(str, table.header.values())))
     yield "".join(f"{key}={value}\n" for key, value in table.header.items())
     yield f"DataType={table.kind}\nversion=3\nendheader\n"
-    ends = suffixes(table.kind)
+    ends = list_suffixes(table.kind)
     labels = [column.removesuffix(ends[0]) for column in table.columns[:: len(ends)]]
     yield "\t".join(("time", *labels)) + "\n"
     line = "\t".join(["%.16g", *[",".join(["%.16g"] * len(ends))] * len(labels)]) + "\n"
@@ -211,13 +213,13 @@ def adapter_lines(table: StoTable) -> Iterator[str]:
         yield line % tuple(row)
 
 
-def number_text(value: float) -> str:
+def format_number(value: float) -> str:
     """All digits of a number, without a needless point."""
     text = repr(float(value))
     return text[:-2] if text.endswith(".0") else text
 
 
-def both_of(time_range: Sequence[float]) -> tuple[float, float]:
+def expect_time_range(time_range: Sequence[float]) -> tuple[float, float]:
     """The first and the last time (s) of a setup; SettingError if it does not give two."""
     if len(time_range) != 2:
         count = format_count(len(time_range), "number")

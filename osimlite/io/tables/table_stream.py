@@ -9,7 +9,7 @@ from pathlib import Path
 from osimlite.base.files import open_file
 from osimlite.base.text import format_count
 from osimlite.errors import DocumentError
-from osimlite.io.tables.headers import LONGEST_HEADER, StorageHeader, suffixes
+from osimlite.io.tables.headers import LONGEST_HEADER, StorageHeader, list_suffixes
 
 _NO_NUMBER = re.compile(r"[-+]?1\.#(IND|QNAN|SNAN|INF)\d*", re.IGNORECASE)
 """How programs on Windows wrote what is no number."""
@@ -75,7 +75,9 @@ class TableStream:
                     f"the row has {format_count(len(row), 'number')} and needs {size}",
                     file=self.file,
                     line=number,
-                    column=len(line.rstrip()) + 1 if len(row) < size else start_of_word(text, size),
+                    column=len(line.rstrip()) + 1
+                    if len(row) < size
+                    else find_word_start(text, size),
                 )
             time = row.pop(place)
             yield time, row
@@ -100,11 +102,11 @@ class TableStream:
         beginning = b"".join(self._stream.readlines(LONGEST_HEADER))
         result = StorageHeader(beginning, self.file)
         if not result.end.text:
-            raise DocumentError(_no_storage(beginning[:100].lstrip()), file=self.file)
+            raise DocumentError(_make_format_error(beginning[:100].lstrip()), file=self.file)
         self._stream.seek(result.rows)
         self.line, self.name, self.in_degrees = result.label_line, result.name, result.in_degrees
         self.header = {entry.key.text: entry.value.text for entry in result.entries.values()}
-        ends = suffixes(result.kind, self.file)
+        ends = list_suffixes(result.kind, self.file)
         self.kind = "double" if ends == ("",) else result.kind
         if not result.labels:
             raise DocumentError(
@@ -124,7 +126,7 @@ class TableStream:
         self.columns = tuple(label + end for label in self.labels for end in ends)
 
 
-def _no_storage(beginning: bytes) -> str:
+def _make_format_error(beginning: bytes) -> str:
     """Why a file without a line 'endheader' cannot be taken, by what it begins with."""
     if beginning.startswith(b"PathFileType"):
         return (
@@ -138,7 +140,7 @@ def _no_storage(beginning: bytes) -> str:
     return "this is no storage file (.sto, .mot): it has no line 'endheader'"
 
 
-def start_of_word(text: str, word: int) -> int:
+def find_word_start(text: str, word: int) -> int:
     """Column (from 1) at which a word (from 0) of a line starts."""
     return [match.start() for match in re.finditer(r"\S+", text)][word] + 1
 

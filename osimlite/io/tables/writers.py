@@ -9,7 +9,7 @@ import numpy as np
 
 from osimlite.base.files import open_atomically
 from osimlite.io.tables.headers import MARKER_KEYS
-from osimlite.io.tables.storage import StoTable, number_text
+from osimlite.io.tables.storage import StoTable, format_number
 
 
 def write_trc(
@@ -35,11 +35,11 @@ def write_trc(
         OsimliteError: the file cannot be written.
     """
     with open_atomically(path) as stream:
-        for line in _lines(Path(path).name, times, markers, rows, units):
+        for line in _format_trc(Path(path).name, times, markers, rows, units):
             stream.write(f"{line}\n".encode())
 
 
-def _lines(
+def _format_trc(
     name: str,
     times: Sequence[float],
     markers: Sequence[str],
@@ -48,7 +48,7 @@ def _lines(
 ) -> Iterator[str]:
     count = len(times)
     span = times[-1] - times[0] if count > 1 else 0.0
-    rate = number_text((count - 1) / span) if span > 0.0 else "1"
+    rate = format_number((count - 1) / span) if span > 0.0 else "1"
     values = (rate, rate, count, len(markers), units, rate, 1, count)
     yield f"PathFileType\t4\t(X/Y/Z)\t{name}"
     yield "\t".join(MARKER_KEYS)
@@ -59,8 +59,8 @@ def _lines(
     )
     yield ""
     for frame, (time, row) in enumerate(zip(times, rows, strict=True), start=1):
-        words = ("" if number != number else number_text(number) for number in row)
-        yield "\t".join((str(frame), number_text(time), *words, ""))
+        words = ("" if number != number else format_number(number) for number in row)
+        yield "\t".join((str(frame), format_number(time), *words, ""))
 
 
 _START = """<?xml version="1.0" encoding="UTF-8" ?>
@@ -96,7 +96,7 @@ _END = """		</objects>
 """
 
 
-def control_set(table: StoTable) -> Iterator[str]:
+def format_control_set(table: StoTable) -> Iterator[str]:
     """The text of a ControlSet, in parts: a ControlLinear for each column; what is no number has no node."""
     # Imported here, because it imports the network code of the standard library.
     from xml.sax.saxutils import quoteattr

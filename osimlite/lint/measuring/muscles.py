@@ -15,7 +15,7 @@ from osimlite.mechanics.laws.muscles import MuscleInputs
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.schema.model import Model
 from osimlite.schema.muscles import Muscle
-from osimlite.schema.states import states_of
+from osimlite.schema.states import list_states
 from osimlite.simulation.elements.builder import ElementBuilder
 from osimlite.simulation.elements.force_type import ForceType
 from osimlite.simulation.elements.parameters import Fields, Number, Numbers, Together
@@ -37,7 +37,7 @@ class MuscleFibers(NamedTuple):
     @property
     def is_elastic(self) -> bool:
         """Whether there is something to bring into equilibrium."""
-        return not set(self.kind.solved_states).isdisjoint(states_of(self.component))
+        return not set(self.kind.solved_states).isdisjoint(list_states(self.component))
 
     def get_start_states(self) -> dict[str, float]:
         """The states where they start."""

@@ -15,8 +15,8 @@ from osimlite.lint.words import describe_object, with_article
 from osimlite.schema.base import Object
 from osimlite.schema.fields import Held
 from osimlite.schema.model import Model
-from osimlite.schema.registry import class_for, tags, tags_of
-from osimlite.schema.specs import FieldSpec, field_specs
+from osimlite.schema.registry import find_class, list_class_tags, list_tags
+from osimlite.schema.specs import FieldSpec, get_field_specs
 
 
 @rule("OSIM102", "unknown-class", severity=ERROR, fixes="both")
@@ -44,7 +44,9 @@ def report_unknown_class(subject: Subject, report: FindingCollector) -> None:
     for note, owner in subject.notes_of("unknown-class"):
         fate = _describe_consequence(subject, note)
         accepted = (
-            tags() if note.spec is None or note.spec.accepts is None else tags_of(note.spec.accepts)
+            list_tags()
+            if note.spec is None or note.spec.accepts is None
+            else list_class_tags(note.spec.accepts)
         )
         suggestion = _find_nearest_class(subject, note, accepted)
         message = f"OpenSim has no class '{note.word}' and {fate}"
@@ -89,8 +91,8 @@ def _find_nearest_class(subject: Subject, note: Note, accepted: Iterable[str]) -
     if best is None or subject.source is None:
         return best
     children = [subject.source.spans[child].tag for child in subject.source.children(note.number)]
-    cls = class_for(best)
-    specs = field_specs(cls) if cls is not None else {}
+    cls = find_class(best)
+    specs = get_field_specs(cls) if cls is not None else {}
     fitting = sum(tag in specs or _is_part(specs, tag) or is_old(cls, tag) for tag in children)
     return best if 2 * fitting >= len(children) else None
 
@@ -109,7 +111,7 @@ def _is_slip(word: str, tag: str) -> bool:
 
 def _is_later(tag: str) -> bool:
     """Return whether OpenSim has a class only after 4.6."""
-    cls = class_for(tag)
+    cls = find_class(tag)
     return cls is not None and bool(cls.since)
 
 
@@ -120,7 +122,7 @@ def is_old(cls: type[Object] | None, tag: str) -> bool:
 
 def _is_part(specs: Mapping[str, FieldSpec], tag: str) -> bool:
     """Return whether an object of a class may be a part of an object with these properties."""
-    part = class_for(tag)
+    part = find_class(tag)
     if part is None:
         return False
     return any(
@@ -240,7 +242,7 @@ def find_wrapper(note: Note, owner: Object) -> str | None:
         return None
     lists = (
         s
-        for s in field_specs(type(owner)).values()
+        for s in get_field_specs(type(owner)).values()
         if isinstance(s.kind, Held) and s.kind.form == "list"
     )
     best = next(
@@ -258,7 +260,7 @@ def find_part(note: Note, owner: Object) -> FieldSpec | None:
     """The one-object property that takes the class of this element, if it would only be called right."""
     if note.value is None:
         return None
-    for spec in field_specs(type(owner)).values():
+    for spec in get_field_specs(type(owner)).values():
         free = (
             isinstance(spec.kind, Held)
             and spec.kind.form == "single"
@@ -288,8 +290,8 @@ def find_set(cls: type[Object] | None) -> str | None:
     """The set of a model that takes objects of a class."""
     if cls is None:
         return None
-    for spec in field_specs(Model).values():
-        members = field_specs(spec.accepts).get("objects") if spec.accepts is not None else None
+    for spec in get_field_specs(Model).values():
+        members = get_field_specs(spec.accepts).get("objects") if spec.accepts is not None else None
         taken = members.accepts if members is not None and spec.tag != "ComponentSet" else None
         if taken is not None and issubclass(cls, taken):
             return spec.tag

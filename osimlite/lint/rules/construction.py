@@ -11,7 +11,7 @@ from osimlite.lint.diagnostic import Severity
 from osimlite.lint.registry import ERROR, INFO, WARNING, FindingCollector, rule
 from osimlite.lint.subject import Subject
 from osimlite.schema.base import Unknown
-from osimlite.schema.registry import further_classes
+from osimlite.schema.registry import get_plugin_classes
 
 _QUOTED = re.compile(r"'([^']+)'")
 
@@ -209,7 +209,9 @@ def report_not_computed(subject: Subject, report: FindingCollector) -> None:
     for obstacle in _select_unreported(subject, report, Stage.UNSUPPORTED):
         item = subject.tree.by_path.get(obstacle.path)
         # Who declares the classes of a plug-in knows what they are.
-        if isinstance(item, Unknown) or (item is not None and type(item).tag in further_classes()):
+        if isinstance(item, Unknown) or (
+            item is not None and type(item).tag in get_plugin_classes()
+        ):
             continue
         groups.setdefault(type(item), []).append(obstacle)
     for first, *others in groups.values():

@@ -15,7 +15,7 @@ from osimlite.lint.words import describe_object
 from osimlite.schema.base import Component, Object, Unknown
 from osimlite.schema.contact import ContactGeometry
 from osimlite.schema.forces import Force
-from osimlite.schema.specs import defaults, reference_specs
+from osimlite.schema.specs import get_defaults, get_reference_specs
 from osimlite.schema.tree import Use
 
 
@@ -164,7 +164,7 @@ def _find_contact_lists(subject: Subject) -> Iterator[tuple[Component, list[Obje
     """Each force that works through lists of contact geometry: the force, its parameter objects, what they name."""
     forces: dict[int, tuple[Component, list[Object], list[Use]]] = {}
     for force in subject.find_instances(Force):
-        if "contact_parameters" in defaults(type(force))[1]:
+        if "contact_parameters" in get_defaults(type(force))[1]:
             parameters: Any = force
             if not isinstance(parameters.contact_parameters, Unknown):
                 forces[id(force)] = (force, list(parameters.contact_parameters.objects), [])
@@ -178,7 +178,8 @@ def _find_contact_lists(subject: Subject) -> Iterator[tuple[Component, list[Obje
             holder
             for holder in holders
             if any(
-                spec.reference.target == "ContactGeometry" for spec in reference_specs(type(holder))
+                spec.reference.target == "ContactGeometry"
+                for spec in get_reference_specs(type(holder))
             )
         ]
         yield owner, lists, uses

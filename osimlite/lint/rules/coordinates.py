@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from osimlite.io.document.lexical import shortest
+from osimlite.io.document.lexical import format_shortest
 from osimlite.lint.fixes import replace_text
 from osimlite.lint.registry import ERROR, WARNING, FindingCollector, Threshold, rule
 from osimlite.lint.subject import Subject
@@ -71,7 +71,7 @@ def report_inverted_range(subject: Subject, report: FindingCollector) -> None:
                 coordinate,
                 tag="range",
                 severity=ERROR if coordinate.clamped else None,
-                suggestion=(better := f"{shortest(high)} {shortest(low)}"),
+                suggestion=(better := f"{format_shortest(high)} {format_shortest(low)}"),
                 fix=replace_text(
                     subject.source, subject.position(coordinate, tag="range"), better, safe=False
                 ),

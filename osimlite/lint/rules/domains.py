@@ -14,8 +14,8 @@ from osimlite.lint.subject import Subject, cached_per_subject
 from osimlite.lint.words import format_quantity, format_value
 from osimlite.schema.base import Object
 from osimlite.schema.facts import REFUSED
-from osimlite.schema.fields import Value, domain_test
-from osimlite.schema.specs import FieldSpec, lineage, value_specs
+from osimlite.schema.fields import Value, make_domain_test
+from osimlite.schema.specs import FieldSpec, get_class_names, get_value_specs
 
 
 def describe_consequence(
@@ -91,7 +91,7 @@ def _describe_nan_consequence(item: Object, spec: FieldSpec, number: float) -> s
         return "OpenSim rejects the file"
     if spec.tag == "gravity" or (spec.tag == "mass" and not number > 0.0):
         return "OpenSim rejects the model"
-    if not _DRAWN.isdisjoint(lineage(type(item))):
+    if not _DRAWN.isdisjoint(get_class_names(type(item))):
         return _DRAWN_CONSEQUENCE
     return _BOUND_CONSEQUENCE if _may_be_infinite(item, spec) else _NAN_CONSEQUENCE
 
@@ -165,7 +165,7 @@ def report_unknown_choice(subject: Subject, report: FindingCollector) -> None:
     ```
     """
     for cls, items in subject.by_class.items():
-        for spec in value_specs(cls):
+        for spec in get_value_specs(cls):
             assert isinstance(spec.kind, Value)
             choices = spec.kind.choices
             if not choices:
@@ -315,11 +315,11 @@ def _get_domain(cls: type[Object], spec: FieldSpec) -> str:
 def _list_domains(cls: type[Object]) -> tuple[tuple[FieldSpec, Callable[[float], bool]], ...]:
     """The properties of a class that have a domain, with the test for it."""
     result = []
-    for spec in value_specs(cls):
+    for spec in get_value_specs(cls):
         assert isinstance(spec.kind, Value)
         domain = _get_domain(cls, spec)
         if domain and spec.kind.scalar in ("double", "int"):
-            result.append((spec, domain_test(domain)))
+            result.append((spec, make_domain_test(domain)))
     return tuple(result)
 
 
@@ -344,7 +344,7 @@ def _list_real_properties(cls: type[Object]) -> tuple[tuple[FieldSpec, str], ...
     """The properties of a class that hold real numbers, each with its name."""
     specs = (
         spec
-        for spec in value_specs(cls)
+        for spec in get_value_specs(cls)
         if isinstance(spec.kind, Value) and spec.kind.scalar == "double"
     )
     return tuple((spec, spec.name) for spec in specs)

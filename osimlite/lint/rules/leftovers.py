@@ -7,10 +7,10 @@ from collections.abc import Iterator
 from math import isfinite
 
 from osimlite.base.text import find_nearest
-from osimlite.io.document.lexical import ABSENT, Unclean, converter
+from osimlite.io.document.lexical import ABSENT, UncleanText, make_converter
 from osimlite.io.document.names import ATTRIBUTE
 from osimlite.io.document.source import Source
-from osimlite.io.document.spans import blank_remarks
+from osimlite.io.document.spans import blank_comments
 from osimlite.lint.fixes import remove_attribute, remove_element, remove_text
 from osimlite.lint.registry import ERROR, INFO, WARNING, FindingCollector, rule
 from osimlite.lint.subject import Subject
@@ -18,7 +18,7 @@ from osimlite.lint.words import describe_object
 from osimlite.schema.base import Component
 from osimlite.schema.fields import Value
 from osimlite.schema.forces import Force
-from osimlite.schema.specs import field_specs
+from osimlite.schema.specs import get_field_specs
 
 
 @rule("OSIM105", "unknown-attribute", severity=ERROR, fixes="safe")
@@ -38,7 +38,7 @@ def report_unknown_attribute(subject: Subject, report: FindingCollector) -> None
     """
     for note, owner in subject.notes_of("unknown-attribute"):
         message = f"OpenSim ignores the attribute '{note.word}' of {describe_object(owner)}"
-        if note.word in field_specs(type(owner)):
+        if note.word in get_field_specs(type(owner)):
             message += f"; write <{note.word}>{note.value}</{note.word}> inside"
         suggestion = (
             "name"
@@ -134,7 +134,7 @@ def report_stray_text(subject: Subject, report: FindingCollector) -> None:
 def _find_stray_texts(source: Source) -> Iterator[tuple[int, str]]:
     """Where text stands beside elements, and the text; what stands in a comment is none."""
     if source.mixed is None:
-        plain = _QUOTED.sub(lambda match: match[0].replace(">", "_"), blank_remarks(source.text))
+        plain = _QUOTED.sub(lambda match: match[0].replace(">", "_"), blank_comments(source.text))
         for start, end in {
             match.span(1) for pattern in (_AFTER, _BEFORE) for match in pattern.finditer(plain)
         }:
@@ -144,7 +144,7 @@ def _find_stray_texts(source: Source) -> Iterator[tuple[int, str]]:
         begin, around = source.spans[number].tag_end, source.spans[number].inner_end
         inner = [source.spans[child] for child in source.children(number)]
         for end, behind in (*((span.start, span.end) for span in inner), (around, around)):
-            plain = blank_remarks(source.text[begin:end])
+            plain = blank_comments(source.text[begin:end])
             if text := plain.strip():
                 yield begin + plain.index(text), text
             begin = behind
@@ -285,11 +285,11 @@ def _describe_unreadable(source: Source, number: int, kind: str) -> str:
     text = "".join(pieces)
     try:
         if kind == "number":
-            converter(Value("double", legacy=True))(text)
+            make_converter(Value("double", legacy=True))(text)
         elif kind == "numbers":
-            numbers = converter(Value("double", "list", legacy=True))(text)
+            numbers = make_converter(Value("double", "list", legacy=True))(text)
             return "" if all(map(isfinite, numbers)) else "a list of finite numbers"
-    except Unclean as unclean:
+    except UncleanText as unclean:
         if kind == "numbers":
             return "a list of finite numbers"
         # Of several numbers OpenSim takes the first, unless it is none, and of a word the

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 from osimlite.io.document.source import Source
-from osimlite.io.document.spans import blank_remarks
+from osimlite.io.document.spans import blank_comments
 from osimlite.lint.diagnostic import Edit, Fix
 from osimlite.lint.fixes import remove_text, replace_text
 from osimlite.lint.registry import ERROR, INFO, WARNING, FindingCollector, rule
@@ -221,7 +221,7 @@ def report_closing_tag(subject: Subject, report: FindingCollector) -> None:
     source = subject.source
     if source is None or not _BLANK_BEFORE_END.search(source.text):
         return
-    plain = blank_remarks(source.text, "-")
+    plain = blank_comments(source.text, "-")
     for match in _BLANK_IN_CLOSING.finditer(plain):
         start, end = match.span(1)
         report(

@@ -15,8 +15,8 @@ from osimlite.lint.table import Table
 from osimlite.lint.words import describe_object, find_nearest_name
 from osimlite.schema.base import Component, Unknown
 from osimlite.schema.fields import Reference, Value
-from osimlite.schema.specs import field_specs, file_specs, member_specs
-from osimlite.schema.states import variables
+from osimlite.schema.specs import get_field_specs, get_file_specs, get_member_specs
+from osimlite.schema.states import find_variables
 from osimlite.schema.tree import Tree, is_a
 
 _ALLOWING_FLAGS = ("allow_unused_references", "kinematics_allow_extra_columns")
@@ -162,10 +162,10 @@ def report_study_data(setup: Setup, report: FindingCollector) -> None:
                 tag="filepath",
             )
     for item in setup.items:
-        for spec in member_specs(type(item)) if getattr(item, "enabled", True) else ():
+        for spec in get_member_specs(type(item)) if getattr(item, "enabled", True) else ():
             held = getattr(item, spec.name)
             assert spec.names is not None and spec.accepts is not None
-            tag = next((file.tag for file in file_specs(spec.accepts, "file")), "")
+            tag = next((file.tag for file in get_file_specs(spec.accepts, "file")), "")
             name = getattr(held, tag, "").strip()
             if not name and spec.names.required and tag:
                 report(f"{describe_object(item)} names no table to track: OpenSim rejects it", item)
@@ -213,7 +213,7 @@ def report_study_data(setup: Setup, report: FindingCollector) -> None:
 
 def _describe_guess_fault(setup: Setup, tree: Tree, guess: Table) -> str:
     """What is wrong with the columns of a trajectory, their counts and their order; nothing if all is right."""
-    wanted = set(variables(tree, "state or control variable")) | {
+    wanted = set(find_variables(tree, "state or control variable")) | {
         item.name for item in setup.find_by_class("MocoParameter")
     }
     columns = {
@@ -241,7 +241,7 @@ def _describe_guess_fault(setup: Setup, tree: Tree, guess: Table) -> str:
     )
     if total != count:
         return f"has {count} columns, and {total} by the counts in its header"
-    states = variables(tree, "state variable")
+    states = find_variables(tree, "state variable")
     odd = next(
         (column for column in guess.columns[: int(said["states"])] if column not in states), None
     )
@@ -325,7 +325,7 @@ def report_study_parts(setup: Setup, report: FindingCollector) -> None:
                     parameter,
                     tag="property_name",
                     suggestion=find_nearest_name(
-                        parameter.property_name, [*field_specs(type(component))]
+                        parameter.property_name, [*get_field_specs(type(component))]
                     ),
                 )
     welded = {
@@ -355,7 +355,7 @@ def report_study_parts(setup: Setup, report: FindingCollector) -> None:
 def _describe_property_fault(parameter: Any, component: Component) -> str:
     """What is wrong with the property that a parameter is about, nothing if all is right."""
     name, element = parameter.property_name, parameter.property_element
-    spec = field_specs(type(component)).get(name)
+    spec = get_field_specs(type(component)).get(name)
     if spec is None:
         return f"{describe_object(component)} has no property '{name}'"
     size = spec.kind.size if isinstance(spec.kind, Value) and spec.kind.scalar == "double" else None

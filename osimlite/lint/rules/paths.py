@@ -14,7 +14,7 @@ from osimlite.schema.base import Object
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.joints import Joint
 from osimlite.schema.paths import ConditionalPathPoint, GeometryPath, PathPoint
-from osimlite.schema.states import motions_of
+from osimlite.schema.states import list_motions
 from osimlite.schema.wrapping import WrapObject
 
 
@@ -168,7 +168,7 @@ def _report_unreachable(
     first, last = point.range
     joint = subject.tree.parent_of(coordinate)
     motion = (
-        motions_of(joint).get(coordinate.name)
+        list_motions(joint).get(coordinate.name)
         if isinstance(joint, Joint) and joint.motion_types
         else None
     )

@@ -15,7 +15,7 @@ from osimlite.schema.forces import (
     HuntCrossleyForce,
 )
 from osimlite.schema.joints import Joint
-from osimlite.schema.states import motions_of
+from osimlite.schema.states import list_motions
 from osimlite.schema.tree import Use
 
 GRAVITY = Threshold("largest-gravity", 30.0, "m/s^2", "no planet that people walk on has more")
@@ -247,7 +247,7 @@ def _find_limits(
             continue
         joint = subject.tree.parent_of(coordinate)
         motion = (
-            motions_of(joint).get(coordinate.name)
+            list_motions(joint).get(coordinate.name)
             if isinstance(joint, Joint) and joint.motion_types
             else None
         )

@@ -16,8 +16,9 @@ from osimlite.schema.base import Component, Object, Unknown
 from osimlite.schema.contact import ContactGeometry
 from osimlite.schema.frames import Frame
 from osimlite.schema.geometry import Geometry
-from osimlite.schema.specs import reference_specs
-from osimlite.schema.tree import Resolution, Use, is_a, normalised
+from osimlite.schema.resolution import normalize_path
+from osimlite.schema.specs import get_reference_specs
+from osimlite.schema.tree import Resolution, Use, is_a
 
 if TYPE_CHECKING:
     from osimlite.schema.custom_joint import CustomJoint
@@ -270,7 +271,7 @@ def _list_uses(subject: Subject) -> Iterator[Use]:
     # An optional reference that OpenSim insists on anyway is not among the uses when it is
     # left out.
     for cls, items in subject.by_class.items():
-        for spec in reference_specs(cls):
+        for spec in get_reference_specs(cls):
             if spec.reference.shape == "optional" and spec.reference.required:
                 for item in items:
                     if getattr(item, spec.name) is None:
@@ -349,7 +350,7 @@ def _differs_in_form(text: str, candidates: list[str]) -> bool:
 def _find_elsewhere(subject: Subject, use: Use, text: str) -> Component | None:
     """A component of another class that goes by this name or path."""
     tree = subject.tree
-    at_path = tree.by_path.get(normalised("/" + text) or "")
+    at_path = tree.by_path.get(normalize_path("/" + text) or "")
     if at_path is not None and not is_a(at_path, use.reference.target):
         return at_path
     if "/" in text:
@@ -374,7 +375,7 @@ def _is_made_up(subject: Subject, use: Use) -> bool:
     if use.reference.rule == "coordinate-name":
         return any(path.rpartition("/")[2] == use.value for path in paths)
     base = "" if use.value.startswith("/") else f"{subject.tree.path_of(use.owner)}/"
-    return normalised(base + use.value) in paths
+    return normalize_path(base + use.value) in paths
 
 
 def _is_overwritten(subject: Subject, use: Use) -> bool:
@@ -405,7 +406,7 @@ def _is_undecided(subject: Subject, use: Use, text: str) -> bool:
     if isinstance(use.owner, Unknown):
         return True
     base = tree.path_of(use.owner) or "/"
-    path = normalised(text if text.startswith("/") else f"{base}/{text}") or ""
+    path = normalize_path(text if text.startswith("/") else f"{base}/{text}") or ""
     while path.count("/") > 1:
         path = path.rpartition("/")[0]
         if isinstance(tree.by_path.get(path), Unknown):

@@ -10,7 +10,7 @@ from osimlite.lint.registry import ERROR, WARNING, FindingCollector, rule
 from osimlite.lint.setup import Setup, get_content_type, select_members
 from osimlite.lint.table import Table
 from osimlite.lint.words import find_nearest_name, suggest_names
-from osimlite.schema.states import variables
+from osimlite.schema.states import find_variables
 from osimlite.schema.tree import is_a
 
 
@@ -137,7 +137,7 @@ def _find_missing_states(setup: Setup, table: Table) -> list[str]:
     columns = set(table.columns)
     ends = {"/".join(column.split("/")[-2:]) for column in columns}
     lacking = []
-    for path in variables(setup.tree, "state variable") if setup.tree is not None else ():
+    for path in find_variables(setup.tree, "state variable") if setup.tree is not None else ():
         owner, state = path.split("/")[-2:]
         old = {"value": owner, "speed": f"{owner}_u"}.get(state, f"{owner}.{state}")
         if f"{owner}/{state}" not in ends and old not in columns:

@@ -15,7 +15,7 @@ from osimlite.lint.setup import (
     is_given,
 )
 from osimlite.lint.words import describe_object, with_article
-from osimlite.schema.specs import file_specs
+from osimlite.schema.specs import get_file_specs
 from osimlite.schema.tree import is_a
 
 _TABLE = (".sto", ".mot", ".trc", ".csv")
@@ -78,7 +78,7 @@ def report_missing_input(setup: Setup, report: FindingCollector) -> None:
                 suggestion="Unassigned",
             )
     for item in setup.items:
-        for spec in file_specs(type(item), "file"):
+        for spec in get_file_specs(type(item), "file"):
             if spec.reference.required and not is_given(getattr(item, spec.name)):
                 report(
                     f"{describe_object(item)} names no {spec.tag}: {NO_FILE_CONSEQUENCE}",
@@ -246,7 +246,7 @@ def report_lost_output(setup: Setup, report: FindingCollector) -> None:
                 suggestion=f"{folder}/{name}",
             )
     for item in setup.items:
-        for spec in file_specs(type(item), "output-file"):
+        for spec in get_file_specs(type(item), "output-file"):
             if spec.reference.required and not getattr(item, spec.name).strip():
                 report(
                     f"{describe_object(item)} names no {spec.tag}: its results get no proper file "

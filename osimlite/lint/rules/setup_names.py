@@ -13,8 +13,8 @@ from osimlite.lint.setup import Setup
 from osimlite.lint.words import describe_object, find_nearest_name
 from osimlite.schema.base import Component, Object, Unknown
 from osimlite.schema.fields import Reference
-from osimlite.schema.specs import reference_specs
-from osimlite.schema.states import variables
+from osimlite.schema.specs import get_reference_specs
+from osimlite.schema.states import find_variables
 from osimlite.schema.tree import Tree, Use, is_a
 
 _KINDS = ("actuator", "body", "coordinate", "frame", "joint", "marker", "muscle")
@@ -66,7 +66,7 @@ def report_unknown_name(setup: Setup, report: FindingCollector) -> None:
         return id(item) not in off and vars(item).get("on", True) and vars(item).get("apply", True)
 
     for cls, items in setup.by_class.items():
-        for spec in reference_specs(cls):
+        for spec in get_reference_specs(cls):
             kind = spec.reference
             what = _get_kind(kind) if kind.required and kind.shape != "list" else None
             for item in items if what else ():
@@ -83,10 +83,10 @@ def report_unknown_name(setup: Setup, report: FindingCollector) -> None:
     @cache
     def known(what: str, rule: str) -> set[str]:
         if rule in _PATHS:
-            return set(variables(tree, what))
+            return set(find_variables(tree, what))
         if what == "Actuator":
             return {
-                *variables(tree, what),
+                *find_variables(tree, what),
                 *(f"/forceset/{name}" for name in setup.list_names(what)),
             }
         return (

@@ -15,7 +15,7 @@ from osimlite.lint.setup import Setup, is_given, select_members
 from osimlite.lint.table import Table
 from osimlite.lint.words import describe_object
 from osimlite.schema.base import Object
-from osimlite.schema.specs import field_specs
+from osimlite.schema.specs import get_field_specs
 from osimlite.schema.tree import is_a
 
 _FIRST_STATES = 0.03
@@ -171,7 +171,7 @@ def report_time_outside_data(setup: Setup, report: FindingCollector) -> None:
                     fault="no-data-at-times",
                 )
                 continue
-            specs = field_specs(type(item))
+            specs = get_field_specs(type(item))
             said = [
                 setup.element_of(item, tag) is not None and not setup.has_note(item, specs[tag])
                 for tag in tags

@@ -19,7 +19,7 @@ from osimlite.schema.fields import Value
 from osimlite.schema.frames import Body, PhysicalOffsetFrame, StationDefinedFrame
 from osimlite.schema.joints import Joint
 from osimlite.schema.markers import Station
-from osimlite.schema.specs import FieldSpec, value_specs
+from osimlite.schema.specs import FieldSpec, get_value_specs
 from osimlite.schema.tree import is_a
 
 POINTS = ("socket_point_a", "socket_point_b", "socket_point_c", "socket_origin_point")
@@ -241,7 +241,7 @@ def _list_lengths(cls: type[Object]) -> tuple[FieldSpec, ...]:
     """The properties of a class that are lengths or places, in metres."""
     return tuple(
         spec
-        for spec in value_specs(cls)
+        for spec in get_value_specs(cls)
         if isinstance(spec.kind, Value) and spec.kind.unit == "m" and spec.kind.scalar == "double"
     )
 

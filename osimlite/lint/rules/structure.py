@@ -21,8 +21,8 @@ from osimlite.lint.words import describe_object, format_value, with_article
 from osimlite.schema.base import Object
 from osimlite.schema.fields import Held, Reference, Value
 from osimlite.schema.model import CURRENT_VERSION, Model
-from osimlite.schema.registry import classes_mentioning
-from osimlite.schema.specs import FieldSpec, field_specs
+from osimlite.schema.registry import find_classes_mentioning
+from osimlite.schema.specs import FieldSpec, get_field_specs
 
 
 @rule("OSIM101", "unknown-tag", severity=ERROR, fixes="both")
@@ -98,7 +98,7 @@ def _describe_unknown(subject: Subject, note: Note, owner: Object) -> _UnknownTa
             "OpenSim ignores it"
         )
         return _UnknownTag(note, owner, message, INFO, fix=comment_out(subject.source, note.number))
-    specs = field_specs(type(owner))
+    specs = get_field_specs(type(owner))
     suggestion = find_nearest(_FORMER.get(note.word, note.word), specs, cutoff=70)
     if suggestion is not None and not _can_hold(subject, note, specs[suggestion]):
         suggestion = None
@@ -338,7 +338,7 @@ def _find_property(subject: Subject, source: Source, number: int) -> FieldSpec |
     for items in subject.by_class.values():
         for item in items:
             if item._index == above:
-                specs = field_specs(type(item))
+                specs = get_field_specs(type(item))
                 old = successor(type(item), span.tag)
                 tag = old.tag if old is not None and old.tag is not None else span.tag
                 spec = specs.get(tag)
@@ -356,7 +356,7 @@ _FORMER = {"enable_controller": "enabled"}
 def _list_given(owner: Object) -> set[str]:
     return {
         spec.tag
-        for spec in field_specs(type(owner)).values()
+        for spec in get_field_specs(type(owner)).values()
         if spec.name in owner.model_fields_set
     }
 
@@ -373,8 +373,8 @@ def list_homes(tag: str, owner: type[Object]) -> list[str]:
     In a model those of tools are left out, and the other way round.
     """
     homes, package = set(), owner.__module__.rpartition(".")[0]
-    for cls in classes_mentioning(tag):
-        spec = field_specs(cls).get(tag)
+    for cls in find_classes_mentioning(tag):
+        spec = get_field_specs(cls).get(tag)
         if spec is not None and spec.declared_in.__module__.rpartition(".")[0] == package:
             homes.add(spec.declared_in.__name__)
     return sorted(homes)

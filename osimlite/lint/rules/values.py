@@ -6,7 +6,14 @@ import re
 from collections.abc import Callable, Iterator
 
 from osimlite.base.text import find_nearest, join_words
-from osimlite.io.document.lexical import Unclean, flag, reads_as, real, split, whole
+from osimlite.io.document.lexical import (
+    UncleanText,
+    parse_flag,
+    parse_integer,
+    parse_real,
+    reads_as,
+    split_words,
+)
 from osimlite.io.document.notes import Note
 from osimlite.lint.fixes import replace_text
 from osimlite.lint.registry import ERROR, WARNING, FindingCollector, rule
@@ -14,7 +21,7 @@ from osimlite.lint.subject import Subject
 from osimlite.lint.words import describe_object, format_value
 from osimlite.schema.base import Object
 from osimlite.schema.fields import Value
-from osimlite.schema.specs import FieldSpec, field_specs
+from osimlite.schema.specs import FieldSpec, get_field_specs
 
 KEEPS_DEFAULT = "OpenSim keeps the default"
 """What a message says of a value that OpenSim cannot read, where it continues."""
@@ -77,7 +84,7 @@ def report_wrong_count(subject: Subject, report: FindingCollector) -> None:
     for note, owner, spec, kind in _find_value_notes(subject, "too-many", "too-few"):
         if not _are_readable(note.word, kind):
             continue
-        count = len(split(note.word))
+        count = len(split_words(note.word))
         report(
             f"{subject.describe_property(owner, spec)} expects {kind.words()}, found {count}: "
             f"{_describe_kept_value(note, owner, spec, kind)}",
@@ -180,31 +187,31 @@ def _find_value_notes(
 
 def _read_beginning(word: str) -> object:
     try:
-        return real(word)
-    except Unclean as unclean:
+        return parse_real(word)
+    except UncleanText as unclean:
         return unclean.value
 
 
 def _are_readable(text: str, kind: Value) -> bool:
     """Whether every word is one of its kind, so that only their count is wrong."""
     readers: dict[str, Callable[[str], object]] = {
-        "double": real,
-        "int": whole,
-        "bool": flag,
+        "double": parse_real,
+        "int": parse_integer,
+        "bool": parse_flag,
         "string": str,
     }
     reads = readers[kind.scalar]
     try:
-        for word in split(text):
+        for word in split_words(text):
             reads(word)
-    except Unclean:
+    except UncleanText:
         return False
     return True
 
 
 def _get_text(owner: Object, spec: FieldSpec) -> str:
     raw = owner.layout.raw.get(spec.name) if owner.layout is not None else None
-    return " ".join(split(raw[1])) if raw else ""
+    return " ".join(split_words(raw[1])) if raw else ""
 
 
 def _is_refused(note: Note, spec: FieldSpec, kind: Value) -> bool:
@@ -222,7 +229,7 @@ def _describe_kept_value(note: Note, owner: Object, spec: FieldSpec, kind: Value
         return "OpenSim rejects the file"
     if spec.tag == "mass" and spec.default != spec.default:
         return "without a mass OpenSim rejects the file"
-    return f"{KEEPS_DEFAULT}, {format_value(field_specs(type(owner))[spec.tag].default)}"
+    return f"{KEEPS_DEFAULT}, {format_value(get_field_specs(type(owner))[spec.tag].default)}"
 
 
 def _describe_foreign_characters(text: str) -> str:

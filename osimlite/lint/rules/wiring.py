@@ -13,8 +13,9 @@ from osimlite.lint.words import describe_object, with_article
 from osimlite.schema.base import Component, Unknown
 from osimlite.schema.frames import Frame
 from osimlite.schema.geometry import Geometry
-from osimlite.schema.states import outputs_of
-from osimlite.schema.tree import Use, normalised
+from osimlite.schema.resolution import normalize_path
+from osimlite.schema.states import list_outputs
+from osimlite.schema.tree import Use
 
 
 @rule("OSIM331", "control-function-count", severity=ERROR)
@@ -158,20 +159,20 @@ def _describe_input_fault(subject: Subject, use: Use, text: str) -> _InputFault 
         return _InputFault("; expected the path of a component, a bar and an output")
     tree, path = subject.tree, match["path"]
     base = tree.path_of(use.owner) or "/"
-    whole = normalised(path if path.startswith("/") else f"{base}/{path}")
+    whole = normalize_path(path if path.startswith("/") else f"{base}/{path}")
     component = tree.by_path.get(whole) if whole is not None else None
     if component is None:
         if subject.has_unknown:
             return None
         right = find_nearest(
-            path, [known for known, item in tree.by_path.items() if outputs_of(type(item))]
+            path, [known for known, item in tree.by_path.items() if list_outputs(type(item))]
         )
         return _InputFault(
             f", but there is no component '{path}'", text.replace(path, right, 1) if right else None
         )
     if isinstance(component, Unknown):
         return None
-    outputs = outputs_of(type(component))
+    outputs = list_outputs(type(component))
     kind = use.reference.target
     known = outputs.get(match["output"])
     if known is None:

@@ -8,7 +8,7 @@ import numpy as np
 
 from osimlite.base.text import suggest_name
 from osimlite.derivatives.symbols import casadi
-from osimlite.io.document.cache import read_anew
+from osimlite.io.document.cache import read_copy
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.optimal.point import (
     Formula,
@@ -105,7 +105,7 @@ def read_contact_groups(goal: ContactGoal, problem: Problem) -> list[ContactGrou
             raise problem.invalid_error(goal, "external_loads or external_loads_file is required")
         file = problem.locate_file(goal.external_loads_file)
         folder = file.parent
-        loads = read_anew(file, ExternalLoads)
+        loads = read_copy(file, ExternalLoads)
         StudyContext(file, None).check_values(loads)
     table = read_loads_table(loads, folder, None if file is None else str(file))
     force_by_name = {force.name: force for force in loads.objects}

@@ -10,7 +10,7 @@ import numpy as np
 from osimlite.base.records import dataclass
 from osimlite.derivatives.symbols import casadi
 from osimlite.errors import DocumentError
-from osimlite.io.tables.headers import suffixes
+from osimlite.io.tables.headers import list_suffixes
 from osimlite.io.tables.storage import StoTable, read_sto
 from osimlite.mechanics.multibody.spatial import Array, quaternion_of
 from osimlite.optimal.point import Formula, Frame, GoalTerms, Point, make_integral_terms
@@ -188,7 +188,7 @@ class FrameReference:
         if not paths:
             raise problem.invalid_error(goal, "frame_paths is empty; OpenSim rejects this too")
         table = self._read_table(problem, paths)
-        endings = suffixes(self.kind)
+        endings = list_suffixes(self.kind)
         size = len(endings)
         series = fit_splines(problem, table, [f"{path}{end}" for path in paths for end in endings])
         weight_by_path = {weight.name: weight.weight for weight in self.weights.objects}
@@ -208,7 +208,7 @@ class FrameReference:
     def _read_table(self, problem: Problem, paths: Sequence[str]) -> StoTable:
         """Return the table of reference values, from the file or from the motion."""
         goal = self.goal
-        endings = suffixes(self.kind)
+        endings = list_suffixes(self.kind)
         if self.file.strip():
             if self.states is not None and self.states.filepath.strip():
                 raise problem.invalid_error(

@@ -19,7 +19,7 @@ from osimlite.schema.moco.tracking import (
     MocoMarkerTrackingGoal,
     MocoStateTrackingGoal,
 )
-from osimlite.schema.states import variables
+from osimlite.schema.states import find_variables
 
 if TYPE_CHECKING:
     from osimlite.optimal.problem import Problem
@@ -124,7 +124,7 @@ def build_generalized_force_tracking_goal(
     `force_paths`.
     """
     applied_forces = _match_forces(goal, problem)
-    coordinates: dict[str, Any] = {**variables(problem.model.tree(), "generalized force")}
+    coordinates: dict[str, Any] = {**find_variables(problem.model.tree(), "generalized force")}
     paths = {
         label: coordinate.path
         for label, coordinate in coordinates.items()

@@ -9,7 +9,7 @@ import numpy as np
 
 from osimlite.errors import ModelError
 from osimlite.io.tables.storage import StoTable
-from osimlite.io.tables.table_stream import TableStream, start_of_word
+from osimlite.io.tables.table_stream import TableStream, find_word_start
 from osimlite.mechanics.multibody.functions import Function, PiecewiseConstant
 from osimlite.mechanics.multibody.smoothing_spline import smoothing_spline
 
@@ -29,7 +29,7 @@ def read_controls(path: str | Path) -> StoTable:
                 if not isfinite(value):
                     where, column = (
                         ("time", *stream.columns)[number],
-                        start_of_word(stream.text, number),
+                        find_word_start(stream.text, number),
                     )
                     raise ModelError(
                         f"'{where}' is {value}; give a number",

@@ -15,9 +15,9 @@ import numpy as np
 
 from osimlite.base.text import find_nearest, join_words
 from osimlite.errors import DocumentError, ModelError, SettingError
-from osimlite.io.document.cache import read_object, while_unchanged
+from osimlite.io.document.cache import cache_by_file, read_object
 from osimlite.io.tables.c3d import ENDING, read_c3d_forces
-from osimlite.io.tables.storage import StoTable, beside, read_sto
+from osimlite.io.tables.storage import StoTable, merge_tables, read_sto
 from osimlite.mechanics.multibody.functions import Constant, Function, PiecewiseLinear
 from osimlite.mechanics.multibody.mechanism import FramePlacement, Mechanism
 from osimlite.mechanics.multibody.smoothing_spline import natural_splines
@@ -157,7 +157,7 @@ def read_loads_table(loads: ExternalLoads, folder: Path, file: str | None) -> St
     name = loads.datafile.strip()
     if name in ("", "Unassigned"):
         raise DocumentError("it names no data file; give it a <datafile>", file=file)
-    path = beside(folder, name)
+    path = merge_tables(folder, name)
     return (
         read_c3d_forces(path)
         if path.suffix.lower() == ENDING
@@ -165,7 +165,7 @@ def read_loads_table(loads: ExternalLoads, folder: Path, file: str | None) -> St
     )
 
 
-_read_cached_table = while_unchanged(4)(read_sto)
+_read_cached_table = cache_by_file(4)(read_sto)
 """Cached reader, since each of the loads reads the same table."""
 
 

@@ -26,7 +26,7 @@ from osimlite.base.records import dataclass, field
 from osimlite.mechanics.kernels.layout import ITEM
 from osimlite.mechanics.multibody.links import Places
 from osimlite.schema.actuators import Actuator
-from osimlite.schema.states import states_of
+from osimlite.schema.states import list_states
 from osimlite.schema.tree import is_a
 from osimlite.simulation.elements.builder import ElementBuilder
 from osimlite.simulation.elements.force_records import ForceRecord, Response, Silent
@@ -161,7 +161,7 @@ class ForceType:
         if self.check is not None:
             self.check(builder, force)
         # A state that the component does not have is 0 for the law.
-        own = states_of(force)
+        own = list_states(force)
         states = tuple(
             StateVariable(f"{path}/{state.name}", state.initial_value(force), state.is_simbody)
             if state.name in own

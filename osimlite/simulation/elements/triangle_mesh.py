@@ -12,10 +12,10 @@ from osimlite.base.files import read_file
 from osimlite.base.records import dataclass
 from osimlite.errors import ModelError
 from osimlite.io.meshes.folders import MeshFolders
-from osimlite.io.meshes.obj import obj_polygons
-from osimlite.io.meshes.stl import stl_corners
+from osimlite.io.meshes.obj import read_obj_polygons
+from osimlite.io.meshes.stl import read_stl_corners
 from osimlite.io.meshes.surface import Indices, Polygons
-from osimlite.io.meshes.vtp import vtp_polygons
+from osimlite.io.meshes.vtp import read_vtp_polygons
 from osimlite.mechanics.multibody.spatial import Array
 
 _SAME_POINT = 8.7e-7
@@ -53,11 +53,11 @@ class TriangleMesh:
         content = read_file(path)
         match path.suffix.lower():
             case ".vtp":
-                return cls.from_polygons(vtp_polygons(content, str(path)), str(path))
+                return cls.from_polygons(read_vtp_polygons(content, str(path)), str(path))
             case ".obj":
-                return cls.from_polygons(obj_polygons(content, str(path)), str(path))
+                return cls.from_polygons(read_obj_polygons(content, str(path)), str(path))
             case ".stl" | ".stla":
-                return cls.from_corners(stl_corners(content, str(path)), str(path))
+                return cls.from_corners(read_stl_corners(content, str(path)), str(path))
             case kind:
                 raise ModelError(
                     f"osimlite, like OpenSim, does not read {kind} files; save it as .obj",

@@ -8,7 +8,7 @@ from osimlite.base.files import MESH_FOLDER_HINT, read_file
 from osimlite.base.records import dataclass, field
 from osimlite.errors import OsimliteError
 from osimlite.io.meshes.folders import MeshFolders, read_surface
-from osimlite.io.meshes.stl import binary_stl, is_binary
+from osimlite.io.meshes.stl import format_binary_stl, is_binary
 from osimlite.io.meshes.surface import Surface
 from osimlite.simulation.robot.names import legal
 
@@ -95,7 +95,7 @@ def _written(source: Path, kind: str, signs: Signs) -> tuple[bytes, str]:
     """What is written of a file, and what was done to it."""
     if kind == ".stl":
         content = read_file(source)
-        binary = binary_stl(content, source.name, signs)
+        binary = format_binary_stl(content, source.name, signs)
         return binary, "" if is_binary(content) else "written as a binary STL file"
     surface = read_surface(source)
     text = (surface.stretched(signs) if min(signs) < 0.0 else surface).obj().encode()

@@ -29,8 +29,8 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from itertools import pairwise
 
-from osimlite.io.document.lexical import shortest
-from osimlite.io.document.xml_text import quoted
+from osimlite.io.document.lexical import format_shortest
+from osimlite.io.document.xml_text import quote_attribute
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.simulation.robot.couplings import Mimic, mimics
 from osimlite.simulation.robot.names import UniqueNames
@@ -99,7 +99,7 @@ def urdf_text(robot: Robot, *, visuals: bool = True) -> str:
 def number(value: float) -> str:
     """The shortest text that reads back as the same float."""
     # Not -0 either.
-    return shortest(float(value) + 0.0)
+    return format_shortest(float(value) + 0.0)
 
 
 def numbers(values: Sequence[float] | Array) -> str:
@@ -207,7 +207,11 @@ class _Writer:
 
     def _start(self, tag: str, attributes: Attributes, end: str) -> None:
         for line in _wrapped(
-            [f"<{tag}", *(f"{name}={quoted(value)}" for name, value in attributes.items())], end
+            [
+                f"<{tag}",
+                *(f"{name}={quote_attribute(value)}" for name, value in attributes.items()),
+            ],
+            end,
         ):
             self.line(line)
 

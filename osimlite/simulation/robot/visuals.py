@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from osimlite.base.records import dataclass, field
-from osimlite.io.meshes.unit_shapes import ball, tube
+from osimlite.io.meshes.unit_shapes import make_ball, make_cylinder
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.spatial import Array, make_transform, rotation_about
 from osimlite.schema.frames import Frame
@@ -138,7 +138,7 @@ class _Collector:
                     return None
                 if a == b == c:
                     return Ball(a), here
-                file = self.mesh_files.stretched("ellipsoid", ball(), (a, b, c))
+                file = self.mesh_files.stretched("ellipsoid", make_ball(), (a, b, c))
                 note(
                     "ellipsoid",
                     path,
@@ -158,7 +158,9 @@ class _Collector:
                     return None
                 if a == b:
                     return Tube(a, length), _Y_TO_Z
-                file = self.mesh_files.stretched("elliptic_cylinder", tube(), (a, b, length))
+                file = self.mesh_files.stretched(
+                    "elliptic_cylinder", make_cylinder(), (a, b, length)
+                )
                 note(
                     "elliptic-cylinder",
                     path,

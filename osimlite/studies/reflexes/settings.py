@@ -21,7 +21,7 @@ from osimlite.base.records import dataclass, field
 from osimlite.base.text import join_words, suggest_name
 from osimlite.base.writing import find_shared_folders
 from osimlite.errors import DocumentError, MissingFileError
-from osimlite.io.document.data import SUFFIXES, parsed_yaml
+from osimlite.io.document.data import SUFFIXES, parse_yaml
 from osimlite.mechanics.multibody.spatial import Array
 
 _TOKEN = re.compile(r'\s+|#[^\n]*|(?P<token>"[^"]*"|<<|>>|[{}=\[\]]|[^\s{}=\[\]#"]+)')
@@ -255,7 +255,7 @@ def _read_source(
         raise DocumentError("the files include one another without end", file=str(path))
     if path.suffix in SUFFIXES:
         top = Node(file=str(path), line=1)
-        found = parsed_yaml(text, str(path), with_lines=True)
+        found = parse_yaml(text, str(path), with_lines=True)
         if found is not None:
             _fill_from_yaml(top, found, path, base, depth, 0, budget)
         return top

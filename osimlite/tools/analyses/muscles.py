@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from osimlite.io.tables.old_storage import UNITS
-from osimlite.io.tables.writers import control_set
+from osimlite.io.tables.writers import format_control_set
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.muscles import Muscle
 from osimlite.schema.tools.analyses import MuscleAnalysis, StaticOptimization
@@ -143,7 +143,7 @@ def write_static_optimization(
     tables.add_table(
         "force", forces.name, forces.columns, forces.rows, description=FORCES_DESCRIPTION
     )
-    tables.add_text("controls.xml", "".join(control_set(activations)))
+    tables.add_text("controls.xml", "".join(format_control_set(activations)))
     _report_unsolved(shared, analysis.name, tables)
 
 

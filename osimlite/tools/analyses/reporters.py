@@ -11,7 +11,7 @@ from osimlite.io.tables.old_storage import DEGREES, UNITS
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.base import Component
 from osimlite.schema.sets import Probe
-from osimlite.schema.states import outputs_of
+from osimlite.schema.states import list_outputs
 from osimlite.schema.tools.analyses import (
     ForceReporter,
     OutputReporter,
@@ -56,7 +56,7 @@ def write_outputs(analysis: OutputReporter, motion: Motion, tables: AnalysisTabl
             raise tables.job.create_error(
                 f"'{analysis.name}' asks for an output of '{path}', which is not in the model"
             )
-        outputs = outputs_of(type(component))
+        outputs = list_outputs(type(component))
         reader = find_reader(motion, component, parts["output"])
         kind = outputs[parts["output"]].type if parts["output"] in outputs else "double"
         if kind not in OUTPUT_FILES:

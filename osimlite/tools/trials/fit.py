@@ -16,7 +16,7 @@ from osimlite.fitting.marker_data import MarkerData
 from osimlite.fitting.pose_fit import PoseFit
 from osimlite.fitting.pose_layout import MarkerTarget
 from osimlite.fitting.scale_tool import compute_scaled_model
-from osimlite.io.tables.storage import both_of
+from osimlite.io.tables.storage import expect_time_range
 from osimlite.lint.trial import Measurement
 from osimlite.mechanics.multibody.parts import CoordinateInfo
 from osimlite.mechanics.multibody.spatial import Array
@@ -159,7 +159,7 @@ def _read_fitted_motion(tool: TrialTool, file: Path) -> FittedMotion:
     model, mechanism = tool.model, tool.mechanism
     recorded = tool.folder.read_motion(file, tool.model_file)
     data = MarkerData.from_source(tool.require_input("marker_file")).select_times(
-        *both_of(tool.setup.time_range)
+        *expect_time_range(tool.setup.time_range)
     )
     tasks = [
         task

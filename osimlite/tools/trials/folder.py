@@ -13,7 +13,7 @@ import numpy as np
 from osimlite.base.files import make_missing_error
 from osimlite.base.records import replace
 from osimlite.errors import OsimliteError
-from osimlite.io.document.cache import read_object, top_at
+from osimlite.io.document.cache import get_object, read_object
 from osimlite.io.document.reader import read_any
 from osimlite.io.document.source import Position, Source
 from osimlite.io.tables.storage import StoTable, read_sto
@@ -95,7 +95,7 @@ class TrialFolder:
                     )
                 setups.setdefault(os.path.realpath(path), path)
         for file in setups.values():
-            top = top_at(str(file))
+            top = get_object(str(file))
             if top is not None and type(top).__name__ in SETUPS:
                 self.tools.append(TrialTool(self, Job(top, file)))
         # In the order in which a trial is worked on.

@@ -29,7 +29,7 @@ from osimlite.mechanics.multibody.schema_functions import convert_function
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.muscles import Muscle
 from osimlite.schema.old_muscles import Delp1990Muscle_Deprecated, Schutte1993Muscle_Deprecated
-from osimlite.schema.states import states_of
+from osimlite.schema.states import list_states
 from osimlite.translate.fidelity import Error
 from osimlite.translate.mjcf.draft import Draft, Unsayable, add, tidy
 from osimlite.translate.mjcf.isometric import isometric_tension
@@ -149,7 +149,7 @@ def muscle(draft: Draft, force: Muscle, path: str) -> str:
         (max(force.min_control, 0.0), min(force.max_control, 1.0)),
     )
     rise, fall = rates.rise, rates.fall
-    lags = rise > 0.0 and fall > 0.0 and "activation" in states_of(force)
+    lags = rise > 0.0 and fall > 0.0 and "activation" in list_states(force)
     gain, bias = curves.numbers(vmax, fvmax)
     add(
         draft.section("actuator"),

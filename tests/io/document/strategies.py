@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 from osimlite.schema.base import Component, Object
 from osimlite.schema.fields import Held, ObjectList, Reference, Value
 from osimlite.schema.model import Model
-from osimlite.schema.registry import class_for, tags
-from osimlite.schema.specs import field_specs
+from osimlite.schema.registry import find_class, list_tags
+from osimlite.schema.specs import get_field_specs
 
 CLASSES: list[type[Object]] = [
-    cls for cls in map(class_for, tags()) if cls is not None and cls is not Model
+    cls for cls in map(find_class, list_tags()) if cls is not None and cls is not Model
 ]
 
 numbers = st.floats(allow_nan=True, allow_infinity=True)
@@ -50,7 +50,7 @@ def objects(draw: st.DrawFn, accepts: type[Object] = Component, depth: int = 2) 
     kinds = [cls for cls in CLASSES if issubclass(cls, accepts)]
     cls = draw(st.sampled_from(kinds))
     given: dict[str, Any] = {"name": draw(names)}
-    specs = list(field_specs(cls).values())
+    specs = list(get_field_specs(cls).values())
     for spec in (
         draw(st.lists(st.sampled_from(specs), unique_by=lambda spec: spec.name, max_size=5))
         if specs

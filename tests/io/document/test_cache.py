@@ -41,10 +41,10 @@ def reads(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
 def test_what_is_known_is_copied(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     text = osimlite.to_text(osimlite.read(file))
-    cache.top_at(f"{file.parent}/./{file.name}")
+    cache.get_object(f"{file.parent}/./{file.name}")
     seen = reads(monkeypatch)
     for _ in range(2):
-        model = cache.read_anew(file, Model)
+        model = cache.read_copy(file, Model)
         assert osimlite.to_text(model) == text
         assert model.layout is not None and model.layout.file == str(file)
         body = model.body_set.objects[0]
@@ -54,7 +54,7 @@ def test_what_is_known_is_copied(file: Path, monkeypatch: pytest.MonkeyPatch) ->
 
 
 def test_another_file_in_its_place_is_read(file: Path, tmp_path: Path) -> None:
-    cache.top_at(str(file))
+    cache.get_object(str(file))
     before, other = os.stat(file), tmp_path / "other.osim"
     other.write_text(file.read_text().replace("3.25", "4.75"))
     os.utime(other, ns=(before.st_atime_ns, before.st_mtime_ns))
@@ -63,7 +63,7 @@ def test_another_file_in_its_place_is_read(file: Path, tmp_path: Path) -> None:
         before.st_mtime_ns,
         before.st_size,
     )
-    assert cache.read_anew(file, Model).body_set.objects[0].mass == 4.75
+    assert cache.read_copy(file, Model).body_set.objects[0].mass == 4.75
 
 
 def test_parts_in_other_files_are_read_again(tmp_path: Path) -> None:
@@ -76,18 +76,18 @@ def test_parts_in_other_files_are_read_again(tmp_path: Path) -> None:
     file.write_text(
         '<OpenSimDocument Version="40600"><Model name="m"><ForceSet file="forces.xml"/></Model></OpenSimDocument>'
     )
-    cache.top_at(str(file))
-    assert [force.name for force in cache.read_anew(file, Model).force_set.objects] == ["one"]
+    cache.get_object(str(file))
+    assert [force.name for force in cache.read_copy(file, Model).force_set.objects] == ["one"]
     part.write_text(part.read_text().replace("one", "two"))
-    assert [force.name for force in cache.read_anew(file, Model).force_set.objects] == ["two"]
+    assert [force.name for force in cache.read_copy(file, Model).force_set.objects] == ["two"]
 
 
 def test_what_is_not_asked_for_is_refused_as_always(file: Path, tmp_path: Path) -> None:
-    cache.top_at(str(file))
+    cache.get_object(str(file))
     with pytest.raises(DocumentError, match="a <Model>, not a <ScaleTool>"):
-        cache.read_anew(file, ScaleTool)
+        cache.read_copy(file, ScaleTool)
     with pytest.raises(DocumentError, match="no such file"):
-        cache.read_anew(tmp_path / "none.osim", Model)
+        cache.read_copy(tmp_path / "none.osim", Model)
 
 
 def test_a_file_is_the_same_by_every_path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -97,7 +97,7 @@ def test_a_file_is_the_same_by_every_path(tmp_path: Path, monkeypatch: pytest.Mo
         seen.append(path)
         return Path(path).read_text()
 
-    known = cache.while_unchanged(2)(make)
+    known = cache.cache_by_file(2)(make)
     (tmp_path / "one.txt").write_text("one")
     monkeypatch.chdir(tmp_path)
     assert known("one.txt") == known("./one.txt") == known(str(tmp_path / "one.txt")) == "one"
@@ -110,7 +110,7 @@ def test_a_file_is_the_same_by_every_path(tmp_path: Path, monkeypatch: pytest.Mo
 
 
 def test_what_somebody_else_has_made_is_kept(tmp_path: Path) -> None:
-    known = cache.while_unchanged(1)(lambda path: Path(path).read_text())
+    known = cache.cache_by_file(1)(lambda path: Path(path).read_text())
     files = [tmp_path / "one.txt", tmp_path / "two.txt"]
     for each in files:
         each.write_text("read")

@@ -8,14 +8,14 @@ import pytest
 
 import osimlite
 from osimlite.errors import DocumentError, OsimliteError
-from osimlite.io.document.printer import formatted
+from osimlite.io.document.printer import format_document
 from osimlite.io.document.reader import read_document
 from osimlite.io.document.source import Source
 from osimlite.schema.base import Object
-from osimlite.schema.difference import Difference, differences
-from osimlite.schema.registry import class_for, tags
+from osimlite.schema.difference import Difference, find_differences
+from osimlite.schema.registry import find_class, list_tags
 from osimlite.schema.resolution import RULES
-from osimlite.schema.specs import reference_specs
+from osimlite.schema.specs import get_reference_specs
 from tests.conftest import ROOT
 
 DOCUMENTS = sorted((ROOT / "fixtures" / "documents").iterdir())
@@ -38,7 +38,7 @@ def test_what_is_read_is_written_again(path: Path, tmp_path: Path) -> None:
     assert osimlite.to_text(again.top) == osimlite.to_text(read.top)
     assert (again.version, again.changes) == (40600, [])
     if read.version == 40600:
-        assert osimlite.to_text(read.top) == path.read_text() == formatted(read.source)
+        assert osimlite.to_text(read.top) == path.read_text() == format_document(read.source)
 
 
 def test_the_object_is_of_the_class_at_the_top(fixtures: Path) -> None:
@@ -130,19 +130,25 @@ def test_members_are_compared_by_name() -> None:
             objects=[osimlite.IKMarkerTask(name=name, weight=float(len(name))) for name in names],
         )
 
-    assert differences(tasks("a", "b"), tasks("b", "a")) == []
-    assert differences(tasks("a", "b"), tasks("c", "b")) == [
+    assert find_differences(tasks("a", "b"), tasks("b", "a")) == []
+    assert find_differences(tasks("a", "b"), tasks("c", "b")) == [
         Difference("set", "objects[a]", "IKMarkerTask", None),
         Difference("set", "objects[c]", None, "IKMarkerTask"),
     ]
     old, new = tasks("a"), tasks("a")
     new.objects[0].weight = 5.0
-    assert differences(old, new) == [Difference("set", "objects[a].weight", 1.0, 5.0)]
+    assert find_differences(old, new) == [Difference("set", "objects[a].weight", 1.0, 5.0)]
 
 
 def test_every_rule_of_a_reference_is_known() -> None:
-    used = {spec.kind.rule for tag in tags() for spec in reference_specs(class_for(tag) or Object)}  # type: ignore[attr-defined]
+    used = {
+        spec.kind.rule  # type: ignore[attr-defined]
+        for tag in list_tags()
+        for spec in get_reference_specs(find_class(tag) or Object)
+    }
     named = {
-        cls.name_reference.rule for tag in tags() if (cls := class_for(tag)) and cls.name_reference
+        cls.name_reference.rule
+        for tag in list_tags()
+        if (cls := find_class(tag)) and cls.name_reference
     }
     assert used | named <= RULES.keys()

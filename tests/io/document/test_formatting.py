@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from osimlite.errors import DocumentError
-from osimlite.io.document.printer import formatted
+from osimlite.io.document.printer import format_document
 from osimlite.io.document.reader import read_document
 from osimlite.io.document.source import Source
 
@@ -14,8 +14,8 @@ DOCUMENT = '<OpenSimDocument Version="{}"><Model name="m">{}</Model></OpenSimDoc
 
 def laid_out(inner: str, version: int = 30000) -> str:
     """The lines between the tags of the model."""
-    text = formatted(Source(DOCUMENT.format(version, inner).encode()))
-    assert formatted(Source(text.encode())) == text
+    text = format_document(Source(DOCUMENT.format(version, inner).encode()))
+    assert format_document(Source(text.encode())) == text
     assert f'<OpenSimDocument Version="{version}">\n\t<Model name="m">' in text
     assert text.startswith('<?xml version="1.0" encoding="UTF-8" ?>\n') and text.endswith(
         "</OpenSimDocument>\n"
@@ -57,12 +57,12 @@ def test_a_document_in_any_encoding_becomes_utf_8(encoding: str) -> None:
     text = f"<?xml version='1.0' encoding='{encoding.removesuffix('-sig')}'?>" + DOCUMENT.format(
         30000, "<x>é</x>"
     )
-    assert "<x>é</x>" in formatted(Source(text.encode(encoding)))
+    assert "<x>é</x>" in format_document(Source(text.encode(encoding)))
 
 
 def test_comments_around_the_document_stay() -> None:
     text = "<!-- before -->\n" + DOCUMENT.format(20302, "") + "<!-- behind -->"
-    first, before, *_, behind = formatted(Source(text.encode())).splitlines()
+    first, before, *_, behind = format_document(Source(text.encode())).splitlines()
     assert (before, behind) == ("<!-- before -->", "<!-- behind -->") and first.startswith("<?xml")
 
 
@@ -83,4 +83,4 @@ def test_a_document_of_a_version_to_come() -> None:
 )
 def test_what_is_no_document_is_refused(text: str) -> None:
     with pytest.raises(DocumentError):
-        formatted(Source(text.encode()))
+        format_document(Source(text.encode()))

@@ -17,8 +17,8 @@ from osimlite.lint import Config, validate
 from osimlite.lint.many import check_files
 from osimlite.lint.settings import load_settings
 from osimlite.schema.base import Unknown
-from osimlite.schema.registry import MODULES, class_for, further_classes
-from osimlite.schema.specs import field_specs
+from osimlite.schema.registry import MODULES, find_class, get_plugin_classes
+from osimlite.schema.specs import get_field_specs
 
 REPO = Path(__file__).resolve().parents[3]
 CLASSES = re.findall(
@@ -72,7 +72,7 @@ def test_without_the_file_they_are_unknown_and_with_it_objects(folder):
     (patch,) = model.subcomponents
     assert patch.path == "/patch" and patch.normal == (0, 0, 1) and patch.pressure.amplitude == 2
     # What counted for one file counts for no other.
-    assert not further_classes() and class_for("BodyDragForce") is None
+    assert not get_plugin_classes() and find_class("BodyDragForce") is None
     assert isinstance(osimlite.read("m.osim").force_set.objects[-1], Unknown)
 
 
@@ -150,9 +150,9 @@ def test_a_class_may_derive_from_another_and_hold_objects_of_a_third(folder):
         },
     )  # fmt: skip
     classes = classes_in(path)
-    assert list(field_specs(classes["Wheel"])) == ["components", "radius", "spokes"]
+    assert list(get_field_specs(classes["Wheel"])) == ["components", "radius", "spokes"]
     spoke = classes["Spoke"]()
-    assert list(field_specs(classes["Spoke"])) == ["path", "from", "loads"]
+    assert list(get_field_specs(classes["Spoke"])) == ["path", "from", "loads"]
     assert (spoke.path, spoke.from_, spoke.loads) == ("", None, (1.0, 2.0))
     assert classes["Wheel"](radius=1, spokes=[spoke]).spokes == [spoke]
 
@@ -166,7 +166,9 @@ def test_a_default_of_the_base_may_be_another(folder):
         },
     )
     cls = classes_in(path)["Ours"]
-    assert list(field_specs(cls)) == ["components", "appliesForce"] and cls().appliesForce is False
+    assert (
+        list(get_field_specs(cls)) == ["components", "appliesForce"] and cls().appliesForce is False
+    )
 
 
 PROPERTY = {"name": "gain", "type": "double"}

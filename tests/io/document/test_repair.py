@@ -10,7 +10,7 @@ from osimlite.errors import DocumentError
 from osimlite.io.document.printer import to_text
 from osimlite.io.document.reader import Document, read_document, read_text
 from osimlite.io.document.source import Source
-from osimlite.io.document.survey import survey
+from osimlite.io.document.survey import survey_source
 
 HEAD = '<?xml version="1.0" encoding="UTF-8" ?>\n'
 TEXT = HEAD + (
@@ -218,14 +218,14 @@ def test_half_a_character_at_the_end_stands_for_one_that_is_missing() -> None:
 
 @pytest.mark.parametrize("cut", range(0, len(TEXT), 7))
 def test_a_text_that_breaks_off_is_surveyed_as_far_as_it_goes(cut: int) -> None:
-    result = survey(Source(TEXT[:cut].encode()))
+    result = survey_source(Source(TEXT[:cut].encode()))
     assert result.faults
     assert all(fault.line is not None for fault in result.faults)
 
 
 def test_what_is_recovered_of_an_old_document_is_upgraded() -> None:
     old = '<OpenSimDocument Version="30000"><Model name="m"><ForceSet><objects><CoordinateActuator name="c">'
-    result = survey(
+    result = survey_source(
         Source((old + "<isDisabled>true</isDisabled></CoordinateActuator></objects>").encode())
     )
     assert result.document is not None

@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from osimlite.io.document.reader import parse
+from osimlite.io.document.reader import parse_source
 from osimlite.io.document.source import Source
-from osimlite.io.document.spans import PlainSpans, Span, markup, spans_of
+from osimlite.io.document.spans import PlainSpans, Span, find_markup, find_spans
 
 PIECES = [
     "<a>",
@@ -63,7 +63,7 @@ TREE: st.SearchStrategy[str] = st.recursive(
 def one_by_one(text: str) -> list[Span]:
     spans: list[Span] = []
     above: list[int] = []
-    for kind, start, end, tag in markup(text):
+    for kind, start, end, tag in find_markup(text):
         if kind in ("open", "empty"):
             spans.append(Span(tag, start, end, end, end))
             if kind == "open":
@@ -76,13 +76,13 @@ def one_by_one(text: str) -> list[Span]:
 
 @given(st.lists(st.sampled_from(PIECES), max_size=30).map("".join))
 def test_one_search_through_a_text_finds_what_its_markup_says(text: str) -> None:
-    assert spans_of(text) == one_by_one(text)
+    assert find_spans(text) == one_by_one(text)
 
 
 @given(st.builds("<?xml version='1.0'?>\n<root>{}</root>".format, TREE))
 def test_a_well_formed_text_is_read_in_parts(text: str) -> None:
     source = Source(text.encode())
-    parse(source)
+    parse_source(source)
     assert list(source.spans) == one_by_one(text)
     assert isinstance(source.spans, PlainSpans)
     inside = [number for number, span in enumerate(source.spans) if span.start > 0]
@@ -101,7 +101,7 @@ def test_a_well_formed_text_is_read_in_parts(text: str) -> None:
 )
 def test_what_looks_like_an_element_in_a_comment_or_its_like_is_none(text: str) -> None:
     source = Source(text.encode())
-    parse(source)
+    parse_source(source)
     assert isinstance(source.spans, PlainSpans)
     assert list(source.spans) == one_by_one(text)
     assert [span.tag for span in source.spans if span.tag in "bd"] == []
@@ -112,21 +112,21 @@ def test_what_looks_like_an_element_in_a_comment_or_its_like_is_none(text: str) 
 )
 def test_an_end_may_have_a_blank(text: str) -> None:
     source = Source(text.encode())
-    parse(source)
+    parse_source(source)
     assert isinstance(source.spans, PlainSpans)
     assert list(source.spans) == one_by_one(text)
 
 
 def test_the_walker_is_read_in_parts(fixtures: Path) -> None:
     source = Source.of_file(fixtures / "walker" / "DynamicWalkerModel.osim")
-    parse(source)
+    parse_source(source)
     assert isinstance(source.spans, PlainSpans)
     assert source.spans[:2] == one_by_one(source.text)[:2]
-    assert list(source.spans) == spans_of(source.text)
+    assert list(source.spans) == find_spans(source.text)
 
 
 @pytest.mark.parametrize("behind", ["", "\n", "<!-- </a> -->", "<!-- </a>\n-->\n", "<?end </a>?>"])
 @pytest.mark.parametrize("close", ["</a>", "</a >"])
 def test_the_root_ends_where_it_does_whatever_is_behind_it(close: str, behind: str) -> None:
     text = f"<a><b>1</b><!-- </a> -->{close}{behind}"
-    assert list(PlainSpans(text, 2)) == spans_of(text)
+    assert list(PlainSpans(text, 2)) == find_spans(text)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from osimlite.errors import OsimliteError
-from osimlite.io.meshes.obj import obj_polygons, read_obj
+from osimlite.io.meshes.obj import read_obj, read_obj_polygons
 
 FOLDED = b"""# two faces that meet at an edge, each with a normal of its own
 mtllib ../secret.mtl
@@ -33,7 +33,7 @@ def test_normals_are_kept_where_faces_disagree_on_them():
         [[0, 0, 0], [1, 0, 0], [0, 1, 0]],
         [[0, 0, 0], [0, 1, 0], [0, 0, 1]],
     ]
-    assert len(obj_polygons(FOLDED, "x.obj").points) == 4
+    assert len(read_obj_polygons(FOLDED, "x.obj").points) == 4
 
 
 def test_what_is_written_says_the_same_and_nothing_else():
@@ -72,6 +72,6 @@ def test_a_surface_without_all_its_normals_has_none(old, new):
     ],
 )
 def test_what_is_no_surface_is_refused(line, said):
-    for read in (read_obj, obj_polygons):
+    for read in (read_obj, read_obj_polygons):
         with pytest.raises(OsimliteError, match=said):
             read(line.encode(), "x.obj")

@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from osimlite.errors import OsimliteError
-from osimlite.io.meshes.surface import Surface, triangulated
+from osimlite.io.meshes.surface import Surface, triangulate
 from osimlite.io.meshes.vtp import read_vtp
 
 WRITTEN_BY_VTK = (
@@ -213,7 +213,7 @@ def test_polygons_that_are_not_convex_are_covered_once(radii, tilt, turned):
     flat = np.array([np.cos(angles), np.sin(angles)]).T * np.array(radii)[:, None]
     flat = flat[::-1] if turned else flat
     points = np.column_stack([flat[:, 0], flat[:, 1] * np.cos(tilt), flat[:, 1] * np.sin(tilt)])
-    triangles = triangulated(points, np.arange(len(points)), np.array([len(points)]))
+    triangles = triangulate(points, np.arange(len(points)), np.array([len(points)]))
     assert len(triangles) == len(points) - 2
     whole = np.cross(points, np.roll(points, -1, axis=0)).sum(axis=0)
     a, b, c = (points[triangles[:, k]] for k in range(3))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from osimlite.io.tables.old_storage import printed
+from osimlite.io.tables.old_storage import format_old_table
 from osimlite.io.tables.storage import StoTable
 
 RNG = np.random.default_rng(7)
@@ -37,7 +37,7 @@ def test_every_number_is_as_its_format_writes_it(name: str, precision: int) -> N
     table = StoTable(
         "a table", np.arange(len(rows)) / 60.0, tuple("abcdefg"[: rows.shape[1]]), rows
     )
-    text = "".join(printed(table, precision=precision))
+    text = "".join(format_old_table(table, precision=precision))
     line = "\t".join([f"%{8 + precision}.{precision}f"] * (1 + rows.shape[1])) + "\n"
     expected = "".join(
         line % (time, *row) for time, row in zip(table.times.tolist(), rows.tolist(), strict=True)
@@ -48,4 +48,4 @@ def test_every_number_is_as_its_format_writes_it(name: str, precision: int) -> N
 def test_the_header_counts_rows_and_columns() -> None:
     table = StoTable("a table", np.zeros(1), ("a", "b"), np.zeros((1, 2)), in_degrees=True)
     head = "a table\nversion=1\nnRows=1\nnColumns=3\ninDegrees=yes\nwords\nendheader\ntime\ta\tb\n"
-    assert "".join(printed(table, "words")).startswith(head)
+    assert "".join(format_old_table(table, "words")).startswith(head)

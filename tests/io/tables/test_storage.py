@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from osimlite.errors import DocumentError, MissingFileError, OsimliteError, UnsupportedError
-from osimlite.io.tables.storage import sto_text
+from osimlite.io.tables.storage import format_sto
 from osimlite.simulation import read_sto, stream_table, write_sto
 
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
@@ -16,7 +16,7 @@ FINITE = st.floats(allow_nan=False, allow_infinity=False)
 
 def test_layout():
     """Line for line what OpenSim 4.6 writes, but for its own version."""
-    assert sto_text(
+    assert format_sto(
         "Walker", [0.0, 0.5], ["/a/value", "/a/speed"], [[1.0, -0.0], [1e-21, 2.5]]
     ).splitlines() == [
         "Walker",

@@ -13,7 +13,7 @@ from osimlite import Body, Model, SliderJoint
 from osimlite.schema.controller_types import PrescribedController
 from osimlite.schema.functions import PiecewiseLinearFunction
 from osimlite.schema.paths import GeometryPath, PathPoint
-from osimlite.schema.registry import class_for
+from osimlite.schema.registry import find_class
 
 FOLDER = Path(__file__).resolve().parents[3] / "fixtures" / "muscles"
 CONFIGURATIONS: dict[str, Any] = json.loads((FOLDER / "configurations.json").read_text())
@@ -39,7 +39,7 @@ def muscle(case: str, **more: Any) -> Any:
     settings = CONFIGURATIONS[case]
     base = {NAMES[name]: value for name, value in {**USUAL, **settings["base"]}.items()}
     own = {name: value for name, value in settings.items() if name not in ("cls", "base")}
-    component: Any = class_for(settings["cls"])
+    component: Any = find_class(settings["cls"])
     return component(name="mu", geometry_path=line(), **{**base, **own, **more})
 
 

@@ -10,7 +10,7 @@ import pytest
 
 import osimlite
 from osimlite.base.load import make_module_name
-from osimlite.schema.states import states_of
+from osimlite.schema.states import list_states
 from osimlite.simulation.elements.force_type import ForceType
 from osimlite.simulation.elements.registry import FORCE_TYPES
 
@@ -48,7 +48,7 @@ def test_the_states_are_those_that_the_class_declares(force_type):
     component = force_type.component()
     if "compute_dissipation_energy" in force_type.component.model_fields:
         component.compute_dissipation_energy = True
-    assert [state.name for state in force_type.states] == states_of(component)
+    assert [state.name for state in force_type.states] == list_states(component)
 
 
 @pytest.mark.parametrize(
@@ -67,7 +67,7 @@ def test_the_states_that_are_left_are_opensims(cls, without_activation, without_
         ("ignore_activation_dynamics", without_activation),
         ("ignore_tendon_compliance", without_tendon),
     ):
-        assert states_of(getattr(osimlite, cls)(**{flag: True})) == left
+        assert list_states(getattr(osimlite, cls)(**{flag: True})) == left
 
 
 def test_a_law_takes_what_the_kernel_gives():

@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 from lxml import etree
 
-from osimlite.io.document.lexical import Unclean, real, split
+from osimlite.io.document.lexical import UncleanText, parse_real, split_words
 from osimlite.io.document.names import as_written
-from osimlite.schema.registry import by_tags, class_for
+from osimlite.schema.registry import cache_by_tags, find_class
 
 Element = etree._Element
 
@@ -95,10 +95,10 @@ class Step(NamedTuple):
         return (self.apply.__doc__ or "").strip().splitlines()[0].rstrip(".")
 
 
-@by_tags
+@cache_by_tags
 def find_families(tag: str) -> frozenset[str]:
     """Return the names of the class of a tag and of its bases; none if the tag is not a class."""
-    cls = class_for(as_written(tag))
+    cls = find_class(as_written(tag))
     return frozenset() if cls is None else frozenset(base.__name__ for base in cls.__mro__)
 
 
@@ -343,17 +343,19 @@ def get_child_text(parent: Element, tag: str) -> str | None:
 
 def get_text(element: Element) -> str:
     """Return the text of an element, white space collapsed."""
-    return " ".join(split("".join([element.text or "", *(node.tail or "" for node in element)])))
+    return " ".join(
+        split_words("".join([element.text or "", *(node.tail or "" for node in element)]))
+    )
 
 
 def parse_reals(text: str | None, count: int) -> list[float] | None:
     """Return the numbers in a text; None unless there are exactly `count` readable numbers."""
-    words = split(text or "")
+    words = split_words(text or "")
     if len(words) != count:
         return None
     try:
-        return [real(word) for word in words]
-    except Unclean:
+        return [parse_real(word) for word in words]
+    except UncleanText:
         return None
 
 

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from functools import cache
 from math import isfinite, isinf
 
-from osimlite.io.document.lexical import Unclean, real, split
+from osimlite.io.document.lexical import UncleanText, parse_real, split_words
 from osimlite.io.document.upgrade.draft import Draft, Element, get_text, list_elements
 
 _NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
@@ -156,10 +156,10 @@ def _is_value(element: Element) -> bool:
 
 def _is_number(text: str) -> bool:
     """Return whether OpenSim reads a number from a text."""
-    word, *others = split(text) or [""]
+    word, *others = split_words(text) or [""]
     try:
-        value = real(word)
-    except Unclean as unclean:
+        value = parse_real(word)
+    except UncleanText as unclean:
         return unclean.trouble == "cut"
     return not others or isfinite(value)
 

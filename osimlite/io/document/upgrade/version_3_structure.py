@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from osimlite.base.text import make_unique_name
-from osimlite.io.document.lexical import ABSENT, Unclean, converter
+from osimlite.io.document.lexical import ABSENT, UncleanText, make_converter
 from osimlite.io.document.upgrade.draft import (
     Draft,
     Element,
@@ -237,14 +237,14 @@ def move_frame_set(draft: Draft) -> None:
 _DEFAULT_BOUNDS = {"min_control": 0.0, "max_control": 1.0}
 
 
-_parse_double = converter(Value("double"))
+_parse_double = make_converter(Value("double"))
 
 
 def _parse_beginning(text: str) -> float | None:
     """Return the number that OpenSim reads: of several the first, of a word its beginning."""
     try:
         return float(_parse_double(text))
-    except Unclean as unclean:
+    except UncleanText as unclean:
         return None if unclean.value is ABSENT else float(unclean.value)
 
 

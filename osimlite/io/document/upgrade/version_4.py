@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from osimlite.io.document.lexical import split
+from osimlite.io.document.lexical import split_words
 from osimlite.io.document.upgrade.draft import (
     Draft,
     Element,
@@ -139,7 +139,7 @@ def convert_controller_actuators(draft: Draft) -> None:
     for path, name in (*actuators, *forces):
         by_name.setdefault(name, path)
     for controller, names in listed:
-        words = split(get_text(names))
+        words = split_words(get_text(names))
         lost = None
         if any(word.lower() == "all" for word in words):
             paths = [path for path, _ in actuators]
