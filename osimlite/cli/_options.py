@@ -18,9 +18,7 @@ if TYPE_CHECKING:
 File = Annotated[Path, Argument(help="A model file.", show_default=False)]
 Source = Annotated[
     str,
-    Argument(
-        help="A model file, or anything that 'osimlite build' makes one of.", show_default=False
-    ),
+    Argument(help="A model file, or any source that 'osimlite build' accepts.", show_default=False),
 ]
 Motion = Annotated[Path, Argument(help="Coordinates over time, .sto or .mot.", show_default=False)]
 Parameters = Annotated[
@@ -35,19 +33,17 @@ Parameters = Annotated[
 ]
 Start = Annotated[
     list[str] | None,
-    Option("--set", metavar="NAME=VALUE", help="Where a coordinate starts (rad, m, or 30deg)."),
+    Option("--set", metavar="NAME=VALUE", help="Initial value of a coordinate (rad, m, or 30deg)."),
 ]
 StartSpeed = Annotated[
     list[str] | None,
-    Option(
-        "--set-speed", metavar="NAME=VALUE", help="At what speed a coordinate starts (per second)."
-    ),
+    Option("--set-speed", metavar="NAME=VALUE", help="Initial speed of a coordinate (per second)."),
 ]
-To = Annotated[float, Option("--to", metavar="SECONDS", help="How long to simulate.")]
+To = Annotated[float, Option("--to", metavar="SECONDS", help="Duration of the simulation.")]
 Engine = Annotated[
     str | None,
     Option(
-        help="What computes the accelerations: 'compiled' or 'bullet' (PyBullet).",
+        help="Engine that computes the accelerations: 'compiled' or 'bullet' (PyBullet).",
         show_default="compiled",
     ),
 ]
@@ -56,7 +52,7 @@ FirstFrame = Annotated[
     Option(
         "--from",
         metavar="SECONDS",
-        help="Time of the first frame that counts.",
+        help="Time of the first frame to use.",
         show_default="the first",
     ),
 ]
@@ -65,22 +61,20 @@ LastFrame = Annotated[
     Option(
         "--until",
         metavar="SECONDS",
-        help="Time of the last frame that counts.",
+        help="Time of the last frame to use.",
         show_default="the last",
     ),
 ]
 Mass = Annotated[
     float,
-    Option(
-        "--mass", metavar="KG", help="What the subject weighs.", show_default="what the model does"
-    ),
+    Option("--mass", metavar="KG", help="Mass of the subject.", show_default="mass of the model"),
 ]
 Weights = Annotated[
     list[str] | None,
     Option(
         "--weight",
         metavar="NAME=NUMBER",
-        help="How much a marker or sensor counts; 1 if left out, 0 for none.",
+        help="Weight of a marker or sensor (default 1; 0 ignores it).",
     ),
 ]
 Lowpass = Annotated[
@@ -96,8 +90,8 @@ AppliedTo = Annotated[
     Option(
         "--applied-to",
         metavar="BODY=FORCE,POINT,MOMENT",
-        help="What columns of a table --external-loads push a body: the beginnings of their labels, f1_,p1_,m1_ "
-        "for the first plate of a .c3d, with + between several loads. Point and moment may be left out.",
+        help="Columns of a table --external-loads that act on a body: the prefixes of their labels, f1_,p1_,m1_ "
+        "for the first plate of a .c3d, with + between several loads. Point and moment are optional.",
         show_default=False,
     ),
 ]
@@ -105,7 +99,7 @@ Foot = Annotated[
     list[str] | None,
     Option(
         metavar="CONTACT",
-        help="Contact of a foot, with + between several of one foot; once for each foot.",
+        help="Contact force of a foot, with + between several of one foot; once for each foot.",
         show_default="the ends of the legs",
     ),
 ]
@@ -114,7 +108,7 @@ Controls = Annotated[
     Option(
         "--controls",
         metavar="CONTROLS",
-        help="Drive actuators: the file of a table of controls over time, or NAME=VALUE; may be given several times.",
+        help="Controls of actuators: a file with a table over time, or NAME=VALUE; may be repeated.",
         show_default=False,
     ),
 ]
@@ -123,7 +117,7 @@ Controller = Annotated[
     Option(
         "--controller",
         metavar="FILE",
-        help="Reflexes that drive actuators: a file of a controller or a scenario, .yaml or .scone.",
+        help="Reflexes that control actuators: a file of a controller or a scenario, .yaml or .scone.",
         show_default=False,
     ),
 ]
@@ -133,7 +127,7 @@ Par = Annotated[
         "--par",
         metavar="FILE",
         help="Values of the parameters of reflexes (.par).",
-        show_default="those that their file begins with",
+        show_default="the initial values in their file",
     ),
 ]
 Numbers = Annotated[
@@ -146,29 +140,33 @@ Select = Annotated[
     list[str] | None,
     Option(
         metavar="RULE",
-        help="Run only these rules: codes, beginnings of codes (OSIM3), names.",
+        help="Run only these rules: codes, prefixes of codes (OSIM3), names.",
         show_default=False,
     ),
 ]
 Ignore = Annotated[
     list[str] | None,
-    Option(metavar="RULE", help="Leave these rules out; as for --select.", show_default=False),
+    Option(
+        metavar="RULE", help="Ignore these rules; same form as for --select.", show_default=False
+    ),
 ]
 FailOn = Annotated[
     str | None,
     Option(
         metavar="SEVERITY",
-        help="What makes the exit code 1: error, warning or info.",
+        help="Lowest severity for which the exit code is 1: error, warning or info.",
         show_default=False,
     ),
 ]
 Everything = Annotated[
     bool,
-    Option("--all", help="Print every finding; else the first stands for those that are like it."),
+    Option("--all", help="Print every finding; by default similar ones are folded into the first."),
 ]
 OnlyOurs = Annotated[
     bool,
-    Option("--skip-other-xml", help="Pass over XML that is not OpenSim's, also where it is named."),
+    Option(
+        "--skip-other-xml", help="Skip XML files that are not OpenSim's, also if they are named."
+    ),
 ]
 Folder = Annotated[
     Path | None,
@@ -177,7 +175,7 @@ Folder = Annotated[
         "--output",
         metavar="FOLDER",
         help="Folder to write into.",
-        show_default="one named after the model's file, here",
+        show_default="named after the model's file",
     ),
 ]
 Geometry = Annotated[
@@ -185,9 +183,9 @@ Geometry = Annotated[
     Option(
         "--geometry",
         metavar="FOLDER",
-        help="Look for mesh files here too, after the model's folder and its folder Geometry; may be repeated. "
+        help="Also search mesh files here, after the model's folder and its subfolder Geometry; may be repeated. "
         "The mesh-paths of the settings and the folders in the environment variable OSIMLITE_GEOMETRY, separated by "
-        "colons, come last.",
+        "colons, are searched last.",
     ),
 ]
 
@@ -216,7 +214,7 @@ def feedback(controller: Path | None, par: Path | None) -> Feedback | None:
 
     if controller is None:
         if par is not None:
-            raise SettingError("--par has values for a controller; give that by --controller")
+            raise SettingError("--par sets parameters of a controller; add --controller")
         return None
     from osimlite.studies.reflexes.feedback import Feedback
 
@@ -277,7 +275,7 @@ def named_numbers(words: Iterable[str] | None, option: str) -> dict[str, float]:
         try:
             result[name] = float(text)
         except ValueError:
-            raise SettingError(f"'{text}' is no number for '{name}'; write {name}=2.5") from None
+            raise SettingError(f"'{text}' is not a number for '{name}'; write {name}=2.5") from None
     return result
 
 
@@ -335,7 +333,7 @@ def read_source(source: str, parameter: Iterable[str] | None) -> tuple[Model, Pa
         return make_model(source, named_words(parameter, "-p")), None
     if parameter:
         raise SettingError(
-            f"'{source}' is a file and takes no parameters; -p is for functions that make a model"
+            f"'{source}' is a file and has no parameters; -p is for functions that build a model"
         )
     return read(source), Path(source).resolve().parent
 
@@ -350,7 +348,9 @@ def named_folders(geometry: Sequence[Path] | None) -> Sequence[Path]:
 
     for place in geometry or ():
         if not place.is_dir():
-            raise MissingFolderError("--geometry names a folder that is not there", file=str(place))
+            raise MissingFolderError(
+                "--geometry names a folder that does not exist", file=str(place)
+            )
     return geometry or ()
 
 
@@ -375,5 +375,5 @@ def checked_numbers(numbers: str) -> NumberStyle:
     from osimlite.errors import SettingError
 
     if numbers not in ("shortest", "opensim"):
-        raise SettingError(f"--numbers is 'shortest' or 'opensim', not '{numbers}'")
+        raise SettingError(f"--numbers must be 'shortest' or 'opensim', not '{numbers}'")
     return "opensim" if numbers == "opensim" else "shortest"

@@ -40,9 +40,9 @@ def written(
 def say_motion(recorded: RecordedMotion, files: Iterable[Path]) -> None:
     """Say what was made from a motion, and what of it counted."""
     if recorded.missing:
-        say(f"not in the motion, kept at the default value: {join_words(recorded.missing)}")
+        say(f"not in the motion, default value used: {join_words(recorded.missing)}")
     if recorded.ignored:
-        say(f"columns that name no coordinate, ignored: {join_words(recorded.ignored)}")
+        say(f"ignored columns, which are not coordinates: {join_words(recorded.ignored)}")
     times = recorded.times
     paths = join_words([str(file) for file in files])
     say(f"{len(times)} times from {times[0]:g} s to {times[-1]:g} s; wrote {paths}")

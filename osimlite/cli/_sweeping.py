@@ -17,11 +17,11 @@ Vary = Annotated[
     Option(
         "--vary",
         metavar="NAME=RANGE",
-        help="LOW:HIGH (in a sweep also LOW:HIGH:COUNT; with :log at the end, spread by the logarithm) of a "
-        "coordinate, COORDINATE/speed, MUSCLE/control, COMPONENT/PROPERTY (@scale: a factor of it), or parameter of "
-        "the model function or of the controller (all of these if nothing else varies). MUSCLE/control@0:0.5:6 are six "
-        "nodes of a control over time, @switch1 is a time at which it is switched. Names may have * and ?, and be "
-        "several with commas: they vary as one; what is in {} makes a variable for each text that it stands for.",
+        help="Range LOW:HIGH (in a sweep also LOW:HIGH:COUNT; :log at the end for a logarithmic scale) of a "
+        "coordinate, COORDINATE/speed, MUSCLE/control, COMPONENT/PROPERTY (@scale: a factor), or a parameter of "
+        "the model function or of the controller (without --vary, all of its parameters). MUSCLE/control@0:0.5:6 are "
+        "six nodes of a control over time, @switch1 is a time at which it switches. Names may have * and ?, or be "
+        "several with commas; they get the same value. {*} makes one variable for each match.",
         show_default=False,
     ),
 ]
@@ -29,19 +29,19 @@ ReportInterval = Annotated[
     float | None,
     Option(
         metavar="SECONDS",
-        help="Time between the states that a function or an expression looks at.",
+        help="Time between the states that a function or an expression uses.",
         show_default="0.01 for expressions",
     ),
 ]
 Interpolation = Annotated[
-    str, Option(help="Between nodes of a control: 'linear', 'steps' or 'cubic'.")
+    str, Option(help="Interpolation between nodes of a control: 'linear', 'steps' or 'cubic'.")
 ]
 Below = Annotated[
     list[str] | None,
     Option(
         "--stop-below",
         metavar="NAME=VALUE",
-        help="End a run when a coordinate falls below.",
+        help="End a run when a coordinate falls below this value.",
         show_default=False,
     ),
 ]
@@ -50,7 +50,7 @@ Above = Annotated[
     Option(
         "--stop-above",
         metavar="NAME=VALUE",
-        help="End a run when a coordinate rises above.",
+        help="End a run when a coordinate rises above this value.",
         show_default=False,
     ),
 ]
@@ -58,7 +58,7 @@ Planted = Annotated[
     bool,
     Option(
         "--planted",
-        help="Put the walker on the ground with the deeper foot, at rest there, at each start.",
+        help="Start each run with the lower foot at rest on the ground.",
     ),
 ]
 Workers = Annotated[
@@ -66,15 +66,13 @@ Workers = Annotated[
     Option(
         min=1,
         metavar="N",
-        help="How many threads or processes work here.",
-        show_default="one for each core of this machine",
+        help="Number of threads or processes on this machine.",
+        show_default="one for each core",
     ),
 ]
 Cluster = Annotated[
     str | None,
-    Option(
-        metavar="ADDRESS", help="Work on the Dask cluster of this scheduler.", show_default=False
-    ),
+    Option(metavar="ADDRESS", help="Use the Dask cluster of this scheduler.", show_default=False),
 ]
 
 

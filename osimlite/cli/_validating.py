@@ -57,7 +57,7 @@ def run(
         target_version=target_version,
     )
     if "-" in paths and (fix or unsafe_fixes) and not diff:
-        raise OsimliteError("standard input cannot be mended in place; use --diff")
+        raise OsimliteError("standard input cannot be fixed in place; use --diff")
     if "-" in paths and stdin_filename is not None:
         # It is what this file would be, were it written now.
         unsaved[os.path.realpath(stdin_filename)] = read_standard_input()
@@ -68,11 +68,11 @@ def run(
     if diff:
         shown = [_show_diff(path, given, unsafe=unsafe_fixes) for path in files]
         count, left, unread = (sum(counts[index] for counts in shown) for index in range(3))
-        say(f"Would mend {format_count(count, 'place')}{_more(left)}.", err=True)
+        say(f"Would apply {_count_fixes(count)}{_more(left)}.", err=True)
         return 2 if unread else int(count > 0)
     if fix or unsafe_fixes:
         count, left, failed = _mend_all(files, given, unsafe=unsafe_fixes)
-        say(f"Mended {format_count(count, 'place')}{_more(left)}.", err=True)
+        say(f"Applied {_count_fixes(count)}{_more(left)}.", err=True)
     with progress_bar("checking", len(files)) as progress:
         report = check_files(files, given, cached=not no_cache, progress=progress)
     report.passed = passed
@@ -107,7 +107,7 @@ def expect_known(format: str, fail_on: str | None) -> None:
         ("--format", format, FORMATS),
     ):
         if word is not None and word not in known:
-            raise OsimliteError(f"{option} is one of {join_words(known)}, not '{word}'")
+            raise OsimliteError(f"{option} must be one of {join_words(known)}, not '{word}'")
 
 
 def _source(path: str) -> Source:
@@ -193,8 +193,12 @@ UNREADABLE = ("OSIM001", "OSIM801")
 """Rules that find what is no XML, or no table: nothing else of such a file is checked or mended."""
 
 
+def _count_fixes(count: int) -> str:
+    return f"{count} fix" if count == 1 else f"{count} fixes"
+
+
 def _more(left: int) -> str:
-    return f"; --unsafe-fixes would mend {format_count(left, 'place')} more" if left else ""
+    return f"; --unsafe-fixes would apply {left} more" if left else ""
 
 
 def _show_diff(path: str, given: Config, unsafe: bool) -> tuple[int, int, bool]:

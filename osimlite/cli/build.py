@@ -32,13 +32,13 @@ def build(
     parameter: options.Parameters = None,
     numbers: options.Numbers = "shortest",
     list_models: Annotated[
-        bool, Option("--list", help="Name the built-in models and stop.")
+        bool, Option("--list", help="List the built-in models and exit.")
     ] = False,
 ) -> None:
-    """Make a built-in model, or one of yours in Python, YAML or JSON, and write its .osim file.
+    """Build a built-in model, or a model from Python, YAML or JSON, and write its .osim file.
 
-    The model is validated first: nothing is written if it has an error. Beside human-walks its
-    study of Moco is written (.omoco, with a guess), which 'osimlite run' solves.
+    The model is validated first; nothing is written if it has an error. With human-walks, its Moco
+    study (.omoco) and a guess are written too; 'osimlite run' solves the study.
 
     Example: osimlite build dynamic-walker -p thigh_length=0.42 -o walker.osim
     """

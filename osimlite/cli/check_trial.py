@@ -17,7 +17,7 @@ def check_trial(
         list[str],
         Argument(
             metavar="PATH...",
-            help="Folders with setups and what these wrote, or setups of ScaleTool, InverseKinematicsTool, "
+            help="Folders with setups and their results, or setups of ScaleTool, InverseKinematicsTool, "
             "InverseDynamicsTool, RRATool, CMCTool and AnalyzeTool.",
             show_default=False,
         ),
@@ -28,16 +28,16 @@ def check_trial(
     fail_on: options.FailOn = None,
     everything: options.Everything = False,
 ) -> None:
-    """Say whether a finished trial is good enough: is the model strong enough, are the data good?
+    """Check a finished trial against published limits: is the model strong enough, are the data good?
 
-    Made by OpenSim or by 'osimlite run': markers, ranges, filters, feet and weight under the loads,
-    residuals, reserve actuators, errors of tracking, activations and passive forces are compared
-    with published limits. Each number is shown with its limits: good, okay (beyond the stricter of
-    two) or bad; findings say where, by which source and what to look at. What could not be looked
-    at is told with the reason. 'osimlite rule OSIM9' lists the rules.
+    The trial may come from OpenSim or from 'osimlite run'. Markers, coordinate ranges, filters, loads
+    on the feet, body weight, residuals, reserve actuators, tracking errors, activations and passive
+    forces are compared with their limits. Each number is good, okay (it meets only the looser of two
+    limits) or bad. Findings give the file, row, source of the limit, and what to look at. Checks that
+    were left out are listed with the reason. 'osimlite rule OSIM9' lists the rules.
 
-    Exits with 0 if all is well, 1 if there are findings as bad as --fail-on, which is warning here,
-    2 if it could not be carried out.
+    Exits with 0 if there are no problems, 1 if there are findings of the severity --fail-on (warning
+    by default) or worse, 2 if the command could not run.
 
     Example: osimlite check-trial subject01
     """

@@ -46,18 +46,18 @@ class Motion(NamedTuple):
 def demo(
     output: Annotated[
         Path,
-        Option("-o", "--output", metavar="FOLDER", help="Folder for everything the tour makes."),
+        Option("-o", "--output", metavar="FOLDER", help="Folder for all files of the demo."),
     ] = Path("osimlite-demo"),
     pictures: Annotated[
         bool, Option(help="Draw the plots, and write the pages for the browser.")
     ] = True,
     browser: options.Browser = True,
 ) -> None:
-    """Build, check, translate and simulate: a walker that falls, one that walks, humans who jump and walk by muscles.
+    """Build, check, translate and simulate: a walker falls, one walks, and human models jump and walk with muscles.
 
-    The first is the model of the OpenSim exercise "Building a Dynamic Walker". All four then play
-    in the browser, with the forces of the ground and the muscles in the colours of their
-    activations. The tour takes some four seconds and needs no display.
+    The first model is that of the OpenSim exercise "Building a Dynamic Walker". The four motions
+    play in the browser, with ground reaction forces and with muscles coloured by activation. The
+    demo takes about four seconds and needs no display.
 
     Example: osimlite demo -o tour --no-browser
     """
@@ -120,7 +120,7 @@ def _check(tour: _Tour) -> None:
         model = dynamic_walker()
         file = make_folder(tour.folder / MOTIONS[0].model) / f"{model.name}.osim"
         write(model, file)
-        tell(f"{sum(1 for _ in model.components())} components, as OpenSim counts", file)
+        tell(f"{sum(1 for _ in model.components())} components", file)
 
     with tour.step("Validate the file") as tell:
         report = validate(file)
@@ -270,9 +270,9 @@ def _walk(tour: _Tour) -> tuple[Scenario, Path, str]:
         peak = float(walked.loads.rows[len(table.times) // 2 :].max())
         mass, t = scenario.walkers(1).mass, walked.times[0]
         said = (
-            f"A human of {mass:.0f} kg walks for {t:.0f} s at {speed:.2f} m/s, in {steps} steps, by reflexes alone: "
-            "muscles answer to their own lengths and forces, those of the hips to the lean of the torso. A search "
-            f"found how much. The ground carries up to {peak:.1f} times the weight."
+            f"A human model of {mass:.0f} kg walks for {t:.0f} s at {speed:.2f} m/s, in {steps} steps, by reflexes alone: "
+            "muscles react to their lengths and forces, and those of the hips to the lean of the torso. The gains come "
+            f"from an optimization. The peak ground reaction force is {peak:.1f} times the body weight."
         )
         tell(said, file)
         scenario.close()
@@ -284,8 +284,8 @@ def _falls(motion: Trajectory) -> str:
     knee = next(event["time_s"] for event in events if "Knee" in event["contact"])
     apart = distance_to_opensim(motion)
     return (
-        f"Let go at rest on a slope of 10 degrees, it falls: after {knee:.2f} s a knee is on the ground. So it does in "
-        f"OpenSim, from whose converged motion no coordinate is ever farther than {apart:.1e} rad or m."
+        f"Released at rest on a slope of 10 degrees, it falls: after {knee:.2f} s a knee touches the ground. It does the same in "
+        f"OpenSim: all coordinates differ from its converged motion by at most {apart:.1e} rad or m."
     )
 
 

@@ -18,17 +18,17 @@ def diff(
     ],
     git: Annotated[
         bool,
-        Option("--git", help="Take the seven arguments that git gives an external diff program."),
+        Option("--git", help="Accept the seven arguments of git's external diff programs."),
     ] = False,
 ) -> None:
-    """Show what changed between two models or setups: component, property, old and new value.
+    """Show the differences between two models or setups: component, property, old and new value.
 
-    Layout, order, comments and number formats do not count, nor does writing a default down. Of two
-    tables (.sto, .mot) it shows which columns went and came, and where each of the others differs
-    most. Exits with 1 if they differ.
+    Layout, order, comments, number formats and defaults that are written out do not count. For two
+    tables (.sto, .mot) it lists added and removed columns, and the largest difference in each of the
+    others. Exits with 1 if the files differ.
 
-    As git's diff for model files: git config diff.osim.command 'osimlite diff --git', and in
-    .gitattributes the
+    To use it as git's diff for model files: git config diff.osim.command 'osimlite diff --git', and
+    add to .gitattributes the
     line: *.osim diff=osim
 
     Example: osimlite diff gait2392.osim gait2392_scaled.osim

@@ -109,7 +109,7 @@ def doctor(
         ),
     ] = None,
 ) -> None:
-    """Show what is installed, what each extra adds and how to get it, and where mesh files are looked for.
+    """Show which packages are installed, what each extra adds, and where mesh files are searched.
 
     Exits with 1 if an installed package cannot be loaded.
 
@@ -261,7 +261,7 @@ def _show_places(model: Path | None) -> None:
         say(f"  {place}: {_meshes(place)}")
     if not os.environ.get(GEOMETRY_VARIABLE) and not settings.mesh_paths:
         say(
-            "Bones of OpenSim's models lie in the folder Geometry of its installation; name that in the environment "
+            "The bones of OpenSim's models are in the folder Geometry of its installation. Name it in the environment "
             f"variable {GEOMETRY_VARIABLE}, or as mesh-paths in the settings."
         )
 

@@ -19,30 +19,29 @@ def find_gait(
     source: options.Source,
     vary: sweeping.Vary = None,
     samples: Annotated[
-        int, Option(min=1, metavar="N", help="How many random walkers are tried.")
+        int, Option(min=1, metavar="N", help="Number of random walkers to try.")
     ] = 65536,
     tries: Annotated[
-        int, Option(min=1, metavar="N", help="How many of the best of them are led to a cycle.")
+        int, Option(min=1, metavar="N", help="Number of the best walkers to refine to cycles.")
     ] = 40,
-    enough: Annotated[
-        int, Option(min=1, metavar="N", help="Cycles after which no more are looked for.")
-    ] = 5,
+    enough: Annotated[int, Option(min=1, metavar="N", help="Stop after N cycles.")] = 5,
     budget: Annotated[
         int,
-        Option(
-            min=0, metavar="N", help="Sets of numbers to try on the way to the most stable cycle."
-        ),
+        Option(min=0, metavar="N", help="Parameter sets to try when the stability is optimized."),
     ] = 300,
     stable: Annotated[
         float,
-        Option(help="A largest multiplier below this is small enough; then the basin counts."),
+        Option(help="Largest multiplier that is small enough; then the basin is optimized."),
     ] = 0.6,
     perturb: Annotated[
         float,
-        Option(metavar="PART", help="How near the cycle walkers start for that: 0.1 is 10 %."),
+        Option(
+            metavar="PART",
+            help="Distance of initial states from the cycle for the basin: 0.1 is 10 %.",
+        ),
     ] = 0.1,
     digits: Annotated[
-        int, Option(min=1, max=17, metavar="N", help="Round the numbers of the model to so many.")
+        int, Option(min=1, max=17, metavar="N", help="Round the parameters to N digits.")
     ] = 3,
     start_digits: Annotated[
         int | None,
@@ -50,28 +49,36 @@ def find_gait(
             min=1,
             max=17,
             metavar="N",
-            help="Round the start to so many.",
+            help="Round the initial state to N digits.",
             show_default="not rounded",
         ),
     ] = None,
-    seed: Annotated[int, Option(help="The same seed, the same search.")] = 0,
+    seed: Annotated[
+        int, Option(help="Seed of the random numbers; equal seeds give equal searches.")
+    ] = 0,
     foot: options.Foot = None,
     parameter: options.Parameters = None,
     output: Annotated[
         Path,
-        Option("-o", "--output", metavar="FOLDER", help="For best.osim, cycles.csv, summary.json."),
+        Option(
+            "-o",
+            "--output",
+            metavar="FOLDER",
+            help="Folder for best.osim, cycles.csv, summary.json.",
+        ),
     ] = Path("found"),
-    force: Annotated[bool, Option("--force", help="Replace what another search found.")] = False,
+    force: Annotated[
+        bool, Option("--force", help="Replace the results of another search.")
+    ] = False,
     *,
     skip_unsupported: bool,
 ) -> None:
-    """Look for the numbers of a model, and the start, with which a walker never stops; writes it, ready to walk.
+    """Search for parameters and an initial state with which a walker never stops, and write the model.
 
-    Give the ranges of what may change in the model, and of the values and speeds of the joints at a
-    random start. The walker is put on the ground with one foot at rest. Of random walkers, those
-    whose second step is most like their first are led to cycles. The best of these is led on to
-    where its largest Floquet multiplier is small, and then to where most of 60 walkers that start
-    near it make 20 steps.
+    Give the ranges of the parameters, and of the coordinates and speeds of a random initial state.
+    The walker is put on the ground with one foot at rest. Random walkers whose second step is most
+    similar to their first are refined to gait cycles. The best cycle is optimized until its largest
+    Floquet multiplier is small, and then until most of 60 walkers that start near it make 20 steps.
 
     Example: osimlite find-gait walker.osim --vary '/bodyset/*Shank/inertia/2=0.02:1:log' --vary
     RHip_rz=-30deg:60deg --vary LHip_rz=-30deg:60deg --vary RHip_rz/speed=-4:4 --vary

@@ -13,38 +13,38 @@ from osimlite.cli._command import Argument, Option, command
 def fit(
     file: options.File,
     trials: Annotated[
-        list[Path], Argument(help="Measured markers of movements: .trc, .c3d, .sto.")
+        list[Path], Argument(help="Files with measured markers of movements: .trc, .c3d, .sto.")
     ],
     static: Annotated[
         Path | None,
-        Option("--static", metavar="FILE", help="Measured markers of the subject, standing."),
+        Option("--static", metavar="FILE", help="Measured markers of the standing subject."),
     ] = None,
     held: Annotated[
         list[str] | None,
         Option(
             "--hold",
             metavar="NAME",
-            help="A marker that is where the model has it; else those that are fixed.",
+            help="Keep this marker's position in the model; may be repeated. By default those that are fixed.",
         ),
     ] = None,
     weight: options.Weights = None,
     by_axis: Annotated[
-        bool, Option("--by-axis", help="Let a body grow in one direction more than in another.")
+        bool, Option("--by-axis", help="Scale each body differently along its axes.")
     ] = False,
     sides: Annotated[
-        bool, Option("--each-side", help="Let the two sides of the body differ.")
+        bool, Option("--each-side", help="Scale the left and the right side differently.")
     ] = False,
     frames: Annotated[
-        int, Option("--frames", metavar="COUNT", help="How many are looked at, of all trials.")
+        int, Option("--frames", metavar="COUNT", help="Number of frames to use, over all trials.")
     ] = 200,
     mass: options.Mass = -1.0,
     output: options.Folder = None,
 ) -> None:
-    """Fit a model to a person: sizes of its segments and places of its markers, from movements.
+    """Fit a model to a person: compute segment sizes and marker positions from recorded movements.
 
-    All poses, sizes and places that are likeliest are found at once; joints are where the movements
-    show them. Writes the model, its markers, its scale factors, and a setup with which OpenSim's
-    ScaleTool makes the same model.
+    Computes the most likely poses, segment sizes and marker positions together; movements determine
+    the joint positions. Writes the model, its markers, its scale factors, and a setup with which
+    OpenSim's ScaleTool makes the same model.
 
     Example: osimlite fit gait2392.osim walk*.trc --static static.trc --hold RASI --hold LASI --mass
         72 -o subject

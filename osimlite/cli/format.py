@@ -17,15 +17,13 @@ def format(
     check: Annotated[
         bool, Option("--check", help="Change nothing; exit with 1 if a file would change.")
     ] = False,
-    show_diff: Annotated[
-        bool, Option("--diff", help="Change nothing; print what would change.")
-    ] = False,
+    show_diff: Annotated[bool, Option("--diff", help="Change nothing; print the changes.")] = False,
     only_ours: options.OnlyOurs = False,
 ) -> None:
-    """Write files in one layout: OpenSim's, one property a line, shortest numbers, people's comments kept.
+    """Rewrite files in OpenSim's layout: one property per line, shortest numbers, your comments preserved.
 
-    Comments that OpenSim prints by itself are dropped. Formatting twice changes nothing. A file of
-    an older format stays one, and its numbers stay as they are: upgrade brings it up.
+    Comments that OpenSim prints itself are removed. Formatting twice changes nothing. A file of an
+    older format keeps its format and its numbers; use 'osimlite upgrade' to convert it.
 
     Example: osimlite format models --check
     """

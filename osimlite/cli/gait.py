@@ -33,34 +33,41 @@ def gait(
     start_speed: options.StartSpeed = None,
     foot: options.Foot = None,
     to: Annotated[
-        float, Option("--to", metavar="SECONDS", help="How long to walk at most.")
+        float, Option("--to", metavar="SECONDS", help="Maximum duration of the walk.")
     ] = 60.0,
     settle: Annotated[
-        int, Option(min=0, metavar="N", help="Steps to make before the cycle is looked for.")
+        int, Option(min=0, metavar="N", help="Steps before the search for the cycle.")
     ] = 0,
-    accuracy: Annotated[float, Option(help="Of the integrator in the step map.")] = 1e-10,
+    accuracy: Annotated[float, Option(help="Integrator accuracy in the step map.")] = 1e-10,
     perturb: Annotated[
         list[float] | None,
         Option(
             metavar="PART",
-            help="Change the start at random by this part at most: 0.05 is 5 %.",
+            help="Change the initial state at random by at most this part: 0.05 is 5 %.",
             show_default=False,
         ),
     ] = None,
-    starts: Annotated[int, Option(min=1, metavar="N", help="How many such starts.")] = 60,
-    seed: Annotated[int, Option(help="The same seed, the same such starts.")] = 0,
+    starts: Annotated[
+        int, Option(min=1, metavar="N", help="Number of random initial states.")
+    ] = 60,
+    seed: Annotated[int, Option(help="Seed of the random initial states.")] = 0,
     steps: Annotated[
-        int, Option(min=1, metavar="N", help="Steps after which a walker counts as walking.")
+        int, Option(min=1, metavar="N", help="Number of steps that counts as walking.")
     ] = 20,
     basin: Annotated[
-        bool, Option("--basin", help="Look from where on a grid around the cycle it walks.")
+        bool,
+        Option(
+            "--basin", help="Test from which initial states on a grid around the cycle it walks."
+        ),
     ] = False,
     basin_x: Annotated[
-        str, Option(metavar="NAME", help="What the columns change: COORDINATE or COORDINATE/speed.")
+        str, Option(metavar="NAME", help="Variable of the columns: COORDINATE or COORDINATE/speed.")
     ] = "",
-    basin_y: Annotated[str, Option(metavar="NAME", help="What the rows change.")] = "",
-    reach: Annotated[float, Option(help="How far from the cycle, rad, m or per second.")] = 0.5,
-    grid: Annotated[int, Option(min=2, metavar="N", help="Rows and columns.")] = 21,
+    basin_y: Annotated[str, Option(metavar="NAME", help="Variable of the rows.")] = "",
+    reach: Annotated[
+        float, Option(help="Size of the grid around the cycle (rad, m, or per second).")
+    ] = 0.5,
+    grid: Annotated[int, Option(min=2, metavar="N", help="Number of rows and columns.")] = 21,
     pictures: Annotated[bool, Option(help="Draw the basin.")] = True,
     output: Annotated[
         Path | None,
@@ -68,7 +75,7 @@ def gait(
             "-o",
             "--output",
             metavar="FOLDER",
-            help="For gait.json, basin.csv, basin.png.",
+            help="Folder for gait.json, basin.csv, basin.png.",
             show_default=False,
         ),
     ] = None,
@@ -76,11 +83,11 @@ def gait(
     *,
     skip_unsupported: bool,
 ) -> None:
-    """Count the steps of a walker, find the cycle that it walks in, and say whether that is stable.
+    """Count the steps of a walker, compute its gait cycle, and report whether the cycle is stable.
 
-    The walk begins at the model's default values and speeds. A step is the other foot touching down
-    at least 5 cm ahead along the slope after at least 0.05 s in the air; any other touch-down is a
-    scuff; anything but a foot on the ground ends the walk.
+    The walk begins at the model's default values and speeds. A step is a touch-down of the other
+    foot, at least 5 cm ahead along the slope and after at least 0.05 s in the air. Any other
+    touch-down is a scuff. The walk ends when another part than a foot touches the ground.
 
     Exits with 1 if there is no cycle.
 
@@ -158,9 +165,9 @@ def _check_numbers(
     ]
     for option, number in numbers:
         if not 0.0 < number < inf:
-            raise SettingError(f"{option} is a positive number, not {number:g}")
+            raise SettingError(f"{option} must be a positive number, not {number:g}")
     if seed < 0:
-        raise SettingError(f"the seed is a whole number from 0 on, not {seed}")
+        raise SettingError(f"the seed must be a whole number of at least 0, not {seed}")
 
 
 @dataclass

@@ -15,7 +15,7 @@ def ik(
     trial: Annotated[
         Path,
         Argument(
-            help="Measured markers: .trc, .c3d, .sto; or orientations: .sto.", show_default=False
+            help="Measured markers (.trc, .c3d, .sto) or orientations (.sto).", show_default=False
         ),
     ],
     weight: options.Weights = None,
@@ -24,23 +24,23 @@ def ik(
         Option(
             "--keep",
             metavar="COORDINATE=NUMBER",
-            help="How much a coordinate is kept at its default (1/rad²); beside the mean of the markers 1 is much.",
+            help="Weight that keeps a coordinate near its default (1/rad²); 1 is already a strong weight.",
         ),
     ] = None,
     first: options.FirstFrame = float("-inf"),
     last: options.LastFrame = float("inf"),
     free: Annotated[
-        bool, Option("--without-constraints", help="Let go of the constraints of the model.")
+        bool, Option("--without-constraints", help="Ignore the constraints of the model.")
     ] = False,
     output: options.Folder = None,
 ) -> None:
-    """Find the motion that fits measured markers: writes ik.mot and marker_errors.sto.
+    """Compute the motion that fits measured markers: writes ik.mot and marker_errors.sto.
 
-    Each frame is the pose with the least weighted mean of squared distances, to the last digits.
-    Locked coordinates stay at their defaults, clamped ones in their ranges. ik.mot has degrees, as
-    OpenSim's; marker_errors.sto how far each marker is from where it was measured (m). Of a table
-    of quaternions, the orientations of sensors, the angles are least, and orientation_errors.sto
-    has them (rad).
+    Each frame is the pose with the smallest weighted mean of squared distances, solved exactly.
+    Locked coordinates keep their defaults, clamped ones stay in their ranges. ik.mot is in degrees,
+    like OpenSim's; marker_errors.sto has the distance of each marker from its measured position (m).
+    For a table of quaternions (orientations of sensors), the angles are minimized, and
+    orientation_errors.sto has them (rad).
 
     Example: osimlite ik gait2392.osim walk.trc --weight RASI=10 -o results
     """
@@ -93,7 +93,7 @@ def ik(
     if data is not None:
         known = {marker.name: None for marker in model.components(Marker)}
         if missing := [name for name in known if name not in data.names]:
-            say(f"of the model, not in the data: {join_words(missing)}")
+            say(f"in the model, but not in the data: {join_words(missing)}")
         if unknown := [name for name in data.names if name not in known]:
-            say(f"in the data, not of the model: {join_words(unknown)}")
+            say(f"in the data, but not in the model: {join_words(unknown)}")
     say(f"wrote {folder / 'ik.mot'} and {folder / f'{what}_errors.sto'}")

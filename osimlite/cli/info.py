@@ -25,10 +25,10 @@ def info(
         bool, Option("--all", help="List every class, or every column of a table.")
     ] = False,
 ) -> None:
-    """Show what is in a model: versions, mass, bodies, joints, coordinates, muscles, and how many of each class.
+    """Show the contents of a model: versions, mass, bodies, joints, coordinates, muscles, and counts of all classes.
 
-    It also says what of it cannot be simulated. Of a setup it shows what the tool reads and writes,
-    of a table its times, units and columns.
+    Also lists what cannot be simulated. For a setup it lists the files that the tool reads and
+    writes, for a table its times, units and columns.
 
     Example: osimlite info gait2392.osim
     """
@@ -56,7 +56,7 @@ def info(
             ("file", size),
             ("document version", str(document.version)),
         ]
-        rows += [*_files(model, file.parent), ("notes on reading", str(len(document.notes)))]
+        rows += [*_files(model, file.parent), *_notes(len(document.notes))]
         Facts(rows=rows).show()
         _classes([*model.walk()], everything)
         return
@@ -83,17 +83,17 @@ def info(
             ),
             ("muscles", str(len(muscles))),
             ("other forces", str(len(model.force_set.objects) - len(muscles))),
-            ("wrap surfaces", f"{surfaces}, for {format_count(len(wraps), 'wrap')}"),
+            (
+                "wrap surfaces",
+                f"{surfaces}, used by {format_count(len(wraps), 'path wrap')}" if surfaces else "0",
+            ),
             ("markers", str(len(model.marker_set.objects))),
             ("controllers", str(len(model.controller_set.objects))),
             ("probes", str(len(model.probe_set.objects))),
             ("contact surfaces", str(len(model.contact_geometry_set.objects))),
             ("constraints", str(len(model.constraint_set.objects))),
-            (
-                "components",
-                f"{len(components)} in the file, {len(tree.components)} as OpenSim counts",
-            ),
-            ("notes on reading", str(len(document.notes))),
+            ("components", f"{len(components)} in the file"),
+            *_notes(len(document.notes)),
             ("simulation", answered("simulation", str(file), source.data, simulation)),
         ]
     ).show()
@@ -107,7 +107,7 @@ def info(
 
     if muscles:
         say()
-        say("Muscles: greatest force, optimal fiber length, tendon slack length, path")
+        say("Muscles: maximum isometric force, optimal fiber length, tendon slack length, path")
         for line in _muscles(muscles):
             say(line)
 
@@ -131,16 +131,21 @@ def _table(file: Path, everything: bool) -> None:
     facts.add("table", kind)
     facts.add("file", f"{file} ({len(table.data) / 1000:.0f} kB)")
     facts.add("rows", str(rows))
-    facts.add("markers" if table.is_markers else "columns beside the time", str(len(table.columns)))
+    facts.add("markers" if table.is_markers else "columns besides time", str(len(table.columns)))
     if table.span is not None:
         first, last = table.span
         # Times have few digits; their mean step has more.
         rate = f", {(rows - 1) / (last - first):.4g} Hz" if last > first else ""
         facts.add("time", f"{first:g} to {last:g} s{rate}")
     unit = "Units" if table.is_markers else "inDegrees"
-    facts.add(unit, said.get(unit, "not said"))
+    facts.add(unit, said.get(unit, "not stated"))
     facts.show()
     _listed("Markers" if table.is_markers else "Columns", table.columns, everything)
+
+
+def _notes(count: int) -> list[tuple[str, str]]:
+    """Return a row for the notes of the reader, if there are any."""
+    return [("notes of the reader", f"{count}; see 'osimlite validate'")] if count else []
 
 
 def _files(top: Object, folder: Path) -> Iterator[tuple[str, str]]:
@@ -156,7 +161,7 @@ def _files(top: Object, folder: Path) -> Iterator[tuple[str, str]]:
                 if name not in ("", None, "Unassigned"):
                     lost = spec.reference.rule == "file" and not (folder / name.strip()).is_file()
                     fate = (
-                        " (not there)"
+                        " (missing)"
                         if lost
                         else " (written)"
                         if spec.reference.rule.startswith("output")

@@ -17,7 +17,7 @@ def inverse_dynamics(
         list[str] | None,
         Option(
             metavar="NAME",
-            help="What does not push: a force, a group, All, Actuators or Muscles; Muscles if left out.",
+            help="Forces to leave out: a force, a group, All, Actuators or Muscles (default: Muscles).",
             show_default=False,
         ),
     ] = None,
@@ -27,15 +27,14 @@ def inverse_dynamics(
     output: options.Folder = None,
     **chosen: Any,
 ) -> None:
-    """Find the forces of a recorded motion: writes inverse_dynamics.sto.
+    """Compute the generalized forces of a recorded motion: writes inverse_dynamics.sto.
 
-    One generalized force (N or N·m) for each coordinate: what it takes beyond gravity, measured
-    loads and the forces of the model (springs, contacts, but no muscles) to make the bodies move
-    so. The coordinates are differentiated by splines of fifth degree, as in OpenSim's tool. What a
-    camera records takes a filter first: --lowpass 6.
+    Each coordinate has one generalized force (N or N·m): the force that produces the motion in
+    addition to gravity, measured loads and the forces of the model (springs and contacts, but not
+    muscles). Coordinates are differentiated by splines of fifth degree, as in OpenSim's tool. Filter
+    motions from motion capture first: --lowpass 6.
 
     Example: osimlite inverse-dynamics gait2392.osim walk.mot --lowpass 6 --external-loads grf.xml
-        -o results
     """
     from osimlite.cli._recorded import written
     from osimlite.io.document.reader import read

@@ -15,20 +15,20 @@ def kinematics(
     assemble: Annotated[
         bool,
         Option(
-            "--assemble", help="Change each pose as little as the model's constraints demand first."
+            "--assemble", help="First change each pose so that it fulfils the model's constraints."
         ),
     ] = False,
-    trc: Annotated[bool, Option("--trc", help="Write the markers as markers.trc too.")] = False,
+    trc: Annotated[bool, Option("--trc", help="Also write the markers as markers.trc.")] = False,
     lowpass: options.Lowpass = None,
     first: options.FirstFrame = float("-inf"),
     last: options.LastFrame = float("inf"),
     output: options.Folder = None,
 ) -> None:
-    """Follow a recorded motion: writes bodies.sto and markers.sto.
+    """Compute positions of bodies and markers along a recorded motion: writes bodies.sto and markers.sto.
 
-    bodies.sto holds the mass centre (m) and the body-fixed X-Y-Z angles (degrees) of every body in
-    ground, as OpenSim's BodyKinematics does, and the whole mass centre; markers.sto the markers
-    (m).
+    bodies.sto has the mass centre (m) and the body-fixed X-Y-Z angles (degrees) of every body in
+    ground, like OpenSim's BodyKinematics, and the mass centre of the model. markers.sto has the
+    markers (m).
 
     Example: osimlite kinematics gait2392.osim walk.mot -o results
     """

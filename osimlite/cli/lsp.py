@@ -11,13 +11,13 @@ from osimlite.cli._command import Option, command
 def lsp(
     stdio: Annotated[
         bool,
-        Option("--stdio", help="Speak over standard input and output: what it does in any case."),
+        Option("--stdio", help="Use standard input and output (the default)."),
     ] = True,
 ) -> None:
-    """Serve an editor: findings while you type, completion, hover, definitions, renaming, mends, outline, formatting.
+    """Start the language server for editors: findings while you type, completion, hover, definitions, renaming, fixes.
 
-    An editor starts it and speaks the Language Server Protocol over its standard input and output.
-    How to set up VS Code, Neovim, Helix and Emacs is said in docs/editors.md.
+    An editor starts this command and uses the Language Server Protocol over standard input and
+    output. docs/editors.md shows how to set up VS Code, Neovim, Helix and Emacs.
     """
     from osimlite.base.require import require
 

@@ -12,9 +12,7 @@ from osimlite.cli._command import Argument, Option, command
 def modify(
     file: Annotated[
         Path,
-        Argument(
-            help="A model, or a study whose ModelProcessor is carried out.", show_default=False
-        ),
+        Argument(help="A model, or a study with a ModelProcessor.", show_default=False),
     ],
     output: Annotated[
         Path | None,
@@ -33,15 +31,15 @@ def modify(
             metavar="NAME=WORD",
             help="muscles=degroote|path-actuators|none, tendon=rigid|explicit|implicit, activation=none, passive=none, "
             "paths=polynomial|FILE, contact=smooth, joints=weld:NAME,NAME, reserves=FORCE[:BOUND], strength=FACTOR, "
-            "width=FACTOR, external-loads=FILE. May be repeated; the first is done first.",
+            "width=FACTOR, external-loads=FILE. May be repeated; applied in this order.",
         ),
     ] = None,
 ) -> None:
     """Replace parts of a model as OpenSim's ModOps do: muscles, tendons, paths, contact, joints.
 
     With paths=polynomial every path becomes a function of the coordinates, wrapping included, and
-    what it is off is told. Of a MocoStudy, MocoTrack or MocoInverse the model is taken as its
-    ModelProcessor makes it.
+    the largest error is reported. For a MocoStudy, MocoTrack or MocoInverse, the model is the result
+    of its ModelProcessor.
 
     Example: osimlite modify gait.osim --replace muscles=degroote --replace tendon=rigid --replace
         paths=polynomial

@@ -22,8 +22,8 @@ def muscles(
         Option(
             "--coordinate",
             metavar="NAME[=LOW:HIGH]",
-            help="Sweep a coordinate (rad, m, or -120deg:0), over its range if no other is given; twice: two at once.",
-            show_default="the default pose alone",
+            help="Vary a coordinate (rad, m, or -120deg:0; default: its range). Repeat it to vary two.",
+            show_default="the default pose only",
         ),
     ] = None,
     muscle: Annotated[
@@ -31,30 +31,28 @@ def muscles(
         Option(
             "--muscle",
             metavar="NAME",
-            help="Only this one; may be repeated.",
-            show_default="all that move with it",
+            help="Only this muscle; may be repeated.",
+            show_default="all that it moves",
         ),
     ] = None,
     points: Annotated[
         int | None,
         Option(
             min=2,
-            help="How many values of each coordinate.",
-            show_default="50, of two coordinates 15",
+            help="Number of values of each coordinate.",
+            show_default="50; 15 for two coordinates",
         ),
     ] = None,
-    activation: Annotated[float, Option(help="Of all muscles, 0 to 1.")] = 1.0,
+    activation: Annotated[float, Option(help="Activation of all muscles, 0 to 1.")] = 1.0,
     compare: Annotated[
         Path | None,
         Option(
             metavar="FILE",
-            help="Another model, side by side: scaled, or converted.",
+            help="Compare with this model, for example a scaled one.",
             show_default=False,
         ),
     ] = None,
-    plot: Annotated[
-        bool, Option("--plot", help="Draw every quantity: PNG files beside the table.")
-    ] = False,
+    plot: Annotated[bool, Option("--plot", help="Draw a picture (PNG) of each quantity.")] = False,
     output: Annotated[
         Path | None,
         Option(
@@ -68,10 +66,10 @@ def muscles(
     *,
     wrapping: str,
 ) -> None:
-    """Tell lengths, moment arms, fiber lengths and forces of muscles over a coordinate, as OpenSim's plotter does.
+    """Compute lengths, moment arms, fiber lengths and forces of muscles over a coordinate, like OpenSim's plotter.
 
     Fibers are in equilibrium with their tendons at the activation, and the model is at rest. Prints
-    what is least and greatest of each muscle; -o has every number.
+    the minimum and maximum for each muscle; -o writes every number.
 
     Example: osimlite muscles gait2392.osim --coordinate knee_angle_r=-120deg:0 --plot
     """
@@ -85,13 +83,11 @@ def muscles(
     from osimlite.simulation.muscle_curves import muscle_curves
 
     if output is not None and output.suffix not in (".csv", ".parquet"):
-        raise SettingError(
-            f"a table of muscles is written as .csv or .parquet, not '{output.name}'"
-        )
+        raise SettingError(f"-o must name a .csv or .parquet file, not '{output.name}'")
     if output is not None:
         expect_folder_of(output)
     if len(coordinate or ()) > 2:
-        raise SettingError("muscles are told over one coordinate or two")
+        raise SettingError("--coordinate can be given once or twice")
     if plot and not coordinate:
         raise SettingError("--plot needs a --coordinate to draw over")
     model = read(file)
@@ -182,7 +178,7 @@ def _common(first: MuscleCurves, second: MuscleCurves) -> tuple[MuscleCurves, Mu
     if not both:
         raise ModelError("the two models have no muscle of the same name")
     if alone:
-        say(f"of one model only: {join_words(alone)}")
+        say(f"in one model only: {join_words(alone)}")
     one, other = (
         curves.of([own.index(name) for name in both])
         for curves, own in zip((first, second), names, strict=True)
@@ -232,7 +228,7 @@ def _print(curves: Sequence[MuscleCurves], file: Path, compare: Path | None) -> 
     plain_console().print(table)
     unsettled = sum(bool(np.isnan(rows.columns["tendon_force"]).any()) for rows in curves)
     if unsettled:
-        say("'-' and gaps in the table: fibers and tendon have no equilibrium there")
+        say("'-' and gaps in the table: the muscle has no equilibrium there")
 
 
 def _write(found: Mapping[str, MuscleCurves], output: Path) -> None:

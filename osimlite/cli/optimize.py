@@ -21,58 +21,60 @@ def optimize(
         str,
         Option(
             metavar="NAME",
-            help="What is wanted: distance, steps, progress, time_to_fall (the more, the better), largest_force, "
-            "scuffs, energy, an expression such as 'max(pelvis_Y)', or module:function (the less, the better).",
+            help="Objective: distance, steps, progress, time_to_fall (maximized), largest_force, "
+            "scuffs, energy, an expression such as 'max(pelvis_Y)', or module:function (minimized).",
             show_default=False,
         ),
     ],
     vary: sweeping.Vary = None,
-    budget: Annotated[int, Option(metavar="N", help="How many runs are allowed.")] = 1000,
+    budget: Annotated[int, Option(metavar="N", help="Maximum number of runs.")] = 1000,
     method: Annotated[
         str,
         Option(
             help="cma, sobol-cma (for a few hundred runs), differential-evolution, nelder-mead or gradient (exact "
-            "derivatives of the motion: for many variables, and smooth objectives)."
+            "derivatives; for many variables and smooth objectives)."
         ),
     ] = "cma",
     popsize: Annotated[
         int | None,
         Option(
-            metavar="N", help="Runs between two decisions.", show_default="what suits the method"
+            metavar="N", help="Number of runs per iteration.", show_default="depends on the method"
         ),
     ] = None,
     sigma: Annotated[
         float,
-        Option(
-            help="How far from where it begins the method looks at first, as a fraction of the ranges."
-        ),
+        Option(help="Initial standard deviation of the search, as a fraction of the ranges."),
     ] = 0.25,
-    seed: Annotated[int, Option(help="The same seed, the same search.")] = 0,
+    seed: Annotated[
+        int, Option(help="Seed of the random numbers; equal seeds give equal searches.")
+    ] = 0,
     start: Annotated[
         Path | None,
         Option(
             metavar="FOLDER",
-            help="Begin at what another search found, of variables that have the same names.",
-            show_default="where the model is",
+            help="Begin at the result of another search, for variables with the same names.",
+            show_default="the model's values",
         ),
     ] = None,
     maximize: Annotated[
         bool | None,
-        Option("--maximize/--minimize", help="What is better.", show_default="see --objective"),
+        Option(
+            "--maximize/--minimize", help="Direction of the search.", show_default="see --objective"
+        ),
     ] = None,
     unbounded: Annotated[
-        bool, Option("--unbounded", help="The ranges say where to begin, and may be left.")
+        bool, Option("--unbounded", help="Use the ranges only as initial ranges, not as bounds.")
     ] = False,
     tolerance: Annotated[
         float | None,
-        Option(help="At which the search has converged.", show_default="that of the method"),
+        Option(help="Tolerance of convergence.", show_default="depends on the method"),
     ] = None,
     measure: Annotated[
         list[str] | None,
         Option(
             "--measure",
             metavar="NAME",
-            help="What else to keep in the history.",
+            help="Another measure to write to the history.",
             show_default=False,
         ),
     ] = None,
@@ -92,25 +94,27 @@ def optimize(
             "-o",
             "--output",
             metavar="FOLDER",
-            help="For history.parquet, best.osim, summary.json (and best.par).",
+            help="Folder for history.parquet, best.osim, summary.json (and best.par).",
         ),
     ] = Path("optimum"),
     resume: Annotated[
-        bool, Option("--resume", help="Go on with an interrupted or finished search.")
+        bool, Option("--resume", help="Continue an interrupted or finished search.")
     ] = False,
-    force: Annotated[bool, Option("--force", help="Replace what another search found.")] = False,
+    force: Annotated[
+        bool, Option("--force", help="Replace the results of another search.")
+    ] = False,
     controls: options.Controls = None,
     controller: options.Controller = None,
     par: options.Par = None,
     interpolation: sweeping.Interpolation = "linear",
     **chosen: Any,
 ) -> None:
-    """Look for the start, the controls or other numbers with which a model does best; writes it with them.
+    """Search for the initial state, controls or parameters that optimize an objective, and write the best model.
 
-    Of muscles: osimlite optimize jumper --objective 'max(center_of_mass_Y)' --maximize
+    With muscles: osimlite optimize jumper --objective 'max(center_of_mass_Y)' --maximize
     --vary '{*}_?/control@0:0.3:4=0:1'
 
-    Of reflexes: osimlite optimize arm.osim --objective 'elbow/value' --maximize --controller
+    With reflexes: osimlite optimize arm.osim --objective 'elbow/value' --maximize --controller
     hold.yaml
 
     Example: osimlite optimize walker.osim --objective distance --vary RHip_rz=0:60deg --vary

@@ -15,12 +15,12 @@ def rule(
     code: Annotated[
         str | None,
         Argument(
-            help="Code or name of a rule; the read_beginning of codes (OSIM8) or a family (data) lists several.",
+            help="Code or name of a rule, or several: a prefix of codes (OSIM8) or a family (data).",
             show_default=False,
         ),
     ] = None,
 ) -> None:
-    """Print what a rule finds, why that is bad, and an example with its correction.
+    """Explain a rule of the validator: what it reports, why it matters, and an example with its correction.
 
     Example: osimlite rule OSIM301
     """

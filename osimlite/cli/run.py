@@ -39,18 +39,19 @@ def run(
             "--output",
             metavar="FOLDER",
             help="Folder to write into.",
-            show_default="where the setup says",
+            show_default="the folder in the setup",
         ),
     ] = None,
     workers: sweeping.Workers = None,
     cluster: sweeping.Cluster = None,
-    resume: Annotated[
-        bool, Option("--resume", help="Leave out what an interrupted run has done.")
-    ] = False,
+    resume: Annotated[bool, Option("--resume", help="Continue an interrupted run.")] = False,
     report: Annotated[
         Path | None,
         Option(
-            "--report", metavar="FILE.html", help="Show it all on one page.", show_default=False
+            "--report",
+            metavar="FILE.html",
+            help="Write a page with all results.",
+            show_default=False,
         ),
     ] = None,
     refine: Annotated[
@@ -58,46 +59,46 @@ def run(
         Option(
             "--refine",
             metavar="TOL[:HESSIAN]",
-            help="Of one study of Moco: split intervals of the mesh until the error of none is above this, with second "
+            help="For one Moco study: divide mesh intervals until no error is above this, with second "
             "derivatives that are exact or limited-memory.",
             show_default=False,
         ),
     ] = None,
     as_json: Annotated[
-        bool, Option("--json", help="Print what became of each setup as JSON.")
+        bool, Option("--json", help="Print the result of each setup as JSON.")
     ] = False,
     overwrite: Annotated[
         bool,
         Option(
-            "--overwrite", help="Let results replace any file, not only results of the same kind."
+            "--overwrite", help="Let results replace any file, not only results of the same type."
         ),
     ] = False,
     write_outside: Annotated[
         bool,
         Option(
             "--write-outside",
-            help="Let setups write outside of their project and of the current folder.",
+            help="Let setups write outside their project and the current folder.",
         ),
     ] = False,
 ) -> None:
     """Run setup files of OpenSim's tools, and write the files that OpenSim would write.
 
-    A setup and all that it names are checked first, as 'osimlite validate' does; an error stops it.
-    Files are looked for from the folder of the setup, then from here. 'run-tool' is another name of
-    this command.
+    A setup and the files that it names are checked first, as by 'osimlite validate'; it does not run
+    if they have an error. Files are searched from the folder of the setup, then from the current
+    folder. 'run-tool' is another name of this command.
 
-    Of several setups each waits for those that make what it names; one that fails stops no other.
-    What is done is noted until all are, and --resume goes on after Ctrl-C, a crash or an error.
-    With -o each has a folder of its own in it.
+    A setup waits for the setups that write its input files. If one fails, only those that need it
+    are skipped. Finished setups are recorded, and --resume continues after Ctrl-C, a crash or an
+    error. With -o each of several setups has its own subfolder.
 
-    A result replaces an existing file only if that is a result of the same kind. It is not written
-    through a link, nor under a hidden name, nor outside of the setup's project and the current
-    folder. See --overwrite, --write-outside.
+    A result replaces an existing file only if that is a result of the same type. It is not written
+    through a link, under a hidden name, or outside the setup's project and the current folder. See
+    --overwrite and --write-outside.
 
-    With --report what a study of Moco finds is simulated, too, and it is told how far the motion
-    stays with it.
+    For a Moco study, --report also simulates the solution, and reports how far simulation and
+    solution differ.
 
-    Exits with 0 if all is done, 1 if the answer of a tool is no, 2 if a setup could not be run.
+    Exits with 0 if all setups are done, 1 if a tool found no solution, 2 if a setup could not run.
 
     Example: osimlite run scale.xml 'trials/*/ik.xml' 'trials/*/id.xml' --workers 4
     """

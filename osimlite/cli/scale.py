@@ -14,15 +14,15 @@ def scale(
     file: options.File,
     static: Annotated[
         Path | None,
-        Argument(help="Measured markers of the subject, standing: .trc, .c3d, or .sto."),
+        Argument(help="Measured markers of the standing subject: .trc, .c3d or .sto."),
     ] = None,
     distance: Annotated[
         list[str] | None,
         Option(
             "--distance",
             metavar="BODY=A:B",
-            help="Scale a body by the distance of markers A and B, or the mean over several pairs with commas; BODY.XZ "
-            "along these axes only. May be repeated.",
+            help="Scale a body by the distance of markers A and B, or by the mean of several pairs (with commas). BODY.XZ "
+            "scales these axes only. May be repeated.",
         ),
     ] = None,
     factor: Annotated[
@@ -35,10 +35,10 @@ def scale(
     ] = None,
     mass: options.Mass = -1.0,
     preserve: Annotated[
-        bool, Option("--preserve-masses", help="Let the bodies keep their shares of the mass.")
+        bool, Option("--preserve-masses", help="Preserve the mass distribution of the bodies.")
     ] = False,
     place: Annotated[
-        bool, Option("--place", help="Move the markers of the model to where they were measured.")
+        bool, Option("--place", help="Move the model's markers to their measured positions.")
     ] = False,
     first: options.FirstFrame = float("-inf"),
     last: options.LastFrame = float("inf"),
@@ -51,8 +51,8 @@ def scale(
 ) -> None:
     """Scale a model to a subject, as OpenSim's ScaleTool does.
 
-    Lengths of muscles, masses and inertias follow. With --place the model is posed as the subject
-    stood, and its markers are moved to the measured places.
+    Muscle lengths, masses and inertias are scaled accordingly. With --place the model is put into
+    the pose of the subject, and its markers are moved to their measured positions.
 
     Example: osimlite scale gait2392.osim static.trc --distance femur_r=RASI:RKNE --mass 72 --place
         -o subject.osim
@@ -107,7 +107,7 @@ def _pair(text: str, body: str) -> tuple[str, str]:
     one, _, two = text.partition(":")
     if not one or not two:
         raise SettingError(
-            f"'{text}' names no pair of markers for '{body}'; write {body}=MARKER:MARKER"
+            f"'{text}' is not a pair of markers for '{body}'; write {body}=MARKER:MARKER"
         )
     return one.strip(), two.strip()
 
@@ -125,6 +125,6 @@ def _factors(text: str, body: str) -> tuple[float, ...]:
         numbers = []
     if len(numbers) not in (1, 3):
         raise SettingError(
-            f"'{text}' are no factors for '{body}'; write one number, or three with commas"
+            f"'{text}' is not a factor for '{body}'; write one number, or three with commas"
         )
     return tuple(numbers * 3)[:3]

@@ -15,7 +15,10 @@ UNITS = {
     "jump height": "cm",
     "early rise": "cm",
 }
-"""Of what measures report."""
+"""Units of the quantities that measures report."""
+
+LABELS = {"transport": "cost of transport"}
+"""Words for people, where they differ from those of the measures."""
 
 
 @command
@@ -24,48 +27,59 @@ def scone(
         Path,
         Argument(
             metavar="SCENARIO",
-            help="A .scone file, or YAML; 'human-walks' is one of ours, which is written there to be changed.",
+            help="A .scone or YAML file, or 'human-walks', a built-in scenario, which is copied to the output folder.",
             show_default=False,
         ),
     ],
     par: options.Par = None,
-    optimize: Annotated[bool, Option("--optimize", help="Look for better ones.")] = False,
+    optimize: Annotated[bool, Option("--optimize", help="Optimize the parameters.")] = False,
     generations: Annotated[
         int | None,
-        Option(metavar="N", help="How many.", show_default="what the scenario says, or 1000"),
+        Option(
+            metavar="N", help="Number of generations.", show_default="that of the scenario, or 1000"
+        ),
     ] = None,
     population: Annotated[
         int | None,
         Option(
             metavar="N",
-            help="Candidates of each generation.",
-            show_default="what the scenario says, or 16",
+            help="Candidates in each generation.",
+            show_default="that of the scenario, or 16",
         ),
     ] = None,
     seed: Annotated[
         int | None,
-        Option(help="The same seed, the same search.", show_default="what the scenario says, or 0"),
+        Option(
+            help="Seed of the random numbers; equal seeds give equal searches.",
+            show_default="that of the scenario, or 0",
+        ),
     ] = None,
     duration: Annotated[
         float | None,
         Option(
-            "--to", metavar="SECONDS", help="Length of a walk.", show_default="that of the scenario"
+            "--to",
+            metavar="SECONDS",
+            help="Duration of the simulation.",
+            show_default="that of the scenario",
         ),
     ] = None,
-    resume: Annotated[bool, Option("--resume", help="Go on with a search.")] = False,
+    resume: Annotated[bool, Option("--resume", help="Continue an interrupted search.")] = False,
     output: Annotated[
         Path,
         Option(
-            "-o", "--output", metavar="FOLDER", help="For states.sto, excitations.sto, best.par."
+            "-o",
+            "--output",
+            metavar="FOLDER",
+            help="Folder for states.sto, excitations.sto, best.par.",
         ),
     ] = Path("scone"),
 ) -> None:
-    """Have the human of a scenario walk, or look for the parameters with which it does best.
+    """Run a SCONE scenario: simulate its human model walking by reflexes, or optimize the parameters.
 
-    A controller of your own, and which of SCONE's parts there are: docs/reflexes.md. All else is
-    refused by its name and line.
+    docs/reflexes.md lists the supported parts of SCONE, and how to write a controller. Other parts
+    are an error that names them, with the line.
 
-    What comes out can be looked at: osimlite view walk/human.osim walk/states.sto
+    To look at the result: osimlite view walk/human.osim walk/states.sto
 
     Example: osimlite scone human-walks -o walk
     """
@@ -83,7 +97,7 @@ def scone(
         resume or any(given is not None for given in (generations, population, seed))
     ):
         raise SettingError(
-            "--generations, --population, --seed and --resume say how to search; add --optimize"
+            "--generations, --population, --seed and --resume are options of a search; add --optimize"
         )
     if str(scenario) == SCENARIO:
         scenario = write_scenario(output)
@@ -115,7 +129,7 @@ def scone(
     for name, term in walked.terms.items():
         facts.add(name, f"{term[0]:.6g}")
     for name, report in walked.report.items():
-        facts.add(name, f"{report[0]:.6g} {UNITS.get(name, '')}".rstrip())
+        facts.add(LABELS.get(name, name), f"{report[0]:.6g} {UNITS.get(name, '')}".rstrip())
     gait = gait_of(given, walked)
     for name, words in () if gait is None else gait.describe().items():
         facts.add(name, words)

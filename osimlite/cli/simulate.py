@@ -30,7 +30,7 @@ def simulate(
         Path | None,
         Option(
             metavar="FILE",
-            help="Start from the last row of a file of states; --set says more.",
+            help="Start from the last row of a file of states; --set overrides it.",
             show_default=False,
         ),
     ] = None,
@@ -40,7 +40,9 @@ def simulate(
     plot: Annotated[
         bool, Option("--plot", help="Draw coordinates, muscles, forces, probes and energy as PNG.")
     ] = False,
-    animate: Annotated[bool, Option("--animate", help="Draw the motion as animation.gif.")] = False,
+    animate: Annotated[
+        bool, Option("--animate", help="Write the motion as animation.gif.")
+    ] = False,
     gui: Annotated[
         bool,
         Option(
@@ -50,12 +52,11 @@ def simulate(
     ] = False,
     **chosen: Any,
 ) -> None:
-    """Simulate a model forward in time, from its default pose: writes states.sto, forces.sto and summary.json.
+    """Simulate a model forward in time from its default pose: writes states.sto, forces.sto and summary.json.
 
-    Names of --set are coordinates, or paths of states such as
-    /forceset/BRA/activation. What the model's probes report goes into probes.sto.
-    Where the motion cannot be computed any further, or Ctrl-C ends it, what was
-    recorded is kept, without pictures.
+    --set accepts names of coordinates, or paths of states such as /forceset/BRA/activation. If the
+    model has probes, probes.sto is written. If the motion cannot be continued, or you press Ctrl-C,
+    the motion up to that time is saved, without pictures.
 
     Example: osimlite simulate walker.osim --to 2 --set RHip_rz=40deg -o results --plot
     """
@@ -69,7 +70,7 @@ def simulate(
         require("PIL", extra="view", purpose="an animation")
     results, before = options.results_folder(file, output), chosen["resume"]
     if before is not None and results.resolve() == Path(before).resolve():
-        raise SettingError(f"'{results}' has what went before; name another folder with -o")
+        raise SettingError(f"'{results}' has the earlier simulation; name another folder with -o")
     model, feedback = read(file), options.feedback(controller, par)
     if controls:
         from osimlite.simulation.run_controls import words_to_controls
@@ -107,7 +108,7 @@ def simulate(
             how = "stopped" if is_failure else "interrupted"
             # After many steps, it takes a while to work out what is written.
             complain(
-                f"{how} at {trajectory.times[-1]:.6g} s of {to:g} s; what was recorded goes into '{results}'"
+                f"{how} at {trajectory.times[-1]:.6g} s of {to:g} s; the motion up to there is saved in '{results}'"
             )
             _told(trajectory, write_files(trajectory, results)).show()
             if is_failure:
@@ -134,6 +135,15 @@ def simulate(
         _told(trajectory, files).show()
         simulation.hold()
 
+
+ENGINE_NAMES = {"bullet": "PyBullet"}
+"""Names of engines for people, where they differ from those of the option."""
+
+INTEGRATOR_NAMES = {
+    "RungeKuttaMerson": "Runge-Kutta-Merson",
+    "SemiExplicitEuler2": "semi-explicit Euler 2",
+}
+"""Names of integrators for people, where they differ from those in ``summary.json``."""
 
 SOME = {
     *("probes.sto", "controller.sto", "animation.gif"),
@@ -196,30 +206,36 @@ def _told(trajectory: Trajectory, files: Sequence[Path]) -> Facts:
 
     summary = trajectory.summary
     facts = Facts(f"{summary['model']}, {trajectory.times[-1]:g} s")
-    facts.add("engine", f"{summary['engine']}, {summary['route']}, {summary['integrator']}")
-    tried = summary["attempted_steps"]
+    facts.add("engine", ENGINE_NAMES.get(summary["engine"], summary["engine"]))
+    facts.add("integrator", INTEGRATOR_NAMES.get(summary["integrator"], summary["integrator"]))
+    rejected = summary["attempted_steps"] - summary["steps"]
     facts.add(
         "steps",
-        f"{summary['steps']} of {tried} tried, {summary['evaluations']} evaluations of the forces",
+        f"{summary['steps']} accepted, {rejected} rejected; {summary['evaluations']} evaluations of the forces",
     )
     facts.add("time taken", f"{summary['wall_time_s']:.3g} s")
     lengths = {path for path in trajectory.auxiliary if path.endswith("/fiber_length")}
     if lengths - set(summary["settings"]["initial"]) and "equilibrate" not in summary["settings"]:
-        facts.add("muscles", "start where the model says; in equilibrium by --equilibrate")
+        facts.add(
+            "warning",
+            "muscles start with the model's states, not in equilibrium; add --equilibrate",
+        )
     first, last = (summary["energy_J"][when]["total"] for when in ("start", "end"))
     facts.add("energy", f"{first:.6g} J at the start, {last:.6g} J at the end")
     for name, largest in summary["largest_contact_forces"].items():
         times = [
-            f"{'on' if event['event'] == 'begin' else 'off'} {event['time_s']:.4g}"
+            f"{'from' if event['event'] == 'begin' else 'to'} {event['time_s']:.4g}"
             for event in summary["contact_events"]
             if event["contact"] == name
         ]
         # The unit follows the last time.
         shown = (
-            ", ".join(times[:6]) + " s" + (f" and {len(times) - 6} more" if len(times) > 6 else "")
+            " ".join(times[:6]) + " s" + (f" and {len(times) - 6} more" if len(times) > 6 else "")
         )
         size, when = largest["force_N"], largest["time_s"]
-        facts.add(name, f"at most {size:.4g} N ({when:.4g} s)" + (f"; {shown}" if times else ""))
+        facts.add(
+            name, f"peak {size:.4g} N at {when:.4g} s" + (f"; contact {shown}" if times else "")
+        )
     for skipped in summarize_skipped(summary["skipped_forces"]):
         facts.add("left out", skipped)
     facts.add("files", ", ".join(str(path) for path in files))

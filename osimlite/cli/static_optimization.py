@@ -19,22 +19,23 @@ def static_optimization(
         Option(
             "--forces",
             metavar="FILE",
-            help="A ForceSet that pushes besides, of reserve actuators for instance; may be given several times.",
+            help="Add the forces of a ForceSet, for example reserve actuators; may be repeated.",
             show_default=False,
         ),
     ] = None,
     replace: Annotated[
-        bool, Option("--replace-forces", help="They take the place of the model's own forces.")
+        bool, Option("--replace-forces", help="Replace the model's forces by those of --forces.")
     ] = False,
     exponent: Annotated[
-        float, Option(metavar="NUMBER", help="Power of the activations whose sum is least.")
+        float,
+        Option(metavar="NUMBER", help="Exponent of the activations in the sum that is minimized."),
     ] = 2.0,
     muscles: Annotated[
         str,
         Option(
             metavar="FORCE",
-            help="What an activation of 1 pulls with: 'active', as in OpenSim: the fibers, along a tendon taken for "
-            "rigid, without passive forces; 'isometric': max_isometric_force.",
+            help="Force at an activation of 1. 'active': the active fiber force with a rigid tendon, as in OpenSim, "
+            "without passive forces; 'isometric': max_isometric_force.",
         ),
     ] = "active",
     lowpass: options.Lowpass = None,
@@ -43,14 +44,14 @@ def static_optimization(
     output: options.Folder = None,
     **chosen: Any,
 ) -> None:
-    """Share the forces of a recorded motion among the muscles: of all activations that move it so, the least.
+    """Compute muscle forces of a recorded motion: the smallest activations that produce the motion.
 
     Writes StaticOptimization_activation.sto, StaticOptimization_force.sto (N, N·m) and
-    StaticOptimization_controls.xml, as OpenSim's analysis does, each time solved exactly. Muscles
-    alone rarely move a pelvis: give reserve actuators with --forces. What min_control and
-    max_control leave without a solution is told with the coordinates that lack strength, has no
-    numbers in the files, and makes the exit code 1. What a camera records takes a filter first:
-    --lowpass 6.
+    StaticOptimization_controls.xml, like OpenSim's analysis, with an exact solution at each time.
+    Muscles alone can rarely move a pelvis: add reserve actuators with --forces. If there is no
+    solution within min_control and max_control, the coordinates that lack strength are reported,
+    the files have no numbers at these times, and the exit code is 1. Filter motions from motion
+    capture first: --lowpass 6.
 
     Example: osimlite static-optimization gait.osim walk.mot --lowpass 6 --external-loads grf.xml
         --forces reserves.xml

@@ -24,7 +24,7 @@ def sweep(
         Option(
             "--samples",
             metavar="N",
-            help="How many runs; leave it out for a grid.",
+            help="Number of runs; leave it out for a grid.",
             show_default=False,
         ),
     ] = None,
@@ -35,13 +35,13 @@ def sweep(
             show_default="grid if every range has a COUNT, else sobol",
         ),
     ] = None,
-    seed: Annotated[int, Option(help="The same seed, the same random samples.")] = 0,
+    seed: Annotated[int, Option(help="Seed of the samples; equal seeds give equal samples.")] = 0,
     measure: Annotated[
         list[str] | None,
         Option(
             "--measure",
             metavar="NAME",
-            help="What to keep of a run: distance, energy, largest_force, steps, scuffs, progress, time_to_fall, "
+            help="Quantity to write for each run: distance, energy, largest_force, steps, scuffs, progress, time_to_fall, "
             "COORDINATE/value, COORDINATE/speed, an expression such as 'max(pelvis_Y)', or module:function.",
             show_default="distance and largest_force",
         ),
@@ -62,19 +62,17 @@ def sweep(
             "-o", "--output", metavar="FILE", help="Parquet file to write, one row for each run."
         ),
     ] = Path("results.parquet"),
-    resume: Annotated[bool, Option("--resume", help="Go on with an interrupted sweep.")] = False,
-    force: Annotated[
-        bool, Option("--force", help="Replace results that were made with other settings.")
-    ] = False,
+    resume: Annotated[bool, Option("--resume", help="Continue an interrupted sweep.")] = False,
+    force: Annotated[bool, Option("--force", help="Replace results of other settings.")] = False,
     controls: options.Controls = None,
     controller: options.Controller = None,
     par: options.Par = None,
     interpolation: sweeping.Interpolation = "linear",
     **chosen: Any,
 ) -> None:
-    """Simulate a model from many starts, or with many values of its numbers: one row of the results for each run.
+    """Simulate a model with many initial states or parameters; writes a table with one row for each run.
 
-    Results of an interrupted sweep are kept beside the file, and --resume goes on with them.
+    Results of an interrupted sweep are saved beside the file, and --resume continues it.
 
     Example: osimlite sweep walker.osim --vary RHip_rz=20deg:40deg --vary Pelvis_tx/speed=0:1
         --samples 1000

@@ -42,20 +42,20 @@ def translate(
         Path | None,
         Option(
             metavar="[MJCF]",
-            help="Compare an MJCF file of any program with the model, and translate nothing; without a file, translate "
-            "to MJCF and compare that (needs MuJoCo).",
+            help="Only compare this MJCF file with the model, and translate nothing; without a file, translate "
+            "to MJCF and compare the result (needs MuJoCo).",
             show_default=False,
             bare_value=WRITTEN,
         ),
     ] = None,
     **chosen: Any,
 ) -> None:
-    """Translate a model: writes its text, its meshes and fidelity.json.
+    """Translate a model to another format: writes the model, its meshes and fidelity.json.
 
-    Meshes in VTK's format (.vtp) become .obj, text .stl becomes binary.
-    fidelity.json says what became of every component, and the table what is lost.
-    --check MJCF prints the errors of lengths, moment arms and forces of its muscles;
-    with -o it writes them to check.json.
+    VTK meshes (.vtp) become .obj, text .stl becomes binary. fidelity.json describes how each
+    component was translated, and the table on the screen what was lost or approximated. --check MJCF
+    prints the errors of lengths, moment arms and forces of its muscles; with -o it writes them to
+    check.json.
 
     Example: osimlite translate gait.osim --geometry ~/OpenSim/Geometry -o robot
     """
@@ -95,7 +95,7 @@ def translate(
     if len(made.fidelity):
         plain_console().print(tabulate(made.fidelity, to.upper()))
     robot, (same, otherwise, lost) = made.robot, made.fidelity.counts()
-    say(f"{same} components as they are, {otherwise} in another way, {lost} left out")
+    say(f"components: {same} exact, {otherwise} approximated or converted, {lost} left out")
     say(
         f"{len(robot.links)} links, {len(robot.joints)} joints of which {len(robot.moving)} move; wrote "
         + join_words([str(path) for path in written], most=4)

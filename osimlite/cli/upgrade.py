@@ -26,16 +26,16 @@ def upgrade(
             "-o",
             "--output",
             metavar="FILE",
-            help="File to write, which may be the file itself.",
-            show_default="<name>_<version> beside it",
+            help="File to write; may be the input file.",
+            show_default="<name>_<version> in its folder",
         ),
     ] = None,
     numbers: options.Numbers = "shortest",
 ) -> None:
-    """Write a file of an older version in the current format, and list what changed and what was lost.
+    """Convert a file of an older version to the current format, and list what changed and what was lost.
 
-    Components get the names and paths that OpenSim gives them. Comments and numbers stay as they
-    are. Other files that it names are left alone.
+    Components get the names and paths that OpenSim gives them. Comments and numbers do not change.
+    Other files that the file names are not converted.
 
     Example: osimlite upgrade gait2354.osim -o gait2354_v4.osim
     """
@@ -56,7 +56,7 @@ def upgrade(
     target = output or file.with_name(f"{file.stem}_{CURRENT_VERSION}{file.suffix or '.osim'}")
     if output is None and target.exists():
         raise OsimliteError(
-            f"'{target}' is there already; name the file to write with -o", file=str(file)
+            f"'{target}' exists already; name the file to write with -o", file=str(file)
         )
     write(document.top, target, numbers=style)
     _report(document)
@@ -90,7 +90,7 @@ def _report(document: Document) -> None:
                 else f"as '{note.value}'"
             )
             fate = f"; {note.value}" if note.kind == "overlooked" else f" and was read {meant}"
-            say(f"line {note.line}: '{note.word}' is no XML{fate}")
+            say(f"line {note.line}: '{note.word}' is not XML{fate}")
     lost: dict[str, list[Change]] = {}
     for change in done:
         if change.lost is not None:

@@ -22,25 +22,23 @@ def validate(
     select: options.Select = None,
     ignore: options.Ignore = None,
     fail_on: options.FailOn = None,
-    fix: Annotated[bool, Option("--fix", help="Mend what can be mended with certainty.")] = False,
+    fix: Annotated[bool, Option("--fix", help="Apply the safe fixes.")] = False,
     unsafe_fixes: Annotated[
         bool,
         Option(
             "--unsafe-fixes",
-            help="Mend also what was probably meant; look at it with --diff first.",
+            help="Also apply probable fixes; check them with --diff first.",
         ),
     ] = False,
-    diff: Annotated[bool, Option("--diff", help="Show the mends and write nothing.")] = False,
+    diff: Annotated[bool, Option("--diff", help="Show the fixes and write nothing.")] = False,
     baseline: Annotated[
         str | None,
-        Option(
-            help="Say nothing of the findings in this file.", metavar="FILE", show_default=False
-        ),
+        Option(help="Do not report findings in this baseline.", metavar="FILE", show_default=False),
     ] = None,
     write_baseline: Annotated[
         str | None,
         Option(
-            help="Write all findings to this file and stop.", metavar="FILE", show_default=False
+            help="Write all findings to a baseline and exit.", metavar="FILE", show_default=False
         ),
     ] = None,
     geometry: options.Geometry = None,
@@ -48,7 +46,7 @@ def validate(
         list[str] | None,
         Option(
             metavar="FILE",
-            help="A file that declares classes of a plug-in; may be repeated.",
+            help="A file that describes classes of a plug-in; may be repeated.",
             show_default=False,
         ),
     ] = None,
@@ -56,31 +54,31 @@ def validate(
         str,
         Option(
             metavar="RELEASE",
-            help="The OpenSim that is to read the files: 4.0 to 4.6 (OSIM113).",
+            help="Release of OpenSim that will read the files: 4.0 to 4.6 (OSIM113).",
             show_default="4.6",
         ),
     ] = "",
     everything: options.Everything = False,
     statistics: Annotated[
-        bool, Option("--statistics", help="Count findings by rule instead.")
+        bool, Option("--statistics", help="Print the number of findings of each rule instead.")
     ] = False,
     stdin_filename: Annotated[
         str | None,
         Option(
             metavar="FILE",
-            help="Take standard input for what this file will be, and check it there.",
+            help="Check standard input as the future content of this file.",
             show_default=False,
         ),
     ] = None,
     only_ours: options.OnlyOurs = False,
     no_cache: Annotated[
-        bool, Option("--no-cache", help="Check every file, also those that have not changed since.")
+        bool, Option("--no-cache", help="Check every file, also unchanged ones.")
     ] = False,
 ) -> None:
-    """Say what is wrong with models, setups and tables: all in one run, with line, column and nearest spelling.
+    """Find errors in models, setups and tables, with line, column and the nearest spelling.
 
-    Exits with 0 if all is well, 1 if there are findings as bad as --fail-on, 2 if a file cannot be
-    read.
+    Exits with 0 if there are no problems, 1 if there are findings of the severity --fail-on or worse,
+    2 if a file cannot be read.
 
     Example: osimlite validate walker.osim --format concise
     """

@@ -30,32 +30,30 @@ def view(
     ] = None,
     values: Annotated[
         list[str] | None,
-        Option("--set", metavar="NAME=VALUE", help="Where a coordinate is (rad, m, or 30deg)."),
+        Option("--set", metavar="NAME=VALUE", help="Value of a coordinate (rad, m, or 30deg)."),
     ] = None,
     forces: Annotated[
         Path | None,
         Option(
             metavar="FILE",
-            help="Contact forces over time, labelled as by OpenSim's ForceReporter.",
+            help="Contact forces over time, a table of OpenSim's ForceReporter.",
             show_default="computed, if the motion has speeds",
         ),
     ] = None,
     geometry: options.Geometry = None,
-    port: Annotated[
-        int, Option(help="Serve the page at this port.", show_default="any that is free")
-    ] = 0,
+    port: Annotated[int, Option(help="Port of the page.", show_default="any free port")] = 0,
     browser: options.Browser = True,
     *,
     wrapping: str,
     **chosen: Any,
 ) -> None:
-    """Look at a model, and at a motion: bodies, contacts, muscles, the component tree, a slider for every coordinate.
+    """Look at a model and its motion: bodies, contacts, muscles, component tree, a slider for every coordinate.
 
-    Muscles bend around their wrap surfaces in every pose. Where the motion has activations, as a
-    file of states, they are blue at rest and red when active. A click on one shows its length and
-    moment arms over each coordinate that it crosses.
+    Muscles wrap around surfaces in every pose. If the motion has activations, as a file of states
+    does, muscles are blue at rest and red when active. Click on a muscle to see its length and moment
+    arms over each coordinate that it crosses.
 
-    Opens a page in the browser and serves it until you press Ctrl-C; with --html, --glb, --rerun or
+    Opens a page in the browser and serves it until you press Ctrl-C. With --html, --glb, --rerun or
     --screenshot it writes files instead.
 
     Example: osimlite view gait.osim walk.sto --geometry ~/OpenSim/Geometry --html walk.html

@@ -17,7 +17,7 @@ UPPER, FORE = 0.3, 0.25
 
 
 def arm() -> Model:
-    """A forearm with a weight, a muscle that bends the elbow and one that stretches it."""
+    """Build a forearm with a weight, a muscle that flexes the elbow and one that extends it."""
     model = Model(name="Arm", gravity=(0.0, -9.80665, 0.0))
     fore = Body(
         name="forearm",

@@ -94,7 +94,7 @@ MUSCLES = {
 
 
 def jumper(driven: bool = True) -> Model:
-    """Build the human who squats and jumps by the muscles of the legs.
+    """Build a human model that squats and jumps with the muscles of its legs.
 
     Args: driven: whether the controller is there that makes it jump; without it, the muscles are
         there to be driven.

@@ -53,7 +53,7 @@ STEP = 0.55
 
 
 def human_walks() -> Model:
-    """Build the human whose walk optimal control finds, for which a study and a guess are written beside the model."""
+    """Build a human model for a predicted walk; its Moco study and guess are written with it."""
     model = human()
     model.name = NAME
     for coordinate in model.components(Coordinate):

@@ -87,11 +87,12 @@ def describe(name: str) -> str:
     except MissingDependency as error:
         return error.message
     summary = (
-        (inspect.getdoc(function) or "").split("\n")[0].removeprefix("Build the ").removesuffix(".")
+        (inspect.getdoc(function) or "").split("\n")[0].removeprefix("Build ").removesuffix(".")
     )
     parameters = ", ".join(
         f"{p.name}={p.default}" for p in inspect.signature(function).parameters.values()
     )
+    summary = summary[:1].upper() + summary[1:]
     return f"{summary} ({parameters})" if parameters else summary
 
 
@@ -111,7 +112,7 @@ def _function(source: str) -> Callable[..., Any]:
             suggest_name(source, BUILT_IN) or f"; the built-in models are {join_words(BUILT_IN)}"
         )
         raise OsimliteError(
-            f"'{source}' is no built-in model, Python file, module:function or data file{known}"
+            f"'{source}' is not a built-in model, Python file, module:function or data file{known}"
         )
     if name:
         result = getattr(module, name, None)

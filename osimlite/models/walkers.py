@@ -47,11 +47,11 @@ FURTHEST_START = {
     "RKnee_rz": (-0.547171, 2.01019),
     "LKnee_rz": (-1.7308, 3.35975),
 }
-"""Value and speed of each coordinate from which the exercise's own walker makes the most steps that were found."""
+"""Value and speed of each coordinate of the best initial state of the exercise's walker that was found."""
 
 
 def furthest_walker() -> Model:
-    """Build the exercise's own walker, with the start from which it makes four steps before it falls.
+    """Build the walker of the exercise with the initial state from which it makes four steps before it falls.
 
     It stands on its right foot, which is at rest, the left leg drawn up and swinging forward.
 
@@ -63,7 +63,7 @@ def furthest_walker() -> Model:
 
 
 def steady_walker(shank_inertia: float = 0.0921, foot_ahead: float = 0.0744) -> Model:
-    """Build the walker that differs from the exercise in two properties and never stops.
+    """Build a walker that differs from that of the exercise in two properties and never stops.
 
     Its shanks have a smaller moment of inertia about the knee's axis (1 kg·m² in the exercise), and
     its feet stand out to the front (not at all in the exercise). It walks down the exercise's slope
@@ -91,7 +91,7 @@ def human_walker(
     foot_ahead: float = 0.0455,
     knee_stiffness: float = 20.1,
 ) -> Model:
-    """Build the walker whose mass is distributed as in a human, on a gentle slope.
+    """Build a walker with the mass distribution of a human, on a gentle slope.
 
     71.3 kg: head, arms and trunk weigh 47.5 kg and stand on the hips, a thigh weighs 7.9 kg and a
     shank with its foot 4 kg. The mass centres and the radii of gyration are near those that D. A.

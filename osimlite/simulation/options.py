@@ -45,7 +45,7 @@ class Options:
     """
 
     accuracy: float | None = define_option(
-        None, "Of the integrator, as in OpenSim.", shown="0.001", more="0.001 if left out."
+        None, "Integrator accuracy, as in OpenSim.", shown="0.001", more="0.001 if left out."
     )
     integrator: str | None = define_option(
         None,
@@ -55,7 +55,7 @@ class Options:
     )
     fixed_step: float | None = define_option(
         None,
-        "Steps of this length (semi-implicit Euler), without error control.",
+        "Use fixed steps (semi-implicit Euler), without error control.",
         unit="SECONDS",
         more="They are the engine's own, s.",
     )
@@ -93,7 +93,7 @@ class Options:
     )
     resume: Trajectory | str | Path | None = define_option(
         None,
-        "Go on where an earlier simulation ended, whose folder this is.",
+        "Continue an earlier simulation, from the folder with its results.",
         unit="FOLDER",
         type=Path | None,
         more="Or the trajectory of one; the time goes on, too. With a controller that began a control step there, to "
@@ -111,26 +111,26 @@ class Options:
     )
     wrapping: str = define_option(
         "opensim",
-        "How paths bend around surfaces: 'opensim', as there; 'geodesic', smoothly, the shortest way.",
+        "How paths wrap around surfaces: 'opensim', as in OpenSim; 'geodesic', smoothly along shortest curves.",
         more="Along a geodesic (where a side is asked for at least a stationary one), all surfaces of a path are taken "
         "together, so that speed and moment arms are derivatives of the length.",
     )
     skip_unsupported: bool = define_option(
-        False, "Leave out forces that cannot be computed.", more="The summary lists them."
+        False, "Leave out unsupported forces.", more="The summary lists them."
     )
     opensim_derivatives: bool = define_option(
         False,
-        "Repeat OpenSim's mistakes in joints with several turns.",
+        "Repeat OpenSim's errors in joints that rotate about several axes.",
         more="Two second derivatives there are wrong; see :func:`osimlite.mechanics.multibody.build_mechanism`.",
     )
     rolling: bool = define_option(
         False,
-        "Let rolling constraints act, which OpenSim leaves off.",
+        "Turn on rolling constraints, which OpenSim leaves off.",
         more="So they are until a program turns them on.",
     )
     external_loads: str | Path | None = define_option(
         None,
-        "Measured forces that act too: a file of ExternalLoads.",
+        "Measured forces to apply: a file of ExternalLoads.",
         unit="FILE",
         type=Path | None,
     )

@@ -448,7 +448,7 @@ def _render_residuals(trial: TrialOutcomes, name: str) -> Iterator[str]:
                 panel.set_ylabel(unit)
                 panel.legend(frameon=False, fontsize=8)
                 _style_axes(panel, "time (s)")
-            note = "What the joint to ground has to push, though nothing does in life."
+            note = "Residual forces at the joint to ground; ideally zero."
             yield f'<h2>Residuals{html.escape(name)}</h2><p class="note">{note}</p>{_render_image(figure)}'
 
 

@@ -120,7 +120,8 @@ def _move_mass_center(
     )
     outcome.add_message(
         "mass",
-        f"{total:.6g} kg, and {change:+.4g} kg would take the vertical residual away; OpenSim leaves that to you",
+        f"{total:.6g} kg; {'add' if change > 0 else 'remove'} {abs(change):.4g} kg to remove the vertical residual "
+        "(not applied, as in OpenSim)",
     )
     for when, averages in (
         ("before", before),

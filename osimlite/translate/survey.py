@@ -230,9 +230,7 @@ class _Survey:
             text,
         )
         if coordinate.clamped:
-            self.note(
-                "clamped", path, "that a user interface must not leave the range", "left out", text
-            )
+            self.note("clamped", path, "clamped range in user interfaces", "left out", text)
 
     def _start(self, coordinate: Coordinate, path: str, unit: str) -> None:
         if coordinate.default_value != 0.0:

@@ -62,7 +62,7 @@ def test_a_trial_is_fitted(lab: Path) -> None:
     ("words", "said"),
     [
         (("ik", "box.osim", "walk.trc", "--weight", "on=1"), "'box' has no marker 'on'"),
-        (("ik", "box.osim", "walk.trc", "--weight", "one=much"), "'much' is no number for 'one'"),
+        (("ik", "box.osim", "walk.trc", "--weight", "one=much"), "'much' is not a number for 'one'"),
         (("ik", "box.osim", "walk.trc", "--keep", "knee=1"), "no coordinate 'knee'"),
         (("ik", "box.osim", "walk.trc", "--from", "7"), "no frame of 'walk.trc' lies between"),
         (("ik", "box.osim", "none.trc"), "none.trc: cannot read the file"),

@@ -94,7 +94,7 @@ def test_folders_of_meshes_are_named_by_options_settings_and_the_environment(
 
 def test_translate_writes_mjcf_and_its_account(walker: Path) -> None:
     code, out, _ = run("translate", "walker.osim", "--to", "mjcf", "-o", "native", folder=walker)
-    assert code == 0 and "worst error" in out and "in another way, 0 left out" in out
+    assert code == 0 and "worst error" in out and "converted, 0 left out" in out
     account = json.loads((walker / "native/fidelity.json").read_text())
     limits = [record for record in account["records"] if record["kind"] == "limit-force"]
     assert account["target"] == "mjcf 4" and {record["how"] for record in limits} == {"approximate"}

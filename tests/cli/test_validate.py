@@ -136,12 +136,12 @@ def test_what_is_no_certain_mend_is_named(tmp_path):
     )
     shown = run("validate", path, "--fix", "--diff")
     assert shown.code == 0 and not shown.out
-    assert shown.err == "Would mend 0 places; --unsafe-fixes would mend 1 place more.\n"
+    assert shown.err == "Would apply 0 fixes; --unsafe-fixes would apply 1 more.\n"
     mended = run("validate", path, "--fix")
-    assert mended.err == "Mended 0 places; --unsafe-fixes would mend 1 place more.\n"
+    assert mended.err == "Applied 0 fixes; --unsafe-fixes would apply 1 more.\n"
     assert "1 can be fixed with --unsafe-fixes." in mended.out
     clean = run("validate", WALKER, "--diff")
-    assert clean.code == 0 and clean.err == "Would mend 0 places.\n"
+    assert clean.code == 0 and clean.err == "Would apply 0 fixes.\n"
 
 
 def test_fix_mends_in_place_and_diff_shows_it_first(tmp_path):
@@ -154,7 +154,7 @@ def test_fix_mends_in_place_and_diff_shows_it_first(tmp_path):
     assert shown.code == 1 and path.read_text() == before
     assert "+++" in shown.out and "RFootContact PlatformContact" in shown.out
     done = run("validate", path, "--fix")
-    assert done.code == 0 and "Mended 1 place." in done.err
+    assert done.code == 0 and "Applied 1 fix." in done.err
     assert path.read_text() == WALKER.read_text()
 
 

@@ -12,7 +12,7 @@ import pytest
 FOLDER = Path(__file__).resolve().parents[2] / "docs" / "notebooks"
 SHOWN = {
     "walker": {"<iframe", "Pelvis_ty", "xarray"},
-    "lint": {"OSIM512", "LeftShank", "Mended"},
+    "lint": {"OSIM512", "LeftShank", "Applied"},
     "gait2392": {"<iframe", "soleus_r"},
     "moment_arms": {"<iframe", "moment arms (m)"},
     "sweep": {"<iframe", "400 runs", "best:"},

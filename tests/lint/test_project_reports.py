@@ -143,7 +143,7 @@ def test_mends_of_a_project(project):
     assert {path: path.read_bytes() for path in before} == before
     assert (
         command("validate", ".", "--fix").err
-        == "Mended 3 places; --unsafe-fixes would mend 1 place more.\n"
+        == "Applied 3 fixes; --unsafe-fixes would apply 1 more.\n"
     )
     assert found()[0] == {("ik.xml", "OSIM831"), ("ik.xml", "OSIM841")}
     assert found("--unsafe-fixes") == (set(), 0)

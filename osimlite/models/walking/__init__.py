@@ -25,7 +25,7 @@ STANDING = {
 
 
 def human() -> Model:
-    """Build the human, with one force of the ground for each foot, as scenarios want it."""
+    """Build a human model with one ground reaction force per foot, as SCONE scenarios need it."""
     model = jumper(driven=False)
     model.name = "Human"
     forces = {

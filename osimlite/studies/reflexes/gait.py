@@ -60,7 +60,10 @@ class Gait(NamedTuple):
         high = (
             f"{name} {mean:.3f} m ({low:.3f} to {high:.3f})" for name, (mean, low, high) in names
         )
-        words = {"way": f"{self.distance:.3f} m, {self.speed:.3f} m/s", "heights": ", ".join(high)}
+        words = {
+            "distance": f"{self.distance:.3f} m, {self.speed:.3f} m/s",
+            "heights": ", ".join(high),
+        }
         if self.strides is not None:
             each = self.strides
             left, right = (100.0 * part for part in each.stance)
@@ -72,7 +75,7 @@ class Gait(NamedTuple):
             )
             first, dip, second = each.humps
             words["ground"] = (
-                f"{first:.2f} weights, {dip:.2f}, {second:.2f} in a stance; at most {each.peak:.2f}"
+                f"{first:.2f}, {dip:.2f}, {second:.2f} body weights (peak, valley, peak); maximum {each.peak:.2f}"
             )
         return words
 

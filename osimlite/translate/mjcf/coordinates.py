@@ -37,7 +37,7 @@ def add_coordinates(draft: Draft) -> None:
                 element.set("range", " ".join(map(repr, info.range)))
                 element.set("limited", "false")
         if info.clamped:
-            note("clamped", info.path, "that a user interface must not leave the range", "left out")
+            note("clamped", info.path, "clamped range in user interfaces", "left out")
         if info.prescribed is not None and not info.locked and lead is not None:
             start = info.prescribed.evaluate(np.zeros(1))[0]
             exact = Composed(Linear(*lead.line), info.prescribed) if draft.options.driver else None

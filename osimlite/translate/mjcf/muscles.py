@@ -174,7 +174,7 @@ def muscle(draft: Draft, force: Muscle, path: str) -> str:
     draft.fidelity.add(
         "muscle",
         path,
-        f"a {type(force).__name__}: an elastic tendon, fibers at a changing angle, curves that are no parabolas",
+        f"a {type(force).__name__}: an elastic tendon, fibers at a changing angle, non-parabolic curves",
         "a muscle of MuJoCo's, "
         + ("fitted to its isometric force" if fits else "with its own fiber and tendon lengths")
         + rates.note
