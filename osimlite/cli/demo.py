@@ -139,7 +139,7 @@ def _check(tour: _Tour) -> None:
         urdf = to_urdf(model)
         urdf.write(file.with_name("urdf"))
         tell(
-            f"{len(urdf.fidelity)} things that URDF cannot say are listed in fidelity.json",
+            f"{len(urdf.fidelity)} parts that URDF cannot express are listed in fidelity.json",
             file.with_name("urdf"),
         )
 

@@ -141,6 +141,7 @@ ENGINE_NAMES = {"bullet": "PyBullet"}
 
 INTEGRATOR_NAMES = {
     "RungeKuttaMerson": "Runge-Kutta-Merson",
+    "SemiImplicitEuler": "semi-implicit Euler",
     "SemiExplicitEuler2": "semi-explicit Euler 2",
 }
 """Names of integrators for people, where they differ from those in ``summary.json``."""

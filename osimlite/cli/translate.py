@@ -110,7 +110,7 @@ def translate(
 
 def tabulate(fidelity: Fidelity, target: str) -> Any:
     """What is lost, one row for all components of which the same is said."""
-    table = plain_table(f"What {target} cannot say of {fidelity.model}", padding=(0, 2, 1, 0))
+    table = plain_table(f"Lost or approximated in {target}: {fidelity.model}", padding=(0, 2, 1, 0))
     table.add_column("what", overflow="fold", ratio=4)
     table.add_column("done about it", overflow="fold", ratio=3)
     table.add_column("where", overflow="fold", ratio=3)

@@ -168,7 +168,7 @@ def test_build_takes_data(fixtures: Path, tmp_path: Path) -> None:
     assert code == 0, error
     assert osimlite.read(tmp_path / "w.osim") == model
     code, _, error = run("build", "w.json", "-p", "a=1", folder=tmp_path)
-    assert code == 2 and "takes no parameters" in error
+    assert code == 2 and "has no parameters" in error
     assert run("build", "nowhere.yaml", folder=tmp_path)[0] == 2
 
 

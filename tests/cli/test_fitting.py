@@ -62,7 +62,10 @@ def test_a_trial_is_fitted(lab: Path) -> None:
     ("words", "said"),
     [
         (("ik", "box.osim", "walk.trc", "--weight", "on=1"), "'box' has no marker 'on'"),
-        (("ik", "box.osim", "walk.trc", "--weight", "one=much"), "'much' is not a number for 'one'"),
+        (
+            ("ik", "box.osim", "walk.trc", "--weight", "one=much"),
+            "'much' is not a number for 'one'",
+        ),
         (("ik", "box.osim", "walk.trc", "--keep", "knee=1"), "no coordinate 'knee'"),
         (("ik", "box.osim", "walk.trc", "--from", "7"), "no frame of 'walk.trc' lies between"),
         (("ik", "box.osim", "none.trc"), "none.trc: cannot read the file"),
@@ -70,9 +73,9 @@ def test_a_trial_is_fitted(lab: Path) -> None:
         (("scale", "box.osim", "--distance", "b=one:two"), "there are no markers of it"),
         (
             ("scale", "box.osim", "walk.trc", "--distance", "b=one"),
-            "'one' names no pair of markers for 'b'",
+            "'one' is not a pair of markers for 'b'",
         ),
-        (("scale", "box.osim", "--factor", "b=1,2"), "'1,2' are no factors for 'b'"),
+        (("scale", "box.osim", "--factor", "b=1,2"), "'1,2' is not a factor for 'b'"),
         (("scale", "box.osim", "--factor", "c=2"), "'box' has no body 'c'"),
         (("scale", "box.osim", "walk.trc", "--distance", "c.X=one:two"), "'box' has no body 'c'"),
         (
@@ -100,8 +103,8 @@ def test_markers_that_do_not_count_and_units_that_cannot_be_right_are_told(lab: 
     trial.write_text(trial.read_text().replace("three", "threee"))
     out = run("ik", "box.osim", "walk.trc", "-o", "out", folder=lab).out
     assert (
-        "of the model, not in the data: three\n" in out
-        and "in the data, not of the model: threee\n" in out
+        "in the model, but not in the data: three\n" in out
+        and "in the data, but not in the model: threee\n" in out
     )
     assert "units" not in out
     data = MarkerData.from_source(trial)

@@ -34,10 +34,10 @@ def pendulum() -> osimlite.Model:
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["--perturb", "-1"], "--perturb is a positive number, not -1"),
-        (["--to", "0"], "--to is a positive number, not 0"),
-        (["--reach", "nan"], "--reach is a positive number, not nan"),
-        (["--seed", "-1"], "the seed is a whole number from 0 on, not -1"),
+        (["--perturb", "-1"], "--perturb must be a positive number, not -1"),
+        (["--to", "0"], "--to must be a positive number, not 0"),
+        (["--reach", "nan"], "--reach must be a positive number, not nan"),
+        (["--seed", "-1"], "the seed must be a whole number of at least 0, not -1"),
         (["-p", "slop=2"], "no parameter 'slop'; did you mean 'slope'"),
         (["-o", __file__], "this is a file, not a folder"),
         (["--basin-x", "UNKNOWN"], "UNKNOWN"),
@@ -80,7 +80,7 @@ def test_what_cannot_walk_leaves_no_folder(tmp_path: Path, file: str) -> None:
 def test_parameters_are_of_functions_only(file: str, capsys: pytest.CaptureFixture[str]) -> None:
     osimlite.write(pendulum(), file)
     assert run(file, "-p", "slope=8") == 2
-    assert "takes no parameters" in capsys.readouterr().err
+    assert "has no parameters" in capsys.readouterr().err
 
 
 def test_without_contacts(file: str, capsys: pytest.CaptureFixture[str]) -> None:

@@ -71,7 +71,7 @@ def test_info_of_a_setup_file_names_its_files(fixtures):
     ]
     assert ["AnalyzeTool", "walk"] in [[word.strip() for word in row] for row in rows]
     files = [row[1].strip() for row in rows if row and row[0] == "force_set_files"]
-    assert files == ["residuals.xml (not there)", "reserves.xml (not there)"]
+    assert files == ["residuals.xml (missing)", "reserves.xml (missing)"]
     assert any("1 StaticOptimization" in row[-1] for row in rows if row)
 
 
@@ -149,7 +149,7 @@ def test_info_lists_muscles_and_says_what_can_be_simulated(tmp_path):
     assert "    m1     546 N     0.1 m     0.2 m  2 points, 1 wrap" in lines
     assert "    m0     546 N     0.1 m     0.2 m  2 points" in lines
     facts = dict(line.split("  ", 1) for line in lines if "  " in line.strip())
-    assert facts["wrap surfaces"].strip() == "1, for 1 wrap"
+    assert facts["wrap surfaces"].strip() == "1, used by 1 path wrap"
     assert facts["simulation"].strip() == "possible, nothing is left out"
     model.find("/forceset/m1").ignore_tendon_compliance = True
     osimlite.write(model, tmp_path / "m.osim")
@@ -196,13 +196,4 @@ def test_components_are_counted_as_on_the_page():
     said = next(
         line for line in run("info", WALKER).out.splitlines() if line.startswith("components ")
     )
-    assert said.split()[1:] == [
-        str(len(nodes)),
-        "in",
-        "the",
-        "file,",
-        "98",
-        "as",
-        "OpenSim",
-        "counts",
-    ]
+    assert said.split()[1:] == [str(len(nodes)), "in", "the", "file"]

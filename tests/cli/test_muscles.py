@@ -93,7 +93,7 @@ def test_pictures(file):
         (("-o", "arm.txt"), ".csv or .parquet"),
         (("--plot",), "--plot needs a --coordinate"),
         (("--activation", "2"), "from 0 to 1"),
-        (("--coordinate", "x", "--coordinate", "x", "--coordinate", "x"), "one coordinate or two"),
+        (("--coordinate", "x", "--coordinate", "x", "--coordinate", "x"), "once or twice"),
         (("--coordinate", "x", "--coordinate", "x=0.31:0.32"), "--coordinate names 'x' twice"),
     ],
 )

@@ -133,7 +133,7 @@ def test_fixed_step(walker, tmp_path):
         "0.05",
         folder=tmp_path,
     )
-    assert code == 0 and "100 of 100" in out
+    assert code == 0 and "100 accepted, 0 rejected" in out
     # Without a folder to write into, one that is named after the model's file.
     assert len(read_sto(tmp_path / "DynamicWalkerModel" / "states.sto").times) == 3
     assert [path.name for path in tmp_path.iterdir()] == ["DynamicWalkerModel"]
@@ -170,7 +170,7 @@ def test_failure_on_the_way_keeps_what_was_recorded(walker, tmp_path):
     assert (
         code == 1
         and "stopped at" in kept
-        and "recorded goes into 'r'" in kept
+        and "motion up to there is saved in 'r'" in kept
         and "shorter fixed step" in said
     )
     summary = json.loads((tmp_path / "r" / "summary.json").read_text())
@@ -255,7 +255,9 @@ def test_what_a_motion_goes_on_from_is_not_replaced(tmp_path):
     again = "simulate", "damped.osim", "--to", "0.1", "--resume", "damped"
     for words in ((), ("-o", tmp_path / "damped")):
         done = run(*again, *words, folder=tmp_path)
-        assert done.code == 2 and "has what went before; name another folder with -o" in done.err
+        assert (
+            done.code == 2 and "has the earlier simulation; name another folder with -o" in done.err
+        )
     assert (tmp_path / "damped" / "states.sto").read_bytes() == before
     assert run(*again, "-o", "second", folder=tmp_path).code == 0
 

@@ -127,7 +127,7 @@ def test_a_search(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
         (["sweep", "walker.osim", "--vary", "RHip_rz=20deg:40:3"], "a unit at one end only"),
         (["sweep", "walker.osim", "--vary", "RHip_rx=0:1"], "did you mean 'RHip_rz'"),
         (["sweep", "walker.osim", "--vary", "RHip_rz=0:1"], "--samples"),
-        (["sweep", "walker.osim", "--vary", "RHip_rz=0:1:3", "-p", "a=1"], "takes no parameters"),
+        (["sweep", "walker.osim", "--vary", "RHip_rz=0:1:3", "-p", "a=1"], "has no parameters"),
         (
             ["sweep", "walker.osim", "--vary", "RHip_rz=0:1:3", "--stop-below", "RHip_rz=low"],
             "--stop-below takes",

@@ -40,7 +40,7 @@ def test_translate_writes_the_urdf_and_tells_what_is_lost(walker: Path) -> None:
     coordinates = json.loads((walker / "robot/walker.coordinates.json").read_text())["coordinates"]
     assert '"file": "walker.urdf"' in (walker / "robot/walker.coordinates.json").read_text()
     assert [item["joint"] for item in coordinates if item["name"] == "RHip_rz"] == ["RHip_rz"]
-    table = out.partition(" components as they are")[0].splitlines()
+    table = out.partition("components: ")[0].splitlines()
     assert len(table) > 10 and max(map(len, table)) <= 80 and not set("│┃┏") & set(out)
 
 
@@ -151,7 +151,7 @@ def test_paths_are_called_by_the_names_of_their_muscles() -> None:
         (("gone.osim",), "gone.osim"),
         (
             ("walker.osim", "--geometry", "gone"),
-            "gone: --geometry names a folder that is not there",
+            "gone: --geometry names a folder that does not exist",
         ),
         (("walker.osim", "-o", "walker.osim"), "cannot make a folder here"),
     ],

@@ -58,7 +58,7 @@ def test_the_report_says_what_changed_where_and_what_was_lost(old: Path) -> None
 def test_a_file_that_is_there_is_not_overwritten_unless_named(old: Path) -> None:
     target = old.with_name(f"leg_{CURRENT_VERSION}.osim")
     target.write_text("mine")
-    with pytest.raises(OsimliteError, match="there already"):
+    with pytest.raises(OsimliteError, match="exists already"):
         run(old)
     assert target.read_text() == "mine"
     run(old, "-o", target)
@@ -84,7 +84,7 @@ def test_text_that_is_no_xml_is_told(old: Path) -> None:
     old.write_text(
         old.read_text().replace('<Model name="old">', '<Model name="old"><credits>A & B</credits>')
     )
-    assert "line 3: '&' is no XML and was read as it stands" in run(old).output
+    assert "line 3: '&' is not XML and was read as it stands" in run(old).output
 
 
 def test_nothing_is_written_for_a_file_that_cannot_be_read(tmp_path: Path) -> None:

@@ -97,10 +97,10 @@ def test_a_folder_is_every_model_below(faulty):
             ["validate", "no_such_file.osim"],
             "no_such_file.osim: cannot read the file: no such file",
         ),
-        (["validate", WALKER, "--format", "yaml"], "--format is one of"),
+        (["validate", WALKER, "--format", "yaml"], "--format must be one of"),
         (
             ["validate", WALKER, "--fail-on", "bad"],
-            "--fail-on is one of error, warning and info, not 'bad'",
+            "--fail-on must be one of error, warning and info, not 'bad'",
         ),
         (["validate", WALKER, "--select", "OSIM999"], "no rule has the code or name 'OSIM999'"),
         (["rule", "unresolved-refrence"], "did you mean 'unresolved-reference'?"),
