@@ -109,11 +109,11 @@ def translate(
 
 
 def tabulate(fidelity: Fidelity, target: str) -> Any:
-    """What is lost, one row for all components of which the same is said."""
+    """Return a table of what is lost, with one row for components that have the same record."""
     table = plain_table(f"Lost or approximated in {target}: {fidelity.model}", padding=(0, 2, 1, 0))
     table.add_column("what", overflow="fold", ratio=4)
-    table.add_column("done about it", overflow="fold", ratio=3)
-    table.add_column("where", overflow="fold", ratio=3)
+    table.add_column("translation", overflow="fold", ratio=3)
+    table.add_column("components", overflow="fold", ratio=3)
     measured = any(record.errors for record in fidelity)
     if measured:
         table.add_column("worst error", overflow="fold", ratio=2)
