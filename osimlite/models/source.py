@@ -38,7 +38,7 @@ def make_model(source: str, parameters: Mapping[str, str] | None = None) -> Mode
     if source.endswith(SUFFIXES):
         if parameters:
             raise OsimliteError(
-                f"'{source}' is data and takes no parameters; edit the file, or build from Python"
+                f"'{source}' is data and has no parameters; edit the file, or build from Python"
             )
         return read_data(source)
     function = _function(source)

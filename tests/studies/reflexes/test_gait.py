@@ -61,7 +61,7 @@ def test_our_human_s_gait(tmp_path) -> None:
     assert all(0.5 < part < 0.65 for part in gait.strides.stance) and 0.05 < gait.strides.both < 0.2
     told = gait.describe()
     assert (
-        list(told) == ["way", "heights", "strides", "stance", "ground"]
+        list(told) == ["distance", "heights", "strides", "stance", "ground"]
         and "weights" in told["ground"]
     )
     # What muscles take, by two measures, is told once.
