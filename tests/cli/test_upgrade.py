@@ -50,7 +50,7 @@ def test_the_report_says_what_changed_where_and_what_was_lost(old: Path) -> None
     lines = output.splitlines()
     assert all(len(line) <= 80 for line in lines[:-1])
     assert lines[0].split() == ["What", "changed", "Places", "First", "line"]
-    [inertia] = [line for line in lines if line.startswith("Six numbers of inertia")]
+    [inertia] = [line for line in lines if line.startswith("Combine the six numbers of inertia")]
     assert inertia.split()[-2:] == ["1", "9"]
     assert "lost: Vmax 12 (line 38, Thelen2003Muscle 'vastus')" in lines
 
