@@ -8,8 +8,12 @@ import numpy as np
 
 from osimlite.derivatives.symbolic import make_symbolic
 from osimlite.derivatives.symbols import Vector, casadi
-from osimlite.mechanics.kernels.constrained_dynamics import away_from_ground, bind, toward_ground
-from osimlite.mechanics.kernels.dynamics import evaluate, solve
+from osimlite.mechanics.kernels.constrained_dynamics import (
+    evaluate_constraints,
+    solve_factor,
+    solve_transposed_factor,
+)
+from osimlite.mechanics.kernels.dynamics import evaluate, solve_accelerations
 from osimlite.mechanics.kernels.layout import CONSTRAINED, CONSTRAINT, DOF, MODEL, OUTCOME, STAGE
 from osimlite.mechanics.kernels.linear_algebra import REDUNDANT
 from osimlite.mechanics.kernels.pointers import Law
@@ -62,7 +66,7 @@ def find_independent_equations(
         y = np.array(state.pack(values.tolist(), speeds.tolist()))
         w, f = np.zeros(int(ints[MODEL.WORK_SIZE])), np.zeros(len(y))
         evaluate(ints, packed.numbers, w, y, f, STAGE.VELOCITY)
-        bind(ints, packed.numbers, w, y, f)
+        evaluate_constraints(ints, packed.numbers, w, y, f)
         rows = _select_independent_rows(w[at_rows : at_rows + count * size].reshape(count, size))
         best = max(best, rows, key=len)
     return sorted(best)
@@ -99,8 +103,8 @@ def make_constrained_dynamics(equations: Sequence[int]) -> Law:
     def law(model: Vector, reals: Vector, data: Vector, y: Vector, f: Vector, unused: int) -> int:
         h, size = model.rest(model[MODEL.CONSTRAINED]), model[MODEL.DOFS]
         right, freedoms = f.rest(size), model.rest(model[MODEL.DOF_AT])
-        make_symbolic(bind)(model, reals, data, y, f)
-        make_symbolic(solve)(model, data, right)
+        make_symbolic(evaluate_constraints)(model, reals, data, y, f)
+        make_symbolic(solve_accelerations)(model, data, right)
         inverse = [1.0 / data[freedoms[DOF.SIZE * k + DOF.ROW]] for k in range(size)]
         rows, missing = [], []
         for number in equations:
@@ -110,7 +114,7 @@ def make_constrained_dynamics(equations: Sequence[int]) -> Law:
                 - sum(a * right[k] for k, a in enumerate(row))
             )
             turned = Vector(row)
-            make_symbolic(toward_ground)(model, data, turned)
+            make_symbolic(solve_transposed_factor)(model, data, turned)
             rows.append(casadi.horzcat(*turned.cells))
         g = casadi.sparsify(casadi.SX(casadi.vertcat(*rows)))
         scaled = g @ casadi.diag(casadi.vertcat(*inverse))
@@ -118,7 +122,7 @@ def make_constrained_dynamics(equations: Sequence[int]) -> Law:
             casadi.SX(casadi.vertcat(*missing)), *casadi.ldl(scaled @ g.T)
         )
         push = Vector(casadi.vertsplit(casadi.densify(scaled.T @ multipliers)))
-        make_symbolic(away_from_ground)(model, data, push)
+        make_symbolic(solve_factor)(model, data, push)
         for k in range(size):
             right[k] += push[k]
         return OUTCOME.OK

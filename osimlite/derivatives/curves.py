@@ -16,7 +16,7 @@ from osimlite.derivatives.symbols import (
     simplify_number,
     times,
 )
-from osimlite.mechanics.kernels.functions import PIECES_OF_OPENSIM, pieces_at
+from osimlite.mechanics.kernels.functions import PIECES_OF_OPENSIM, evaluate_piecewise
 from osimlite.mechanics.laws.bezier import (
     FIRST,
     HEAD,
@@ -38,7 +38,7 @@ ROUNDING_GRID = 2.0**53
 
 
 def evaluate_pieces(table: Any, z: Any, kind: int) -> tuple[Any, Any, Any]:
-    """Evaluate a piecewise polynomial as :func:`osimlite.mechanics.kernels.functions.pieces_at`.
+    """Evaluate a piecewise polynomial as :func:`osimlite.mechanics.kernels.functions.evaluate_piecewise`.
 
     The coefficients of the active piece are selected before anything is computed.
 
@@ -54,7 +54,7 @@ def evaluate_pieces(table: Any, z: Any, kind: int) -> tuple[Any, Any, Any]:
     knots, width = int(simplify_number(table[2])), int(simplify_number(table[3]))
     if not is_symbol(z):
         numbers: Any = [simplify_number(number) for number in table[: 4 + knots * (1 + width)]]
-        return pieces_at(numbers, float(simplify_number(z)), kind)
+        return evaluate_piecewise(numbers, float(simplify_number(z)), kind)
     below = [SX.binary(casadi.OP_LT, z, table[4 + k]) for k in range(1, knots)]
     # Exactly one of the tests in `here` holds.
     beyond = [SX(1.0), *(SX.unary(casadi.OP_NOT, test) for test in below)]

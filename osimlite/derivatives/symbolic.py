@@ -18,7 +18,7 @@ from osimlite.derivatives.curves import (
 from osimlite.derivatives.symbols import COUNTERPARTS, UNSET, NoFormula, Vector
 from osimlite.mechanics.codegen.reader import Function, Kernel, copy_tree, name_of, stored
 from osimlite.mechanics.kernels import pointers
-from osimlite.mechanics.kernels.functions import pieces_at
+from osimlite.mechanics.kernels.functions import evaluate_piecewise
 from osimlite.mechanics.laws.bezier import curve_value
 from osimlite.mechanics.laws.dual_numbers import is_nothing
 from osimlite.mechanics.laws.millard2012_equilibrium import damped_velocity
@@ -78,7 +78,7 @@ _counterparts: dict[Any, Any] = {
     is_nothing: symbols.is_zero,
     curve_value: evaluate_curve,
     damped_velocity: solve_damped_velocity,
-    pieces_at: evaluate_pieces,
+    evaluate_piecewise: evaluate_pieces,
 }
 """Symbolic counterparts of the functions that were used so far."""
 

@@ -13,11 +13,11 @@ from osimlite.derivatives.outputs import list_probe_items
 from osimlite.derivatives.symbolic import make_symbolic, register_symbolic, replace_kernel
 from osimlite.derivatives.symbols import Vector, casadi
 from osimlite.errors import UnsupportedError
-from osimlite.mechanics.kernels.constrained_dynamics import bind
-from osimlite.mechanics.kernels.constraint_equations import add_wrench
+from osimlite.mechanics.kernels.constrained_dynamics import evaluate_constraints
+from osimlite.mechanics.kernels.constraint_equations import add_wrench_row
 from osimlite.mechanics.kernels.dynamics import evaluate, inverse
 from osimlite.mechanics.kernels.layout import CONSTRAINED, ITEM, MODEL, RUN, STAGE, WORK
-from osimlite.mechanics.kernels.pointers import address, call
+from osimlite.mechanics.kernels.pointers import call, register_law
 from osimlite.mechanics.multibody.functions import Function
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.geometries.load import Load, evaluate_load
@@ -79,7 +79,7 @@ class SymbolicEvaluator:
         given: dict[int, int] = {}
         for place, kernel in packed.kernels.items():
             if not isinstance(kernel, str) and hasattr(kernel, "takes_symbols"):
-                given[place] = address(kernel)  # type: ignore[arg-type]
+                given[place] = register_law(kernel)  # type: ignore[arg-type]
                 continue
             if place in packed.owners and (
                 not isinstance(kernel, str) or kernel in UNSUPPORTED_KERNELS
@@ -97,7 +97,7 @@ class SymbolicEvaluator:
         self.structure[MODEL.CONTROLS] = 0
         if self.structure[MODEL.CONSTRAINED]:
             law = self.structure[self.structure[MODEL.CONSTRAINED] + CONSTRAINED.DYNAMICS]
-            self.structure[MODEL.LAWS + law] = address(
+            self.structure[MODEL.LAWS + law] = register_law(
                 register_symbolic(make_constrained_dynamics(equations))
             )
 
@@ -160,7 +160,7 @@ class SymbolicEvaluator:
             model: Vector, reals: Vector, data: Vector, y: Vector, f: Vector
         ) -> dict[tuple[int, int], list[Any]]:
             wrenches: dict[tuple[int, int], list[Any]] = {}
-            kernel = make_symbolic(add_wrench)
+            kernel = make_symbolic(add_wrench_row)
 
             def add(
                 model: Vector, data: Vector, link: int, torque: Any, force: Any, row: Vector
@@ -173,8 +173,8 @@ class SymbolicEvaluator:
                 kernel(model, data, link, torque, force, row)
 
             make_symbolic(evaluate)(model, reals, data, y, f, STAGE.VELOCITY)
-            with replace_kernel(add_wrench, add):
-                make_symbolic(bind)(model, reals, data, y, f)
+            with replace_kernel(add_wrench_row, add):
+                make_symbolic(evaluate_constraints)(model, reals, data, y, f)
             return wrenches
 
         return self.run(law)

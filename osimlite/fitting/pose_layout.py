@@ -9,7 +9,7 @@ import numpy as np
 from osimlite.base.records import dataclass
 from osimlite.mechanics.kernels import pose_record as fit
 from osimlite.mechanics.kernels.layout import CONSTRAINED, LINK, MODEL, MOTION, OPERATION
-from osimlite.mechanics.kernels.linear_algebra import factor_room
+from osimlite.mechanics.kernels.linear_algebra import factor_size
 from osimlite.mechanics.kernels.pointers import Floats, Ints
 from osimlite.mechanics.kernels.pose_fit import POSES
 from osimlite.mechanics.multibody.constraints import Constraint, Coupler
@@ -145,7 +145,7 @@ class FitLayout:
         ints += [known.get(k, fit.VARIABLE) for k in range(size)]
         ints[fit.FREE_AT] = len(ints)
         ints += [0] * size
-        room = 2 * size + factor_room(equations, size) + 2 * equations + 3 * size * size + 4 * size
+        room = 2 * size + factor_size(equations, size) + 2 * equations + 3 * size * size + 4 * size
         lengths = {
             fit.MEASURED: 3 * len(markers) + 9 * len(sensors) + len(goals) + len(held),
             fit.WEIGHTS: len(markers) + len(sensors) + len(goals),

@@ -24,19 +24,19 @@ from osimlite.mechanics.laws.rotations import (
     X,
     Y,
     Z,
-    about_axis,
-    along_axes,
-    body_fixed,
-    transposed,
-    turned_axes,
+    combine_axes,
+    multiply_rotations,
+    rotation_about_axis,
+    rotation_from_xyz,
+    transpose_rotation,
 )
 from osimlite.mechanics.laws.vectors import (
     ZERO,
     Vector,
-    along,
-    elementwise,
+    add_scaled,
+    divide,
+    multiply_elementwise,
     norm,
-    over,
     plus,
     times,
 )
@@ -59,20 +59,22 @@ class FramePose(NamedTuple):
 
     def rotate(self, vector: Vector) -> Vector:
         """A vector of the inner frame, expressed in the outer one."""
-        return along_axes(self.axes, vector)
+        return combine_axes(self.axes, vector)
 
     def transform_point(self, point: Vector) -> Vector:
         """A point of the inner frame, in the outer one."""
-        return plus(along_axes(self.axes, point), self.position)
+        return plus(combine_axes(self.axes, point), self.position)
 
     def compose(self, inner: FramePose) -> FramePose:
         """A frame within this one, seen from outside."""
-        return FramePose(turned_axes(self.axes, inner.axes), self.transform_point(inner.position))
+        return FramePose(
+            multiply_rotations(self.axes, inner.axes), self.transform_point(inner.position)
+        )
 
     def inverse(self) -> FramePose:
         """The outer frame, seen from the inner one."""
-        back = transposed(self.axes)
-        return FramePose(back, times(-1.0, along_axes(back, self.position)))
+        back = transpose_rotation(self.axes)
+        return FramePose(back, times(-1.0, combine_axes(back, self.position)))
 
 
 FrameLocation = tuple[Component, FramePose] | None
@@ -82,7 +84,7 @@ FrameLocation = tuple[Component, FramePose] | None
 def make_offset(angles: Vector, position: Vector) -> FramePose:
     """A frame displaced, and turned by body-fixed X-Y-Z angles."""
     (s1, c1), (s2, c2), (s3, c3) = map(_sine_cosine, angles)
-    return FramePose(body_fixed(s1, c1, s2, c2, s3, c3), position)
+    return FramePose(rotation_from_xyz(s1, c1, s2, c2, s3, c3), position)
 
 
 def _sine_cosine(angle: float) -> tuple[float, float]:
@@ -183,7 +185,7 @@ def _find_joint_motions(subject: Subject, rough: bool) -> dict[int, list[_JointM
                 result[id(joint)] = [
                     _JointMotion(
                         place < 3,
-                        over(axis.axis, norm(axis.axis) or 1.0),
+                        divide(axis.axis, norm(axis.axis) or 1.0),
                         [] if isinstance(axis.function, Constant) else axis.names,
                         function,
                     )
@@ -232,11 +234,11 @@ def _compute_joint_pose(
     for motion in motions:
         amount = motion.amount(values)
         if motion.turns and amount:
-            axes = turned_axes(axes, about_axis(motion.axis, *_sine_cosine(amount)))
+            axes = multiply_rotations(axes, rotation_about_axis(motion.axis, *_sine_cosine(amount)))
         elif amount:
-            place = along(place, amount, motion.axis)
+            place = add_scaled(place, amount, motion.axis)
     if isinstance(joint, EllipsoidJoint):
-        place = elementwise(joint.radii_x_y_z, axes[2])
+        place = multiply_elementwise(joint.radii_x_y_z, axes[2])
     return FramePose(axes, place)
 
 
@@ -255,8 +257,10 @@ def find_rotation_axes(subject: Subject, joint: Joint) -> list[tuple[str, Vector
             continue
         if motion.names[0] not in values or motion.axis == ZERO:
             return []
-        result[motion.names[0]] = along_axes(axes, motion.axis)
-        axes = turned_axes(axes, about_axis(motion.axis, *_sine_cosine(motion.amount(values))))
+        result[motion.names[0]] = combine_axes(axes, motion.axis)
+        axes = multiply_rotations(
+            axes, rotation_about_axis(motion.axis, *_sine_cosine(motion.amount(values)))
+        )
     return (
         list(result.items()) if isinstance(joint, GimbalJoint) or is_a(joint, "CustomJoint") else []
     )

@@ -20,7 +20,7 @@ from osimlite.base.records import dataclass
 from osimlite.base.text import format_count, join_words, suggest_or_list
 from osimlite.errors import ModelError, SettingError, UnsupportedError
 from osimlite.io.tables.storage import StoTable
-from osimlite.mechanics.kernels.effort import effort_room
+from osimlite.mechanics.kernels.effort import effort_size
 from osimlite.mechanics.kernels.layout import CONSTRAINED, MODEL, STAGE
 from osimlite.mechanics.multibody.constraints import Coupler
 from osimlite.mechanics.multibody.mechanism import Mechanism
@@ -448,7 +448,7 @@ def least_effort(
     numbers = np.array([exponent, *bounds.ravel()])
     given = np.ascontiguousarray(np.hstack([columns.reshape(frames, -1), needed]))
     result = np.zeros((frames, count + size + 1))
-    code.entry("least_effort")(sizes, numbers, given, result, np.zeros(effort_room(size, count)))
+    code.entry("least_effort")(sizes, numbers, given, result, np.zeros(effort_size(size, count)))
     return result[:, :count], result[:, count:-1], result[:, -1] == 1.0
 
 

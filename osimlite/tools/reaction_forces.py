@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from osimlite.base.records import dataclass
-from osimlite.mechanics.kernels.constrained_dynamics import SLIGHT, bind
+from osimlite.mechanics.kernels.constrained_dynamics import SLIGHT, evaluate_constraints
 from osimlite.mechanics.kernels.layout import LINK_WORK, MODEL
 from osimlite.mechanics.kernels.points import link_work
 from osimlite.mechanics.multibody.body_constraints import find_carrier
@@ -94,7 +94,7 @@ class ConstraintForces:
                 *state.origins[body],
                 *state.origins[body],
             )
-        bind(program.model, program.reals, data, y, f)
+        evaluate_constraints(program.model, program.reals, data, y, f)
         wrenches = (multipliers @ program.equations(data).rows).reshape(-1, 6)
         # What pushes ground pushes back at the other bodies.
         force = -wrenches[bodies, 3:].sum(axis=0)

@@ -9,17 +9,20 @@ from typing import Any
 import numpy as np
 
 from osimlite.mechanics.codegen.javascript import write_javascript
-from osimlite.mechanics.kernels.constrained_dynamics import bind
-from osimlite.mechanics.kernels.dynamics import clear_wrenches, generalized_forces
+from osimlite.mechanics.kernels.constrained_dynamics import evaluate_constraints
+from osimlite.mechanics.kernels.dynamics import add_generalized_forces, clear_wrenches
 from osimlite.mechanics.kernels.layout import CONSTRAINED, ITEM, LINK_WORK, MODEL
-from osimlite.mechanics.kernels.motion import move, place
+from osimlite.mechanics.kernels.motion import move_links, place_links
 from osimlite.mechanics.kernels.paths import pull_path
 from osimlite.mechanics.kernels.projection import project_speeds
 from osimlite.mechanics.multibody.constraints import Constraint, Coupler
 from osimlite.simulation.elements.laws import find_function
 from osimlite.simulation.polylines import Polylines
 
-FOR_ARMS, FOR_SPEEDS = (move, clear_wrenches, pull_path, generalized_forces), (bind, project_speeds)
+FOR_ARMS, FOR_SPEEDS = (
+    (move_links, clear_wrenches, pull_path, add_generalized_forces),
+    (evaluate_constraints, project_speeds),
+)
 """What moment arms of paths are found with, and the speeds of coordinates that must move with one."""
 
 
@@ -70,7 +73,7 @@ def kernels_text(program: Mapping[str, Any]) -> str:
     """What the page computes with."""
     laws = [find_function(name) for name in program["laws"]]
     others = [
-        place,
+        place_links,
         *(FOR_ARMS if program["items"] else ()),
         *(FOR_SPEEDS if program["bound"] else ()),
     ]

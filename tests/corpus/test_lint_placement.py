@@ -11,7 +11,7 @@ from osimlite.io.document.source import Source
 from osimlite.io.document.survey import survey_source
 from osimlite.lint.placement import compute_default_poses
 from osimlite.lint.subject import Subject
-from osimlite.mechanics.laws.rotations import transposed
+from osimlite.mechanics.laws.rotations import transpose_rotation
 from osimlite.schema.frames import Body
 from osimlite.schema.sets import Constraint
 from tests.conftest import ROUNDED, CorpusModel
@@ -39,5 +39,5 @@ def test_default_poses_are_opensims(corpus_model: CorpusModel) -> None:
         pose = poses[id(body)]
         position, rotation = truth[subject.path(body)]
         assert pose.position == pytest.approx(position, abs=near), body.name
-        numbers = [number for row in transposed(pose.axes) for number in row]
+        numbers = [number for row in transpose_rotation(pose.axes) for number in row]
         assert numbers == pytest.approx(rotation, abs=near), body.name

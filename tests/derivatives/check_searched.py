@@ -9,7 +9,7 @@ import pytest
 import osimlite
 from osimlite.derivatives.curves import evaluate_curve
 from osimlite.errors import UnsupportedError
-from osimlite.mechanics.laws.bezier import curve, curve_value
+from osimlite.mechanics.laws.bezier import curve_value, make_curve
 from osimlite.mechanics.multibody.functions import Constant
 from osimlite.models.jumper import jumper
 from tests.conftest import SHARED
@@ -102,7 +102,7 @@ def test_what_depends_on_the_way_is_no_parameter(tmp_path):
 
 
 def test_curves_are_met_to_rounding():
-    numbers = curve(((0.0, 0.0, 0.0), (0.7, 0.3, 2.0), (1.6, 0.9, 0.0)), (1.0, 0.4))
+    numbers = make_curve(((0.0, 0.0, 0.0), (0.7, 0.3, 2.0), (1.6, 0.9, 0.0)), (1.0, 0.4))
     x = casadi.SX.sym("x")
     y, slope = evaluate_curve(numbers, x)
     function = casadi.Function("curve", [x], [y, slope, casadi.gradient(y, x)])

@@ -17,7 +17,7 @@ from osimlite.errors import SimulationError
 from osimlite.fitting.pose_fit import PoseFit
 from osimlite.fitting.pose_layout import CoordinateTarget, MarkerTarget, SensorTarget
 from osimlite.mechanics.kernels import pose_cost, pose_record
-from osimlite.mechanics.kernels.pose_fit import weigh
+from osimlite.mechanics.kernels.pose_fit import compute_weights
 from osimlite.mechanics.multibody import functions as f
 from osimlite.mechanics.multibody.constraints import Coupler
 from osimlite.mechanics.multibody.mechanism import FramePlacement, Mechanism, StationPlacement
@@ -67,10 +67,10 @@ def derivatives(fit: PoseFit, frame: Any, q: Any) -> tuple[float, Any, Any]:
         shape.work,
     )
     m.v[m.p[pose_record.MEASURED] :][: fit.width] = frame
-    assert weigh(m)
+    assert compute_weights(m)
     y = np.zeros(2 * size)
     y[:size] = q[fit.order]
-    value = pose_cost.cost(m, y)
+    value = pose_cost.evaluate_cost(m, y)
     stiffness, bend = (
         m.v[m.p[part] :][: size * size].reshape(size, size)
         for part in (pose_record.STIFFNESS, pose_record.BEND)

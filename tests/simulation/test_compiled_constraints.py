@@ -360,11 +360,11 @@ def test_equations_that_repeat_or_contradict_each_other(
     rank = min(count, size, rank)
     rows = rng.normal(size=(count, rank)) @ rng.normal(size=(rank, size))
     values = rng.normal(size=count)
-    a, room, x = np.zeros(ls.factor_room(count, size)), np.zeros(count), np.zeros(size)
+    a, room, x = np.zeros(ls.factor_size(count, size)), np.zeros(count), np.zeros(size)
     a[: count * size] = rows.ravel()
-    result = ls.factorise(count, size, a, 1e-9)
+    result = ls.factorise_equations(count, size, a, 1e-9)
     assert result == rank
-    ls.minimum_norm(count, size, a, result, values, room, x)
+    ls.solve_minimum_norm(count, size, a, result, values, room, x)
     expected = np.linalg.lstsq(rows, values, rcond=1e-9)[0]
     condition = (
         np.linalg.cond(rows)

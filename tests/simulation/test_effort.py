@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.random import Generator, default_rng
 
-from osimlite.mechanics.kernels.effort import effort_room
+from osimlite.mechanics.kernels.effort import effort_size
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.simulation.engines.linking import PYTHON, Code, best
 
@@ -32,7 +32,7 @@ def solved(
     code = code or best()
     code.make_ready(("least_effort",))
     numbers = np.concatenate([[power], low, high])
-    code.entry("least_effort")(sizes, numbers, given, result, np.zeros(effort_room(m, n)))
+    code.entry("least_effort")(sizes, numbers, given, result, np.zeros(effort_size(m, n)))
     return result[:, :n], result[:, n:-1], result[:, -1]
 
 

@@ -20,7 +20,12 @@ from osimlite import (
     PlanarJoint,
 )
 from osimlite.errors import SettingError
-from osimlite.mechanics.kernels.condensation import condensation_room, condense, correct, linearise
+from osimlite.mechanics.kernels.condensation import (
+    condensation_size,
+    condense_system,
+    linearise_state,
+    solve_condensed,
+)
 from osimlite.mechanics.kernels.layout import MODEL, OUTCOME, STAGE
 from osimlite.mechanics.kernels.rosenbrock import ALPHA, EMBEDDED, GAMMA, WEIGHTS
 from osimlite.mechanics.multibody import build_mechanism
@@ -112,19 +117,19 @@ def assert_condensed(model, y, rel=1e-4):
     s = system.structure
     system.program.link_responses("bdf")
     size, c = int(s[MODEL.DOFS]), 2e-3
-    room, f = np.zeros(condensation_room(size, int(s[MODEL.RESPONSES]))), np.zeros(len(y))
+    room, f = np.zeros(condensation_size(size, int(s[MODEL.RESPONSES]))), np.zeros(len(y))
     rates = partial(rates_at, system)
     jacobian = np.column_stack(
         [(rates(y + h) - rates(y - h)) / 2e-6 for h in 1e-6 * np.eye(len(y))]
     )
     assert (
-        linearise(system.program.ints, system.numbers, system.work_vector, y, f, room, 0.0)
+        linearise_state(system.program.ints, system.numbers, system.work_vector, y, f, room, 0.0)
         == OUTCOME.OK
     )
-    assert condense(system.program.ints, c, room)
+    assert condense_system(system.program.ints, c, room)
     right = np.random.default_rng(1).uniform(-1.0, 1.0, len(y))
     result = right.copy()
-    correct(system.program.ints, c, room, result)
+    solve_condensed(system.program.ints, c, room, result)
     assert result == pytest.approx(
         np.linalg.solve(np.eye(len(y)) - c * jacobian, right), rel=rel, abs=1e-6
     )

@@ -11,7 +11,7 @@ import pytest
 
 from osimlite.mechanics.kernels import wrapping
 from osimlite.mechanics.kernels.layout import ITEM
-from osimlite.mechanics.kernels.wrap_cylinder import settled
+from osimlite.mechanics.kernels.wrap_cylinder import smooth_heights
 from osimlite.mechanics.multibody.spatial import invert_transform, make_offset, make_transform
 from osimlite.simulation.engines.linking import COMPILED
 from tests.conftest import ROOT
@@ -85,7 +85,7 @@ def test_surface(name, code):
 
 @pytest.mark.parametrize("height", [1e200, np.nan])
 def test_a_helix_beyond_all_numbers_stays(height):
-    result = settled(
+    result = smooth_heights(
         (1.0, 1.0, 0.0), (-1.0, 1.0, height), (1.0, 0.0, 0.0), (-1.0, 0.0, height), 3.0, 3.0
     )
     assert result == pytest.approx((0.0, height), nan_ok=True)

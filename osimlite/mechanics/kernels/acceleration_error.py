@@ -8,10 +8,10 @@ axes. To reproduce OpenSim's motions, an operation of the type
 from __future__ import annotations
 
 from osimlite.mechanics.kernels.layout import MODEL, OPERATION, OPERATION_WORK, OUTCOME, WORK
-from osimlite.mechanics.kernels.motion import set_row
-from osimlite.mechanics.kernels.pointers import Floats, Ints, at, copy
+from osimlite.mechanics.kernels.motion import set_spatial_vector
+from osimlite.mechanics.kernels.pointers import Floats, Ints, at, copy_numbers
 from osimlite.mechanics.kernels.points import operation_ints, operation_work
-from osimlite.mechanics.laws.vectors import ZERO, along, cross, minus, times, vector
+from osimlite.mechanics.laws.vectors import ZERO, add_scaled, cross, minus, times, vector
 
 SIGN = 0
 """Index among the operation's integers of 1, or -1 if the joint is traversed from child to parent."""
@@ -26,7 +26,7 @@ def place_drift(
 ) -> int:
     """Pass the frame in SCRATCH on unchanged, since a drift does not move its link."""
     kept, frame = operation_work(model, data, operation), at(data, WORK.SCRATCH)
-    copy(12, frame, kept)
+    copy_numbers(12, frame, kept)
     return OUTCOME.OK
 
 
@@ -60,22 +60,22 @@ def move_drift(
             for c in range(row):
                 freedom = own[COORDINATES + c]
                 if freedom >= 0:
-                    wrong += share(model, data, number, freedom) * u[freedom]
+                    wrong += operation_gradient(model, data, number, freedom) * u[freedom]
             if turn < row:
-                wrong -= rate(model, data, u, number)
-            drift = along(
+                wrong -= operation_rate(model, data, u, number)
+            drift = add_scaled(
                 drift, wrong, vector(operation_work(model, data, number), OPERATION_WORK.AXIS)
             )
         axis = vector(operation_work(model, data, last), OPERATION_WORK.AXIS)
-        total = along(total, -rate(model, data, u, last), cross(axis, drift))
+        total = add_scaled(total, -operation_rate(model, data, u, last), cross(axis, drift))
     kept[OPERATION_WORK.AMOUNT], kept[OPERATION_WORK.RATE], kept[OPERATION_WORK.CURVATURE] = total
     total = times(float(own[SIGN]), total)
-    set_row(result, ZERO, ZERO)
-    set_row(at(result, 6), cross(arm, total), total)
+    set_spatial_vector(result, ZERO, ZERO)
+    set_spatial_vector(at(result, 6), cross(arm, total), total)
     return OUTCOME.OK
 
 
-def rate(model: Ints, data: Floats, u: Floats, operation: int) -> float:
+def operation_rate(model: Ints, data: Floats, u: Floats, operation: int) -> float:
     """Return the rate of the amount of an operation."""
     freedom = operation_ints(model, operation)[OPERATION.DOF]
     return (
@@ -83,7 +83,7 @@ def rate(model: Ints, data: Floats, u: Floats, operation: int) -> float:
     )
 
 
-def share(model: Ints, data: Floats, operation: int, freedom: int) -> float:
+def operation_gradient(model: Ints, data: Floats, operation: int, freedom: int) -> float:
     """Return the derivative of the amount of an operation by a degree of freedom."""
     j, total = operation_ints(model, operation), 0.0
     if j[OPERATION.DOF] >= 0:

@@ -12,21 +12,21 @@ from __future__ import annotations
 from math import inf, sqrt
 from typing import NamedTuple
 
-from osimlite.mechanics.kernels.constrained_dynamics import bind
+from osimlite.mechanics.kernels.constrained_dynamics import evaluate_constraints
 from osimlite.mechanics.kernels.layout import CONSTRAINED, MODEL, OUTCOME, STAGE, WORK
 from osimlite.mechanics.kernels.linear_algebra import (
     REDUNDANT,
     ROUNDING,
-    cholesky,
     diagonalize,
-    factor_room,
-    factorise,
-    minimum_norm,
-    substitute,
+    factor_size,
+    factorise_cholesky,
+    factorise_equations,
+    solve_cholesky,
+    solve_minimum_norm,
     write_null_space,
 )
-from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call, copy, is_finite
-from osimlite.mechanics.kernels.projection import position_errors, rows_by_values
+from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call, copy_numbers, is_finite
+from osimlite.mechanics.kernels.projection import collect_position_errors, write_position_jacobian
 
 # Integers: the head, then what each degree of freedom is, three arrays (n,), room for a list (n,)
 # of those that are free, and of each coupler the degree of freedom that depends on others and its
@@ -108,7 +108,7 @@ def assembly_work_size(count: int, size: int) -> int:
         7 * size
         + 3 * count
         + 2 * count * size
-        + factor_room(count, size)
+        + factor_size(count, size)
         + count * count
         + 5 * size * size
     )
@@ -171,7 +171,7 @@ def assemble_pose(a: Assembly, target: Floats, q: Floats) -> bool:
 def find_nearest(a: Assembly, target: Floats, q: Floats) -> bool:
     """Fill q with the nearest pose, whatever the ranges; return whether there is one."""
     size, tolerance = a.model[MODEL.DOFS], a.c[TOLERANCE]
-    copy(size, a.w, q)
+    copy_numbers(size, a.w, q)
     list_freed(a)
     trial = at(a.w, 4 * size)
     largest = evaluate_equations(a, q)
@@ -215,7 +215,7 @@ def find_nearest(a: Assembly, target: Floats, q: Floats) -> bool:
                 return True
             has_curvature, before = True, inf
         else:
-            copy(size, trial, q)
+            copy_numbers(size, trial, q)
             before = length if part == 1.0 else inf
     return True
 
@@ -244,13 +244,13 @@ def measure_change(a: Assembly, target: Floats, q: Floats) -> float:
 def evaluate_equations(a: Assembly, q: Floats) -> float:
     """Evaluate errors and rows of the equations of a pose; return the largest error, infinite if undefined."""
     model, size = a.model, a.model[MODEL.DOFS]
-    copy(size, q, a.y)
+    copy_numbers(size, q, a.y)
     if a.p[MOVES_LINKS] > 0:
         call(model[MODEL.LAWS], model, a.reals, a.data, a.y, a.f, STAGE.VELOCITY)
-    bind(model, a.reals, a.data, a.y, a.f)
+    evaluate_constraints(model, a.reals, a.data, a.y, a.f)
     count, errors = count_equations(a), at(a.w, 7 * size)
-    position_errors(model, a.data, errors)
-    rows_by_values(model, a.data, a.y, rows_of(a))
+    collect_position_errors(model, a.data, errors)
+    write_position_jacobian(model, a.data, a.y, equation_rows(a))
     if not is_finite(count, errors):
         return inf
     largest = 0.0
@@ -264,14 +264,14 @@ def count_equations(a: Assembly) -> int:
     return a.model[a.model[MODEL.CONSTRAINED] + CONSTRAINED.POSITIONS]
 
 
-def rows_of(a: Assembly) -> Floats:
+def equation_rows(a: Assembly) -> Floats:
     """Return the derivatives of the errors by the coordinates (m, n)."""
     return at(a.w, 7 * a.model[MODEL.DOFS] + 3 * count_equations(a))
 
 
-def factor_of(a: Assembly) -> Floats:
+def equation_factor(a: Assembly) -> Floats:
     """Return the factor of the equations of the free coordinates."""
-    return at(rows_of(a), count_equations(a) * a.model[MODEL.DOFS])
+    return at(equation_rows(a), count_equations(a) * a.model[MODEL.DOFS])
 
 
 def follow_couplers(a: Assembly, q: Floats) -> None:
@@ -290,7 +290,7 @@ def follow_couplers(a: Assembly, q: Floats) -> None:
 def factorise_rows(a: Assembly, free: int, is_eased: bool) -> int:
     """Factorise the equations of the free coordinates, each with a left side of unit length; return their rank."""
     size, count = a.model[MODEL.DOFS], count_equations(a)
-    status, rows, factor = at(a.p, ASSEMBLY_HEAD), rows_of(a), factor_of(a)
+    status, rows, factor = at(a.p, ASSEMBLY_HEAD), equation_rows(a), equation_factor(a)
     counted, free_list = at(status, COUNTED * size), at(status, FREE * size)
     lengths, longest = at(a.w, 7 * size + count), 1.0
     for i in range(count):
@@ -308,15 +308,15 @@ def factorise_rows(a: Assembly, free: int, is_eased: bool) -> int:
             lengths[i] = longest
         for k in range(free):
             factor[free * i + k] /= lengths[i]
-    return factorise(count, free, factor, REDUNDANT)
+    return factorise_equations(count, free, factor, REDUNDANT)
 
 
 def restore_pose(a: Assembly, q: Floats, is_assembled: bool) -> bool:
     """Move q to where the equations hold, by Newton's method with the shortest steps; return whether they do."""
     size, count, tolerance = a.model[MODEL.DOFS], count_equations(a), a.c[TOLERANCE]
-    status, errors, factor = at(a.p, ASSEMBLY_HEAD), at(a.w, 7 * size), factor_of(a)
+    status, errors, factor = at(a.p, ASSEMBLY_HEAD), at(a.w, 7 * size), equation_factor(a)
     counted, free_list = at(status, COUNTED * size), at(status, FREE * size)
-    step, trial, work = at(a.w, 2 * size), at(a.w, 3 * size), at(factor, factor_room(count, size))
+    step, trial, work = at(a.w, 2 * size), at(a.w, 3 * size), at(factor, factor_size(count, size))
     lengths, values = at(errors, count), at(errors, 2 * count)
     free, largest = list_freed(a), evaluate_equations(a, q)
     for _ in range(MAX_STEPS):
@@ -325,21 +325,21 @@ def restore_pose(a: Assembly, q: Floats, is_assembled: bool) -> bool:
         rank = factorise_rows(a, free, not is_assembled)
         for i in range(count):
             values[i] = -errors[i] / lengths[i]
-        minimum_norm(count, free, factor, rank, values, work, step)
+        solve_minimum_norm(count, free, factor, rank, values, work, step)
         furthest = LONGEST_STEP
         for k in range(free):
             if not is_assembled and counted[free_list[k]] == 0:
                 step[k] *= EASE
             furthest = max(furthest, abs(step[k]))
         # Far from a solution the linearization is poor: take short steps, even where errors grow.
-        copy(size, q, trial)
+        copy_numbers(size, q, trial)
         for k in range(free):
             trial[free_list[k]] += LONGEST_STEP / furthest * step[k]
         new = evaluate_equations(a, trial)
         if largest <= tolerance and not new < 0.5 * largest:
             break
         largest = new
-        copy(size, trial, q)
+        copy_numbers(size, trial, q)
     return largest <= tolerance
 
 
@@ -356,11 +356,11 @@ def find_step(a: Assembly, target: Floats, q: Floats, has_curvature: bool) -> fl
         The largest change of a coordinate (rad or m).
     """
     size, count = a.model[MODEL.DOFS], count_equations(a)
-    status, factor, step = at(a.p, ASSEMBLY_HEAD), factor_of(a), at(a.w, size)
+    status, factor, step = at(a.p, ASSEMBLY_HEAD), equation_factor(a), at(a.w, size)
     counted, free_list = at(status, COUNTED * size), at(status, FREE * size)
     gradient, along = (
         at(a.w, 5 * size),
-        at(factor, factor_room(count, size) + count * size + count * count),
+        at(factor, factor_size(count, size) + count * size + count * count),
     )
     evaluate_equations(a, q)
     free = list_freed(a)
@@ -385,12 +385,12 @@ def find_step(a: Assembly, target: Floats, q: Floats, has_curvature: bool) -> fl
         lengths[k] = 0.0
         for j in range(free):
             lengths[k] -= along[free * k + j] * gradient[j]
-    copy(left * left, curvature, spare)
-    is_convex = cholesky(left, spare, 0.0)
+    copy_numbers(left * left, curvature, spare)
+    is_convex = factorise_cholesky(left, spare, 0.0)
     for k in range(left):
         is_convex = is_convex and spare[left * k + k] * spare[left * k + k] > SAFE
     if is_convex:
-        substitute(left, spare, lengths)
+        solve_cholesky(left, spare, lengths)
     else:
         step_downhill(left, curvature, spare, at(spare, size * size), lengths)
     for k in range(size):
@@ -410,14 +410,14 @@ def add_curvature(
 ) -> None:
     """Add the second derivatives of the equations times their multipliers, by central differences."""
     size, count = a.model[MODEL.DOFS], count_equations(a)
-    factor, gradient = factor_of(a), at(a.w, 5 * size)
+    factor, gradient = equation_factor(a), at(a.w, 5 * size)
     rows, lengths, multipliers = (
-        rows_of(a),
+        equation_rows(a),
         at(a.w, 7 * size + count),
         at(a.w, 7 * size + 2 * count),
     )
     free_list, trial = at(a.p, ASSEMBLY_HEAD + FREE * size), at(a.w, 3 * size)
-    unit = at(factor, factor_room(count, size))
+    unit = at(factor, factor_size(count, size))
     normal, row_change = at(unit, count * size), at(along, 2 * size * size)
     for i in range(count):
         multipliers[i] = 0.0
@@ -430,9 +430,9 @@ def add_curvature(
             for k in range(free):
                 total += unit[free * i + k] * unit[free * j + k]
             normal[count * i + j] = total
-    if not cholesky(count, normal, 0.0):
+    if not factorise_cholesky(count, normal, 0.0):
         return
-    substitute(count, normal, multipliers)
+    solve_cholesky(count, normal, multipliers)
     for i in range(count):
         multipliers[i] /= lengths[i]
     for k in range(left):
@@ -440,7 +440,7 @@ def add_curvature(
             row_change[j] = 0.0
         for side in range(2):
             change = DIFFERENCE if side == 0 else -DIFFERENCE
-            copy(size, q, trial)
+            copy_numbers(size, q, trial)
             for j in range(free):
                 trial[free_list[j]] += change * along[free * k + j]
             evaluate_equations(a, trial)

@@ -18,28 +18,33 @@ from osimlite.mechanics.kernels.layout import (
     OUTCOME,
     WORK,
 )
-from osimlite.mechanics.kernels.motion import add_row, axes_of, set_frame, set_row
-from osimlite.mechanics.kernels.pointers import Floats, Ints, at, copy
+from osimlite.mechanics.kernels.motion import (
+    add_spatial_vector,
+    axes_from_rows,
+    set_frame,
+    set_spatial_vector,
+)
+from osimlite.mechanics.kernels.pointers import Floats, Ints, at, copy_numbers
 from osimlite.mechanics.kernels.points import operation_ints, operation_work
 from osimlite.mechanics.laws.rotations import (
-    along_axes,
-    body_fixed,
+    combine_axes,
+    multiply_rotations,
+    rotation_from_xyz,
     sine_cosine,
-    transposed,
-    turned_axes,
+    transpose_rotation,
 )
 from osimlite.mechanics.laws.vectors import (
     ZERO,
     Vector,
-    along,
+    add_scaled,
     cross,
     dot,
-    elementwise,
     minus,
+    multiply_elementwise,
     plus,
-    replaced,
+    replace_component,
+    rotate,
     times,
-    turned,
     vector,
 )
 
@@ -58,19 +63,19 @@ def place_ball(
     s1, c1 = sine_cosine(y[angles[0]])
     s2, c2 = sine_cosine(y[angles[1]])
     s3, c3 = sine_cosine(y[angles[2]])
-    axes, turned_by = axes_of(frame), body_fixed(s1, c1, s2, c2, s3, c3)
-    end = elementwise(vector(radii, 0), turned_by[2])
+    axes, turned_by = axes_from_rows(frame), rotation_from_xyz(s1, c1, s2, c2, s3, c3)
+    end = multiply_elementwise(vector(radii, 0), turned_by[2])
     if j[OPERATION.MOTION] == MOTION.BALL:
-        copy(12, frame, kept)
+        copy_numbers(12, frame, kept)
         set_frame(
             frame,
-            turned_axes(axes, turned_by),
-            plus(vector(frame, LINK_WORK.POSITION), along_axes(axes, end)),
+            multiply_rotations(axes, turned_by),
+            plus(vector(frame, LINK_WORK.POSITION), combine_axes(axes, end)),
         )
     else:
-        axes = turned_axes(axes, transposed(turned_by))
-        set_frame(frame, axes, minus(vector(frame, LINK_WORK.POSITION), along_axes(axes, end)))
-        copy(12, frame, kept)
+        axes = multiply_rotations(axes, transpose_rotation(turned_by))
+        set_frame(frame, axes, minus(vector(frame, LINK_WORK.POSITION), combine_axes(axes, end)))
+        copy_numbers(12, frame, kept)
     return OUTCOME.OK
 
 
@@ -92,28 +97,30 @@ def move_ball(
     )
     angles, u = at(model, j[OPERATION.ARGUMENTS]), at(y, model[MODEL.DOFS])
     sign = 1.0 if j[OPERATION.MOTION] == MOTION.BALL else -1.0
-    n, far = last_axis(y, angles), vector(radii, 0)
+    n, far = third_axis(y, angles), vector(radii, 0)
     arm, spin = (
         minus(vector(kept, OPERATION_WORK.POINT), vector(result, 0)),
         (u[angles[0]], u[angles[1]], u[angles[2]]),
     )
     turn = shift = ZERO
     for k in range(3):
-        axis = replaced(ZERO, k, 1.0)
-        e = times(sign, turned(kept, axis))
-        m = plus(times(sign, turned(kept, left_behind(far, axis, n))), cross(arm, e))
-        add_row(at(data, model[MODEL.WORK_COLUMN] + 6 * angles[k]), 1.0, e, m)
-        turn, shift = along(turn, spin[k], e), along(shift, spin[k], m)
-    set_row(result, turn, shift)
-    set_row(at(result, 6), times(sign, turned(kept, left_behind(far, spin, cross(spin, n)))), ZERO)
+        axis = replace_component(ZERO, k, 1.0)
+        e = times(sign, rotate(kept, axis))
+        m = plus(times(sign, rotate(kept, far_end_velocity(far, axis, n))), cross(arm, e))
+        add_spatial_vector(at(data, model[MODEL.WORK_COLUMN] + 6 * angles[k]), 1.0, e, m)
+        turn, shift = add_scaled(turn, spin[k], e), add_scaled(shift, spin[k], m)
+    set_spatial_vector(result, turn, shift)
+    set_spatial_vector(
+        at(result, 6), times(sign, rotate(kept, far_end_velocity(far, spin, cross(spin, n)))), ZERO
+    )
     if abs(sine_cosine(y[angles[1]])[1]) < 1e-12:
         return OUTCOME.SINGULAR_RATES
     for k in range(3):
-        f[angles[k]] = dot(angle_row(y, angles, k), spin)
+        f[angles[k]] = dot(angle_rate_row(y, angles, k), spin)
     return OUTCOME.OK
 
 
-def angle_row(y: Floats, angles: Ints, part: int) -> Vector:
+def angle_rate_row(y: Floats, angles: Ints, part: int) -> Vector:
     """Return the row of N that gives the rate of one angle from the three speeds."""
     s1, c1 = sine_cosine(y[angles[0]])
     s2, c2 = sine_cosine(y[angles[1]])
@@ -122,7 +129,7 @@ def angle_row(y: Floats, angles: Ints, part: int) -> Vector:
     return (1.0, s1 * s2 / c2, -c1 * s2 / c2) if part == 0 else (0.0, -s1 / c2, c1 / c2)
 
 
-def angle_drift(y: Floats, f: Floats, angles: Ints, row: Vector) -> float:
+def angle_acceleration_bias(y: Floats, f: Floats, angles: Ints, row: Vector) -> float:
     """Return the acceleration of an angle while udot = 0.
 
     The speeds are u = B r, where r are the rates and the columns of B the axes of the angles, so that
@@ -142,13 +149,15 @@ def angle_drift(y: Floats, f: Floats, angles: Ints, row: Vector) -> float:
     return -dot(row, (c2 * r2 * r3, dy, dz))
 
 
-def last_axis(y: Floats, angles: Ints) -> Vector:
+def third_axis(y: Floats, angles: Ints) -> Vector:
     """Return the third axis n of the rotation of a ball, in its parent frame."""
     s1, c1 = sine_cosine(y[angles[0]])
     s2, c2 = sine_cosine(y[angles[1]])
     return s2, -s1 * c2, c1 * c2
 
 
-def left_behind(far: Vector, turn: Vector, n: Vector) -> Vector:
+def far_end_velocity(far: Vector, turn: Vector, n: Vector) -> Vector:
     """Return the velocity of the end r * n less that of the rotating frame: r * (e x n) - e x (r * n)."""
-    return minus(elementwise(far, cross(turn, n)), cross(turn, elementwise(far, n)))
+    return minus(
+        multiply_elementwise(far, cross(turn, n)), cross(turn, multiply_elementwise(far, n))
+    )

@@ -16,14 +16,14 @@ from osimlite.mechanics.laws.bezier import (
     STARTS,
     X,
     Y,
-    beyond_sum,
-    end_of_sum,
-    first_place,
-    first_place_of_sum,
-    missed,
-    nearer_place,
-    on_section,
-    value_at,
+    end_beyond_sum,
+    evaluate_section,
+    extrapolate_sum,
+    find_section,
+    find_section_of_sum,
+    search_residual,
+    search_section,
+    take_halley_step,
 )
 
 LANES = 64
@@ -46,7 +46,7 @@ ROWS = 5 + COEFFICIENTS
 """Number of rows, each of LANES numbers."""
 
 
-def ask(x: Floats, room: Floats, number: int, place: int, z: float) -> None:
+def request_value(x: Floats, room: Floats, number: int, place: int, z: float) -> None:
     """Request the value of a curve.
 
     Args:
@@ -65,13 +65,13 @@ def ask(x: Floats, room: Floats, number: int, place: int, z: float) -> None:
         lane[LANES * INSIDE] = lane[LANES * REST] = lane[LANES * U] = 0.0
         lane[LANES * OF_X] = 1.0
         return
-    section, rest, u = first_place(c, z)
+    section, rest, u = find_section(c, z)
     lane[LANES * INSIDE], lane[LANES * REST], lane[LANES * U] = 1.0, rest, u
     for k in range(COEFFICIENTS):
         lane[LANES * (OF_X + k)] = c[section + X + k]
 
 
-def ask_sum(
+def request_sum(
     x: Floats, room: Floats, number: int, place: int, of_y: float, of_x: float, total: float
 ) -> None:
     """Request the value of a curve where ``of_y * y + of_x * x`` has a total, see `bezier.value_of_sum`.
@@ -87,15 +87,15 @@ def ask_sum(
     """
     c: Any = at(x, place)
     lane = at(room, number)
-    end = end_of_sum(c, of_y, of_x, total)
+    end = end_beyond_sum(c, of_y, of_x, total)
     if end > 0:
-        lane[LANES * VALUE] = beyond_sum(c, of_y, of_x, total, end)
+        lane[LANES * VALUE] = extrapolate_sum(c, of_y, of_x, total, end)
         lane[LANES * INSIDE] = lane[LANES * U] = 0.0
         lane[LANES * REST], lane[LANES * OF_X] = total - total, 1.0
         for k in range(1, COEFFICIENTS):
             lane[LANES * (OF_X + k)] = 0.0
         return
-    section, rest, u = first_place_of_sum(c, of_y, of_x, total)
+    section, rest, u = find_section_of_sum(c, of_y, of_x, total)
     lane[LANES * INSIDE], lane[LANES * REST], lane[LANES * U] = 1.0, rest, u
     for k in range(Y - X):
         lane[LANES * (OF_X + k)] = of_y * c[section + Y + 1 + k] + of_x * c[section + X + k]
@@ -103,19 +103,19 @@ def ask_sum(
         lane[LANES * (OF_X + k)] = c[section + X + k]
 
 
-def missed_of(room: Any, number: int) -> float:
+def request_residual(room: Any, number: int) -> float:
     """Return the residual of a search."""
-    return missed(
+    return search_residual(
         room, LANES * OF_X + number, LANES, room[LANES * U + number], room[LANES * REST + number]
     )
 
 
-def value_of(room: Floats, number: int) -> float:
+def request_result(room: Floats, number: int) -> float:
     """Return the result of a request."""
     return room[LANES * VALUE + number]
 
 
-def answer(room: Any, asked: int, rounds: int) -> None:
+def compute_requests(room: Any, asked: int, rounds: int) -> None:
     """Compute all requests.
 
     Args:
@@ -127,27 +127,29 @@ def answer(room: Any, asked: int, rounds: int) -> None:
         room[LANES * GOES_ON + lane] = 1.0
     for _ in range(rounds):
         for lane in range(asked):
-            step(room, lane)
+            step_lane(room, lane)
     for lane in range(asked):
-        tell(room, lane)
+        store_result(room, lane)
     for lane in range(asked):
         if room[LANES * GOES_ON + lane] > 0.0:
             u, rest = room[LANES * U + lane], room[LANES * REST + lane]
-            u, _, _, _ = on_section(room, LANES * OF_X + lane, LANES, u, rest, ROUNDS - rounds)
+            u, _, _, _ = search_section(room, LANES * OF_X + lane, LANES, u, rest, ROUNDS - rounds)
             room[LANES * U + lane] = u
-            tell(room, lane)
+            store_result(room, lane)
 
 
-def step(room: Any, lane: int) -> None:
+def step_lane(room: Any, lane: int) -> None:
     """Take a search step in one lane."""
     before, is_going = room[LANES * U + lane], room[LANES * GOES_ON + lane] > 0.0
-    u, goes_on = nearer_place(room, LANES * OF_X + lane, LANES, before, room[LANES * REST + lane])
+    u, goes_on = take_halley_step(
+        room, LANES * OF_X + lane, LANES, before, room[LANES * REST + lane]
+    )
     room[LANES * U + lane] = u if is_going else before
     room[LANES * GOES_ON + lane] = 1.0 if is_going and goes_on else 0.0
 
 
-def tell(room: Any, lane: int) -> None:
+def store_result(room: Any, lane: int) -> None:
     """Store the result of a search."""
-    value, _ = value_at(room, LANES * OF_X + lane, LANES, room[LANES * U + lane])
+    value, _ = evaluate_section(room, LANES * OF_X + lane, LANES, room[LANES * U + lane])
     is_inside = room[LANES * INSIDE + lane] > 0.0
     room[LANES * VALUE + lane] = value if is_inside else room[LANES * VALUE + lane]

@@ -36,26 +36,30 @@ from osimlite.mechanics.kernels.cable_surfaces import (
     A,
     R,
     nearest_on_line,
-    shoot,
-    value,
+    shoot_geodesic,
+    surface_value,
 )
 from osimlite.mechanics.kernels.layout import ITEM, OUTCOME
-from osimlite.mechanics.kernels.linear_algebra import factor_room, factorise, minimum_norm
+from osimlite.mechanics.kernels.linear_algebra import (
+    factor_size,
+    factorise_equations,
+    solve_minimum_norm,
+)
 from osimlite.mechanics.kernels.paths import LENGTH, SPEED, TENSION
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at
 from osimlite.mechanics.kernels.points import apply_force, place_frame, station, velocity
 from osimlite.mechanics.laws.vectors import (
     Vector,
-    along,
+    add_scaled,
     cross,
     dot,
     minus,
     norm,
     plus,
-    put,
+    rotate,
+    rotate_back,
+    store_vector,
     times,
-    turned,
-    turned_back,
     unit,
     vector,
 )
@@ -133,10 +137,10 @@ SIGNIFICANT = 2.0**-45.5
 """Threshold of independence per equation, Simbody's significant part of a double."""
 
 
-def solver_room(obstacles: int) -> int:
+def solver_size(obstacles: int) -> int:
     """Return the length of the workspace of a search with `obstacles` obstacles between two points."""
     count, size = EQUATIONS * obstacles, UNKNOWNS * obstacles
-    return GEODESIC_ROOM + 4 * (obstacles + 1) + factor_room(count, size) + 2 * count + size
+    return GEODESIC_ROOM + 4 * (obstacles + 1) + factor_size(count, size) + 2 * count + size
 
 
 def cable_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
@@ -149,9 +153,12 @@ def cable_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, i
     length, first = 0.0, 0
     for k in range(1, i[COUNT]):
         if elements[ELEMENT_INTS * k + IS_OBSTACLE] == 0:
-            length += span(elements, p, result, first, k, at(result, i[SOLVER]))
+            length += find_cable(elements, p, result, first, k, at(result, i[SOLVER]))
             first = k
-    result[LENGTH], result[SPEED] = length, speed(model, data, i[COUNT], elements, result)
+    result[LENGTH], result[SPEED] = (
+        length,
+        lengthening_speed(model, data, i[COUNT], elements, result),
+    )
     return OUTCOME.OK
 
 
@@ -159,19 +166,21 @@ def place_element(model: Ints, data: Floats, element: Ints, p: Floats, record: F
     """Compute the position of a point, or the pose and the initial contact of an obstacle."""
     numbers, part, link = at(p, element[AT]), at(record, element[KEPT]), element[LINK]
     if element[IS_OBSTACLE] == 0:
-        put(part, 0, station(model, data, link, vector(numbers, PLACE)))
+        store_vector(part, 0, station(model, data, link, vector(numbers, PLACE)))
         return
     place_frame(model, data, link, numbers, vector(numbers, 9), at(part, IN_GROUND))
     for k in range(TOUCH_NUMBERS):
         part[k] = numbers[BEGIN + k]
 
 
-def to_ground(pose: Floats, point: Vector) -> Vector:
+def surface_to_ground(pose: Floats, point: Vector) -> Vector:
     """Return a point of a surface in ground."""
-    return plus(vector(pose, 9), turned(pose, point))
+    return plus(vector(pose, 9), rotate(pose, point))
 
 
-def span(elements: Ints, p: Floats, record: Floats, first: int, last: int, work: Floats) -> float:
+def find_cable(
+    elements: Ints, p: Floats, record: Floats, first: int, last: int, work: Floats
+) -> float:
     """Find the cable between two points.
 
     Args:
@@ -189,19 +198,19 @@ def span(elements: Ints, p: Floats, record: Floats, first: int, last: int, work:
     count = 0
     for round_number in range(ROUNDS + 1):
         for k in range(first + 1, last):
-            if not touch(elements, p, record, first, k, last, work):
+            if not update_contact(elements, p, record, first, k, last, work):
                 return nan
         count = draw_lines(elements, record, first, last, lines)
         values = at(lines, 4 * (count + 1))
-        rough = roughness(elements, record, first, last, lines, values)
+        rough = measure_kinks(elements, record, first, last, lines, values)
         if isnan(rough):
             return nan
         if rough <= SMOOTH or round_number == ROUNDS:
             break
-        if not correct(elements, p, record, first, last, count, rough, work):
+        if not correct_geodesics(elements, p, record, first, last, count, rough, work):
             return nan
-    put(at(record, elements[ELEMENT_INTS * first + KEPT]), AFTER, vector(lines, 0))
-    put(at(record, elements[ELEMENT_INTS * last + KEPT]), BEFORE, vector(lines, 4 * count))
+    store_vector(at(record, elements[ELEMENT_INTS * first + KEPT]), AFTER, vector(lines, 0))
+    store_vector(at(record, elements[ELEMENT_INTS * last + KEPT]), BEFORE, vector(lines, 4 * count))
     length = 0.0
     for k in range(count + 1):
         length += lines[4 * k + 3]
@@ -212,7 +221,7 @@ def span(elements: Ints, p: Floats, record: Floats, first: int, last: int, work:
     return length
 
 
-def touch(
+def update_contact(
     elements: Ints, p: Floats, record: Floats, first: int, number: int, last: int, work: Floats
 ) -> bool:
     """Update whether the cable touches an obstacle.
@@ -233,26 +242,26 @@ def touch(
     numbers, part = at(p, element[AT]), at(record, element[KEPT])
     geodesic, pose, surface = at(part, GEODESIC), at(part, IN_GROUND), at(numbers, SURFACE)
     if part[STATE] != TOUCHES or not geodesic[ARC] > 0.0:
-        before = neighbour(elements, record, pose, number, -1, first)
-        after = neighbour(elements, record, pose, number, 1, last)
-        if value(surface, before) > 0.0 or value(surface, after) > 0.0:
+        before = find_neighbour(elements, record, pose, number, -1, first)
+        after = find_neighbour(elements, record, pose, number, 1, last)
+        if surface_value(surface, before) > 0.0 or surface_value(surface, after) > 0.0:
             return False
         chord = minus(after, before)
         if part[STATE] == GUESSED:
             part[STATE] = TOUCHES
-            if not shoot(surface, vector(part, TRACKED), chord, 0.0, geodesic, work):
+            if not shoot_geodesic(surface, vector(part, TRACKED), chord, 0.0, geodesic, work):
                 return False
         elif part[STATE] == TOUCHES:
             point, normal = vector(geodesic, START + POINT), vector(geodesic, START + NORMAL)
             if dot(minus(before, point), normal) > 0.0 and dot(minus(after, point), normal) > 0.0:
                 part[STATE] = LIFTED
-                put(part, TRACKED, point)
+                store_vector(part, TRACKED, point)
         else:
             below, point = nearest_on_line(surface, before, after, vector(part, TRACKED))
-            put(part, TRACKED, point)
+            store_vector(part, TRACKED, point)
             if below:
                 part[STATE] = TOUCHES
-                if not shoot(surface, point, chord, 0.0, geodesic, work):
+                if not shoot_geodesic(surface, point, chord, 0.0, geodesic, work):
                     return False
     if part[STATE] == TOUCHES:
         end_to_ground(pose, at(geodesic, START), at(part, GROUND_START))
@@ -260,7 +269,7 @@ def touch(
     return True
 
 
-def neighbour(
+def find_neighbour(
     elements: Ints, record: Floats, pose: Floats, number: int, step: int, limit: int
 ) -> Vector:
     """Return the next end of the cable before (-1) or after (1) an obstacle, in the obstacle's frame."""
@@ -271,17 +280,17 @@ def neighbour(
     if k == limit:
         point = vector(part, 0)
     else:
-        point = to_ground(
+        point = surface_to_ground(
             at(part, IN_GROUND), vector(part, GEODESIC + (END if step < 0 else START) + POINT)
         )
-    return turned_back(pose, minus(point, vector(pose, 9)))
+    return rotate_back(pose, minus(point, vector(pose, 9)))
 
 
 def end_to_ground(pose: Floats, end: Floats, ground: Floats) -> None:
     """Transform an end of a geodesic to ground."""
-    put(ground, POINT, to_ground(pose, vector(end, POINT)))
+    store_vector(ground, POINT, surface_to_ground(pose, vector(end, POINT)))
     for place in (ALONG, NORMAL, ACROSS):
-        put(ground, place, turned(pose, vector(end, place)))
+        store_vector(ground, place, rotate(pose, vector(end, place)))
     for place in (ALONG_BENDS, ACROSS_BENDS, TORSION):
         ground[place] = end[place]
 
@@ -294,7 +303,7 @@ def draw_lines(elements: Ints, record: Floats, first: int, last: int, lines: Flo
         part = at(record, elements[ELEMENT_INTS * k + KEPT])
         if k == last or part[STATE] == TOUCHES:
             chord = minus(vector(part, 0 if k == last else GROUND_START + POINT), start)
-            put(lines, 4 * count, unit(chord))
+            store_vector(lines, 4 * count, unit(chord))
             lines[4 * count + 3] = norm(chord)
             if k < last:
                 start = vector(part, GROUND_END + POINT)
@@ -302,7 +311,7 @@ def draw_lines(elements: Ints, record: Floats, first: int, last: int, lines: Flo
     return count
 
 
-def roughness(
+def measure_kinks(
     elements: Ints, record: Floats, first: int, last: int, lines: Floats, values: Floats
 ) -> float:
     """Compute the kinks at both ends of each geodesic, along the normal and the binormal.
@@ -326,7 +335,7 @@ def roughness(
     return most
 
 
-def correct(
+def correct_geodesics(
     elements: Ints,
     p: Floats,
     record: Floats,
@@ -377,8 +386,8 @@ def correct(
             a[(4 * count + number) * size + 4 * number + 3] = rough
             values[4 * count + number] = 0.0
             number, before = number + 1, k
-    rank = factorise(equations, size, a, SIGNIFICANT * equations)
-    minimum_norm(equations, size, a, rank, values, at(values, equations), corrections)
+    rank = factorise_equations(equations, size, a, SIGNIFICANT * equations)
+    solve_minimum_norm(equations, size, a, rank, values, at(values, equations), corrections)
     for k in range(size):
         corrections[k] = -corrections[k]
     step, number = 1.0, 0
@@ -408,8 +417,10 @@ def set_rows(part: Floats, end: int, line: Floats, rows: Floats, size: int) -> N
     e = vector(line, 0)
     for k in range(2):
         a = vector(part, end + (NORMAL if k == 0 else ACROSS))
-        shift = times((1.0 if end == GROUND_START else -1.0) / line[3], along(a, -dot(e, a), e))
-        vary(part, end, shift, cross(a, e), at(rows, k * size))
+        shift = times(
+            (1.0 if end == GROUND_START else -1.0) / line[3], add_scaled(a, -dot(e, a), e)
+        )
+        differentiate_end(part, end, shift, cross(a, e), at(rows, k * size))
 
 
 def set_far_rows(
@@ -419,11 +430,13 @@ def set_far_rows(
     e = vector(line, 0)
     for k in range(2):
         a = vector(part, end + (NORMAL if k == 0 else ACROSS))
-        shift = times((-1.0 if end == GROUND_START else 1.0) / line[3], along(a, -dot(e, a), e))
-        vary(other, far, shift, (0.0, 0.0, 0.0), at(rows, k * size))
+        shift = times(
+            (-1.0 if end == GROUND_START else 1.0) / line[3], add_scaled(a, -dot(e, a), e)
+        )
+        differentiate_end(other, far, shift, (0.0, 0.0, 0.0), at(rows, k * size))
 
 
-def fields(part: Floats, end: int) -> tuple[float, float, float, float]:
+def jacobi_fields(part: Floats, end: int) -> tuple[float, float, float, float]:
     """Return A, R and their derivatives at an end of a geodesic.
 
     Returns:
@@ -435,7 +448,7 @@ def fields(part: Floats, end: int) -> tuple[float, float, float, float]:
     return g[A], g[R], g[A_RATE], g[R_RATE]
 
 
-def vary(part: Floats, end: int, shift: Vector, turn: Vector, row: Floats) -> None:
+def differentiate_end(part: Floats, end: int, shift: Vector, turn: Vector, row: Floats) -> None:
     """Fill the derivatives by the four variations of a geodesic of a function of its end.
 
     Args:
@@ -445,7 +458,7 @@ def vary(part: Floats, end: int, shift: Vector, turn: Vector, row: Floats) -> No
         turn: derivative of the function by the rotation of its frame.
         row: filled (4,).
     """
-    a, r, a_rate, r_rate = fields(part, end)
+    a, r, a_rate, r_rate = jacobi_fields(part, end)
     frame = at(part, end)
     t, n, b = vector(frame, ALONG), vector(frame, NORMAL), vector(frame, ACROSS)
     tt, nt, bt = dot(t, turn), dot(n, turn), dot(b, turn)
@@ -464,20 +477,24 @@ def largest_turn(part: Floats, corrections: Floats) -> float:
     """
     most = 0.0
     for end in (GROUND_START, GROUND_END):
-        a, r, a_rate, r_rate = fields(part, end)
+        a, r, a_rate, r_rate = jacobi_fields(part, end)
         frame = at(part, end)
         t, n, b = vector(frame, ALONG), vector(frame, NORMAL), vector(frame, ACROSS)
-        forwards = along(times(frame[TORSION], t), frame[ALONG_BENDS], b)
-        sideways = along(times(-frame[ACROSS_BENDS], t), -frame[TORSION], b)
-        most = max(most, corrections[0] * largest(forwards))
-        most = max(most, corrections[1] * largest(along(times(a, sideways), -a_rate, n)))
-        most = max(most, corrections[2] * largest(along(times(r, sideways), -r_rate, n)))
+        forwards = add_scaled(times(frame[TORSION], t), frame[ALONG_BENDS], b)
+        sideways = add_scaled(times(-frame[ACROSS_BENDS], t), -frame[TORSION], b)
+        most = max(most, corrections[0] * largest_component(forwards))
+        most = max(
+            most, corrections[1] * largest_component(add_scaled(times(a, sideways), -a_rate, n))
+        )
+        most = max(
+            most, corrections[2] * largest_component(add_scaled(times(r, sideways), -r_rate, n))
+        )
         if end == GROUND_END:
-            most = max(most, corrections[3] * largest(forwards))
+            most = max(most, corrections[3] * largest_component(forwards))
     return most
 
 
-def largest(a: Vector) -> float:
+def largest_component(a: Vector) -> float:
     """Return the largest absolute value of a component."""
     x, y, z = a
     return max(abs(x), abs(y), abs(z))
@@ -502,13 +519,15 @@ def shoot_again(
         length = 0.0
     start = at(geodesic, START)
     t, n, b = vector(start, ALONG), vector(start, NORMAL), vector(start, ACROSS)
-    point = along(along(vector(start, POINT), forwards, t), sideways, b)
+    point = add_scaled(add_scaled(vector(start, POINT), forwards, t), sideways, b)
     tilt = start[ALONG_BENDS] * forwards - start[TORSION] * sideways
-    turning = along(times(tilt, b), -turn, n)
-    return shoot(surface, point, plus(t, cross(turning, t)), length, geodesic, work)
+    turning = add_scaled(times(tilt, b), -turn, n)
+    return shoot_geodesic(surface, point, plus(t, cross(turning, t)), length, geodesic, work)
 
 
-def speed(model: Ints, data: Floats, count: int, elements: Ints, record: Floats) -> float:
+def lengthening_speed(
+    model: Ints, data: Floats, count: int, elements: Ints, record: Floats
+) -> float:
     """Return the lengthening speed of the straight parts (m/s); their ends on obstacles move with these."""
     total = 0.0
     here = vector(record, elements[KEPT])

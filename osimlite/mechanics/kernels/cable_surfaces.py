@@ -17,13 +17,13 @@ from osimlite.mechanics.kernels.pointers import Floats, at
 from osimlite.mechanics.laws.vectors import (
     EPSILON,
     Vector,
-    along,
+    add_scaled,
     cross,
     dot,
-    elementwise,
     minus,
+    multiply_elementwise,
     norm,
-    put,
+    store_vector,
     times,
     unit,
     vector,
@@ -120,27 +120,27 @@ MORE = 1.2
 """Smallest factor with which a step is made longer."""
 
 
-def value(p: Floats, a: Vector) -> float:
+def surface_value(p: Floats, a: Vector) -> float:
     """Return the function of a surface, which is zero on the surface and positive inside."""
     x, y, z = a
-    result = p[SQUARE] - dot(elementwise(vector(p, WEIGHTS), a), a)
+    result = p[SQUARE] - dot(multiply_elementwise(vector(p, WEIGHTS), a), a)
     if p[KIND] == TORUS:
         across = p[RADIUS] - sqrt(x * x + y * y)
         result = 1.0 - (across * across + z * z) / (p[TUBE] * p[TUBE])
     return float(result)
 
 
-def gradient(p: Floats, a: Vector) -> Vector:
+def surface_gradient(p: Floats, a: Vector) -> Vector:
     """Return the gradient of the function of a surface."""
     if p[KIND] == TORUS:
         x, y, z = a
         scale, distance = -2.0 / (p[TUBE] * p[TUBE]), sqrt(x * x + y * y)
         inwards = 1.0 - p[RADIUS] / distance
         return scale * inwards * x, scale * inwards * y, scale * z
-    return times(-2.0, elementwise(vector(p, WEIGHTS), a))
+    return times(-2.0, multiply_elementwise(vector(p, WEIGHTS), a))
 
 
-def hessian(p: Floats, a: Vector) -> tuple[float, float, float, float]:
+def surface_hessian(p: Floats, a: Vector) -> tuple[float, float, float, float]:
     """Return the second derivatives xx, yy, zz, xy of the function of a surface; xz and yz vanish.
 
     Returns:
@@ -162,7 +162,7 @@ def hessian(p: Floats, a: Vector) -> tuple[float, float, float, float]:
 
 def hessian_times(p: Floats, a: Vector, b: Vector) -> Vector:
     """Multiply a vector by the second derivatives of the function of a surface."""
-    xx, yy, zz, xy = hessian(p, a)
+    xx, yy, zz, xy = surface_hessian(p, a)
     x, y, z = b
     return xx * x + xy * y, xy * x + yy * y, zz * z
 
@@ -185,22 +185,22 @@ def nearest_on_line(p: Floats, a: Vector, b: Vector, start: Vector) -> tuple[boo
     way = minus(b, a)
     square = dot(way, way)
     if square < EPSILON:
-        return value(p, a) > 0.0, a
+        return surface_value(p, a) > 0.0, a
     part = min(max(-dot(way, minus(a, start)) / square, 0.0), 1.0)
     for _ in range(50):
-        point = along(a, part, way)
-        if -value(p, point) < EPSILON:
+        point = add_scaled(a, part, way)
+        if -surface_value(p, point) < EPSILON:
             return True, point
         curvature = abs(dot(way, hessian_times(p, point, way)))
-        step = -dot(gradient(p, point), way) / (curvature + 0.5)
+        step = -dot(surface_gradient(p, point), way) / (curvature + 0.5)
         before = part
         part = min(max(part - min(max(step, -0.2), 0.2), 0.0), 1.0)
         if abs(part - before) < CONSTRAINT:
-            return False, along(a, part, way)
+            return False, add_scaled(a, part, way)
     return False, start
 
 
-def shoot(
+def shoot_geodesic(
     p: Floats, point: Vector, direction: Vector, length: float, geodesic: Floats, work: Floats
 ) -> bool:
     """Compute a geodesic from near a point in about a direction; return whether it exists.
@@ -219,9 +219,12 @@ def shoot(
         normal = unit(point)
         tangent = cross(normal, unit(cross(direction, normal)))
         c, s = cos(length / radius), sin(length / radius)
-        end, end_tangent = along(times(c, normal), s, tangent), along(times(c, tangent), -s, normal)
-        set_end(p, times(radius, normal), tangent, at(geodesic, START))
-        set_end(p, times(radius, end), end_tangent, at(geodesic, END))
+        end, end_tangent = (
+            add_scaled(times(c, normal), s, tangent),
+            add_scaled(times(c, tangent), -s, normal),
+        )
+        store_end(p, times(radius, normal), tangent, at(geodesic, START))
+        store_end(p, times(radius, end), end_tangent, at(geodesic, END))
         geodesic[A], geodesic[A_RATE], geodesic[R], geodesic[R_RATE] = c, -s / radius, s * radius, c
         return True
     if p[KIND] == CYLINDER:
@@ -231,33 +234,33 @@ def shoot(
         tx, ty, tz = tangent = cross(normal, unit(cross(direction, normal)))
         _, _, turn = cross(normal, tangent)
         c, s = cos(length / radius * turn), sin(length / radius * turn)
-        set_end(p, (radius * nx, radius * ny, height), tangent, at(geodesic, START))
+        store_end(p, (radius * nx, radius * ny, height), tangent, at(geodesic, START))
         end = radius * (c * nx - s * ny), radius * (s * nx + c * ny), height + length * tz
-        set_end(p, end, (c * tx - s * ty, s * tx + c * ty, tz), at(geodesic, END))
+        store_end(p, end, (c * tx - s * ty, s * tx + c * ty, tz), at(geodesic, END))
         geodesic[A], geodesic[A_RATE], geodesic[R], geodesic[R_RATE] = 1.0, 0.0, length, 1.0
         return True
     if geodesic[STEP] == 0.0:
-        return extrapolate(p, point, direction, length, geodesic, work)
-    return integrate(p, point, direction, length, geodesic, work)
+        return integrate_by_extrapolation(p, point, direction, length, geodesic, work)
+    return integrate_by_merson(p, point, direction, length, geodesic, work)
 
 
-def set_end(p: Floats, point: Vector, direction: Vector, end: Floats) -> None:
+def store_end(p: Floats, point: Vector, direction: Vector, end: Floats) -> None:
     """Store an end of a geodesic: position, frame, curvatures and torsion."""
-    g = gradient(p, point)
+    g = surface_gradient(p, point)
     normal = times(-1.0, unit(g))
     across = unit(cross(direction, normal))
     tangent = cross(normal, across)
-    put(end, POINT, point)
-    put(end, ALONG, tangent)
-    put(end, NORMAL, normal)
-    put(end, ACROSS, across)
+    store_vector(end, POINT, point)
+    store_vector(end, ALONG, tangent)
+    store_vector(end, NORMAL, normal)
+    store_vector(end, ACROSS, across)
     bent = hessian_times(p, point, tangent)
     end[ALONG_BENDS] = dot(tangent, bent) / norm(g)
     end[ACROSS_BENDS] = dot(across, hessian_times(p, point, across)) / norm(g)
     end[TORSION] = -dot(bent, cross(g, tangent)) / dot(g, g)
 
 
-def integrate(
+def integrate_by_merson(
     p: Floats, point: Vector, direction: Vector, length: float, geodesic: Floats, work: Floats
 ) -> bool:
     """Integrate a geodesic by Merson's method, with the steps of Simbody's GeodesicIntegrator.
@@ -265,13 +268,13 @@ def integrate(
     The arguments and the result are those of `shoot_geodesic`.
     """
     y, rates, trial = work, at(work, SIZE), at(work, 2 * SIZE)
-    put(y, 0, point)
-    put(y, 5, unit(direction))
+    store_vector(y, 0, point)
+    store_vector(y, 5, unit(direction))
     y[3], y[4], y[8], y[9] = 0.0, 1.0, 1.0, 0.0
-    if not project(p, y, 0.1 * CONSTRAINT):
+    if not project_to_surface(p, y, 0.1 * CONSTRAINT):
         return False
-    slope(p, y, rates)
-    set_end(p, vector(y, 0), vector(y, 5), at(geodesic, START))
+    geodesic_derivative(p, y, rates)
+    store_end(p, vector(y, 0), vector(y, 5), at(geodesic, START))
     t, step, first, second, taken = 0.0, geodesic[STEP], 0.0, 0.0, 0
     while t != length:
         next_t = t + step
@@ -279,8 +282,8 @@ def integrate(
             next_t = length
         while True:
             h = next_t - t
-            error = merson(p, h, work)
-            if error <= ACCURACY and project(p, trial, 0.1 * CONSTRAINT):
+            error = merson_step(p, h, work)
+            if error <= ACCURACY and project_to_surface(p, trial, 0.1 * CONSTRAINT):
                 break
             if not h > SMALLEST:
                 return False
@@ -298,19 +301,19 @@ def integrate(
             return False
         for k in range(SIZE):
             y[k] = trial[k]
-        slope(p, y, rates)
+        geodesic_derivative(p, y, rates)
         if next_t < length:
             longer = MOST * h if error == 0.0 else SAFETY * h * sqrt(sqrt(ACCURACY / error))
             step = min(longer if longer >= MORE * h else h, MOST * h)
         t = next_t
-    set_end(p, vector(y, 0), vector(y, 5), at(geodesic, END))
+    store_end(p, vector(y, 0), vector(y, 5), at(geodesic, END))
     geodesic[R], geodesic[A], geodesic[R_RATE], geodesic[A_RATE] = y[3], y[4], y[8], y[9]
     if taken >= 2:
         geodesic[STEP] = first if first < geodesic[STEP] else max(geodesic[STEP], second)
     return True
 
 
-def extrapolate(
+def integrate_by_extrapolation(
     p: Floats, point: Vector, direction: Vector, length: float, geodesic: Floats, work: Floats
 ) -> bool:
     """Integrate a geodesic by the method of Gragg, Bulirsch and Stoer, in steps as long as possible.
@@ -318,38 +321,38 @@ def extrapolate(
     The arguments and the result are those of `shoot_geodesic`.
     """
     y = work
-    put(y, 0, point)
-    put(y, 5, unit(direction))
+    store_vector(y, 0, point)
+    store_vector(y, 5, unit(direction))
     y[3], y[4], y[8], y[9] = 0.0, 1.0, 1.0, 0.0
-    if not project(p, y, ROUNDED):
+    if not project_to_surface(p, y, ROUNDED):
         return False
-    set_end(p, vector(y, 0), vector(y, 5), at(geodesic, START))
+    store_end(p, vector(y, 0), vector(y, 5), at(geodesic, START))
     left = step = length
     while left > 0.0:
         step = min(step, left)
-        while not leap(p, step, work):
+        while not extrapolate_step(p, step, work):
             step *= 0.5
             if not step > SMALLEST:
                 return False
         left -= step
-        if not project(p, y, ROUNDED):
+        if not project_to_surface(p, y, ROUNDED):
             return False
-    set_end(p, vector(y, 0), vector(y, 5), at(geodesic, END))
+    store_end(p, vector(y, 0), vector(y, 5), at(geodesic, END))
     geodesic[R], geodesic[A], geodesic[R_RATE], geodesic[A_RATE] = y[3], y[4], y[8], y[9]
     return True
 
 
-def leap(p: Floats, step: float, work: Floats) -> bool:
+def extrapolate_step(p: Floats, step: float, work: Floats) -> bool:
     """Take a step by midpoint rules of 2, 4, 6 ... parts, extrapolated; return whether it is exact."""
     y, f, old, columns = work, at(work, SIZE), at(work, 2 * SIZE), at(work, 3 * SIZE)
     for column in range(COLUMNS):
         new, parts = at(columns, column * SIZE), 2 * column + 2
         h = step / parts
-        slope(p, y, f)
+        geodesic_derivative(p, y, f)
         for k in range(SIZE):
             old[k], new[k] = y[k], y[k] + h * f[k]
         for _ in range(1, parts):
-            slope(p, new, f)
+            geodesic_derivative(p, new, f)
             for k in range(SIZE):
                 old[k], new[k] = new[k], old[k] + 2.0 * h * f[k]
         # Neville's scheme towards h = 0: each row takes the place of the one before, from its end
@@ -373,59 +376,59 @@ def leap(p: Floats, step: float, work: Floats) -> bool:
     return False
 
 
-def slope(p: Floats, y: Floats, f: Floats) -> None:
+def geodesic_derivative(p: Floats, y: Floats, f: Floats) -> None:
     """Compute the derivative of the state of a geodesic by the arc length.
 
     The acceleration is normal to the surface, and the Jacobi fields satisfy A'' = -K A and R'' = -K R
     with the Gaussian curvature K.
     """
     point, velocity = vector(y, 0), vector(y, 5)
-    g = gradient(p, point)
-    xx, yy, zz, xy = hessian(p, point)
+    g = surface_gradient(p, point)
+    xx, yy, zz, xy = surface_hessian(p, point)
     gx, gy, gz = g
     square = dot(g, g)
     adjoint = (gx * gx * yy + gy * gy * xx - 2.0 * gx * gy * xy) * zz + gz * gz * (
         xx * yy - xy * xy
     )
     gaussian = adjoint / (square * square)
-    put(f, 0, velocity)
-    put(f, 5, times(-dot(velocity, hessian_times(p, point, velocity)) / square, g))
+    store_vector(f, 0, velocity)
+    store_vector(f, 5, times(-dot(velocity, hessian_times(p, point, velocity)) / square, g))
     f[3], f[4], f[8], f[9] = y[8], y[9], -gaussian * y[3], -gaussian * y[4]
 
 
-def project(p: Floats, y: Floats, exactness: float) -> bool:
+def project_to_surface(p: Floats, y: Floats, exactness: float) -> bool:
     """Project the state of a geodesic onto the surface; return whether that converged."""
     point = vector(y, 0)
-    error = value(p, point)
+    error = surface_value(p, point)
     for _ in range(MOST_CORRECTIONS):
         if abs(error) <= exactness:
             break
-        g = gradient(p, point)
-        point = along(point, -error / dot(g, g), g)
-        error = value(p, point)
-    g, velocity = gradient(p, point), vector(y, 5)
-    velocity = along(velocity, -dot(g, velocity) / dot(g, g), g)
-    put(y, 0, point)
-    put(y, 5, times(1.0 / norm(velocity), velocity))
+        g = surface_gradient(p, point)
+        point = add_scaled(point, -error / dot(g, g), g)
+        error = surface_value(p, point)
+    g, velocity = surface_gradient(p, point), vector(y, 5)
+    velocity = add_scaled(velocity, -dot(g, velocity) / dot(g, g), g)
+    store_vector(y, 0, point)
+    store_vector(y, 5, times(1.0 / norm(velocity), velocity))
     return abs(error) <= CONSTRAINT
 
 
-def merson(p: Floats, h: float, work: Floats) -> float:
+def merson_step(p: Floats, h: float, work: Floats) -> float:
     """Take a step of Merson's method; fill the state at its end, and return its error."""
     y, f0, y1, rough = work, at(work, SIZE), at(work, 2 * SIZE), at(work, 3 * SIZE)
     f1, f2, f3, f4 = at(work, 4 * SIZE), at(work, 5 * SIZE), at(work, 6 * SIZE), at(work, 7 * SIZE)
     for k in range(SIZE):
         y1[k] = y[k] + h / 3.0 * f0[k]
-    slope(p, y1, f1)
+    geodesic_derivative(p, y1, f1)
     for k in range(SIZE):
         y1[k] = y[k] + h / 6.0 * (f0[k] + f1[k])
-    slope(p, y1, f2)
+    geodesic_derivative(p, y1, f2)
     for k in range(SIZE):
         y1[k] = y[k] + h / 8.0 * (f0[k] + 3.0 * f2[k])
-    slope(p, y1, f3)
+    geodesic_derivative(p, y1, f3)
     for k in range(SIZE):
         rough[k] = y[k] + h / 2.0 * (f0[k] - 3.0 * f2[k] + 4.0 * f3[k])
-    slope(p, rough, f4)
+    geodesic_derivative(p, rough, f4)
     error = 0.0
     for k in range(SIZE):
         y1[k] = y[k] + h / 6.0 * (f0[k] + 4.0 * f3[k] + f4[k])

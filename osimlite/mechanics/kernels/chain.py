@@ -8,7 +8,11 @@ accelerations b. A share is an entry of J that may differ from zero.
 
 from __future__ import annotations
 
-from osimlite.mechanics.kernels.ball_joint import angle_drift, angle_row, last_axis
+from osimlite.mechanics.kernels.ball_joint import (
+    angle_acceleration_bias,
+    angle_rate_row,
+    third_axis,
+)
 from osimlite.mechanics.kernels.layout import (
     CHAIN,
     DOF,
@@ -25,7 +29,15 @@ from osimlite.mechanics.kernels.layout import (
 )
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call
 from osimlite.mechanics.kernels.points import link_work, operation_ints, operation_work
-from osimlite.mechanics.laws.vectors import ZERO, cross, dot, put, replaced, times, vector
+from osimlite.mechanics.laws.vectors import (
+    ZERO,
+    cross,
+    dot,
+    replace_component,
+    store_vector,
+    times,
+    vector,
+)
 
 
 def chain_dynamics(
@@ -70,7 +82,7 @@ def chain_dynamics(
         )
     for k in range(h[CHAIN.EXCESSES]):
         excess = at(model, h[CHAIN.EXCESS_AT] + EXCESS.SIZE * k)
-        take_off(
+        subtract_inertia(
             model,
             data,
             reals[excess[EXCESS.NUMBER]],
@@ -81,7 +93,7 @@ def chain_dynamics(
     return OUTCOME.OK
 
 
-def take_off(
+def subtract_inertia(
     model: Ints, data: Floats, moment: float, freedom: int, acceleration: Floats, right: Floats
 ) -> None:
     """Subtract an isotropic moment of inertia of a link from the equations of motion.
@@ -179,8 +191,8 @@ def move_joints(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) 
 
 def move_angle(angles: Ints, y: Floats, f: Floats, part: int, row: Floats) -> float:
     """Fill the row of N of one angle of a ball; return its acceleration while udot = 0 (rad/s²)."""
-    put(row, 0, angle_row(y, angles, part))
-    return angle_drift(y, f, angles, vector(row, 0))
+    store_vector(row, 0, angle_rate_row(y, angles, part))
+    return angle_acceleration_bias(y, f, angles, vector(row, 0))
 
 
 def move_end(
@@ -199,8 +211,8 @@ def move_end(
     Returns:
         Value (m), rate (m/s) and acceleration while udot = 0 (m/s²).
     """
-    n, spin = last_axis(y, angles), (u[angles[0]], u[angles[1]], u[angles[2]])
+    n, spin = third_axis(y, angles), (u[angles[0]], u[angles[1]], u[angles[2]])
     # n moves by u x n, and that by u x (u x n).
-    put(row, 0, times(radius, cross(n, replaced(ZERO, part, 1.0))))
+    store_vector(row, 0, times(radius, cross(n, replace_component(ZERO, part, 1.0))))
     own = spin[part] * dot(spin, n) - n[part] * dot(spin, spin)
     return radius * n[part], dot(vector(row, 0), spin), radius * own

@@ -11,7 +11,7 @@ from math import sqrt
 
 from osimlite.mechanics.kernels.pointers import Floats
 from osimlite.mechanics.laws.dual_numbers import settled
-from osimlite.mechanics.laws.vectors import Vector, along, component, minus, norm, plus, unit
+from osimlite.mechanics.laws.vectors import Vector, add_scaled, component, minus, norm, plus, unit
 
 FLAT = 2e-13
 """Distance from a plane of symmetry (m) up to which OpenSim counts a point as in the plane."""
@@ -56,7 +56,7 @@ def closest_point(radii: Vector, point: Vector) -> Vector:
     inside = (u / a) * (u / a) + (v / b) * (v / b) + (w / c) * (w / c) < 1.0
     t = 0.0 if inside else max(a, b, c) * norm(point)
     for _ in range(STEPS):
-        value, slope = polynomial(t + aa, t + bb, t + cc, aauu, bbvv, ccww)
+        value, slope = evaluate_polynomial(t + aa, t + bb, t + cc, aauu, bbvv, ccww)
         if abs(value) < SMALL:
             t = settled(t, value, slope)
             break
@@ -64,7 +64,7 @@ def closest_point(radii: Vector, point: Vector) -> Vector:
     return aa * u / (t + aa), bb * v / (t + bb), cc * w / (t + cc)
 
 
-def polynomial(
+def evaluate_polynomial(
     P: float, Q: float, R: float, aauu: float, bbvv: float, ccww: float
 ) -> tuple[float, float]:
     """Evaluate the polynomial whose root t gives the closest point (a a u / P, b b v / Q, c c w / R).
@@ -131,7 +131,7 @@ def closest_on_ellipse(a: float, b: float, u: float, v: float) -> tuple[float, f
     return aa * u / (t + aa), bb * v / (t + bb)
 
 
-def fan(radii: Vector, start: Vector, chord: Vector, work: Floats) -> Vector:
+def mean_way_out(radii: Vector, start: Vector, chord: Vector, work: Floats) -> Vector:
     """Return the mean direction of the shortest ways out of an ellipsoid, from points of a chord.
 
     Args:
@@ -150,7 +150,7 @@ def fan(radii: Vector, start: Vector, chord: Vector, work: Floats) -> Vector:
             part = min(first + k, SAMPLES - 2) / SAMPLES
             u, v, w = sx + part * dx, sy + part * dy, sz + part * dz
             aauu, bbvv, ccww = aa * (u * u), bb * (v * v), cc * (w * w)
-            value, slope = polynomial(aa, bb, cc, aauu, bbvv, ccww)
+            value, slope = evaluate_polynomial(aa, bb, cc, aauu, bbvv, ccww)
             work[PART + k], work[MULTIPLIER + k] = (
                 part,
                 -value / slope if abs(value) >= SMALL else 0.0,
@@ -160,7 +160,7 @@ def fan(radii: Vector, start: Vector, chord: Vector, work: Floats) -> Vector:
             going = 0
             for k in range(LANES):
                 t = work[MULTIPLIER + k]
-                value, slope = polynomial(
+                value, slope = evaluate_polynomial(
                     t + aa, t + bb, t + cc, work[X + k], work[Y + k], work[Z + k]
                 )
                 if abs(value) >= SMALL:
@@ -178,7 +178,7 @@ def fan(radii: Vector, start: Vector, chord: Vector, work: Floats) -> Vector:
             inverse = 1.0 / size if size > 0.0 else 0.0
             work[X + k], work[Y + k], work[Z + k] = inverse * x, inverse * y, inverse * z
         for k in range(min(LANES, SAMPLES - 1 - first)):
-            point = along(start, work[PART + k], chord)
+            point = add_scaled(start, work[PART + k], chord)
             blade = work[X + k], work[Y + k], work[Z + k]
             u, v, w = point
             if min(abs(u), abs(v), abs(w)) <= FLAT:

@@ -16,12 +16,12 @@ are omitted from J: iterations converge without them, and W-methods keep their o
 
 from __future__ import annotations
 
-from osimlite.mechanics.kernels.constrained_dynamics import bind
+from osimlite.mechanics.kernels.constrained_dynamics import evaluate_constraints
 from osimlite.mechanics.kernels.dynamics import (
     SMALLEST_PIVOT,
+    add_generalized_forces,
     clear_wrenches,
     composite_rigid_body,
-    generalized_forces,
     spatial_inertias_and_bias,
 )
 from osimlite.mechanics.kernels.layout import (
@@ -49,8 +49,8 @@ from osimlite.mechanics.kernels.points import (
     link_work,
     operation_ints,
     operation_work,
-    screw,
     station,
+    unit_twist,
 )
 from osimlite.mechanics.laws.vectors import (
     ZERO,
@@ -59,9 +59,9 @@ from osimlite.mechanics.laws.vectors import (
     dot,
     minus,
     plus,
-    put,
+    rotate,
+    store_vector,
     times,
-    turned,
     vector,
 )
 
@@ -109,12 +109,12 @@ HEAVY = 1e6
 """Mass that represents a constraint equation, relative to the largest diagonal entry of M."""
 
 
-def condensation_room(size: int, responses: int) -> int:
+def condensation_size(size: int, responses: int) -> int:
     """Return the length of the workspace for `size` speeds and `responses` forces."""
     return RIGHT_AT * size * size + size + responses * (size + RESPONSE_WORK)
 
 
-def linearise(
+def linearise_state(
     model: Ints,
     reals: Floats,
     data: Floats,
@@ -131,7 +131,7 @@ def linearise(
         data: results of an evaluation.
         y: state.
         f: workspace for its rates.
-        work: filled, see `condensation_room`.
+        work: filled, see `condensation_size`.
         is_evaluated: not 0 if the last evaluation was at this state.
 
     Returns:
@@ -144,18 +144,18 @@ def linearise(
     if status != OUTCOME.OK:
         return status
     if model[MODEL.CONSTRAINED] > 0:
-        bind(model, reals, data, y, f)
+        evaluate_constraints(model, reals, data, y, f)
     spatial_inertias_and_bias(model, reals, data)
     composite_rigid_body(model, data, right)
-    masses(model, data, work)
+    fill_mass_matrix(model, data, work)
     stiffness, damping = at(work, STIFFNESS * size * size), at(work, DAMPING * size * size)
     for k in range(size * size):
         stiffness[k] = damping[k] = 0.0
-    turn_levers(model, reals, data, stiffness)
+    add_geometric_stiffness(model, reals, data, stiffness)
     for number in range(model[MODEL.RESPONSES]):
         response, record = (
             at(model, model[MODEL.RESPONSE_AT] + RESPONSE.SIZE * number),
-            known_of(model, work, number),
+            response_record(model, work, number),
         )
         clear_wrenches(model, data)
         for k in range(size):
@@ -169,7 +169,7 @@ def linearise(
             changes = changes or data[WORK.SCRATCH + k] != 0.0
         first, end = size, 0
         if changes:
-            generalized_forces(model, data, right)
+            add_generalized_forces(model, data, right)
         for k in range(size):
             record[k] = right[k]
             if abs(right[k]) > SLIGHT:
@@ -181,21 +181,23 @@ def linearise(
                 record[size],
                 record[size + 1],
             )
-            add_product(size, 1.0, record, first, end, f, 0, size, stiffness)
-            add_product(
+            add_outer_product(size, 1.0, record, first, end, f, 0, size, stiffness)
+            add_outer_product(
                 size, sense * by_displacement, record, first, end, record, first, end, stiffness
             )
-            add_product(size, sense * by_speed, record, first, end, record, first, end, damping)
+            add_outer_product(
+                size, sense * by_speed, record, first, end, record, first, end, damping
+            )
     return OUTCOME.OK
 
 
-def known_of(model: Ints, work: Floats, number: int) -> Floats:
+def response_record(model: Ints, work: Floats, number: int) -> Floats:
     """Return the record of a force in the workspace: its generalized force per newton, then RESPONSE_WORK."""
     size = model[MODEL.DOFS]
     return at(work, RIGHT_AT * size * size + size + number * (size + RESPONSE_WORK))
 
 
-def masses(model: Ints, data: Floats, mass: Floats) -> None:
+def fill_mass_matrix(model: Ints, data: Floats, mass: Floats) -> None:
     """Fill the mass matrix (n, n), with heavy masses along the constraint equations."""
     size, freedoms, largest = model[MODEL.DOFS], at(model, model[MODEL.DOF_AT]), 0.0
     for k in range(size * size):
@@ -214,10 +216,10 @@ def masses(model: Ints, data: Floats, mass: Floats) -> None:
             for k in range(size):
                 square += row[k] * row[k]
             if square > 0.0:
-                add_product(size, HEAVY * largest / square, row, 0, size, row, 0, size, mass)
+                add_outer_product(size, HEAVY * largest / square, row, 0, size, row, 0, size, mass)
 
 
-def turn_levers(model: Ints, reals: Floats, data: Floats, levers: Floats) -> None:
+def add_geometric_stiffness(model: Ints, reals: Floats, data: Floats, levers: Floats) -> None:
     """Add the geometric stiffness of weights and contacts to a matrix (n, n).
 
     It is the change of their generalized forces as coordinates move the points of application. The
@@ -253,9 +255,9 @@ def turn_levers(model: Ints, reals: Floats, data: Floats, levers: Floats) -> Non
             j = operation_ints(model, operation)
             if j[OPERATION.DOF] < 0 or j[OPERATION.MOTION] >= MOTION.BALL:
                 continue
-            turn, shift = screw(j, operation_work(model, data, operation), origin)
+            turn, shift = unit_twist(j, operation_work(model, data, operation), origin)
             moved = minus(cross(shift, vector(load, 0)), times(load[3] + load[7] + load[11], turn))
-            moved, inner, within = plus(moved, turned(at(load, 3), turn)), operation, link
+            moved, inner, within = plus(moved, rotate(at(load, 3), turn)), operation, link
             while within >= 0:
                 other = operation_ints(model, inner)
                 if other[OPERATION.DOF] >= 0 and other[OPERATION.MOTION] == MOTION.TURN:
@@ -291,16 +293,16 @@ def add_load(
     if link >= 0:
         here = link_work(model, data, link)
         load, arm = at(here, LINK_WORK.INERTIA), minus(point, vector(here, LINK_WORK.ORIGIN))
-        put(load, 0, plus(vector(load, 0), force))
+        store_vector(load, 0, plus(vector(load, 0), force))
         for k in range(3):
-            put(
+            store_vector(
                 load,
                 3 + 3 * k,
                 plus(vector(load, 3 + 3 * k), plus(times(arm[k], force), times(force[k], offset))),
             )
 
 
-def add_product(
+def add_outer_product(
     size: int,
     factor: float,
     a: Floats,
@@ -331,7 +333,7 @@ def add_product(
                 target[k] += scaled * b[k]
 
 
-def condense(model: Ints, c: float, work: Floats) -> bool:
+def condense_system(model: Ints, c: float, work: Floats) -> bool:
     """Eliminate all but the speeds from 1 - c J and factorise the rest; return whether it is regular."""
     size = model[MODEL.DOFS]
     system, levers = at(work, SYSTEM * size * size), at(work, LEVERS * size * size)
@@ -342,7 +344,7 @@ def condense(model: Ints, c: float, work: Floats) -> bool:
     for number in range(model[MODEL.RESPONSES]):
         response, record = (
             at(model, model[MODEL.RESPONSE_AT] + RESPONSE.SIZE * number),
-            known_of(model, work, number),
+            response_record(model, work, number),
         )
         count, a = response[RESPONSE.STATES], at(record, size)
         states = at(model, response[RESPONSE.ITEM] + response[RESPONSE.FIRST_STATE])
@@ -356,7 +358,7 @@ def condense(model: Ints, c: float, work: Floats) -> bool:
             for k in range(count):
                 own = c * rates[2 + k] if has_state and states[k] >= 0 else 0.0
                 inverse[count * i + k] = (1.0 if i == k else 0.0) - own
-        invert(count, inverse)
+        invert_matrix(count, inverse)
         by_speed = by_displacement = 0.0
         for i in range(count):
             gains[i] = pulls[i] = 0.0
@@ -369,12 +371,16 @@ def condense(model: Ints, c: float, work: Floats) -> bool:
                 by_speed += a[2 + i] * gains[i]
                 by_displacement += c * pulls[i] * a[WIDTH * (1 + i)]
         first, end, sense = int(a[FIRST]), int(a[END]), response[RESPONSE.SENSE]
-        add_product(size, -c * sense * by_speed, record, first, end, record, first, end, system)
-        add_product(size, sense * by_displacement, record, first, end, record, first, end, levers)
-    return eliminate(size, system, work)
+        add_outer_product(
+            size, -c * sense * by_speed, record, first, end, record, first, end, system
+        )
+        add_outer_product(
+            size, sense * by_displacement, record, first, end, record, first, end, levers
+        )
+    return factorise_matrix(size, system, work)
 
 
-def eliminate(size: int, a: Floats, masses: Floats) -> bool:
+def factorise_matrix(size: int, a: Floats, masses: Floats) -> bool:
     """Factorise a matrix (size, size) in place by Gaussian elimination without pivoting.
 
     Returns:
@@ -395,16 +401,16 @@ def eliminate(size: int, a: Floats, masses: Floats) -> bool:
     return True
 
 
-def substitute(size: int, a: Floats, x: Floats) -> None:
+def solve_factorised(size: int, a: Floats, x: Floats) -> None:
     """Solve a linear system in place with the factors of `factorise_matrix`."""
     for i in range(size):
-        x[i] -= product(0, i, at(a, size * i), x)
+        x[i] -= dot_range(0, i, at(a, size * i), x)
     for i in range(size - 1, -1, -1):
         row = at(a, size * i)
-        x[i] = (x[i] - product(i + 1, size, row, x)) * row[i]
+        x[i] = (x[i] - dot_range(i + 1, size, row, x)) * row[i]
 
 
-def invert(size: int, a: Floats) -> None:
+def invert_matrix(size: int, a: Floats) -> None:
     """Invert a small matrix (size, size) in place."""
     for i in range(size):
         pivot = 1.0 / a[size * i + i]
@@ -419,7 +425,7 @@ def invert(size: int, a: Floats) -> None:
                     a[size * j + k] -= factor * a[size * i + k]
 
 
-def correct(model: Ints, c: float, work: Floats, d: Floats) -> None:
+def solve_condensed(model: Ints, c: float, work: Floats, d: Floats) -> None:
     """Solve (1 - c J) d = r in place, after `condense_system` with the same c."""
     size = model[MODEL.DOFS]
     du, system, right = (
@@ -435,7 +441,7 @@ def correct(model: Ints, c: float, work: Floats, d: Floats) -> None:
     for number in range(model[MODEL.RESPONSES]):
         response, record = (
             at(model, model[MODEL.RESPONSE_AT] + RESPONSE.SIZE * number),
-            known_of(model, work, number),
+            response_record(model, work, number),
         )
         states, a, force = (
             at(model, response[RESPONSE.ITEM] + response[RESPONSE.FIRST_STATE]),
@@ -448,26 +454,26 @@ def correct(model: Ints, c: float, work: Floats, d: Floats) -> None:
         if force != 0.0:
             for k in range(int(a[FIRST]), int(a[END])):
                 right[k] += force * record[k]
-    substitute(size, system, right)
+    solve_factorised(size, system, right)
     for number in range(model[MODEL.RESPONSES]):
         response, record = (
             at(model, model[MODEL.RESPONSE_AT] + RESPONSE.SIZE * number),
-            known_of(model, work, number),
+            response_record(model, work, number),
         )
         count, a = response[RESPONSE.STATES], at(record, size)
         states = at(model, response[RESPONSE.ITEM] + response[RESPONSE.FIRST_STATE])
         if count == 0:
             continue
         first, end = int(a[FIRST]), int(a[END])
-        displacement = response[RESPONSE.SENSE] * product(first, end, record, d)
-        speed = response[RESPONSE.SENSE] * product(first, end, record, right)
+        displacement = response[RESPONSE.SENSE] * dot_range(first, end, record, d)
+        speed = response[RESPONSE.SENSE] * dot_range(first, end, record, right)
         for i in range(count):
             a[RIGHT + i] = (
                 d[states[i]] + c * a[WIDTH * (1 + i)] * displacement if states[i] >= 0 else 0.0
             )
         for i in range(count):
             if states[i] >= 0:
-                d[states[i]] = a[GAINS + i] * speed + product(
+                d[states[i]] = a[GAINS + i] * speed + dot_range(
                     0, count, at(a, INVERSE + count * i), at(a, RIGHT)
                 )
     for k in range(size):
@@ -475,7 +481,7 @@ def correct(model: Ints, c: float, work: Floats, d: Floats) -> None:
         d[k] += c * right[k]
 
 
-def product(first: int, end: int, a: Floats, b: Floats) -> float:
+def dot_range(first: int, end: int, a: Floats, b: Floats) -> float:
     """Return the scalar product of the entries `first` to `end` of two vectors."""
     total = 0.0
     for k in range(first, end):

@@ -42,14 +42,16 @@ def amount_by_arc(
     a = (y[one] if one >= 0 else p[0]) + table[NEUTRAL]
     b = (y[two] if two >= 0 else p[1]) + table[NEUTRAL + 1]
     ua, ub = u[one] if one >= 0 else 0.0, u[two] if two >= 0 else 0.0
-    value, da, db, daa, dab, dbb = arc_at(table, a, b)
+    value, da, db, daa, dab, dbb = evaluate_arc(table, a, b)
     data[j[OPERATION.GRADIENT]], data[j[OPERATION.GRADIENT] + 1] = da, db
     kept[OPERATION_WORK.AMOUNT], kept[OPERATION_WORK.RATE] = value, da * ua + db * ub
     kept[OPERATION_WORK.CURVATURE] = daa * ua * ua + 2.0 * dab * ua * ub + dbb * ub * ub
     return OUTCOME.OK
 
 
-def arc_at(table: Floats, a: float, b: float) -> tuple[float, float, float, float, float, float]:
+def evaluate_arc(
+    table: Floats, a: float, b: float
+) -> tuple[float, float, float, float, float, float]:
     """Return a component of the end position, and its derivatives by the two angles.
 
     Args:
@@ -64,7 +66,7 @@ def arc_at(table: Floats, a: float, b: float) -> tuple[float, float, float, floa
     # The cosine of the whole angle, with its derivatives by the two.
     c, ga, gb, haa, hab, hbb = ca * cb, -sa * cb, -ca * sb, -ca * cb, sa * sb, -ca * cb
     component = int(table[COMPONENT])
-    share, first, second = along_the_arc(table, c) if component == 1 else across_the_arc(table, c)
+    share, first, second = axial_ratio(table, c) if component == 1 else transverse_ratio(table, c)
     oaa, oab, obb = (
         first * haa + second * ga * ga,
         first * hab + second * ga * gb,
@@ -85,29 +87,29 @@ def arc_at(table: Floats, a: float, b: float) -> tuple[float, float, float, floa
     return size * v * share, da, db, daa, dab, dbb
 
 
-def along_the_arc(table: Floats, cosine: float) -> tuple[float, float, float]:
+def axial_ratio(table: Floats, cosine: float) -> tuple[float, float, float]:
     """Return (sin θ) / θ and its first and second derivative by cos θ.
 
     Returns:
         Value, first and second derivative.
     """
     square = angle_squared(cosine)
-    h, h1, h2 = series(at(table, SERIES), int(table[TERMS]), square)
-    return by_cosine(h, h1, h2, h, h1)
+    h, h1, h2 = evaluate_series(at(table, SERIES), int(table[TERMS]), square)
+    return differentiate_by_cosine(h, h1, h2, h, h1)
 
 
-def across_the_arc(table: Floats, cosine: float) -> tuple[float, float, float]:
+def transverse_ratio(table: Floats, cosine: float) -> tuple[float, float, float]:
     """Return (1 - cos θ) / (θ sin θ) and its first and second derivative by cos θ.
 
     Returns:
         Value, first and second derivative.
     """
     square, count = angle_squared(cosine), int(table[TERMS])
-    h, h1, h2 = series(at(table, SERIES), count, square)
-    m, m1, m2 = series(at(table, SERIES + count), count, square)
+    h, h1, h2 = evaluate_series(at(table, SERIES), count, square)
+    m, m1, m2 = evaluate_series(at(table, SERIES + count), count, square)
     k, k1 = 1.0 / h, -h1 / (h * h)
     k2 = 2.0 * h1 * h1 / (h * h * h) - h2 / (h * h)
-    return by_cosine(m * k, m1 * k + m * k1, m2 * k + 2.0 * m1 * k1 + m * k2, h, h1)
+    return differentiate_by_cosine(m * k, m1 * k + m * k1, m2 * k + 2.0 * m1 * k1 + m * k2, h, h1)
 
 
 def angle_squared(cosine: float) -> float:
@@ -116,7 +118,7 @@ def angle_squared(cosine: float) -> float:
     return angle * angle
 
 
-def series(terms: Floats, count: int, square: float) -> tuple[float, float, float]:
+def evaluate_series(terms: Floats, count: int, square: float) -> tuple[float, float, float]:
     """Evaluate a polynomial by Horner's rule.
 
     Args:
@@ -135,7 +137,7 @@ def series(terms: Floats, count: int, square: float) -> tuple[float, float, floa
     return value, slope, 2.0 * bend
 
 
-def by_cosine(
+def differentiate_by_cosine(
     value: float, first: float, second: float, h: float, h1: float
 ) -> tuple[float, float, float]:
     """Convert derivatives by θ² to derivatives by c = cos θ, using d(θ²)/dc = -2 θ / sin θ = -2 / h.

@@ -9,16 +9,16 @@ from __future__ import annotations
 
 from math import sqrt
 
-from osimlite.mechanics.kernels.dynamics import SMALLEST_PIVOT, solve
+from osimlite.mechanics.kernels.dynamics import SMALLEST_PIVOT, solve_accelerations
 from osimlite.mechanics.kernels.layout import CONSTRAINED, DOF, ITEM, MODEL, OUTCOME
 from osimlite.mechanics.kernels.linear_algebra import (
     REDUNDANT,
     ROUNDING,
     apply_q,
-    cholesky,
-    factored,
-    solved,
-    substitute,
+    factorise_by_law,
+    factorise_cholesky,
+    solve_by_law,
+    solve_cholesky,
 )
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call
 from osimlite.mechanics.laws.dual_numbers import is_nothing
@@ -51,7 +51,7 @@ def constrained_dynamics(
     """
     h, size = at(model, model[MODEL.CONSTRAINED]), model[MODEL.DOFS]
     right = at(f, size)
-    bind(model, reals, data, y, f)
+    evaluate_constraints(model, reals, data, y, f)
     # Of the mass matrix and the forces, nothing is left when they have been solved for.
     system, matrix = (
         at(data, h[CONSTRAINED.WORK_SYSTEM]),
@@ -62,12 +62,14 @@ def constrained_dynamics(
     forces = at(system, h[CONSTRAINED.ENTRIES])
     for k in range(size):
         forces[k] = right[k]
-    if solve(model, data, right) < 0 and by_multipliers(model, data, right, at(forces, size)):
+    if solve_accelerations(model, data, right) < 0 and solve_by_multipliers(
+        model, data, right, at(forces, size)
+    ):
         return OUTCOME.OK
-    return by_directions(model, data, system, forces, right, at(forces, size))
+    return solve_in_null_space(model, data, system, forces, right, at(forces, size))
 
 
-def bind(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) -> None:
+def evaluate_constraints(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) -> None:
     """Evaluate all constraint equations: G, errors, and the required values of G u and G udot.
 
     Args:
@@ -88,7 +90,7 @@ def bind(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) -> None
         call(model[MODEL.LAWS + model[constraint + ITEM.LAW]], model, reals, data, y, f, constraint)
 
 
-def by_multipliers(model: Ints, data: Floats, right: Floats, room: Floats) -> bool:
+def solve_by_multipliers(model: Ints, data: Floats, right: Floats, room: Floats) -> bool:
     """Correct unconstrained accelerations by constraint forces, if M is well conditioned.
 
     With M = Uᵀ D U, the equations G U⁻¹ D^(-1/2) x = b - G udot have the shortest solution x, and
@@ -131,10 +133,10 @@ def by_multipliers(model: Ints, data: Floats, right: Floats, room: Floats) -> bo
             longest = max(longest, abs(row[k]))
         for k in range(size):
             turned[k] = row[k] if longest > ROUNDING else 0.0
-        toward_ground(model, data, turned)
+        solve_transposed_factor(model, data, turned)
         for k in range(size):
             turned[k] *= scales[k]
-    factored(model, data, count, weighted, SLIGHT * sqrt(count))
+    factorise_by_law(model, data, count, weighted, SLIGHT * sqrt(count))
     # The second time mends the rounding of the first.
     for _ in range(2):
         for i in range(count):
@@ -142,16 +144,16 @@ def by_multipliers(model: Ints, data: Floats, right: Floats, room: Floats) -> bo
             for k in range(size):
                 missing -= row[k] * right[k]
             values[i] = missing
-        solved(model, count, weighted, values, spare, push)
+        solve_by_law(model, count, weighted, values, spare, push)
         for k in range(size):
             push[k] *= scales[k]
-        away_from_ground(model, data, push)
+        solve_factor(model, data, push)
         for k in range(size):
             right[k] += push[k]
     return True
 
 
-def toward_ground(model: Ints, data: Floats, right: Floats) -> None:
+def solve_transposed_factor(model: Ints, data: Floats, right: Floats) -> None:
     """Solve Uᵀ x = b in place with the factor that `solve_accelerations` left."""
     freedoms = at(model, model[MODEL.DOF_AT])
     for k in range(model[MODEL.DOFS] - 1, -1, -1):
@@ -164,7 +166,7 @@ def toward_ground(model: Ints, data: Floats, right: Floats) -> None:
             i = freedoms[DOF.SIZE * i + DOF.ABOVE]
 
 
-def away_from_ground(model: Ints, data: Floats, right: Floats) -> None:
+def solve_factor(model: Ints, data: Floats, right: Floats) -> None:
     """Solve U x = b in place with the factor that `solve_accelerations` left."""
     freedoms = at(model, model[MODEL.DOF_AT])
     for k in range(model[MODEL.DOFS]):
@@ -176,7 +178,7 @@ def away_from_ground(model: Ints, data: Floats, right: Floats) -> None:
         right[k] = total
 
 
-def by_directions(
+def solve_in_null_space(
     model: Ints, data: Floats, matrix: Floats, forces: Floats, right: Floats, room: Floats
 ) -> int:
     """Compute the accelerations in the null space of the constraint equations.
@@ -213,16 +215,16 @@ def by_directions(
         values[i] = scale * drifts[i]
         for k in range(size):
             equations[size * i + k] = scale * rows[size * i + k]
-    rank = factored(model, data, count, equations, REDUNDANT)
+    rank = factorise_by_law(model, data, count, equations, REDUNDANT)
     free = size - rank
-    solved(model, count, equations, values, spare, right)
+    solve_by_law(model, count, equations, values, spare, right)
     pushed, reduced, basis = (
         at(spare, count),
         at(spare, count + 2 * size),
         at(spare, count + 2 * size + size * size),
     )
     rest = at(pushed, size)
-    times_mass(model, matrix, right, pushed)
+    multiply_mass(model, matrix, right, pushed)
     for k in range(size):
         forces[k] -= pushed[k]
     for j in range(free):
@@ -230,7 +232,7 @@ def by_directions(
         for k in range(size):
             direction[k] = 1.0 if k == rank + j else 0.0
         apply_q(size, equations, rank, direction)
-        times_mass(model, matrix, direction, pushed)
+        multiply_mass(model, matrix, direction, pushed)
         for i in range(j + 1):
             total = 0.0
             for k in range(size):
@@ -240,16 +242,16 @@ def by_directions(
         for k in range(size):
             total += direction[k] * forces[k]
         rest[j] = total
-    if not cholesky(free, reduced, SMALLEST_PIVOT):
+    if not factorise_cholesky(free, reduced, SMALLEST_PIVOT):
         return OUTCOME.SINGULAR_MASS
-    substitute(free, reduced, rest)
+    solve_cholesky(free, reduced, rest)
     for j in range(free):
         for k in range(size):
             right[k] += rest[j] * basis[size * j + k]
     return OUTCOME.OK
 
 
-def times_mass(model: Ints, matrix: Floats, u: Floats, product: Floats) -> None:
+def multiply_mass(model: Ints, matrix: Floats, u: Floats, product: Floats) -> None:
     """Multiply a vector by the mass matrix, whose sparse rows are stored one after the other."""
     size, freedoms, start = model[MODEL.DOFS], at(model, model[MODEL.DOF_AT]), 0
     for k in range(size):

@@ -8,8 +8,8 @@ speeds equals the generalized force of a unit force along it (principle of virtu
 
 from __future__ import annotations
 
-from osimlite.mechanics.kernels.ball_joint import angle_drift, angle_row
-from osimlite.mechanics.kernels.functions import MONOMIALS, several_at, value_at
+from osimlite.mechanics.kernels.ball_joint import angle_acceleration_bias, angle_rate_row
+from osimlite.mechanics.kernels.functions import MONOMIALS, evaluate_function, evaluate_monomials
 from osimlite.mechanics.kernels.layout import (
     CONSTRAINED,
     CONSTRAINT,
@@ -36,10 +36,10 @@ from osimlite.mechanics.laws.vectors import (
     ZERO,
     Vector,
     cross,
+    divide,
     dot,
     minus,
     norm,
-    over,
     plus,
     times,
     vector,
@@ -71,7 +71,7 @@ def prescribe(
     """Fill in the equation of a coordinate that follows a function of time."""
     i, h = at(model, constraint), at(model, model[MODEL.CONSTRAINED])
     row, own = i[CONSTRAINT.FIRST_EQUATION], at(i, CONSTRAINT.OWN)
-    value, slope, curvature = value_at(at(reals, i[CONSTRAINT.NUMBERS]), data[WORK.TIME])
+    value, slope, curvature = evaluate_function(at(reals, i[CONSTRAINT.NUMBERS]), data[WORK.TIME])
     data[h[CONSTRAINED.WORK_ERRORS] + row] = y[own[0]] - value
     data[h[CONSTRAINED.WORK_RATES] + row] = slope
     bias = add_coordinate(
@@ -98,13 +98,13 @@ def couple(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, const
     size, freedoms = own[COORDINATE.SIZE + 1], at(own, COORDINATE.SIZE + 2)
     others, gradient, constants = at(freedoms, size), at(data, own[COORDINATE.SIZE]), at(p, 1)
     if int(constants[size]) >= MONOMIALS:
-        value, _, curvature = several_at(size, freedoms, constants, y, f, gradient)
+        value, _, curvature = evaluate_monomials(size, freedoms, constants, y, f, gradient)
     else:
         argument = rate = 0.0
         if size > 0:
             argument = y[freedoms[0]] if freedoms[0] >= 0 else constants[0]
             rate = f[freedoms[0]] if freedoms[0] >= 0 else 0.0
-        value, slope, bend = value_at(at(constants, size), argument)
+        value, slope, bend = evaluate_function(at(constants, size), argument)
         curvature = bend * rate * rate
         gradient[0] = slope
     to = at(data, h[CONSTRAINED.WORK_ROWS] + model[MODEL.DOFS] * row)
@@ -139,12 +139,12 @@ def add_coordinate(
         row[freedom] += factor
         return 0.0
     angles = at(model, ball)
-    n = angle_row(y, angles, coordinate[COORDINATE.PART])
+    n = angle_rate_row(y, angles, coordinate[COORDINATE.PART])
     one, two, three = n
     row[angles[0]] += factor * one
     row[angles[1]] += factor * two
     row[angles[2]] += factor * three
-    return factor * angle_drift(y, f, angles, n)
+    return factor * angle_acceleration_bias(y, f, angles, n)
 
 
 def bind_bodies(
@@ -160,28 +160,28 @@ def bind_bodies(
         )
         one, two, wanted = at(own, 1), at(own, 1 + VECTOR_INTS), p[12]
         to = at(data, h[CONSTRAINED.WORK_ROWS] + size * row)
-        a, a_rate, a_bias = follow(model, reals, data, one, p)
-        b, b_rate, b_bias = follow(model, reals, data, two, at(p, 6))
+        a, a_rate, a_bias = differentiate_vector(model, reals, data, one, p)
+        b, b_rate, b_bias = differentiate_vector(model, reals, data, two, at(p, 6))
         error = drift = 0.0
         if own[0] == PRODUCT:
             error = dot(a, b) - wanted
             drift = dot(a, b_bias) + dot(b, a_bias) + 2.0 * dot(a_rate, b_rate)
-            lean(model, data, one, p, b, to)
-            lean(model, data, two, at(p, 6), a, to)
+            add_vector_row(model, data, one, p, b, to)
+            add_vector_row(model, data, two, at(p, 6), a, to)
         elif own[0] == DISTANCE:
             length = norm(b)
             error = length - wanted
             # No direction is better than another to leave a point in.
             e, stretch = (1.0, 0.0, 0.0), 0.0
             if length > 0.0:
-                e = over(b, length)
+                e = divide(b, length)
                 stretch = (dot(b_rate, b_rate) - dot(e, b_rate) ** 2) / length
             drift = dot(e, b_bias) + stretch
-            lean(model, data, two, at(p, 6), e, to)
+            add_vector_row(model, data, two, at(p, 6), e, to)
         else:
             surface, roller, point = two[1], two[2], station(model, data, two[1], vector(p, 6))
-            add_force(model, data, surface, point, times(-1.0, a), to)
-            add_force(model, data, roller, point, a, to)
+            add_force_row(model, data, surface, point, times(-1.0, a), to)
+            add_force_row(model, data, roller, point, a, to)
             turning, turning_bias = (
                 angular_velocity(model, data, roller),
                 angular_acceleration_bias(model, data, roller),
@@ -195,7 +195,7 @@ def bind_bodies(
     return OUTCOME.OK
 
 
-def follow(
+def differentiate_vector(
     model: Ints, reals: Floats, data: Floats, kind: Ints, p: Floats
 ) -> tuple[Vector, Vector, Vector]:
     """Compute a vector, its rate, and its second derivative while udot = 0.
@@ -241,7 +241,9 @@ def follow(
     return arm, rate, bias
 
 
-def lean(model: Ints, data: Floats, kind: Ints, p: Floats, on: Vector, row: Floats) -> None:
+def add_vector_row(
+    model: Ints, data: Floats, kind: Ints, p: Floats, on: Vector, row: Floats
+) -> None:
     """Add to a row the derivative by the speeds of a vector's rate along a direction.
 
     Args:
@@ -254,27 +256,27 @@ def lean(model: Ints, data: Floats, kind: Ints, p: Floats, on: Vector, row: Floa
     """
     one, two = kind[1], kind[2]
     if kind[0] == AXIS:
-        add_wrench(
+        add_wrench_row(
             model, data, one, cross(direction(model, data, one, vector(p, 0)), on), ZERO, row
         )
         return
     start, end = station(model, data, one, vector(p, 0)), station(model, data, two, vector(p, 3))
     if kind[0] == MEETING:
         start = end
-    add_force(model, data, one, start, times(-1.0, on), row)
-    add_force(model, data, two, end, on, row)
+    add_force_row(model, data, one, start, times(-1.0, on), row)
+    add_force_row(model, data, two, end, on, row)
 
 
-def add_force(
+def add_force_row(
     model: Ints, data: Floats, link: int, point: Vector, force: Vector, row: Floats
 ) -> None:
     """Add to a row the generalized forces of a force on a link at a point of ground."""
     if link >= 0:
         arm = minus(point, vector(link_work(model, data, link), LINK_WORK.ORIGIN))
-        add_wrench(model, data, link, cross(arm, force), force, row)
+        add_wrench_row(model, data, link, cross(arm, force), force, row)
 
 
-def add_wrench(
+def add_wrench_row(
     model: Ints, data: Floats, link: int, torque: Vector, force: Vector, row: Floats
 ) -> None:
     """Add to a row the generalized forces of a wrench on a link about the origin of its spatial vectors."""

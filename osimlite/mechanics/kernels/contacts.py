@@ -29,8 +29,8 @@ from osimlite.mechanics.kernels.points import (
     link_work,
     operation_ints,
     operation_work,
-    screw,
     station,
+    unit_twist,
     velocity,
 )
 from osimlite.mechanics.laws.hunt_crossley import (
@@ -43,13 +43,13 @@ from osimlite.mechanics.laws.smooth_contact import smooth_contact_derivatives
 from osimlite.mechanics.laws.vectors import (
     ZERO,
     Vector,
-    along,
+    add_scaled,
     cross,
+    divide,
     dot,
     minus,
-    over,
     plus,
-    put,
+    store_vector,
     times,
     vector,
 )
@@ -64,21 +64,21 @@ def touch_half_space(
     model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int
 ) -> int:
     """Apply the contact force of a sphere on a half space."""
-    d, radius, n, point = on_half_space(model, reals, data, item)
+    d, radius, n, point = measure_half_space(model, reals, data, item)
     if d > 0.0:
-        press(model, reals, data, item, d, radius, n, point)
+        apply_contact_force(model, reals, data, item, d, radius, n, point)
     return OUTCOME.OK
 
 
 def touch_spheres(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
     """Apply the contact force of two spheres."""
-    d, radius, n, point = on_sphere(model, reals, data, item)
+    d, radius, n, point = measure_spheres(model, reals, data, item)
     if d > 0.0:
-        press(model, reals, data, item, d, radius, n, point)
+        apply_contact_force(model, reals, data, item, d, radius, n, point)
     return OUTCOME.OK
 
 
-def on_half_space(
+def measure_half_space(
     model: Ints, reals: Floats, data: Floats, item: int
 ) -> tuple[float, float, Vector, Vector]:
     """Compute the contact geometry of a sphere on a half space.
@@ -93,7 +93,7 @@ def on_half_space(
     return d, p[10], n, point
 
 
-def on_sphere(
+def measure_spheres(
     model: Ints, reals: Floats, data: Floats, item: int
 ) -> tuple[float, float, Vector, Vector]:
     """Compute the contact geometry of two spheres.
@@ -124,9 +124,9 @@ def contact_response(
     for k in range(INVERSE):
         change[k] = 0.0
     d, radius, n, point = (
-        on_half_space(model, reals, data, pair)
+        measure_half_space(model, reals, data, pair)
         if i[ITEM.OWN + 2] > 0
-        else on_sphere(model, reals, data, pair)
+        else measure_spheres(model, reals, data, pair)
     )
     if d > 0.0:
         one, two, p = (
@@ -137,7 +137,7 @@ def contact_response(
         v = minus(velocity(model, data, one, point), velocity(model, data, two, point))
         changes = contact_derivatives(d, radius, p[11], p[13], p[14], p[15], p[16], p[17], n, v)
         center = station(model, data, two, vector(p, CENTER))
-        respond(
+        write_response(
             model, data, y, f, one, two, axis, point, center, n, v, 1.0 - p[12], changes, 1.5 / d
         )
     return OUTCOME.OK
@@ -163,14 +163,14 @@ def smooth_contact_response(
         station(model, data, g[1], vector(place, 6)),
     )
     d = place[9] - dot(minus(center, station(model, data, g[0], vector(place, 0))), n)
-    point = along(center, 0.5 * d - place[9], n)
+    point = add_scaled(center, 0.5 * d - place[9], n)
     v = minus(velocity(model, data, g[0], point), velocity(model, data, g[1], point))
     pressed, damped, dragged, growth = smooth_contact_derivatives(
         d, place[9], p[0], p[1], p[2], p[3], p[4], p[5], p[6], p[7], p[8], n, v
     )
     if growth != 0.0:
         changes = pressed, damped, dragged
-        respond(
+        write_response(
             model,
             data,
             y,
@@ -189,7 +189,7 @@ def smooth_contact_response(
     return OUTCOME.OK
 
 
-def respond(
+def write_response(
     model: Ints,
     data: Floats,
     y: Floats,
@@ -228,9 +228,9 @@ def respond(
     if axis > 0:
         # Any two directions across the normal do.
         nx, ny, nz = n
-        way = over(cross(n, (1.0, 0.0, 0.0)), sqrt(ny * ny + nz * nz))
+        way = divide(cross(n, (1.0, 0.0, 0.0)), sqrt(ny * ny + nz * nz))
         if abs(nx) > 0.7:
-            way = over(cross(n, (0.0, 1.0, 0.0)), sqrt(nx * nx + nz * nz))
+            way = divide(cross(n, (0.0, 1.0, 0.0)), sqrt(nx * nx + nz * nz))
         if axis > 1:
             way = cross(n, way)
         change[1], by_depth = -dragged, -growth * dragged * dot(v, way)
@@ -238,7 +238,7 @@ def respond(
         change[0], change[1] = -pressed, -damped
     apply_force(model, data, two, point, way)
     apply_force(model, data, one, point, times(-1.0, way))
-    turns(
+    add_rotation_terms(
         model,
         data,
         y,
@@ -251,7 +251,7 @@ def respond(
         times(by_depth, n),
         times(change[1], way),
     )
-    turns(
+    add_rotation_terms(
         model,
         data,
         y,
@@ -266,7 +266,7 @@ def respond(
     )
 
 
-def turns(
+def add_rotation_terms(
     model: Ints,
     data: Floats,
     y: Floats,
@@ -307,7 +307,7 @@ def turns(
             j, a = operation_ints(model, operation), operation_work(model, data, operation)
             if j[OPERATION.MOTION] >= MOTION.BALL:
                 continue
-            turn, shift = screw(j, a, origin)
+            turn, shift = unit_twist(j, a, origin)
             rate = a[OPERATION_WORK.RATE]
             if j[OPERATION.DOF] >= 0:
                 moved = plus(shift, cross(turn, minus(center, origin)))
@@ -319,11 +319,11 @@ def turns(
                 placed = dot(by_place, plus(shift, cross(turn, arm)))
                 row[j[OPERATION.DOF]] += placed + dot(by_motion, plus(swept, cross(spin, moved)))
                 rate = y[model[MODEL.DOFS] + j[OPERATION.DOF]]
-            turning, shifting = along(turning, rate, turn), along(shifting, rate, shift)
+            turning, shifting = add_scaled(turning, rate, turn), add_scaled(shifting, rate, shift)
         link = i[LINK.PARENT]
 
 
-def press(
+def apply_contact_force(
     model: Ints,
     reals: Floats,
     data: Floats,
@@ -354,8 +354,8 @@ def press(
     )
     v = minus(velocity(model, data, one, point), velocity(model, data, two, point))
     force = contact_force(d, radius, p[11], p[13], p[14], p[15], p[16], p[17], n, v)
-    put(result, 0, force)
-    put(result, 3, point)
+    store_vector(result, 0, force)
+    store_vector(result, 3, point)
     result[6], result[7] = d, radius
     apply_force(model, data, two, point, force)
     apply_force(model, data, one, point, times(-1.0, force))
@@ -396,7 +396,7 @@ def contact_places(
                 at(positions, 9 * (pairs * k + pair)),
             )
             a, one, two = at(x, i[ITEM.NUMBERS]), i[ITEM.OWN], i[ITEM.OWN + 1]
-            put(to, 0, station(model, data, one, vector(a, 0)))
-            put(to, 3, direction(model, data, one, vector(a, 3)))
-            put(to, 6, station(model, data, two, vector(a, 7)))
+            store_vector(to, 0, station(model, data, one, vector(a, 0)))
+            store_vector(to, 3, direction(model, data, one, vector(a, 3)))
+            store_vector(to, 6, station(model, data, two, vector(a, 7)))
     return OUTCOME.OK

@@ -11,7 +11,7 @@ from math import cos, pi, sin
 
 from osimlite.mechanics.kernels.layout import Record
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at
-from osimlite.mechanics.kernels.sensors import SENSED, SENSES, foot
+from osimlite.mechanics.kernels.sensors import SENSED, SENSES, foot_position
 
 GAIT = 0
 """Kind of criterion: steps of a gait."""
@@ -120,7 +120,7 @@ def begin_criteria(senses: Ints, i: Ints, row: Floats, room: Floats) -> None:
         criterion = at(i, 1 + CRITERION.SIZE * number)
         noted, centre = at(room, criterion[CRITERION.ROOM]), senses[SENSES.CENTRE]
         if criterion[CRITERION.KIND] == GAIT:
-            noted[GAIT_NOTED.BEFORE] = noted[GAIT_NOTED.HERE] = distance(senses, row)
+            noted[GAIT_NOTED.BEFORE] = noted[GAIT_NOTED.HERE] = walked_distance(senses, row)
             noted[GAIT_NOTED.HEIGHT] = row[centre + 1]
             noted[GAIT_NOTED.FALLEN] = noted[GAIT_NOTED.COUNT] = 0.0
             noted[GAIT_NOTED.TOUCHES] = noted[GAIT_NOTED.TOUCHES + 1] = -1.0
@@ -134,7 +134,7 @@ def begin_criteria(senses: Ints, i: Ints, row: Floats, room: Floats) -> None:
             noted[NOTED.START] = noted[NOTED.HERE] = row[centre]
 
 
-def judged(
+def update_criteria(
     senses: Ints, known: Floats, i: Ints, p: Floats, t: float, row: Floats, u: Floats, room: Floats
 ) -> bool:
     """Update all criteria; return whether the walker has fallen, or its jump has ended.
@@ -164,21 +164,21 @@ def judged(
             has_fallen = has_fallen or noted[JUMP_NOTED.ENDED] > 0.0
             continue
         if criterion[CRITERION.KIND] == WANG:
-            value = wang(senses, known, numbers, row, u)
+            value = metabolic_power(senses, known, numbers, row, u)
         elif criterion[CRITERION.KIND] >= POWERS:
-            value = effort(
+            value = muscle_effort(
                 senses, known, criterion[CRITERION.KIND], criterion[CRITERION.PLACE], row
             )
         else:
-            value = penalty(
+            value = range_penalty(
                 senses, criterion[CRITERION.KIND], criterion[CRITERION.PLACE], numbers, row
             )
         noted[NOTED.HERE] = row[senses[SENSES.CENTRE]]
-        add(noted, t, value)
+        add_sample(noted, t, value)
     return has_fallen
 
 
-def add(noted: Floats, t: float, value: float) -> None:
+def add_sample(noted: Floats, t: float, value: float) -> None:
     """Add a sample of a value to its integral by the trapezoidal rule, and to its extremes."""
     if noted[NOTED.BEGUN] > 0.0:
         dt = t - noted[NOTED.TIME]
@@ -191,12 +191,16 @@ def add(noted: Floats, t: float, value: float) -> None:
     noted[NOTED.BEGUN], noted[NOTED.TIME], noted[NOTED.VALUE] = 1.0, t, value
 
 
-def distance(senses: Ints, row: Floats) -> float:
+def walked_distance(senses: Ints, row: Floats) -> float:
     """Return the distance of a walker along x (m).
 
     It is the mean of the two smallest positions of both feet and the mass centre.
     """
-    centre, one, two = row[senses[SENSES.CENTRE]], foot(senses, row, 0), foot(senses, row, 1)
+    centre, one, two = (
+        row[senses[SENSES.CENTRE]],
+        foot_position(senses, row, 0),
+        foot_position(senses, row, 1),
+    )
     if centre >= one and centre >= two:
         return 0.5 * (one + two)
     return 0.5 * (centre + min(one, two))
@@ -204,7 +208,7 @@ def distance(senses: Ints, row: Floats) -> float:
 
 def note_gait(senses: Ints, numbers: Floats, t: float, row: Floats, noted: Floats) -> None:
     """Update a gait: detect a fall by the height of the mass centre, and a step by a foot that lands."""
-    noted[GAIT_NOTED.HERE] = distance(senses, row)
+    noted[GAIT_NOTED.HERE] = walked_distance(senses, row)
     if (
         row[senses[SENSES.CENTRE] + 1]
         < numbers[CRITERION_NUMBERS.HEIGHT] * noted[GAIT_NOTED.HEIGHT]
@@ -255,7 +259,7 @@ def note_jump(senses: Ints, numbers: Floats, t: float, row: Floats, noted: Float
         )
 
 
-def penalty(senses: Ints, kind: int, place: int, numbers: Floats, row: Floats) -> float:
+def range_penalty(senses: Ints, kind: int, place: int, numbers: Floats, row: Floats) -> float:
     """Return the penalty of a number beyond its range."""
     one, two = row[place], 0.0
     if kind != NUMBER:
@@ -270,7 +274,7 @@ def penalty(senses: Ints, kind: int, place: int, numbers: Floats, row: Floats) -
     )
 
 
-def effort(senses: Ints, known: Floats, kind: int, power: int, row: Floats) -> float:
+def muscle_effort(senses: Ints, known: Floats, kind: int, power: int, row: Floats) -> float:
     """Return the sum of the activations to a power, or 1 plus the sum of the tensions (N)."""
     count, total = senses[SENSES.MUSCLES], 1.0 if kind == TENSIONS else 0.0
     strengths = at(known, SENSED.HEAD + count)
@@ -285,7 +289,9 @@ def effort(senses: Ints, known: Floats, kind: int, power: int, row: Floats) -> f
     return total
 
 
-def wang(senses: Ints, known: Floats, numbers: Floats, row: Floats, excitations: Floats) -> float:
+def metabolic_power(
+    senses: Ints, known: Floats, numbers: Floats, row: Floats, excitations: Floats
+) -> float:
     """Return the metabolic power of all muscles (W).
 
     Source: J. M. Wang et al., ACM Trans. Graph. 31, 2012, after F. C. Anderson's thesis of 1999.

@@ -25,20 +25,20 @@ from osimlite.mechanics.kernels.layout import (
     RUN,
     STAGE,
 )
-from osimlite.mechanics.kernels.motion import move, place
+from osimlite.mechanics.kernels.motion import move_links, place_links
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call
 from osimlite.mechanics.kernels.points import link_ints, link_work
 from osimlite.mechanics.laws.vectors import (
     ZERO,
     Vector,
-    along,
+    add_scaled,
     cross,
     dot,
     minus,
     plus,
-    put,
+    rotate,
+    store_vector,
     times,
-    turned,
     vector,
 )
 
@@ -60,17 +60,17 @@ def evaluate(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, sta
     Returns:
         `OUTCOME.OK` or what went wrong; with SINGULAR_MASS, f[0] is the degree of freedom without mass.
     """
-    place(model, reals, data, y, f)
+    place_links(model, reals, data, y, f)
     if stage == STAGE.POSITION:
         return OUTCOME.OK
-    status = move(model, reals, data, y, f)
+    status = move_links(model, reals, data, y, f)
     if status != OUTCOME.OK or stage == STAGE.VELOCITY:
         return status
     right = at(f, model[MODEL.DOFS])
     if stage == STAGE.FORCE or model[MODEL.CHAIN] > 0:
         clear_wrenches(model, data)
         status = apply_forces(model, reals, data, y, f)
-        generalized_forces(model, data, right)
+        add_generalized_forces(model, data, right)
         if stage == STAGE.ACCELERATION and status == OUTCOME.OK:
             status = call(
                 model[MODEL.LAWS + model[model[MODEL.CHAIN] + CHAIN.DYNAMICS]],
@@ -97,7 +97,7 @@ def evaluate(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, sta
             f,
             0,
         )
-    singular = solve(model, data, right)
+    singular = solve_accelerations(model, data, right)
     if singular >= 0:
         f[0] = singular
         return OUTCOME.SINGULAR_MASS
@@ -118,15 +118,15 @@ def inverse(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, unus
     Returns:
         `OUTCOME.OK` or what went wrong, as of `evaluate`.
     """
-    place(model, reals, data, y, f)
-    status = move(model, reals, data, y, f)
+    place_links(model, reals, data, y, f)
+    status = move_links(model, reals, data, y, f)
     if status != OUTCOME.OK:
         return status
     right = at(f, model[MODEL.DOFS])
-    accelerate(model, data, right)
+    add_accelerations(model, data, right)
     spatial_inertias_and_bias(model, reals, data)
     status = apply_forces(model, reals, data, y, f)
-    generalized_forces(model, data, right)
+    add_generalized_forces(model, data, right)
     for freedom in range(model[MODEL.DOFS]):
         right[freedom] = -right[freedom]
     return status
@@ -150,14 +150,14 @@ def equilibrate(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, 
     return status
 
 
-def spun(moments: Floats, a: Vector) -> Vector:
+def multiply_symmetric(moments: Floats, a: Vector) -> Vector:
     """Multiply a vector by the symmetric matrix with the entries xx, yy, zz, xy, xz, yz."""
     x, y, z = a
     xx, yy, zz, xy, xz, yz = moments[0], moments[1], moments[2], moments[3], moments[4], moments[5]
     return xx * x + xy * y + xz * z, xy * x + yy * y + yz * z, xz * x + yz * y + zz * z
 
 
-def momentum(i: Floats, spin: Vector, velocity: Vector) -> tuple[Vector, Vector]:
+def spatial_momentum(i: Floats, spin: Vector, velocity: Vector) -> tuple[Vector, Vector]:
     """Multiply a spatial velocity by a spatial inertia.
 
     Args:
@@ -170,7 +170,7 @@ def momentum(i: Floats, spin: Vector, velocity: Vector) -> tuple[Vector, Vector]
     """
     first = vector(i, 1)
     return (
-        plus(spun(at(i, 4), spin), cross(first, velocity)),
+        plus(multiply_symmetric(at(i, 4), spin), cross(first, velocity)),
         plus(times(i[0], velocity), cross(spin, first)),
     )
 
@@ -182,14 +182,17 @@ def spatial_inertias_and_bias(model: Ints, reals: Floats, data: Floats) -> None:
         r, i, m = at(here, LINK_WORK.ROTATION), at(here, LINK_WORK.INERTIA), b[INERTIA.MASS]
         center = plus(
             minus(vector(here, LINK_WORK.POSITION), vector(here, LINK_WORK.ORIGIN)),
-            turned(r, vector(b, INERTIA.CENTER)),
+            rotate(r, vector(b, INERTIA.CENTER)),
         )
         cx, cy, cz = center
         mx, my, mz = times(m, center)
         one, two, three = vector(r, 0), vector(r, 3), vector(r, 6)
         # Rows of R I.
-        first, second = spun(at(b, INERTIA.MOMENTS), one), spun(at(b, INERTIA.MOMENTS), two)
-        third = spun(at(b, INERTIA.MOMENTS), three)
+        first, second = (
+            multiply_symmetric(at(b, INERTIA.MOMENTS), one),
+            multiply_symmetric(at(b, INERTIA.MOMENTS), two),
+        )
+        third = multiply_symmetric(at(b, INERTIA.MOMENTS), three)
         i[0], i[1], i[2], i[3] = m, mx, my, mz
         i[4] = dot(first, one) + my * cy + mz * cz
         i[5] = dot(second, two) + mx * cx + mz * cz
@@ -198,16 +201,16 @@ def spatial_inertias_and_bias(model: Ints, reals: Floats, data: Floats) -> None:
         i[8] = dot(first, three) - mx * cz
         i[9] = dot(second, three) - my * cz
         spin, velocity = vector(here, LINK_WORK.VELOCITY), vector(here, LINK_WORK.VELOCITY + 3)
-        angular, linear = momentum(i, spin, velocity)
-        torque, force = momentum(
+        angular, linear = spatial_momentum(i, spin, velocity)
+        torque, force = spatial_momentum(
             i, vector(here, LINK_WORK.ACCELERATION), vector(here, LINK_WORK.ACCELERATION + 3)
         )
         torque = plus(torque, plus(cross(spin, angular), cross(velocity, linear)))
-        put(here, LINK_WORK.WRENCH, times(-1.0, torque))
-        put(here, LINK_WORK.WRENCH + 3, times(-1.0, plus(force, cross(spin, linear))))
+        store_vector(here, LINK_WORK.WRENCH, times(-1.0, torque))
+        store_vector(here, LINK_WORK.WRENCH + 3, times(-1.0, plus(force, cross(spin, linear))))
 
 
-def accelerate(model: Ints, data: Floats, udot: Floats) -> None:
+def add_accelerations(model: Ints, data: Floats, udot: Floats) -> None:
     """Add the contribution of udot to the accelerations of the links, outwards from ground."""
     columns = at(data, model[MODEL.WORK_COLUMN])
     for link in range(model[MODEL.LINKS]):
@@ -220,13 +223,15 @@ def accelerate(model: Ints, data: Floats, udot: Floats) -> None:
         for freedom in range(j[LINK.FIRST_DOF], j[LINK.END_DOF]):
             c = at(columns, 6 * freedom)
             turn, shift = (
-                along(turn, udot[freedom], vector(c, 0)),
-                along(shift, udot[freedom], vector(c, 3)),
+                add_scaled(turn, udot[freedom], vector(c, 0)),
+                add_scaled(shift, udot[freedom], vector(c, 3)),
             )
-        put(here, LINK_WORK.WRENCH, turn)
-        put(here, LINK_WORK.WRENCH + 3, shift)
-        put(here, LINK_WORK.ACCELERATION, plus(vector(here, LINK_WORK.ACCELERATION), turn))
-        put(here, LINK_WORK.ACCELERATION + 3, plus(vector(here, LINK_WORK.ACCELERATION + 3), shift))
+        store_vector(here, LINK_WORK.WRENCH, turn)
+        store_vector(here, LINK_WORK.WRENCH + 3, shift)
+        store_vector(here, LINK_WORK.ACCELERATION, plus(vector(here, LINK_WORK.ACCELERATION), turn))
+        store_vector(
+            here, LINK_WORK.ACCELERATION + 3, plus(vector(here, LINK_WORK.ACCELERATION + 3), shift)
+        )
 
 
 def clear_wrenches(model: Ints, data: Floats) -> None:
@@ -264,7 +269,7 @@ def apply_forces(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats)
     return OUTCOME.OK
 
 
-def generalized_forces(model: Ints, data: Floats, right: Floats) -> None:
+def add_generalized_forces(model: Ints, data: Floats, right: Floats) -> None:
     """Add the generalized forces of the wrenches, inwards from the leaves; sums up the wrenches."""
     columns = at(data, model[MODEL.WORK_COLUMN])
     for link in range(model[MODEL.LINKS] - 1, -1, -1):
@@ -292,7 +297,7 @@ def composite_rigid_body(model: Ints, data: Floats, right: Floats) -> None:
             c = at(columns, 6 * freedom)
             turn, shift = vector(c, 0), vector(c, 3)
             right[freedom] += dot(turn, vector(load, 0)) + dot(shift, vector(load, 3))
-            angular, linear = momentum(i, turn, shift)
+            angular, linear = spatial_momentum(i, turn, shift)
             row, k, column = at(data, freedoms[DOF.SIZE * freedom + DOF.ROW]), freedom, 0
             while k >= 0:
                 c = at(columns, 6 * k)
@@ -306,7 +311,7 @@ def composite_rigid_body(model: Ints, data: Floats, right: Floats) -> None:
                 above[k] += i[k]
 
 
-def solve(model: Ints, data: Floats, right: Floats) -> int:
+def solve_accelerations(model: Ints, data: Floats, right: Floats) -> int:
     """Factorise the mass matrix and solve for the accelerations in place.
 
     Args:

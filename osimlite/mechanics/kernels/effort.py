@@ -21,7 +21,7 @@ from __future__ import annotations
 from math import sqrt
 
 from osimlite.mechanics.kernels.layout import OUTCOME
-from osimlite.mechanics.kernels.linear_algebra import cholesky, substitute
+from osimlite.mechanics.kernels.linear_algebra import factorise_cholesky, solve_cholesky
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at
 
 FRAMES = 0
@@ -68,7 +68,7 @@ LEAST_GAIN = 1e-15
 """Relative decrease of the sum below which the Newton steps for p other than 2 end."""
 
 
-def effort_room(equations: int, unknowns: int) -> int:
+def effort_size(equations: int, unknowns: int) -> int:
     """Return the length of the workspace for `equations` equations and `unknowns` unknowns."""
     return equations * (equations + 8) + 5 * unknowns
 
@@ -95,29 +95,37 @@ def least_effort(
         previous[k] = 0.0
     for frame in range(sizes[FRAMES]):
         columns, x = at(problems, (n + 1) * m * frame), at(solutions, (n + m + 1) * frame)
-        scale(sizes, columns, scales)
+        scale_equations(sizes, columns, scales)
         for j in range(n):
             targets[j], compliances[j] = 0.0, 1.0
         for k in range(m):
             multipliers[k] = previous[k] / scales[k]
-        is_solved = share(sizes, numbers, columns, x, at(x, n), multipliers, inner_work) <= CLOSE
+        is_solved = (
+            solve_weighted_least_squares(
+                sizes, numbers, columns, x, at(x, n), multipliers, inner_work
+            )
+            <= CLOSE
+        )
         if not is_solved and frame > 0:
             for k in range(m):
                 multipliers[k] = 0.0
             is_solved = (
-                share(sizes, numbers, columns, x, at(x, n), multipliers, inner_work) <= CLOSE
+                solve_weighted_least_squares(
+                    sizes, numbers, columns, x, at(x, n), multipliers, inner_work
+                )
+                <= CLOSE
             )
         for k in range(m):
             previous[k] = multipliers[k] * scales[k] if is_solved else 0.0
         if is_solved and numbers[POWER] != 2.0:
-            newton(sizes, numbers, columns, x, multipliers, inner_work)
+            minimize_powers(sizes, numbers, columns, x, multipliers, inner_work)
         for k in range(m):
             x[n + k] /= scales[k]
         x[n + m] = 1.0 if is_solved else 0.0
     return OUTCOME.OK
 
 
-def scale(sizes: Ints, columns: Floats, scales: Floats) -> None:
+def scale_equations(sizes: Ints, columns: Floats, scales: Floats) -> None:
     """Scale each equation to unit length, drop negligible entries, and list the nonzeros of A.
 
     Args:
@@ -153,7 +161,7 @@ def scale(sizes: Ints, columns: Floats, scales: Floats) -> None:
         entries[0] = count
 
 
-def newton(
+def minimize_powers(
     sizes: Ints, numbers: Floats, columns: Floats, x: Floats, multipliers: Floats, work: Floats
 ) -> None:
     """Minimize the sum of |x|^p for p other than 2 by Newton steps, starting from a solution for p = 2.
@@ -189,28 +197,32 @@ def newton(
             compliances[j] = stiffest / stiffness
         for k in range(m):
             multipliers[k] = 0.0
-        error = share(sizes, numbers, columns, tried, at(x, n), multipliers, work)
-        if error > CLOSEST and not mended(
+        error = solve_weighted_least_squares(
+            sizes, numbers, columns, tried, at(x, n), multipliers, work
+        )
+        if error > CLOSEST and not restore_equations(
             sizes, numbers, columns, tried, at(x, n), multipliers, work
         ):
             break
-        before, step_length = effort(n, power, unit, x, tried, 0.0), 1.0
-        after = effort(n, power, unit, x, tried, step_length)
+        before, step_length = sum_powers(n, power, unit, x, tried, 0.0), 1.0
+        after = sum_powers(n, power, unit, x, tried, step_length)
         for _ in range(HALVINGS):
             if after < before:
                 break
             step_length *= 0.5
-            after = effort(n, power, unit, x, tried, step_length)
+            after = sum_powers(n, power, unit, x, tried, step_length)
         if not after < before:
             break
         for j in range(n):
             x[j] += step_length * (tried[j] - x[j])
         if before - after <= LEAST_GAIN * before:
             break
-    missing_of(sizes, columns, x, at(x, n), terms)
+    compute_residual(sizes, columns, x, at(x, n), terms)
 
 
-def effort(n: int, power: float, unit: float, x: Floats, end: Floats, step_length: float) -> float:
+def sum_powers(
+    n: int, power: float, unit: float, x: Floats, end: Floats, step_length: float
+) -> float:
     """Return the sum of (|x| / unit)^p at the fraction `step_length` of the way from x to `end`."""
     total = 0.0
     for j in range(n):
@@ -218,7 +230,7 @@ def effort(n: int, power: float, unit: float, x: Floats, end: Floats, step_lengt
     return total
 
 
-def share(
+def solve_weighted_least_squares(
     sizes: Ints,
     numbers: Floats,
     columns: Floats,
@@ -250,9 +262,9 @@ def share(
     for number in range(CENTRES):
         for k in range(m):
             centre[k] = multipliers[k]
-        pulled(sizes, columns, multipliers, y)
-        error = answers(sizes, numbers, columns, work, x, residual, terms)
-        second(sizes, numbers, columns, work, matrix)
+        transpose_times(sizes, columns, multipliers, y)
+        error = update_primal(sizes, numbers, columns, work, x, residual, terms)
+        fill_dual_hessian(sizes, numbers, columns, work, matrix)
         trace = 0.0
         for k in range(m):
             trace += matrix[m * k + k]
@@ -272,25 +284,25 @@ def share(
                 largest = max(largest, abs(slope[k]) / terms[k])
             if largest <= TIGHTEST:
                 break
-            second(sizes, numbers, columns, work, matrix)
+            fill_dual_hessian(sizes, numbers, columns, work, matrix)
             for k in range(m):
                 matrix[m * k + k] += slight[k]
-            if not cholesky(m, matrix, 0.0):
+            if not factorise_cholesky(m, matrix, 0.0):
                 break
-            substitute(m, matrix, step)
-            pulled(sizes, columns, step, change)
-            step_length = way(sizes, numbers, rhs, step, multipliers, work)
+            solve_cholesky(m, matrix, step)
+            transpose_times(sizes, columns, step, change)
+            step_length = line_search(sizes, numbers, rhs, step, multipliers, work)
             for k in range(m):
                 multipliers[k] += step_length * step[k]
-            pulled(sizes, columns, multipliers, y)
-            error = answers(sizes, numbers, columns, work, x, residual, terms)
+            transpose_times(sizes, columns, multipliers, y)
+            error = update_primal(sizes, numbers, columns, work, x, residual, terms)
         if error <= CLOSEST or (number > 1 and not error < SLOWEST * error_before):
             break
         error_before = error
     return error
 
 
-def mended(
+def restore_equations(
     sizes: Ints,
     numbers: Floats,
     columns: Floats,
@@ -307,10 +319,13 @@ def mended(
         work[j], work[sizes[UNKNOWNS] + j] = x[j], 1.0
     for k in range(sizes[EQUATIONS]):
         multipliers[k] = 0.0
-    return share(sizes, numbers, columns, x, residual, multipliers, work) <= CLOSE
+    return (
+        solve_weighted_least_squares(sizes, numbers, columns, x, residual, multipliers, work)
+        <= CLOSE
+    )
 
 
-def pulled(sizes: Ints, columns: Floats, multipliers: Floats, y: Floats) -> None:
+def transpose_times(sizes: Ints, columns: Floats, multipliers: Floats, y: Floats) -> None:
     """Compute y = Aᵀ λ."""
     m = sizes[EQUATIONS]
     for j in range(sizes[UNKNOWNS]):
@@ -320,13 +335,13 @@ def pulled(sizes: Ints, columns: Floats, multipliers: Floats, y: Floats) -> None
         y[j] = total
 
 
-def answer(numbers: Floats, n: int, j: int, work: Floats, y: float) -> float:
+def primal_from_multipliers(numbers: Floats, n: int, j: int, work: Floats, y: float) -> float:
     """Return the unknown `j` that minimizes the Lagrangian: target + compliance y, clamped to its bounds."""
     x = work[j] + work[n + j] * y
     return min(max(x, numbers[BOUNDS + j]), numbers[BOUNDS + n + j])
 
 
-def answers(
+def update_primal(
     sizes: Ints,
     numbers: Floats,
     columns: Floats,
@@ -338,11 +353,13 @@ def answers(
     """Compute x from y = Aᵀ λ; fill residual and term sizes, and return as `compute_residual`."""
     n = sizes[UNKNOWNS]
     for j in range(n):
-        x[j] = answer(numbers, n, j, work, work[2 * n + j])
-    return missing_of(sizes, columns, x, residual, terms)
+        x[j] = primal_from_multipliers(numbers, n, j, work, work[2 * n + j])
+    return compute_residual(sizes, columns, x, residual, terms)
 
 
-def missing_of(sizes: Ints, columns: Floats, x: Floats, residual: Floats, terms: Floats) -> float:
+def compute_residual(
+    sizes: Ints, columns: Floats, x: Floats, residual: Floats, terms: Floats
+) -> float:
     """Compute the residual b - A x and the size of the terms of each equation.
 
     Args:
@@ -373,7 +390,9 @@ def missing_of(sizes: Ints, columns: Floats, x: Floats, residual: Floats, terms:
     return largest
 
 
-def second(sizes: Ints, numbers: Floats, columns: Floats, work: Floats, matrix: Floats) -> None:
+def fill_dual_hessian(
+    sizes: Ints, numbers: Floats, columns: Floats, work: Floats, matrix: Floats
+) -> None:
     """Fill the lower triangle of Σ_j compliance_j a_j a_jᵀ over the unknowns j within their bounds (m, m).
 
     This is the second derivative of the dual function without the proximal term, with opposite sign.
@@ -393,7 +412,7 @@ def second(sizes: Ints, numbers: Floats, columns: Floats, work: Floats, matrix: 
                 row[entries[g]] += factor * column[entries[g]]
 
 
-def way(
+def line_search(
     sizes: Ints, numbers: Floats, rhs: Floats, step: Floats, multipliers: Floats, work: Floats
 ) -> float:
     """Return the step length in (0, 1] along `step`.
@@ -424,7 +443,9 @@ def way(
             )
         for j in range(n):
             if change[j] != 0.0:
-                rise -= change[j] * answer(numbers, n, j, work, y[j] + step_length * change[j])
+                rise -= change[j] * primal_from_multipliers(
+                    numbers, n, j, work, y[j] + step_length * change[j]
+                )
         if step_length == 0.0:
             start, step_length = rise, 1.0
         elif abs(rise) <= 0.1 * abs(start) or (step_length == 1.0 and rise > 0.0):

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from math import inf
 
-from osimlite.mechanics.kernels.contacts import press
+from osimlite.mechanics.kernels.contacts import apply_contact_force
 from osimlite.mechanics.kernels.layout import CONTACT_WORK, ITEM, MODEL, OUTCOME
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call
 from osimlite.mechanics.kernels.points import direction, station
 from osimlite.mechanics.laws.ellipsoid_contact import ellipsoid_ellipsoid, half_space_ellipsoid
 from osimlite.mechanics.laws.rotations import Axes
-from osimlite.mechanics.laws.vectors import dot, minus, put, vector
+from osimlite.mechanics.laws.vectors import dot, minus, store_vector, vector
 
 
 def touch_ellipsoid(
@@ -25,10 +25,10 @@ def touch_ellipsoid(
     o, n = station(model, data, one, vector(p, 0)), direction(model, data, one, vector(p, 3))
     center = station(model, data, two, vector(p, 7))
     d, radius, point = half_space_ellipsoid(
-        o, n, center, axes(model, data, two, at(p, 18)), vector(p, 27), p[12]
+        o, n, center, ellipsoid_axes(model, data, two, at(p, 18)), vector(p, 27), p[12]
     )
     if d > 0.0:
-        press(model, reals, data, item, d, radius, n, point)
+        apply_contact_force(model, reals, data, item, d, radius, n, point)
     return OUTCOME.OK
 
 
@@ -45,16 +45,19 @@ def touch_ellipsoids(
     way = minus(b, a)
     if dot(way, way) >= (p[6] + p[10]) * (p[6] + p[10]):
         return OUTCOME.OK
-    axes1, axes2 = axes(model, data, one, at(p, 18)), axes(model, data, two, at(p, 30))
+    axes1, axes2 = (
+        ellipsoid_axes(model, data, one, at(p, 18)),
+        ellipsoid_axes(model, data, two, at(p, 30)),
+    )
     d, radius, n, point = ellipsoid_ellipsoid(
         a, axes1, vector(p, 27), b, axes2, vector(p, 39), p[12]
     )
     if d > 0.0:
-        press(model, reals, data, item, d, radius, n, point)
+        apply_contact_force(model, reals, data, item, d, radius, n, point)
     return OUTCOME.OK
 
 
-def axes(model: Ints, data: Floats, link: int, p: Floats) -> Axes:
+def ellipsoid_axes(model: Ints, data: Floats, link: int, p: Floats) -> Axes:
     """Return the axes of an ellipsoid in ground.
 
     Returns:
@@ -85,7 +88,7 @@ def early_return(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats,
     )
     centers, start, order = room, at(room, 3 * count), at(room, 4 * count)
     for k in range(count):
-        put(centers, 3 * k, station(model, data, links[k], vector(p, 4 * k)))
+        store_vector(centers, 3 * k, station(model, data, links[k], vector(p, 4 * k)))
     axis = 0
     widest = -1.0
     for side in range(3):
@@ -111,9 +114,9 @@ def early_return(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats,
             two = int(order[later])
             if start[two] > centers[3 * one + axis] + p[4 * one + 3]:
                 break
-            if near(at(centers, 3 * one), at(centers, 3 * two), p[4 * one + 3], p[4 * two + 3]):
-                pair = pair_of(at(links, count), pairs, one, two)
-                if pair >= 0 and separates(
+            if are_near(at(centers, 3 * one), at(centers, 3 * two), p[4 * one + 3], p[4 * two + 3]):
+                pair = find_pair(at(links, count), pairs, one, two)
+                if pair >= 0 and is_separating(
                     model,
                     reals,
                     data,
@@ -125,7 +128,7 @@ def early_return(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats,
     return OUTCOME.OK
 
 
-def near(a: Floats, b: Floats, one: float, two: float) -> bool:
+def are_near(a: Floats, b: Floats, one: float, two: float) -> bool:
     """Return whether the bounding spheres of two surfaces overlap; two half spaces are never a pair."""
     if one == inf and two == inf:
         return False
@@ -133,7 +136,7 @@ def near(a: Floats, b: Floats, one: float, two: float) -> bool:
     return dot(way, way) <= (one + two) * (one + two)
 
 
-def pair_of(surfaces: Ints, pairs: int, one: int, two: int) -> int:
+def find_pair(surfaces: Ints, pairs: int, one: int, two: int) -> int:
     """Return the number of the pair of two surfaces, or -1."""
     for pair in range(pairs):
         a, b = surfaces[2 * pair], surfaces[2 * pair + 1]
@@ -142,7 +145,9 @@ def pair_of(surfaces: Ints, pairs: int, one: int, two: int) -> int:
     return -1
 
 
-def separates(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, part: int) -> bool:
+def is_separating(
+    model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, part: int
+) -> bool:
     """Compute one contact; return whether it touches without a force."""
     call(model[part + ITEM.LAW], model, reals, data, y, f, part)
     result = at(data, model[part + ITEM.RECORD])

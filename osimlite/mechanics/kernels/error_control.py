@@ -55,7 +55,7 @@ def shortest_step(t: float, tried: float) -> float:
     return max(2.0**-52 * abs(t), 1e-300) if tried < PATIENCE else 4.0 * 2.0**-52 * max(1.0, abs(t))
 
 
-def weight(value: float) -> float:
+def error_weight(value: float) -> float:
     """Return the weight of the error of a speed or auxiliary state with a value at the start of the step."""
     return 1.0 / abs(value) if abs(value) > 1.0 else 1.0
 
@@ -89,7 +89,7 @@ def step_end(h: Floats) -> float:
     return limit if limit <= t0 + 1.001 * step else t0 + step
 
 
-def judge(h: Floats, t1: float, error: float, order: float) -> None:
+def judge_step(h: Floats, t1: float, error: float, order: float) -> None:
     """Accept or reject a step by its error, and choose the next one.
 
     Args:
@@ -109,7 +109,7 @@ def judge(h: Floats, t1: float, error: float, order: float) -> None:
         h[REACHED] = t1
 
 
-def projected(
+def project_by_law(
     model: Ints,
     reals: Floats,
     data: Floats,
@@ -148,7 +148,7 @@ def projected(
     )
 
 
-def step_error(
+def project_and_measure(
     model: Ints,
     reals: Floats,
     data: Floats,
@@ -179,7 +179,7 @@ def step_error(
     tolerance = h[ACCEPTED] / 10.0
     for k in range(model[MODEL.STATE_SIZE]):
         errors[k] = abs(errors[k])
-    if not projected(
+    if not project_by_law(
         model, reals, data, t1, y1, errors, 1, tolerance, max(2.0 * tolerance, sqrt(tolerance))
     ):
         return inf
@@ -206,10 +206,10 @@ def error_norm(model: Ints, y0: Floats, errors: Floats, h: Floats, is_strict: in
     for k in range(n):
         of_q += errors[k] * errors[k]
     for k in range(n, 2 * n):
-        weighted = weight(y0[k]) * errors[k]
+        weighted = error_weight(y0[k]) * errors[k]
         of_u += weighted * weighted
     for k in range(2 * n, size):
-        weighted = weight(y0[k]) * errors[k]
+        weighted = error_weight(y0[k]) * errors[k]
         square = weighted * weighted
         of_z = max(of_z, square) if is_strict else of_z + square
     of_q /= max(h[COUNTED_Q], 1.0)

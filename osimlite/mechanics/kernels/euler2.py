@@ -17,8 +17,8 @@ from osimlite.mechanics.kernels.error_control import (
     MEMORY,
     REACHED,
     error_norm,
-    judge,
-    projected,
+    judge_step,
+    project_by_law,
     step_end,
 )
 from osimlite.mechanics.kernels.layout import LINK, MODEL, MOTION, OPERATION, OUTCOME, STAGE, WORK
@@ -52,19 +52,19 @@ def euler2(model: Ints, reals: Floats, data: Floats, y0: Floats, y1: Floats, pla
     t0, t1, tolerance = h[REACHED], step_end(h), h[ACCEPTED] / 10.0
     h[EVALUATED], h[HAS_DERIVATIVE] = 1.0, 0.0
     error = inf
-    if halved(model, reals, data, t0, t1, y0, y1, whole, at(whole, size)) == OUTCOME.OK:
+    if take_half_steps(model, reals, data, t0, t1, y0, y1, whole, at(whole, size)) == OUTCOME.OK:
         for k in range(size):
             errors[k] = y1[k] - whole[k]
         # As in Simbody, whatever the error is, and the error is left as it is.
-        if model[MODEL.CONSTRAINED] == 0 or projected(
+        if model[MODEL.CONSTRAINED] == 0 or project_by_law(
             model, reals, data, t1, y1, errors, 0, tolerance, max(2.0 * tolerance, sqrt(tolerance))
         ):
             error = error_norm(model, y0, errors, h, 0)
-    judge(h, t1, error, ORDER)
+    judge_step(h, t1, error, ORDER)
     return OUTCOME.OK
 
 
-def halved(
+def take_half_steps(
     model: Ints,
     reals: Floats,
     data: Floats,
@@ -94,18 +94,18 @@ def halved(
     size = model[MODEL.STATE_SIZE]
     f, half = at(middle, size), 0.5 * (t1 - t0)
     f0 = at(y0, size)
-    status = advanced(model, reals, data, t1, t1 - t0, y0, f0, whole, f)
+    status = advance_state(model, reals, data, t1, t1 - t0, y0, f0, whole, f)
     if status == OUTCOME.OK:
-        status = advanced(model, reals, data, t0 + half, half, y0, f0, middle, f)
+        status = advance_state(model, reals, data, t0 + half, half, y0, f0, middle, f)
     if status == OUTCOME.OK:
         data[WORK.TIME] = t0 + half
         status = call(model[MODEL.LAWS], model, reals, data, middle, f, STAGE.ACCELERATION)
     if status == OUTCOME.OK:
-        status = advanced(model, reals, data, t1, half, middle, f, y1, at(y1, size))
+        status = advance_state(model, reals, data, t1, half, middle, f, y1, at(y1, size))
     return status
 
 
-def advanced(
+def advance_state(
     model: Ints,
     reals: Floats,
     data: Floats,

@@ -6,11 +6,11 @@ begins with its value, followed by the derivatives by the arguments.
 
 from __future__ import annotations
 
-from osimlite.mechanics.kernels.functions import value_at
+from osimlite.mechanics.kernels.functions import evaluate_function
 from osimlite.mechanics.kernels.layout import ITEM, MODEL, OUTCOME
 from osimlite.mechanics.kernels.paths import LENGTH, SPEED, TENSION
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call
-from osimlite.mechanics.kernels.programs import compute
+from osimlite.mechanics.kernels.programs import run_program
 
 COUNT = ITEM.OWN + 1
 """Index in the integers of a path of the number of its coordinates."""
@@ -44,12 +44,12 @@ def function_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats
     """Compute length, speed and moment arms of a FunctionBasedPath."""
     i, result = at(model, item), at(data, model[item + ITEM.RECORD])
     count, coordinates = i[COUNT], at(i, COORDINATES)
-    length = called(model, reals, data, y, f, item - i[LENGTH_BACK])
+    length = evaluate_item(model, reals, data, y, f, item - i[LENGTH_BACK])
     speed = 0.0
     for k in range(count):
         back = coordinates[count + k]
         arm = (
-            called(model, reals, data, y, f, item - back)[0]
+            evaluate_item(model, reals, data, y, f, item - back)[0]
             if back > 0
             else -length[DERIVATIVES + k]
         )
@@ -57,12 +57,14 @@ def function_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats
         if coordinates[k] >= 0:
             speed -= arm * f[coordinates[k]]
     if i[SPEED_BACK] > 0:
-        speed = called(model, reals, data, y, f, item - i[SPEED_BACK])[0]
+        speed = evaluate_item(model, reals, data, y, f, item - i[SPEED_BACK])[0]
     result[LENGTH], result[SPEED] = length[0], speed
     return OUTCOME.OK
 
 
-def called(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> Floats:
+def evaluate_item(
+    model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int
+) -> Floats:
     """Evaluate the function of an item and return its record."""
     call(model[item + ITEM.LAW], model, reals, data, y, f, item)
     return at(data, model[item + ITEM.RECORD])
@@ -90,7 +92,9 @@ def function_of_one(
         at(data, model[item + ITEM.RECORD]),
     )
     place = i[ARGUMENTS]
-    result[0], result[DERIVATIVES], _ = value_at(at(p, 1), y[place] if place >= 0 else p[0])
+    result[0], result[DERIVATIVES], _ = evaluate_function(
+        at(p, 1), y[place] if place >= 0 else p[0]
+    )
     return OUTCOME.OK
 
 
@@ -163,6 +167,6 @@ def formula(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item
         for k in range(size):
             place = i[ARGUMENTS + k]
             registers[k] = y[place] if place >= 0 else p[k]
-        result[number] = compute(at(program, 2), program[0], at(p, program[1]), registers, size)
+        result[number] = run_program(at(program, 2), program[0], at(p, program[1]), registers, size)
         program = at(program, 2 + 3 * program[0])
     return OUTCOME.OK

@@ -31,7 +31,7 @@ ARC = 6
 """Kind: end of a bent rod, see :mod:`osimlite.mechanics.kernels.constant_curvature`."""
 
 
-def value_at(table: Floats, z: float) -> tuple[float, float, float]:
+def evaluate_function(table: Floats, z: float) -> tuple[float, float, float]:
     """Evaluate a function of one argument.
 
     Args:
@@ -57,11 +57,11 @@ def value_at(table: Floats, z: float) -> tuple[float, float, float]:
         t = min(max(t, 0.0), 1.0)
         value = table[4] + rise * t * t * t * (10.0 - 15.0 * t + 6.0 * t * t)
     else:
-        value, slope, curvature = pieces_at(table, z, kind)
+        value, slope, curvature = evaluate_piecewise(table, z, kind)
     return factor * value, factor * slope, factor * curvature
 
 
-def pieces_at(table: Floats, z: float, kind: int) -> tuple[float, float, float]:
+def evaluate_piecewise(table: Floats, z: float, kind: int) -> tuple[float, float, float]:
     """Evaluate a function that consists of polynomials between knots.
 
     Args:
@@ -98,7 +98,7 @@ def amount_by_one(
         operation_work(model, data, operation),
     )
     freedom = model[j[OPERATION.ARGUMENTS]]
-    value, slope, curvature = value_at(
+    value, slope, curvature = evaluate_function(
         at(reals, j[OPERATION.EXTRA] + 1), y[freedom] if freedom >= 0 else reals[j[OPERATION.EXTRA]]
     )
     speed = y[model[MODEL.DOFS] + freedom] if freedom >= 0 else 0.0
@@ -125,13 +125,13 @@ def amount_by_several(
         at(reals, j[OPERATION.EXTRA]),
         at(data, j[OPERATION.GRADIENT]),
     )
-    a[OPERATION_WORK.AMOUNT], a[OPERATION_WORK.RATE], a[OPERATION_WORK.CURVATURE] = several_at(
-        size, arguments, constants, y, at(y, model[MODEL.DOFS]), gradient
+    a[OPERATION_WORK.AMOUNT], a[OPERATION_WORK.RATE], a[OPERATION_WORK.CURVATURE] = (
+        evaluate_monomials(size, arguments, constants, y, at(y, model[MODEL.DOFS]), gradient)
     )
     return OUTCOME.OK
 
 
-def several_at(
+def evaluate_monomials(
     size: int, arguments: Ints, constants: Floats, y: Floats, rates: Floats, gradient: Floats
 ) -> tuple[float, float, float]:
     """Evaluate a polynomial of several coordinates and fill its gradient.
@@ -154,12 +154,14 @@ def several_at(
         gradient[index] = 0.0
     for term in range(count):
         coefficient, powers = factor * table[3 + term], at(table, 3 + count + term * size)
-        value += coefficient * product(size, arguments, constants, y, powers, -1, -1)
+        value += coefficient * multiply_powers(size, arguments, constants, y, powers, -1, -1)
         for one in range(size):
             if powers[one] == 0.0:
                 continue
             first = (
-                coefficient * powers[one] * product(size, arguments, constants, y, powers, one, -1)
+                coefficient
+                * powers[one]
+                * multiply_powers(size, arguments, constants, y, powers, one, -1)
             )
             gradient[one] += first
             if arguments[one] < 0:
@@ -173,7 +175,7 @@ def several_at(
                     coefficient
                     * powers[one]
                     * power
-                    * product(size, arguments, constants, y, powers, one, two)
+                    * multiply_powers(size, arguments, constants, y, powers, one, two)
                 )
                 curvature += second * rates[arguments[one]] * rates[arguments[two]]
     if int(table[0]) == MONOMIALS_OF_OPENSIM:
@@ -184,7 +186,7 @@ def several_at(
     return value, rate, curvature
 
 
-def product(
+def multiply_powers(
     size: int, arguments: Ints, constants: Floats, y: Floats, powers: Floats, one: int, two: int
 ) -> float:
     """Return the product of powers of all arguments, with those of `one` and `two` (-1 for none) reduced by one."""
@@ -208,14 +210,14 @@ def set_controls(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats,
     for control in range(count):
         total = 0.0
         while place < ends[control]:
-            value, _, _ = value_at(at(numbers, tables[place]), data[WORK.TIME])
+            value, _, _ = evaluate_function(at(numbers, tables[place]), data[WORK.TIME])
             total += value
             place += 1
         values[control] = total
     return OUTCOME.OK
 
 
-def with_reflex(data: Floats, place: int, gain: float, rate: float) -> float:
+def add_reflex(data: Floats, place: int, gain: float, rate: float) -> float:
     """Add a stretch reflex to a control: gain (s/m) times the lengthening speed (m/s) of the muscle."""
     total: float = data[place] + gain * max(rate, 0.0)
     data[place] = total

@@ -26,7 +26,7 @@ from osimlite.mechanics.kernels.cable_surfaces import (
     POINT,
     START,
     STEP,
-    shoot,
+    shoot_geodesic,
 )
 from osimlite.mechanics.kernels.geodesic_paths import (
     CHAIN,
@@ -38,7 +38,7 @@ from osimlite.mechanics.kernels.geodesic_paths import (
 )
 from osimlite.mechanics.kernels.geodesic_starts import SURFACE
 from osimlite.mechanics.kernels.layout import ITEM
-from osimlite.mechanics.kernels.path_wraps import in_ground, in_surface
+from osimlite.mechanics.kernels.path_wraps import point_in_ground, point_in_surface
 from osimlite.mechanics.kernels.paths import (
     ALONG,
     COUNT,
@@ -52,8 +52,8 @@ from osimlite.mechanics.kernels.paths import (
 )
 from osimlite.mechanics.kernels.paths import SURFACE as SURFACE_LENGTH
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at
-from osimlite.mechanics.kernels.wrap_curves import pieces
-from osimlite.mechanics.laws.vectors import Vector, dot, put, turned_back, vector
+from osimlite.mechanics.kernels.wrap_curves import count_segments
+from osimlite.mechanics.laws.vectors import Vector, dot, rotate_back, store_vector, vector
 
 
 def trace_geodesics(
@@ -73,7 +73,7 @@ def trace_geodesics(
     for k in range(int(result[COUNT])):
         number = int(order[k])
         here = at(work, NODE_WORK * number)
-        put(f, 3 * count, vector(here, PLACE))
+        store_vector(f, 3 * count, vector(here, PLACE))
         count += 1
         wrap = (number - points) // 2
         if number >= points and number == points + 2 * wrap:
@@ -81,8 +81,8 @@ def trace_geodesics(
                 at(p, wraps[WRAP_INTS * wrap + PLACES] + SURFACE),
                 at(result, slots[POSES] + POSE_NUMBERS * wrap),
             )
-            point = in_surface(pose, vector(here, PLACE))
-            way = turned_back(pose, vector(work, NODE_WORK * int(order[k - 1]) + ALONG))
+            point = point_in_surface(pose, vector(here, PLACE))
+            way = rotate_back(pose, vector(work, NODE_WORK * int(order[k - 1]) + ALONG))
             length = here[NODE_WORK + SURFACE_LENGTH]
             count += trace_geodesic(
                 surface, pose, point, way, length, geodesic, room, at(f, 3 * count)
@@ -102,7 +102,7 @@ def trace_cable(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, 
         element = at(i, ELEMENTS + ELEMENT_INTS * k)
         part = at(result, element[KEPT])
         if element[IS_OBSTACLE] == 0:
-            put(f, 3 * count, vector(part, 0))
+            store_vector(f, 3 * count, vector(part, 0))
             count += 1
         elif part[STATE] == TOUCHES:
             geodesic = at(part, GEODESIC)
@@ -112,12 +112,12 @@ def trace_cable(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, 
                 at(part, IN_GROUND),
                 at(result, i[SOLVER]),
             )
-            put(f, 3 * count, vector(part, GROUND_START + POINT))
+            store_vector(f, 3 * count, vector(part, GROUND_START + POINT))
             count += 1
             count += trace_geodesic(
                 surface, pose, point, way, geodesic[ARC], geodesic, work, at(f, 3 * count)
             )
-            put(f, 3 * count, vector(part, GROUND_END + POINT))
+            store_vector(f, 3 * count, vector(part, GROUND_END + POINT))
             count += 1
     return count
 
@@ -145,11 +145,11 @@ def trace_geodesic(
         f: filled with the points.
     """
     geodesic[STEP] = 0.0
-    if not (dot(way, way) > 0.0 and shoot(surface, point, way, length, geodesic, work)):
+    if not (dot(way, way) > 0.0 and shoot_geodesic(surface, point, way, length, geodesic, work)):
         return 0
     bends = max(abs(geodesic[START + ALONG_BENDS]), abs(geodesic[END + ALONG_BENDS]))
-    count = pieces(bends * length)
+    count = count_segments(bends * length)
     for k in range(1, count):
-        shoot(surface, point, way, length * k / count, geodesic, work)
-        put(f, 3 * (k - 1), in_ground(pose, vector(geodesic, END + POINT)))
+        shoot_geodesic(surface, point, way, length * k / count, geodesic, work)
+        store_vector(f, 3 * (k - 1), point_in_ground(pose, vector(geodesic, END + POINT)))
     return count - 1

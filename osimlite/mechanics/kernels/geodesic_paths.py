@@ -31,17 +31,17 @@ from osimlite.mechanics.kernels.cable_surfaces import (
     STEP,
     SURFACE_NUMBERS,
     TORUS,
-    shoot,
-    value,
+    shoot_geodesic,
+    surface_value,
 )
 from osimlite.mechanics.kernels.geodesic_search import (
     OWNER,
     SLOT,
-    end_before,
-    search_room,
-    smooth,
-    start_after,
-    to_ground,
+    ends_to_ground,
+    line_end,
+    line_start,
+    search_size,
+    smooth_chain,
 )
 from osimlite.mechanics.kernels.geodesic_starts import (
     ANY_SIDE,
@@ -49,12 +49,12 @@ from osimlite.mechanics.kernels.geodesic_starts import (
     PULLED,
     SIDE,
     SURFACE,
-    depth,
-    start,
-    ways_past,
+    count_ways,
+    squared_depth,
+    start_on_surface,
 )
 from osimlite.mechanics.kernels.layout import ITEM, OUTCOME
-from osimlite.mechanics.kernels.path_wraps import in_surface
+from osimlite.mechanics.kernels.path_wraps import point_in_surface
 from osimlite.mechanics.kernels.paths import (
     AT,
     COUNT,
@@ -75,7 +75,16 @@ from osimlite.mechanics.kernels.paths import (
 from osimlite.mechanics.kernels.paths import SURFACE as SURFACE_LENGTH
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at
 from osimlite.mechanics.kernels.points import place_frame
-from osimlite.mechanics.laws.vectors import Vector, cross, minus, norm, put, times, unit, vector
+from osimlite.mechanics.laws.vectors import (
+    Vector,
+    cross,
+    minus,
+    norm,
+    store_vector,
+    times,
+    unit,
+    vector,
+)
 
 WRAP_INTS = 4
 """Number of integers of a wrap; wraps follow the nodes."""
@@ -124,7 +133,7 @@ TURNS = 16
 """Largest number of changes of the list of surfaces in a search."""
 
 
-def slots_and_room(most: int, wraps: int, work: int) -> tuple[list[int], int]:
+def layout_slots(most: int, wraps: int, work: int) -> tuple[list[int], int]:
     """Return the integers after the wraps, and the length of the record.
 
     Args:
@@ -137,7 +146,7 @@ def slots_and_room(most: int, wraps: int, work: int) -> tuple[list[int], int]:
     """
     best = work + SLOT * (most + 2)
     search = best + SLOT * (most + 2)
-    poses = search + search_room(most)
+    poses = search + search_size(most)
     return [work, best, search, poses], poses + POSE_NUMBERS * wraps
 
 
@@ -150,9 +159,9 @@ def geodesic_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats
     slots = at(i, NODES_AT + NODE_INTS * size + WRAP_INTS * i[WRAPS])
     place_surfaces(model, data, i, p)
     for k in range(1, int(result[COUNT])):
-        find_near(i, p, result, slots, int(order[k - 1]), int(order[k]))
+        mark_near_wraps(i, p, result, slots, int(order[k - 1]), int(order[k]))
     for k in range(int(result[COUNT]) - 2, -1, -1):
-        count = bend(i, p, result, int(order[k]), int(order[k + 1]))
+        count = bend_segment(i, p, result, int(order[k]), int(order[k + 1]))
         if count > 0:
             for other in range(int(result[COUNT]) - 1, k, -1):
                 order[other + 2 * count] = order[other]
@@ -161,8 +170,8 @@ def geodesic_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats
             slot = at(result, slots[BEST] + SLOT * (number + 1))
             node = points + 2 * int(slot[OWNER])
             one, two = at(work, NODE_WORK * node), at(work, NODE_WORK * (node + 1))
-            put(one, PLACE, vector(slot, GROUND_START + POINT))
-            put(two, PLACE, vector(slot, GROUND_END + POINT))
+            store_vector(one, PLACE, vector(slot, GROUND_START + POINT))
+            store_vector(two, PLACE, vector(slot, GROUND_END + POINT))
             one[SURFACE_LENGTH], two[SURFACE_LENGTH] = 0.0, slot[GEODESIC + ARC]
             one[IS_KEPT] = two[IS_KEPT] = 0.0
             order[k + 2 * number + 1], order[k + 2 * number + 2] = node, node + 1
@@ -184,7 +193,7 @@ def place_surfaces(model: Ints, data: Floats, i: Ints, p: Floats) -> None:
         pose[HOW] = NOT
 
 
-def bend(i: Ints, p: Floats, record: Floats, one: int, two: int) -> int:
+def bend_segment(i: Ints, p: Floats, record: Floats, one: int, two: int) -> int:
     """Bend the segment between two points around its surfaces, in the shortest of all combinations.
 
     Args:
@@ -204,11 +213,11 @@ def bend(i: Ints, p: Floats, record: Floats, one: int, two: int) -> int:
     for number in range(i[WRAPS]):
         if wraps[WRAP_INTS * number + FIRST] == one and poses[POSE_NUMBERS * number + HOW] != NOT:
             near += 1
-    put(chain, 0, vector(work, NODE_WORK * one + PLACE))
+    store_vector(chain, 0, vector(work, NODE_WORK * one + PLACE))
     most, least, way, stage = 0, inf, 0, MEANT
     while way < WAYS and near > 0:
-        put(chain, SLOT, vector(work, NODE_WORK * two + PLACE))
-        count, step = settle(i, p, record, one, two, near, way, stage, least)
+        store_vector(chain, SLOT, vector(work, NODE_WORK * two + PLACE))
+        count, step = fill_slots(i, p, record, one, two, near, way, stage, least)
         length = chain_length(chain, count) if count >= 0 else inf
         if length < least:
             most, least = count, length
@@ -224,14 +233,14 @@ def bend(i: Ints, p: Floats, record: Floats, one: int, two: int) -> int:
 
 def chain_length(chain: Floats, count: int) -> float:
     """Return the length of a segment that is bent around `count` surfaces (m)."""
-    length = norm(minus(start_after(chain, 0, count), end_before(chain, 1)))
+    length = norm(minus(line_end(chain, 0, count), line_start(chain, 1)))
     for k in range(1, count + 1):
-        line = minus(start_after(chain, k, count), end_before(chain, k + 1))
+        line = minus(line_end(chain, k, count), line_start(chain, k + 1))
         length += chain[SLOT * k + GEODESIC + ARC] + norm(line)
     return length
 
 
-def settle(
+def fill_slots(
     i: Ints,
     p: Floats,
     record: Floats,
@@ -268,17 +277,17 @@ def settle(
         at(record, slots[POSES]),
     )
     for number in range(i[WRAPS]):
-        put(poses, POSE_NUMBERS * number + ABOUT, (0.0, 0.0, 0.0))
+        store_vector(poses, POSE_NUMBERS * number + ABOUT, (0.0, 0.0, 0.0))
     waits = False
     for _ in range(TURNS):
         before = count
         for k in range(count, 0, -1):
             if not chain[SLOT * k + GEODESIC + ARC] > 0.0:
-                take_out(chain, count, k)
+                remove_slot(chain, count, k)
                 count -= 1
         # What was left is met again, if at all, once the rest is smooth.
         if count == before:
-            number, place, axis = meet_most(i, p, wraps, poses, one, chain, count, room)
+            number, place, axis = find_largest_turn(i, p, wraps, poses, one, chain, count, room)
             if (place == 0 and not waits) or (count > 0 and stage == ALONE):
                 return count, step
             waits = False
@@ -289,32 +298,32 @@ def settle(
                 )
                 is_open = numbers[SIDE] == 0.0 and numbers[SURFACE + KIND] != TORUS and step > 1
                 if is_open and norm(vector(pose, ABOUT)) == 0.0:
-                    a, b = seen(pose, work, one), seen(pose, work, two)
-                    ways = min(ways_past(at(numbers, SURFACE), a, b, near == 1), step)
+                    a, b = node_in_surface(pose, work, one), node_in_surface(pose, work, two)
+                    ways = min(count_ways(at(numbers, SURFACE), a, b, near == 1), step)
                     if ways > 1:
                         step //= ways
                         which = way // step % ways
                         if which > 1:
                             axis = cross(axis, unit(minus(b, a)))
-                        put(pose, ABOUT, times(-1.0 if which % 2 == 1 else 1.0, axis))
+                        store_vector(pose, ABOUT, times(-1.0 if which % 2 == 1 else 1.0, axis))
                         # Elsewhere than first it waits for what else is met: alone it might slide
                         # back.
                         waits = which > 0 and stage < ALONE
-                insert(numbers, pose, chain, count, place, number)
-                if not lay(numbers, pose, chain, count + 1, place, stage, room):
-                    take_out(chain, count + 1, place)
+                insert_slot(numbers, pose, chain, count, place, number)
+                if not lay_chain(numbers, pose, chain, count + 1, place, stage, room):
+                    remove_slot(chain, count + 1, place)
                     continue
                 count += 1
                 if waits:
                     continue
         elif count == 0:
             break
-        if NEARLY * chain_length(chain, count) > least or not smooth(chain, count, room):
+        if NEARLY * chain_length(chain, count) > least or not smooth_chain(chain, count, room):
             break
     return -1, step
 
 
-def find_near(i: Ints, p: Floats, record: Floats, slots: Ints, one: int, two: int) -> None:
+def mark_near_wraps(i: Ints, p: Floats, record: Floats, slots: Ints, one: int, two: int) -> None:
     """Mark the wraps that may bend the segment between two points outside of them, and how."""
     size = i[POINTS] + 2 * i[WRAPS]
     wraps, work = at(i, NODES_AT + NODE_INTS * size), at(record, ORDER + size)
@@ -326,11 +335,15 @@ def find_near(i: Ints, p: Floats, record: Floats, slots: Ints, one: int, two: in
         if wrap_ints[FIRST] == one:
             numbers = at(p, wrap_ints[PLACES])
             surface = at(numbers, SURFACE)
-            inside, a, b = INSIDE * surface[SQUARE], seen(pose, work, one), seen(pose, work, two)
+            inside, a, b = (
+                INSIDE * surface[SQUARE],
+                node_in_surface(pose, work, one),
+                node_in_surface(pose, work, two),
+            )
             is_near = (
                 two <= wrap_ints[LAST]
-                and value(surface, a) <= inside
-                and value(surface, b) <= inside
+                and surface_value(surface, a) <= inside
+                and surface_value(surface, b) <= inside
             )
             pose[HOW] = AS_MEANT if is_near else NOT
             if (
@@ -338,24 +351,28 @@ def find_near(i: Ints, p: Floats, record: Floats, slots: Ints, one: int, two: in
                 and wrap_ints[LAST] - wrap_ints[RANGE] > 1
                 and (numbers[SIDE] != 0.0 or surface[KIND] == TORUS)
             ):
-                deepest = depth(surface, a, b)
+                deepest = squared_depth(surface, a, b)
                 for k in range(1, int(record[COUNT])):
                     before, after = int(record[ORDER + k - 1]), int(record[ORDER + k])
                     others = wrap_ints[RANGE] <= before != one and after <= wrap_ints[LAST]
                     if (
                         others
-                        and depth(surface, seen(pose, work, before), seen(pose, work, after))
+                        and squared_depth(
+                            surface,
+                            node_in_surface(pose, work, before),
+                            node_in_surface(pose, work, after),
+                        )
                         < deepest
                     ):
                         pose[HOW] = ANY_SIDE
 
 
-def seen(pose: Floats, work: Floats, node: int) -> Vector:
+def node_in_surface(pose: Floats, work: Floats, node: int) -> Vector:
     """Return the position of a node in the frame of a surface."""
-    return in_surface(pose, vector(work, NODE_WORK * node + PLACE))
+    return point_in_surface(pose, vector(work, NODE_WORK * node + PLACE))
 
 
-def place_of(chain: Floats, count: int, number: int) -> int:
+def find_slot(chain: Floats, count: int, number: int) -> int:
     """Return the slot of a wrap, 0 if it has none."""
     for k in range(1, count + 1):
         if chain[SLOT * k + OWNER] == number:
@@ -363,13 +380,13 @@ def place_of(chain: Floats, count: int, number: int) -> int:
     return 0
 
 
-def take_out(chain: Floats, count: int, place: int) -> None:
+def remove_slot(chain: Floats, count: int, place: int) -> None:
     """Remove a slot from the chain."""
     for k in range(SLOT * place, SLOT * (count + 1)):
         chain[k] = chain[k + SLOT]
 
 
-def meet_most(
+def find_largest_turn(
     i: Ints,
     p: Floats,
     wraps: Ints,
@@ -399,21 +416,25 @@ def meet_most(
     result, place, most, axis = 0, 0, 0.0, (0.0, 0.0, 0.0)
     for number in range(i[WRAPS]):
         wrap_ints, pose = at(wraps, WRAP_INTS * number), at(poses, POSE_NUMBERS * number)
-        if wrap_ints[FIRST] == one and pose[HOW] != NOT and place_of(chain, count, number) == 0:
+        if wrap_ints[FIRST] == one and pose[HOW] != NOT and find_slot(chain, count, number) == 0:
             numbers, about = at(p, wrap_ints[PLACES]), vector(pose, ABOUT)
             surface, before = at(numbers, SURFACE), WHOLE if numbers[SIDE] != 0.0 else 0.0
             inside = INSIDE * surface[SQUARE]
             for k in range(count + 1):
                 a, b = (
-                    in_surface(pose, end_before(chain, k + 1)),
-                    in_surface(pose, start_after(chain, k, count)),
+                    point_in_surface(pose, line_start(chain, k + 1)),
+                    point_in_surface(pose, line_end(chain, k, count)),
                 )
-                if value(surface, a) <= inside and value(surface, b) <= inside:
-                    turn, point, way, _ = start(numbers, a, b, pose[HOW], (0.0, 0.0, 0.0), work)
+                if surface_value(surface, a) <= inside and surface_value(surface, b) <= inside:
+                    turn, point, way, _ = start_on_surface(
+                        numbers, a, b, pose[HOW], (0.0, 0.0, 0.0), work
+                    )
                     # Which line meets it is told by the shorter way; it is met, also if no other
                     # way is found.
                     if turn > TOUCH and norm(about) > 0.0:
-                        other, there, onwards, _ = start(numbers, a, b, pose[HOW], about, work)
+                        other, there, onwards, _ = start_on_surface(
+                            numbers, a, b, pose[HOW], about, work
+                        )
                         if other > TOUCH:
                             turn, point, way = other, there, onwards
                     if turn > TOUCH and turn + before > most:
@@ -421,7 +442,9 @@ def meet_most(
     return result, place, axis
 
 
-def insert(p: Floats, pose: Floats, chain: Floats, count: int, place: int, number: int) -> None:
+def insert_slot(
+    p: Floats, pose: Floats, chain: Floats, count: int, place: int, number: int
+) -> None:
     """Insert a surface into a slot of the chain."""
     for k in range(SLOT * (count + 3) - 1, SLOT * (place + 1) - 1, -1):
         chain[k] = chain[k - SLOT]
@@ -433,23 +456,24 @@ def insert(p: Floats, pose: Floats, chain: Floats, count: int, place: int, numbe
         slot[OBSTACLE_WORK + k] = p[SURFACE + k]
 
 
-def lay(
+def lay_chain(
     p: Floats, pose: Floats, chain: Floats, count: int, k: int, stage: int, work: Floats
 ) -> bool:
     """Lay the chain around the surface in a slot, between its neighbours; return whether it touches."""
     first, second = (
-        in_surface(pose, end_before(chain, k)),
-        in_surface(pose, start_after(chain, k, count)),
+        point_in_surface(pose, line_start(chain, k)),
+        point_in_surface(pose, line_end(chain, k, count)),
     )
     about, slot = vector(pose, ABOUT), at(chain, SLOT * k)
-    turn, point, way, arc = start(
+    turn, point, way, arc = start_on_surface(
         p, first, second, PULLED if stage == STRING else pose[HOW], about, work
     )
     if not (
-        turn > TOUCH and shoot(at(slot, OBSTACLE_WORK), point, way, arc, at(slot, GEODESIC), work)
+        turn > TOUCH
+        and shoot_geodesic(at(slot, OBSTACLE_WORK), point, way, arc, at(slot, GEODESIC), work)
     ):
         return False
     if norm(about) > 0.0:
-        put(pose, ABOUT, cross(point, way))
-    to_ground(slot)
+        store_vector(pose, ABOUT, cross(point, way))
+    ends_to_ground(slot)
     return True

@@ -24,9 +24,9 @@ from osimlite.mechanics.kernels.cable_paths import (
     IN_GROUND,
     OBSTACLE_WORK,
     UNKNOWNS,
+    differentiate_end,
     end_to_ground,
     shoot_again,
-    vary,
 )
 from osimlite.mechanics.kernels.cable_surfaces import (
     ACROSS,
@@ -40,7 +40,11 @@ from osimlite.mechanics.kernels.cable_surfaces import (
     START,
     SURFACE_NUMBERS,
 )
-from osimlite.mechanics.kernels.linear_algebra import factor_room, factorise, minimum_norm
+from osimlite.mechanics.kernels.linear_algebra import (
+    factor_size,
+    factorise_equations,
+    solve_minimum_norm,
+)
 from osimlite.mechanics.kernels.pointers import Floats, at
 from osimlite.mechanics.laws.vectors import Vector, cross, dot, minus, norm, times, vector
 
@@ -72,29 +76,29 @@ SHORT = 1e-6
 """Angle (rad) of a geodesic below which it may vanish in a round."""
 
 
-def search_room(count: int) -> int:
+def search_size(count: int) -> int:
     """Return the length of the workspace of a search with `count` geodesics."""
     size = UNKNOWNS * count
-    return GEODESIC_ROOM + 3 * size + factor_room(size, size)
+    return GEODESIC_ROOM + 3 * size + factor_size(size, size)
 
 
-def to_ground(slot: Floats) -> None:
+def ends_to_ground(slot: Floats) -> None:
     """Transform both ends of a geodesic to ground."""
     end_to_ground(at(slot, IN_GROUND), at(slot, GEODESIC + START), at(slot, GROUND_START))
     end_to_ground(at(slot, IN_GROUND), at(slot, GEODESIC + END), at(slot, GROUND_END))
 
 
-def end_before(chain: Floats, k: int) -> Vector:
+def line_start(chain: Floats, k: int) -> Vector:
     """Return the start of the line to a slot."""
     return vector(chain, SLOT * (k - 1) + (GROUND_END + POINT if k > 1 else 0))
 
 
-def start_after(chain: Floats, k: int, count: int) -> Vector:
+def line_end(chain: Floats, k: int, count: int) -> Vector:
     """Return the end of the line from a slot."""
     return vector(chain, SLOT * (k + 1) + (GROUND_START + POINT if k < count else 0))
 
 
-def smooth(chain: Floats, count: int, work: Floats) -> bool:
+def smooth_chain(chain: Floats, count: int, work: Floats) -> bool:
     """Correct all geodesics until the lines meet them without kinks; return whether that converged.
 
     It also ends where a geodesic would become shorter than zero; this one then has no length.
@@ -105,19 +109,21 @@ def smooth(chain: Floats, count: int, work: Floats) -> bool:
     a = at(corrections, size)
     before, stiff = inf, 0.0
     for _ in range(ROUNDS):
-        rough = equations(chain, count, values, a, stiff)
+        rough = fill_equations(chain, count, values, a, stiff)
         if rough <= SMOOTH or before <= rough < STALLED:
             return True
         before = rough
-        rank = factorise(size, size, a, 0.0)
+        rank = factorise_equations(size, size, a, 0.0)
         if determinant_sign(size, a) < 0.0:
             stiff = max(STIFFER * stiff, STIFF)
             continue
-        minimum_norm(size, size, a, rank, values, at(values, size), corrections)
+        solve_minimum_norm(size, size, a, rank, values, at(values, size), corrections)
         stiff = stiff / STIFFER if stiff > STIFF else 0.0
         step = 1.0
         for k in range(count):
-            step = min(step, part_of(at(chain, SLOT * (k + 1)), at(corrections, UNKNOWNS * k)))
+            step = min(
+                step, accepted_part(at(chain, SLOT * (k + 1)), at(corrections, UNKNOWNS * k))
+            )
         if not step > 0.0:
             return step == 0.0
         for k in range(count):
@@ -130,11 +136,11 @@ def smooth(chain: Floats, count: int, work: Floats) -> bool:
                 work,
             ):
                 return False
-            to_ground(slot)
+            ends_to_ground(slot)
     return False
 
 
-def part_of(slot: Floats, corrections: Floats) -> float:
+def accepted_part(slot: Floats, corrections: Floats) -> float:
     """Return the part of its corrections that a geodesic may take.
 
     It is 0 if the geodesic would become shorter than zero, and its length is then set to zero.
@@ -164,7 +170,7 @@ def determinant_sign(size: int, a: Floats) -> float:
     return sign
 
 
-def equations(chain: Floats, count: int, values: Floats, a: Floats, stiff: float) -> float:
+def fill_equations(chain: Floats, count: int, values: Floats, a: Floats, stiff: float) -> float:
     """Fill left sides (4 n, 4 n) and right sides of the equations.
 
     Args:
@@ -188,9 +194,9 @@ def equations(chain: Floats, count: int, values: Floats, a: Floats, stiff: float
             )
             here = vector(slot, end + POINT)
             line = (
-                minus(here, end_before(chain, k))
+                minus(here, line_start(chain, k))
                 if side == 0
-                else minus(start_after(chain, k, count), here)
+                else minus(line_end(chain, k, count), here)
             )
             distance = max(norm(line), NEAR)
             for across in range(2):
@@ -198,7 +204,7 @@ def equations(chain: Floats, count: int, values: Floats, a: Floats, stiff: float
                 row = UNKNOWNS * (k - 1) + 2 * side + across
                 values[row] = -dot(line, axis)
                 most = max(most, abs(values[row]) / distance)
-                vary(
+                differentiate_end(
                     slot,
                     end,
                     times(sign * (1.0 + stiff * distance), axis),
@@ -210,5 +216,7 @@ def equations(chain: Floats, count: int, values: Floats, a: Floats, stiff: float
                         GROUND_END if side == 0 else GROUND_START,
                         at(a, size * row + UNKNOWNS * (other - 1)),
                     )
-                    vary(at(chain, SLOT * other), far, times(-sign, axis), (0.0, 0.0, 0.0), of)
+                    differentiate_end(
+                        at(chain, SLOT * other), far, times(-sign, axis), (0.0, 0.0, 0.0), of
+                    )
     return most

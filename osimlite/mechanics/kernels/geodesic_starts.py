@@ -32,23 +32,23 @@ from osimlite.mechanics.kernels.cable_surfaces import (
     TORUS,
     TUBE,
     WEIGHTS,
-    value,
+    surface_value,
 )
 from osimlite.mechanics.kernels.pointers import Floats, at
 from osimlite.mechanics.kernels.wrap_cylinder import closest_to_axis
-from osimlite.mechanics.kernels.wrapping import NONE, action, on_side
+from osimlite.mechanics.kernels.wrapping import NONE, decide_wrapping, is_on_side
 from osimlite.mechanics.laws.vectors import (
     Vector,
-    along,
+    add_scaled,
     component,
     cross,
     dot,
-    elementwise,
     minus,
+    multiply_elementwise,
     norm,
     plus,
-    put,
-    replaced,
+    replace_component,
+    store_vector,
     times,
     unit,
     vector,
@@ -99,7 +99,7 @@ PULLS = 8
 """Number of sweeps at each resolution of the string."""
 
 
-def start(
+def start_on_surface(
     p: Floats, first: Vector, second: Vector, how: float, about: Vector, work: Floats
 ) -> Start:
     """Find where a straight segment between two points begins to bend around a surface.
@@ -115,17 +115,17 @@ def start(
     """
     axis, side, surface = int(p[AXIS]), p[SIDE], at(p, SURFACE)
     if surface[KIND] == TORUS:
-        return around_torus(surface[RADIUS], surface[TUBE], first, second, axis, side, how)
+        return start_on_torus(surface[RADIUS], surface[TUBE], first, second, axis, side, how)
     if surface[KIND] == CYLINDER:
         is_held = how != ANY_SIDE and axis < 2
-        side_out = replaced((0.0, 0.0, 0.0), axis, side if is_held else 0.0)
-        return around_cylinder(
+        side_out = replace_component((0.0, 0.0, 0.0), axis, side if is_held else 0.0)
+        return start_on_cylinder(
             surface[RADIUS], p[HALF_LENGTH], first, second, side_out, component(about, 2)
         )
-    return around_ellipsoid(surface, first, second, axis, side, how, about, work)
+    return start_on_ellipsoid(surface, first, second, axis, side, how, about, work)
 
 
-def ways_past(p: Floats, first: Vector, second: Vector, is_alone: bool) -> int:
+def count_ways(p: Floats, first: Vector, second: Vector, is_alone: bool) -> int:
     """Return the number of directions in which a line through an open surface is bent in turn.
 
     Around a single surface there is a second one only on an ellipsoid. Among others, each is passed on
@@ -133,19 +133,21 @@ def ways_past(p: Floats, first: Vector, second: Vector, is_alone: bool) -> int:
     the line passes near its middle.
     """
     if not is_alone:
-        return 4 if p[KIND] == SPHERE and depth(p, first, second) < NEAR_MIDDLE else 2
+        return 4 if p[KIND] == SPHERE and squared_depth(p, first, second) < NEAR_MIDDLE else 2
     if p[KIND] != ELLIPSOID:
         return 1
     way, weights = minus(second, first), vector(p, WEIGHTS)
-    part = -dot(elementwise(weights, first), way) / max(dot(elementwise(weights, way), way), LEAST)
+    part = -dot(multiply_elementwise(weights, first), way) / max(
+        dot(multiply_elementwise(weights, way), way), LEAST
+    )
     x, y, z = weights
     out = way_out(
-        (sqrt(1.0 / x), sqrt(1.0 / y), sqrt(1.0 / z)), along(first, part, way), way, WORTHWHILE
+        (sqrt(1.0 / x), sqrt(1.0 / y), sqrt(1.0 / z)), add_scaled(first, part, way), way, WORTHWHILE
     )
     return 2 if dot(out, out) > 0.0 else 1
 
 
-def depth(p: Floats, first: Vector, second: Vector) -> float:
+def squared_depth(p: Floats, first: Vector, second: Vector) -> float:
     """Return how near a segment comes to the middle of a surface, squared.
 
     It is the distance from the axis of a cylinder or the ring of a torus (m²), or from the centre of a
@@ -154,13 +156,15 @@ def depth(p: Floats, first: Vector, second: Vector) -> float:
     if p[KIND] == TORUS:
         return distance_from_ring(nearest_to_ring(p[RADIUS], first, second), p[RADIUS])
     way, weights = minus(second, first), vector(p, WEIGHTS)
-    square = dot(elementwise(weights, way), way)
-    part = min(max(-dot(elementwise(weights, first), way) / max(square, LEAST), 0.0), 1.0)
-    middle = along(first, part, way)
-    return dot(elementwise(weights, middle), middle) / (p[SQUARE] if p[KIND] != CYLINDER else 1.0)
+    square = dot(multiply_elementwise(weights, way), way)
+    part = min(max(-dot(multiply_elementwise(weights, first), way) / max(square, LEAST), 0.0), 1.0)
+    middle = add_scaled(first, part, way)
+    return dot(multiply_elementwise(weights, middle), middle) / (
+        p[SQUARE] if p[KIND] != CYLINDER else 1.0
+    )
 
 
-def around_cylinder(
+def start_on_cylinder(
     radius: float, half_length: float, first: Vector, second: Vector, side_out: Vector, about: float
 ) -> Start:
     """Return the start on a cylinder about z, along a straight line on the unrolled cylinder.
@@ -186,7 +190,7 @@ def around_cylinder(
         and (
             NONE
             if is_open and not crosses
-            else action(*active, dot(side_out, closest) >= 0.0, crosses)
+            else decide_wrapping(*active, dot(side_out, closest) >= 0.0, crosses)
         )
         == NONE
     ):
@@ -247,7 +251,7 @@ def turns_left(one: float, before: float, two: float, after: float, sweep: float
     return (sweep <= pi) == (left1 or left2)
 
 
-def around_ellipsoid(
+def start_on_ellipsoid(
     p: Floats,
     first: Vector,
     second: Vector,
@@ -265,10 +269,10 @@ def around_ellipsoid(
     wx, wy, wz = times(1.0 / p[SQUARE], weights)
     scale = sx, sy, sz = sqrt(wx), sqrt(wy), sqrt(wz)
     radii = 1.0 / sx, 1.0 / sy, 1.0 / sz
-    one, two = elementwise(scale, first), elementwise(scale, second)
+    one, two = multiply_elementwise(scale, first), multiply_elementwise(scale, second)
     way = minus(two, one)
     part = min(max(-dot(one, way) / max(dot(way, way), LEAST), 0.0), 1.0)
-    middle = along(one, part, way)
+    middle = add_scaled(one, part, way)
     if not dot(middle, middle) < 1.0:
         return 0.0, first, way, 0.0
     out = middle
@@ -276,28 +280,30 @@ def around_ellipsoid(
         # Of two ways both begin where it is narrow.
         out = way_out(
             radii,
-            times(0.0 if norm(about) > 0.0 else 1.0, elementwise(radii, middle)),
-            elementwise(radii, way),
+            times(0.0 if norm(about) > 0.0 else 1.0, multiply_elementwise(radii, middle)),
+            multiply_elementwise(radii, way),
             0.0,
         )
     if norm(about) > 0.0:
-        out = times(-1.0 if dot(about, cross(out, elementwise(radii, way))) < 0.0 else 1.0, out)
+        out = times(
+            -1.0 if dot(about, cross(out, multiply_elementwise(radii, way))) < 0.0 else 1.0, out
+        )
         # Across the side where it is least deep: another surface may make that the shortest.
-        other = cross(elementwise(radii, way), about)
+        other = cross(multiply_elementwise(radii, way), about)
         if p[KIND] == SPHERE and dot(unit(other), unit(out)) < ASIDE:
             out = other
-    if side != 0.0 and not on_side(out, axis, side):
+    if side != 0.0 and not is_on_side(out, axis, side):
         # Towards where a mirror would have it, which itself is near no geodesic.
-        mirrored = replaced(out, axis, -component(out, axis))
+        mirrored = replace_component(out, axis, -component(out, axis))
         out = times(1.0 if dot(mirrored, out) >= 0.0 else -1.0, out)
-    out = elementwise(scale, out)
-    result = on_section(radii, one, two, cross(out, way), work)
+    out = multiply_elementwise(scale, out)
+    result = start_on_section(radii, one, two, cross(out, way), work)
     turn, _, sets_out, _ = result
     is_bent = dot(unit(sets_out), unit(vector(work, 0))) < BENT and (
         side == 0.0 or dot(out, middle) > 0.0
     )
     if p[KIND] == ELLIPSOID and (is_bent or how == PULLED):
-        result = shortened(p, turn, first, second, work)
+        result = start_on_string(p, turn, first, second, work)
     return result
 
 
@@ -313,15 +319,15 @@ def way_out(radii: Vector, middle: Vector, way: Vector, deeper: float) -> Vector
     """
     x, y, z = way
     axis = 0 if abs(x) <= min(abs(y), abs(z)) else (1 if abs(y) <= abs(z) else 2)
-    a = unit(cross(way, replaced((0.0, 0.0, 0.0), axis, 1.0)))
+    a = unit(cross(way, replace_component((0.0, 0.0, 0.0), axis, 1.0)))
     b = cross(unit(way), a)
-    ra, rb = elementwise(radii, a), elementwise(radii, b)
+    ra, rb = multiply_elementwise(radii, a), multiply_elementwise(radii, b)
     aa, ab, bb = dot(ra, ra), dot(ra, rb), dot(rb, rb)
     ma, mb = dot(middle, a), dot(middle, b)
     best = second = (inf, 0.0)
-    before, here = below(aa, ab, bb, ma, mb, -2), below(aa, ab, bb, ma, mb, -1)
+    before, here = line_depth(aa, ab, bb, ma, mb, -2), line_depth(aa, ab, bb, ma, mb, -1)
     for k in range(WAYS):
-        after = below(aa, ab, bb, ma, mb, k)
+        after = line_depth(aa, ab, bb, ma, mb, k)
         if here < before and here <= after:
             result = (
                 here,
@@ -335,16 +341,18 @@ def way_out(radii: Vector, middle: Vector, way: Vector, deeper: float) -> Vector
     depth, angle = second if deeper > 0.0 else best
     if depth == inf or depth > max(deeper, 1.0) * best[0]:
         return 0.0, 0.0, 0.0
-    return along(times(cos(angle), a), sin(angle), b)
+    return add_scaled(times(cos(angle), a), sin(angle), b)
 
 
-def below(aa: float, ab: float, bb: float, ma: float, mb: float, k: int) -> float:
+def line_depth(aa: float, ab: float, bb: float, ma: float, mb: float, k: int) -> float:
     """Return the depth of a line in an ellipsoid in a direction across it, from products of scaled directions."""
     c, s = cos(2.0 * pi / WAYS * k), sin(2.0 * pi / WAYS * k)
     return sqrt(aa * c * c + 2.0 * ab * c * s + bb * s * s) - ma * c - mb * s
 
 
-def on_section(radii: Vector, one: Vector, two: Vector, across: Vector, work: Floats) -> Start:
+def start_on_section(
+    radii: Vector, one: Vector, two: Vector, across: Vector, work: Floats
+) -> Start:
     """Return the start on a plane section of an ellipsoid, and beads along it.
 
     Args:
@@ -358,35 +366,39 @@ def on_section(radii: Vector, one: Vector, two: Vector, across: Vector, work: Fl
     centre = times(dot(normal, one), normal)
     radius = sqrt(max(1.0 - dot(centre, centre), 0.0))
     a1, a2 = (
-        touching(minus(one, centre), radius, normal, 1.0),
-        touching(minus(two, centre), radius, normal, -1.0),
+        find_tangent(minus(one, centre), radius, normal, 1.0),
+        find_tangent(minus(two, centre), radius, normal, -1.0),
     )
     across = cross(normal, a1)
     turn = atan2(dot(across, a2), dot(a1, a2))
     if turn < -1e-6:
         turn += 2.0 * pi
-    put(work, 0, elementwise(radii, cross(normal, a2)))
+    store_vector(work, 0, multiply_elementwise(radii, cross(normal, a2)))
     length = 0.0
     for k in range(1, BEADS):
         angle = turn * (k - 0.5) / (BEADS - 1)
         c, s = cos(angle), sin(angle)
-        length += norm(elementwise(radii, along(times(c, across), -s, a1)))
-        put(work, 3 * k, elementwise(radii, along(along(centre, c, a1), s, across)))
+        length += norm(multiply_elementwise(radii, add_scaled(times(c, across), -s, a1)))
+        store_vector(
+            work,
+            3 * k,
+            multiply_elementwise(radii, add_scaled(add_scaled(centre, c, a1), s, across)),
+        )
     return (
         turn,
-        elementwise(radii, along(centre, 1.0, a1)),
-        elementwise(radii, across),
+        multiply_elementwise(radii, add_scaled(centre, 1.0, a1)),
+        multiply_elementwise(radii, across),
         turn / (BEADS - 1) * length,
     )
 
 
-def shortened(p: Floats, turn: float, first: Vector, second: Vector, work: Floats) -> Start:
+def start_on_string(p: Floats, turn: float, first: Vector, second: Vector, work: Floats) -> Start:
     """Return a start from a string of beads that is tightened over an ellipsoid, at rising resolutions.
 
     A section that turns far may be near no geodesic, or not near the shortest one.
     """
-    put(work, 0, first)
-    put(work, 3 * BEADS, second)
+    store_vector(work, 0, first)
+    store_vector(work, 3 * BEADS, second)
     stride = BEADS // 4
     one, two = BEADS, 0
     while stride > 0:
@@ -396,13 +408,13 @@ def shortened(p: Floats, turn: float, first: Vector, second: Vector, work: Float
                 bead = times(
                     0.5, plus(vector(work, 3 * (k - stride)), vector(work, 3 * (k + stride)))
                 )
-                if value(p, bead) > 0.0:
+                if surface_value(p, bead) > 0.0:
                     for _ in range(2):
-                        out = elementwise(vector(p, WEIGHTS), bead)
-                        bead = along(bead, 0.5 * value(p, bead) / dot(out, out), out)
+                        out = multiply_elementwise(vector(p, WEIGHTS), bead)
+                        bead = add_scaled(bead, 0.5 * surface_value(p, bead) / dot(out, out), out)
                     if stride == 1 and pull == PULLS:
                         one, two = min(one, k), k
-                put(work, 3 * k, bead)
+                store_vector(work, 3 * k, bead)
         stride //= 2
     if two == 0:
         return 0.0, first, second, 0.0
@@ -415,7 +427,7 @@ def shortened(p: Floats, turn: float, first: Vector, second: Vector, work: Float
     return turn, times(0.5, plus(begin, end)), minus(end, begin), length
 
 
-def touching(point: Vector, radius: float, normal: Vector, way: float) -> Vector:
+def find_tangent(point: Vector, radius: float, normal: Vector, way: float) -> Vector:
     """Return the tangent point of a circle about the origin from a point, in a direction of rotation.
 
     For a point inside, it is the nearest point of the circle.
@@ -423,29 +435,31 @@ def touching(point: Vector, radius: float, normal: Vector, way: float) -> Vector
     distance = max(norm(point), LEAST)
     cosine = min(radius / distance, 1.0)
     foot = times(radius * cosine / distance, point)
-    return along(foot, way * radius * sqrt(1.0 - cosine * cosine) / distance, cross(normal, point))
+    return add_scaled(
+        foot, way * radius * sqrt(1.0 - cosine * cosine) / distance, cross(normal, point)
+    )
 
 
-def around_torus(
+def start_on_torus(
     ring: float, tube: float, first: Vector, second: Vector, axis: int, side: float, how: float
 ) -> Start:
     """Return the start on a torus about z, as on a cylinder at the point of the ring nearest to the line."""
     x, y, _ = near = nearest_to_ring(ring, first, second)
-    if side != 0.0 and not on_side(near, axis, side):
+    if side != 0.0 and not is_on_side(near, axis, side):
         return 0.0, first, near, 0.0
     rx, ry, _ = inwards = unit((-x, -y, 0.0))
     centre, tangent = times(-ring, inwards), (-ry, rx, 0.0)
     one, two = (
-        seen(minus(first, centre), inwards, tangent),
-        seen(minus(second, centre), inwards, tangent),
+        vector_in_cylinder(minus(first, centre), inwards, tangent),
+        vector_in_cylinder(minus(second, centre), inwards, tangent),
     )
-    turn, point, way, length = around_cylinder(
+    turn, point, way, length = start_on_cylinder(
         tube, inf, one, two, (0.0 if how == ANY_SIDE else 1.0, 0.0, 0.0), 0.0
     )
     return (
         turn,
-        along(back(point, inwards, tangent), 1.0, centre),
-        back(way, inwards, tangent),
+        add_scaled(vector_from_cylinder(point, inwards, tangent), 1.0, centre),
+        vector_from_cylinder(way, inwards, tangent),
         length,
     )
 
@@ -455,11 +469,11 @@ def nearest_to_ring(ring: float, first: Vector, second: Vector) -> Vector:
     wx, wy, wz = way = minus(second, first)
     best, least = 0.0, inf
     for k in range(SAMPLES + 1):
-        distance = distance_from_ring(along(first, k / SAMPLES, way), ring)
+        distance = distance_from_ring(add_scaled(first, k / SAMPLES, way), ring)
         if distance < least:
             best, least = k / SAMPLES, distance
     for _ in range(STEPS):
-        x, y, z = along(first, best, way)
+        x, y, z = add_scaled(first, best, way)
         square = max(x * x + y * y, LEAST)
         outer, flat = sqrt(square), x * wx + y * wy
         slope = flat * (1.0 - ring / outer) + z * wz
@@ -471,7 +485,7 @@ def nearest_to_ring(ring: float, first: Vector, second: Vector) -> Vector:
         if not bends > 0.0:
             break
         best = min(max(best - slope / bends, 0.0), 1.0)
-    return along(first, best, way)
+    return add_scaled(first, best, way)
 
 
 def distance_from_ring(point: Vector, ring: float) -> float:
@@ -481,13 +495,13 @@ def distance_from_ring(point: Vector, ring: float) -> float:
     return across * across + z * z
 
 
-def seen(point: Vector, inwards: Vector, tangent: Vector) -> Vector:
+def vector_in_cylinder(point: Vector, inwards: Vector, tangent: Vector) -> Vector:
     """Return the components of a vector along the cylinder at the ring: inwards, down, and along the ring."""
     _, _, z = point
     return dot(inwards, point), -z, dot(tangent, point)
 
 
-def back(point: Vector, inwards: Vector, tangent: Vector) -> Vector:
+def vector_from_cylinder(point: Vector, inwards: Vector, tangent: Vector) -> Vector:
     """Return the vector with these components, in the frame of the torus."""
     x, y, z = point
-    return along(along((0.0, 0.0, -y), x, inwards), z, tangent)
+    return add_scaled(add_scaled((0.0, 0.0, -y), x, inwards), z, tangent)

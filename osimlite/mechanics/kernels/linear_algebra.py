@@ -31,12 +31,12 @@ than `count`, and at the end the rank.
 """
 
 
-def factor_room(count: int, size: int) -> int:
+def factor_size(count: int, size: int) -> int:
     """Return the length of a factor of `count` equations in `size` unknowns."""
     return count * size + count * count + FACTOR_EXTRA * count + 1
 
 
-def factored(model: Ints, data: Floats, count: int, a: Floats, smallest: float) -> int:
+def factorise_by_law(model: Ints, data: Floats, count: int, a: Floats, smallest: float) -> int:
     """Factorise equations in all speeds by the law of the model, see `factorise_equations`; return the rank."""
     data[WORK.SCRATCH] = smallest
     return call(
@@ -50,7 +50,9 @@ def factored(model: Ints, data: Floats, count: int, a: Floats, smallest: float) 
     )
 
 
-def solved(model: Ints, count: int, a: Floats, values: Floats, room: Floats, reals: Floats) -> None:
+def solve_by_law(
+    model: Ints, count: int, a: Floats, values: Floats, room: Floats, reals: Floats
+) -> None:
     """Solve equations that `factorise_by_law` factorised, see `solve_minimum_norm`.
 
     Args:
@@ -77,8 +79,8 @@ def factorise_law(
 ) -> int:
     """Factorise equations as a law: f holds the equations and gets the factor, SCRATCH the threshold."""
     size = model[MODEL.DOFS]
-    rank = factorise(count, size, f, data[WORK.SCRATCH])
-    f[factor_room(count, size) - 1] = rank
+    rank = factorise_equations(count, size, f, data[WORK.SCRATCH])
+    f[factor_size(count, size) - 1] = rank
     return rank
 
 
@@ -87,12 +89,12 @@ def minimum_norm_law(
 ) -> int:
     """Solve factorised equations as a law: right sides `reals`, workspace `data`, factor y, solution f."""
     size = model[MODEL.DOFS]
-    rank = int(y[factor_room(count, size) - 1])
-    minimum_norm(count, size, y, rank, reals, data, f)
+    rank = int(y[factor_size(count, size) - 1])
+    solve_minimum_norm(count, size, y, rank, reals, data, f)
     return rank
 
 
-def factorise(count: int, size: int, a: Floats, smallest: float) -> int:
+def factorise_equations(count: int, size: int, a: Floats, smallest: float) -> int:
     """Factorise equations in place.
 
     An equation counts as independent if its part beyond the others is more than `smallest` times the
@@ -129,9 +131,9 @@ def factorise(count: int, size: int, a: Floats, smallest: float) -> int:
             for k in range(size):
                 a[size * r + k], a[size * best + k] = a[size * best + k], a[size * r + k]
         row = at(a, size * r)
-        diagonal[r] = reflection(r, size, 1, length, row)
+        diagonal[r] = make_reflection(r, size, 1, length, row)
         for i in range(r + 1, count):
-            reflect(r, size, 1, row, 1, at(a, size * i))
+            apply_reflection(r, size, 1, row, 1, at(a, size * i))
         rank += 1
     if rank < count:
         # The lower trapezoid (count, rank) is turned into a triangle.
@@ -144,13 +146,13 @@ def factorise(count: int, size: int, a: Floats, smallest: float) -> int:
             for i in range(r, count):
                 square += t[count * i + r] * t[count * i + r]
             column = at(t, r)
-            corner[r] = reflection(r, count, count, sqrt(square), column)
+            corner[r] = make_reflection(r, count, count, sqrt(square), column)
             for k in range(r + 1, rank):
-                reflect(r, count, count, column, count, at(t, k))
+                apply_reflection(r, count, count, column, count, at(t, k))
     return rank
 
 
-def reflection(first: int, end: int, stride: int, length: float, v: Floats) -> float:
+def make_reflection(first: int, end: int, stride: int, length: float, v: Floats) -> float:
     """Compute the Householder vector that maps a vector to a multiple of its entry `first`.
 
     Args:
@@ -174,7 +176,7 @@ def reflection(first: int, end: int, stride: int, length: float, v: Floats) -> f
     return value
 
 
-def reflect(first: int, end: int, stride: int, v: Floats, apart: int, x: Floats) -> None:
+def apply_reflection(first: int, end: int, stride: int, v: Floats, apart: int, x: Floats) -> None:
     """Reflect the vector x by a Householder vector v: x -= (v . x) v.
 
     Args:
@@ -192,7 +194,7 @@ def reflect(first: int, end: int, stride: int, v: Floats, apart: int, x: Floats)
         x[apart * k] -= total * v[stride * k]
 
 
-def minimum_norm(
+def solve_minimum_norm(
     count: int, size: int, a: Floats, rank: int, values: Floats, room: Floats, x: Floats
 ) -> None:
     """Compute the shortest least-squares solution of factorised equations.
@@ -212,7 +214,7 @@ def minimum_norm(
     if rank < count:
         t, corner = at(a, count * size + FACTOR_EXTRA * count), at(a, count * size + 2 * count)
         for r in range(rank):
-            reflect(r, count, count, at(t, r), 1, room)
+            apply_reflection(r, count, count, at(t, r), 1, room)
         for r in range(rank - 1, -1, -1):
             total = room[r]
             for k in range(r + 1, rank):
@@ -232,7 +234,7 @@ def minimum_norm(
 def apply_q(size: int, a: Floats, rank: int, x: Floats) -> None:
     """Transform rotated unknowns back to the unknowns; those from `rank` on are free."""
     for r in range(rank - 1, -1, -1):
-        reflect(r, size, 1, at(a, size * r), 1, x)
+        apply_reflection(r, size, 1, at(a, size * r), 1, x)
 
 
 def write_null_space(size: int, a: Floats, rank: int, basis: Floats) -> None:
@@ -252,7 +254,7 @@ def write_null_space(size: int, a: Floats, rank: int, basis: Floats) -> None:
         apply_q(size, a, rank, direction)
 
 
-def cholesky(size: int, a: Floats, smallest: float) -> bool:
+def factorise_cholesky(size: int, a: Floats, smallest: float) -> bool:
     """Factorise a symmetric positive definite matrix (size, size) in place; its lower triangle is used.
 
     Returns:
@@ -273,8 +275,8 @@ def cholesky(size: int, a: Floats, smallest: float) -> bool:
     return True
 
 
-def substitute(size: int, a: Floats, x: Floats) -> None:
-    """Solve a linear system in place with the factor of `cholesky`."""
+def solve_cholesky(size: int, a: Floats, x: Floats) -> None:
+    """Solve a linear system in place with the factor of `factorise_cholesky`."""
     for i in range(size):
         total = x[i]
         for k in range(i):
@@ -314,10 +316,10 @@ def diagonalize(size: int, a: Floats, vectors: Floats) -> None:
             return
         for i in range(size):
             for j in range(i):
-                rotate(size, a, vectors, i, j)
+                rotate_plane(size, a, vectors, i, j)
 
 
-def rotate(size: int, a: Floats, vectors: Floats, i: int, j: int) -> None:
+def rotate_plane(size: int, a: Floats, vectors: Floats, i: int, j: int) -> None:
     """Rotate the plane of two unknowns so that their common entry vanishes."""
     entry = a[size * i + j]
     if entry == 0.0:

@@ -10,9 +10,9 @@ from osimlite.mechanics.kernels.error_control import (
     HAS_DERIVATIVE,
     MEMORY,
     REACHED,
-    judge,
+    judge_step,
+    project_and_measure,
     step_end,
-    step_error,
 )
 from osimlite.mechanics.kernels.layout import MODEL, OUTCOME, STAGE, WORK
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call
@@ -46,13 +46,13 @@ def merson(model: Ints, reals: Floats, data: Floats, y0: Floats, y1: Floats, pla
     t0, t1 = h[REACHED], step_end(h)
     h[EVALUATED], h[HAS_DERIVATIVE] = 4.0, 0.0
     error = inf
-    if staged(model, reals, data, t0, t1, y0, y1, errors, stages) == OUTCOME.OK:
-        error = step_error(model, reals, data, t1, y0, y1, errors, h, 0)
-    judge(h, t1, error, ORDER)
+    if compute_stages(model, reals, data, t0, t1, y0, y1, errors, stages) == OUTCOME.OK:
+        error = project_and_measure(model, reals, data, t1, y0, y1, errors, h, 0)
+    judge_step(h, t1, error, ORDER)
     return OUTCOME.OK
 
 
-def staged(
+def compute_stages(
     model: Ints,
     reals: Floats,
     data: Floats,

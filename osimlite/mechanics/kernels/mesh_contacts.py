@@ -17,7 +17,17 @@ from osimlite.mechanics.laws.elastic_foundation import (
     spring_in_sphere,
     spring_load,
 )
-from osimlite.mechanics.laws.vectors import ZERO, Vector, dot, minus, norm, plus, put, times, vector
+from osimlite.mechanics.laws.vectors import (
+    ZERO,
+    Vector,
+    dot,
+    minus,
+    norm,
+    plus,
+    store_vector,
+    times,
+    vector,
+)
 
 SPRINGS = 16
 """Offset among the numbers of the springs: stiffness (N/m) and position in the link of each."""
@@ -61,11 +71,11 @@ def touch_mesh(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, i
                 spring[0], p[11], p[12], p[13], p[14], p[15], middle, end, about, v, turning
             )
             force, torque, energy = plus(force, push), plus(torque, turn), energy + stored
-    load_mesh(model, data, item, about, force, torque, energy)
+    apply_mesh_load(model, data, item, about, force, torque, energy)
     return OUTCOME.OK
 
 
-def load_mesh(
+def apply_mesh_load(
     model: Ints,
     data: Floats,
     item: int,
@@ -93,11 +103,11 @@ def load_mesh(
             model[model[MODEL.CONTACT_AT] + i[ITEM.FIRST_CONTACT] + i[ITEM.OWN + 2]] + ITEM.RECORD
         ],
     )
-    put(result, 0, force)
-    put(result, 3, about)
-    put(result, 6, torque)
-    put(contact, 0, force)
-    put(contact, 3, about)
+    store_vector(result, 0, force)
+    store_vector(result, 3, about)
+    store_vector(result, 6, torque)
+    store_vector(contact, 0, force)
+    store_vector(contact, 3, about)
     result[9] = energy
     apply_force(model, data, two, about, force)
     apply_torque(model, data, two, torque)

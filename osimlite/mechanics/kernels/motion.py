@@ -27,16 +27,33 @@ from osimlite.mechanics.kernels.points import (
     link_work,
     operation_ints,
     operation_work,
-    screw,
+    unit_twist,
 )
-from osimlite.mechanics.laws.rotations import Axes, X, Y, Z, along_axes, sine_cosine, turned_axes
-from osimlite.mechanics.laws.vectors import ZERO, Vector, along, cross, plus, put, times, vector
+from osimlite.mechanics.laws.rotations import (
+    Axes,
+    X,
+    Y,
+    Z,
+    combine_axes,
+    multiply_rotations,
+    sine_cosine,
+)
+from osimlite.mechanics.laws.vectors import (
+    ZERO,
+    Vector,
+    add_scaled,
+    cross,
+    plus,
+    store_vector,
+    times,
+    vector,
+)
 
 BALL_MOVES = 1
 """Offset from the number of the law that places a ball (or drift) to that of the law that moves it."""
 
 
-def place(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) -> None:
+def place_links(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) -> None:
     """Compute rotations, positions and origins of all links, and the axes of all operations.
 
     Args:
@@ -51,15 +68,15 @@ def place(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) -> Non
         axes, origin = (X, Y, Z), ZERO
         if i[LINK.PARENT] >= 0:
             parent = link_work(model, data, i[LINK.PARENT])
-            axes, origin = axes_of(parent), vector(parent, LINK_WORK.POSITION)
+            axes, origin = axes_from_rows(parent), vector(parent, LINK_WORK.POSITION)
         for operation in range(i[LINK.FIRST_OPERATION], i[LINK.END_OPERATION]):
             record = model[MODEL.OPERATION_AT] + OPERATION.SIZE * operation
             j, a = at(model, record), operation_work(model, data, operation)
             b = at(reals, model[MODEL.FIXED_AT] + FIXED.SIZE * operation)
             if j[OPERATION.BEFORE] != TRANSFORM.NOTHING:
-                origin = plus(origin, along_axes(axes, vector(b, FIXED.TRANSLATION)))
+                origin = plus(origin, combine_axes(axes, vector(b, FIXED.TRANSLATION)))
                 if j[OPERATION.BEFORE] == TRANSFORM.MOVE:
-                    axes = turned_axes(axes, axes_of(b))
+                    axes = multiply_rotations(axes, axes_from_rows(b))
             motion = j[OPERATION.MOTION]
             if motion < MOTION.BALL:
                 if j[OPERATION.DOF] >= 0:
@@ -77,30 +94,30 @@ def place(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) -> Non
                     amount = a[OPERATION_WORK.AMOUNT]
                 if motion == MOTION.TURN:
                     one, two, three = axes
-                    put(a, OPERATION_WORK.AXIS, three)
-                    put(a, OPERATION_WORK.POINT, origin)
+                    store_vector(a, OPERATION_WORK.AXIS, three)
+                    store_vector(a, OPERATION_WORK.POINT, origin)
                     sine, cosine = sine_cosine(amount)
                     axes = (
-                        along(times(cosine, one), sine, two),
-                        along(times(cosine, two), -sine, one),
+                        add_scaled(times(cosine, one), sine, two),
+                        add_scaled(times(cosine, two), -sine, one),
                         three,
                     )
                 else:
-                    axis = along_axes(axes, vector(b, FIXED.AXIS))
-                    put(a, OPERATION_WORK.AXIS, axis)
-                    origin = along(origin, amount, axis)
+                    axis = combine_axes(axes, vector(b, FIXED.AXIS))
+                    store_vector(a, OPERATION_WORK.AXIS, axis)
+                    origin = add_scaled(origin, amount, axis)
             else:
                 frame = at(data, WORK.SCRATCH)
                 set_frame(frame, axes, origin)
                 call(model[MODEL.LAWS + j[OPERATION.FUNCTION]], model, reals, data, y, f, operation)
-                axes, origin = axes_of(frame), vector(frame, LINK_WORK.POSITION)
+                axes, origin = axes_from_rows(frame), vector(frame, LINK_WORK.POSITION)
         set_frame(here, axes, origin)
         if i[LINK.PARENT] >= 0:
             origin = vector(link_work(model, data, i[LINK.PARENT]), LINK_WORK.ORIGIN)
-        put(here, LINK_WORK.ORIGIN, origin)
+        store_vector(here, LINK_WORK.ORIGIN, origin)
 
 
-def axes_of(rows: Floats) -> Axes:
+def axes_from_rows(rows: Floats) -> Axes:
     """Return the axes of a frame, the columns of a rotation that is stored by rows."""
     return (rows[0], rows[3], rows[6]), (rows[1], rows[4], rows[7]), (rows[2], rows[5], rows[8])
 
@@ -111,10 +128,10 @@ def set_frame(rows: Floats, axes: Axes, origin: Vector) -> None:
     rows[0], rows[3], rows[6] = one
     rows[1], rows[4], rows[7] = two
     rows[2], rows[5], rows[8] = three
-    put(rows, LINK_WORK.POSITION, origin)
+    store_vector(rows, LINK_WORK.POSITION, origin)
 
 
-def move(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) -> int:
+def move_links(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) -> int:
     """Compute velocities, accelerations while udot = 0, columns of the speeds, and controls.
 
     `place_links` must have been called for the same state.
@@ -135,7 +152,7 @@ def move(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) -> int:
     for freedom in range(size):
         f[freedom] = y[size + freedom]
     for k in range(model[MODEL.SUMMED]):
-        set_row(
+        set_spatial_vector(
             at(data, model[MODEL.WORK_COLUMN] + 6 * model[model[MODEL.SUMMED_AT] + k]), ZERO, ZERO
         )
     for link in range(model[MODEL.LINKS]):
@@ -163,22 +180,22 @@ def move(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) -> int:
             a = operation_work(model, data, operation)
             motion, freedom = j[OPERATION.MOTION], j[OPERATION.DOF]
             if motion < MOTION.BALL:
-                turn, shift = screw(j, a, origin)
+                turn, shift = unit_twist(j, a, origin)
                 if freedom >= 0:
                     rate = y[size + freedom]
                     column = at(data, model[MODEL.WORK_COLUMN] + 6 * freedom)
                     if j[OPERATION.FUNCTION] == OPERATION.ALONE:
-                        set_row(column, turn, shift)
+                        set_spatial_vector(column, turn, shift)
                     else:
-                        add_row(column, 1.0, turn, shift)
+                        add_spatial_vector(column, 1.0, turn, shift)
                 else:
                     rate, curvature = a[OPERATION_WORK.RATE], a[OPERATION_WORK.CURVATURE]
-                    spin_rate = along(spin_rate, curvature, turn)
-                    acceleration = along(acceleration, curvature, shift)
+                    spin_rate = add_scaled(spin_rate, curvature, turn)
+                    acceleration = add_scaled(acceleration, curvature, shift)
                     for k in range(j[OPERATION.ARGUMENT_COUNT]):
                         freedom = model[j[OPERATION.ARGUMENTS] + k]
                         if freedom >= 0:
-                            add_row(
+                            add_spatial_vector(
                                 at(data, model[MODEL.WORK_COLUMN] + 6 * freedom),
                                 data[j[OPERATION.GRADIENT] + k],
                                 turn,
@@ -188,7 +205,7 @@ def move(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) -> int:
             else:
                 # The origin goes to the law, and what it finds comes back.
                 result = at(data, WORK.SCRATCH)
-                put(result, 0, origin)
+                store_vector(result, 0, origin)
                 status = max(
                     status,
                     call(
@@ -210,17 +227,19 @@ def move(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) -> int:
             spin_rate = plus(spin_rate, cross(spin, turn))
             acceleration = plus(acceleration, plus(cross(velocity, turn), cross(spin, shift)))
             spin, velocity = plus(spin, turn), plus(velocity, shift)
-        set_row(at(here, LINK_WORK.VELOCITY), spin, velocity)
-        set_row(at(here, LINK_WORK.ACCELERATION), spin_rate, acceleration)
+        set_spatial_vector(at(here, LINK_WORK.VELOCITY), spin, velocity)
+        set_spatial_vector(at(here, LINK_WORK.ACCELERATION), spin_rate, acceleration)
     return status
 
 
-def set_row(row: Floats, turn: Vector, shift: Vector) -> None:
+def set_spatial_vector(row: Floats, turn: Vector, shift: Vector) -> None:
     """Store a spatial vector."""
-    put(row, 0, turn)
-    put(row, 3, shift)
+    store_vector(row, 0, turn)
+    store_vector(row, 3, shift)
 
 
-def add_row(row: Floats, factor: float, turn: Vector, shift: Vector) -> None:
+def add_spatial_vector(row: Floats, factor: float, turn: Vector, shift: Vector) -> None:
     """Add a multiple of a spatial vector to a stored one."""
-    set_row(row, along(vector(row, 0), factor, turn), along(vector(row, 3), factor, shift))
+    set_spatial_vector(
+        row, add_scaled(vector(row, 0), factor, turn), add_scaled(vector(row, 3), factor, shift)
+    )

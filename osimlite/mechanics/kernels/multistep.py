@@ -16,7 +16,12 @@ from __future__ import annotations
 from itertools import pairwise
 from math import inf, sqrt
 
-from osimlite.mechanics.kernels.condensation import condense, correct, linearise, product
+from osimlite.mechanics.kernels.condensation import (
+    condense_system,
+    dot_range,
+    linearise_state,
+    solve_condensed,
+)
 from osimlite.mechanics.kernels.error_control import (
     ACCEPTED,
     ERRORS,
@@ -27,7 +32,7 @@ from osimlite.mechanics.kernels.error_control import (
     NEXT_STEP,
     REACHED,
     error_norm,
-    step_error,
+    project_and_measure,
 )
 from osimlite.mechanics.kernels.layout import MODEL, OUTCOME, STAGE, WORK
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call, is_finite
@@ -110,15 +115,15 @@ PATIENCE = 3
 
 def bdf(model: Ints, reals: Floats, data: Floats, y0: Floats, y1: Floats, place: int) -> int:
     """Try one step by a numerical differentiation formula, see `try_multistep`."""
-    return multistep(model, reals, data, y0, y1, place, BDF)
+    return try_multistep(model, reals, data, y0, y1, place, BDF)
 
 
 def adams(model: Ints, reals: Floats, data: Floats, y0: Floats, y1: Floats, place: int) -> int:
     """Try one step by an Adams-Moulton formula, see `try_multistep`."""
-    return multistep(model, reals, data, y0, y1, place, ADAMS)
+    return try_multistep(model, reals, data, y0, y1, place, ADAMS)
 
 
-def multistep(
+def try_multistep(
     model: Ints, reals: Floats, data: Floats, y0: Floats, y1: Floats, place: int, method: int
 ) -> int:
     """Try one step from y0, which is followed by its derivative, to y1; write its derivative after y1.
@@ -142,24 +147,24 @@ def multistep(
     )
     h[EVALUATED], h[HAS_DERIVATIVE] = 0.0, 1.0
     if h[ORDER] == 0.0:
-        begin(model, h, y0, rows)
+        start_history(model, h, y0, rows)
     t0, accuracy, order = h[REACHED], h[ACCEPTED], int(h[ORDER])
     t1 = t0 + h[STEP]
     if h[LAST_TIME] <= t0 + 1.001 * h[STEP]:
         t1 = h[LAST_TIME]
-        rescale(size, method, h, rows, (t1 - t0) / h[STEP])
+        rescale_differences(size, method, h, rows, (t1 - t0) / h[STEP])
     constants = WIDTH * method + order
     c = h[STEP] / ALPHA[constants]
     iterations, is_new = 0, False
     while True:
-        predict(size, method, order, rows, y1, psi)
+        predict_state(size, method, order, rows, y1, psi)
         if h[AGE] <= 0.0 or h[AGE] > RENEWED:
             data[WORK.TIME] = t1
-            is_new = linearise(model, reals, data, y1, at(y1, size), work, 0.0) == OUTCOME.OK
+            is_new = linearise_state(model, reals, data, y1, at(y1, size), work, 0.0) == OUTCOME.OK
             h[AGE], h[CONDENSED] = 1.0 if is_new else 0.0, 0.0
-        if h[AGE] > 0.0 and (h[CONDENSED] == c or condense(model, c, work)):
+        if h[AGE] > 0.0 and (h[CONDENSED] == c or condense_system(model, c, work)):
             h[CONDENSED] = c
-            iterations = newton(model, reals, data, t1, c, y0, y1, d, psi, errors, work, h)
+            iterations = iterate_newton(model, reals, data, t1, c, y0, y1, d, psi, errors, work, h)
         if iterations > 0 or is_new or h[AGE] <= 0.0:
             break
         h[AGE] = 0.0
@@ -167,9 +172,9 @@ def multistep(
     if iterations > 0:
         for k in range(size):
             errors[k] = ERROR_CONSTANT[constants] * DIFFERENCE[constants] * d[k]
-        error = step_error(model, reals, data, t1, y0, y1, errors, h, 1)
+        error = project_and_measure(model, reals, data, t1, y0, y1, errors, h, 1)
     if not error <= accuracy:
-        refuse(size, method, h, rows, error / accuracy)
+        shorten_step(size, method, h, rows, error / accuracy)
         return OUTCOME.OK
     h[AGE] += 1.0
     h[REFUSED] = 0.0
@@ -189,7 +194,7 @@ def multistep(
         rows[k] = y1[k]
     h[EQUAL] += 1.0
     if h[EQUAL] > order:
-        choose(
+        choose_order(
             model,
             method,
             h,
@@ -203,7 +208,7 @@ def multistep(
     return OUTCOME.OK
 
 
-def begin(model: Ints, h: Floats, y0: Floats, rows: Floats) -> None:
+def start_history(model: Ints, h: Floats, y0: Floats, rows: Floats) -> None:
     """Start the history with order 1 and a step that changes the state little."""
     size = model[MODEL.STATE_SIZE]
     speed = error_norm(model, y0, at(y0, size), h, 1)
@@ -216,7 +221,7 @@ def begin(model: Ints, h: Floats, y0: Floats, rows: Floats) -> None:
             rows[size * i + k] = 0.0
 
 
-def predict(size: int, method: int, order: int, rows: Floats, y: Floats, psi: Floats) -> None:
+def predict_state(size: int, method: int, order: int, rows: Floats, y: Floats, psi: Floats) -> None:
     """Compute psi, and the state at the end of a step whose newest difference is zero."""
     first = WIDTH * method
     for k in range(size):
@@ -227,7 +232,7 @@ def predict(size: int, method: int, order: int, rows: Floats, y: Floats, psi: Fl
         psi[k] /= ALPHA[first + order]
 
 
-def newton(
+def iterate_newton(
     model: Ints,
     reals: Floats,
     data: Floats,
@@ -278,7 +283,7 @@ def newton(
         for k in range(size):
             change[k] = c * f1[k] - psi[k] - d[k]
         residual = error_norm(model, y0, change, h, 1)
-        correct(model, c, work, change)
+        solve_condensed(model, c, work, change)
         length = error_norm(model, y0, change, h, 1)
         for k in range(size):
             y1[k] += change[k]
@@ -297,7 +302,7 @@ def newton(
     return 0
 
 
-def refuse(size: int, method: int, h: Floats, rows: Floats, excess: float) -> None:
+def shorten_step(size: int, method: int, h: Floats, rows: Floats, excess: float) -> None:
     """Shorten the step after a rejection.
 
     Args:
@@ -313,11 +318,11 @@ def refuse(size: int, method: int, h: Floats, rows: Floats, excess: float) -> No
         h[NEXT_STEP], h[ORDER] = SHRINK * h[STEP], 0.0
         return
     factor = SAFETY * excess ** (-1.0 / (h[ORDER] + 1.0)) if excess < inf else 0.25
-    rescale(size, method, h, rows, min(max(factor, SHRINK), SAFETY))
+    rescale_differences(size, method, h, rows, min(max(factor, SHRINK), SAFETY))
     h[NEXT_STEP] = h[STEP]
 
 
-def choose(
+def choose_order(
     model: Ints,
     method: int,
     h: Floats,
@@ -340,27 +345,27 @@ def choose(
         safety: ratio of the step to the one that would just meet the accuracy.
     """
     size, order, accuracy = model[MODEL.STATE_SIZE], int(h[ORDER]), h[ACCEPTED]
-    best, factor = order, reach(error / accuracy, order)
+    best, factor = order, step_factor(error / accuracy, order)
     for other in (order - 1, order + 1):
         if not 1 <= other <= MOST_ORDER[method]:
             continue
         for k in range(size):
             errors[k] = ERROR_CONSTANT[WIDTH * method + other] * rows[size * (other + 1) + k]
-        result = reach(error_norm(model, y0, errors, h, 1) / accuracy, other)
+        result = step_factor(error_norm(model, y0, errors, h, 1) / accuracy, other)
         if result > factor:
             best, factor = other, result
     factor = min(safety * factor, GROW)
     if factor >= WORTH or factor < 1.0:
         h[ORDER], h[EQUAL] = float(best), 0.0
-        rescale(size, method, h, rows, max(factor, SHRINK))
+        rescale_differences(size, method, h, rows, max(factor, SHRINK))
 
 
-def reach(excess: float, order: int) -> float:
+def step_factor(excess: float, order: int) -> float:
     """Return the factor of the step with which an error of `excess` times the accuracy would just meet it."""
     return max(excess, 1e-12) ** (-1.0 / (order + 1.0))
 
 
-def rescale(size: int, method: int, h: Floats, rows: Floats, factor: float) -> None:
+def rescale_differences(size: int, method: int, h: Floats, rows: Floats, factor: float) -> None:
     """Change the step by a factor: interpolate the differences on the polynomial through the same values."""
     # Adams' are of the derivative times the step, behind the state.
     order, differing = int(h[ORDER]) - method, at(rows, size * method)
@@ -371,8 +376,8 @@ def rescale(size: int, method: int, h: Floats, rows: Floats, factor: float) -> N
         at(h, MATRICES + 2 * WIDTH * WIDTH),
     )
     column = at(both, WIDTH * WIDTH)
-    differences(order, factor, new)
-    differences(order, 1.0, unit)
+    fill_difference_matrix(order, factor, new)
+    fill_difference_matrix(order, 1.0, unit)
     for i in range(order + 1):
         for j in range(order + 1):
             both[WIDTH * i + j] = 0.0
@@ -382,12 +387,12 @@ def rescale(size: int, method: int, h: Floats, rows: Floats, factor: float) -> N
         for i in range(order + 1):
             column[i] = differing[size * i + k]
         for i in range(order + 1):
-            differing[size * i + k] = product(0, order + 1, at(both, WIDTH * i), column)
+            differing[size * i + k] = dot_range(0, order + 1, at(both, WIDTH * i), column)
     h[STEP] *= factor
     h[EQUAL] = 0.0
 
 
-def differences(order: int, factor: float, matrix: Floats) -> None:
+def fill_difference_matrix(order: int, factor: float, matrix: Floats) -> None:
     """Fill the matrix that evaluates differences at steps that are `factor` times as long."""
     for j in range(order + 1):
         total = 1.0

@@ -35,9 +35,9 @@ from osimlite.mechanics.kernels.paths import (
     TANGENT,
     TURN,
     WRAPS,
+    line_end,
     measure_points,
     place_points,
-    spot,
 )
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call
 from osimlite.mechanics.kernels.points import place_frame
@@ -59,9 +59,9 @@ from osimlite.mechanics.laws.vectors import (
     minus,
     norm,
     plus,
-    put,
-    turned,
-    turned_back,
+    rotate,
+    rotate_back,
+    store_vector,
     vector,
 )
 
@@ -101,7 +101,9 @@ def wrapped_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats,
     for turn in range(ROUNDS if wraps > 1 else 1):
         first = second = NONE
         for k in range(wraps):
-            result = wrap(model, reals, data, y, f, item, 1 - k if exchanged and k < 2 else k)
+            result = wrap_surface(
+                model, reals, data, y, f, item, 1 - k if exchanged and k < 2 else k
+            )
             if result == NOWHERE:
                 measure_points(model, data, y, item)
                 return OUTCOME.OK
@@ -118,7 +120,7 @@ def wrapped_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats,
             break
         if turn == 0 and wraps > 1 and first == NONE and second == INSIDE:
             exchanged = True
-            take_out(model, data, item, 0)
+            remove_tangents(model, data, item, 0)
     return OUTCOME.OK
 
 
@@ -142,7 +144,7 @@ def place_surfaces(model: Ints, reals: Floats, data: Floats, item: int) -> None:
             place_frame(model, data, node[LINK], at(n, TURN), vector(n, STATION), pose)
 
 
-def take_out(model: Ints, data: Floats, item: int, number: int) -> None:
+def remove_tangents(model: Ints, data: Floats, item: int, number: int) -> None:
     """Remove the tangent points of a wrap from the path, if they are in it."""
     i, result = at(model, item), at(data, model[item + ITEM.RECORD])
     order, count, first = at(result, ORDER), int(result[COUNT]), i[POINTS] + 2 * number
@@ -154,11 +156,11 @@ def take_out(model: Ints, data: Floats, item: int, number: int) -> None:
     result[COUNT] = kept
 
 
-def wrap(
+def wrap_surface(
     model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int, number: int
 ) -> int:
     """Bend the path around one surface; return the result for the last segment that was tried."""
-    take_out(model, data, item, number)
+    remove_tangents(model, data, item, number)
     i, result = at(model, item), at(data, model[item + ITEM.RECORD])
     points, count = i[POINTS], int(result[COUNT])
     size = points + 2 * i[WRAPS]
@@ -183,23 +185,23 @@ def wrap(
         a, b = at(work, NODE_WORK * int(order[k])), at(work, NODE_WORK * int(order[k + 1]))
         if m[KIND] == TANGENT and n[KIND] == TANGENT and m[OF] == n[OF]:
             continue
-        put(e, FIRST_END, in_surface(at(e, POSE), vector(a, PLACE)))
-        put(e, SECOND_END, in_surface(at(e, POSE), vector(b, PLACE)))
+        store_vector(e, FIRST_END, point_in_surface(at(e, POSE), vector(a, PLACE)))
+        store_vector(e, SECOND_END, point_in_surface(at(e, POSE), vector(b, PLACE)))
         code = call(model[surface + ITEM.LAW], model, reals, data, y, f, surface)
         if code < WRAPPED:
             continue
-        r1 = in_ground(at(e, POSE), vector(e, FIRST_TANGENT))
-        r2 = in_ground(at(e, POSE), vector(e, SECOND_TANGENT))
+        r1 = point_in_ground(at(e, POSE), vector(e, FIRST_TANGENT))
+        r2 = point_in_ground(at(e, POSE), vector(e, SECOND_TANGENT))
         increase = -inf
         if code == WRAPPED:
-            p1, p2 = spot(m, a), spot(n, b)
+            p1, p2 = line_end(m, a), line_end(n, b)
             increase = (
                 norm(minus(p1, r1)) + e[SURFACE_LENGTH] + norm(minus(p2, r2)) - norm(minus(p1, p2))
             )
         if increase < least:
             best, least = k, increase
-            put(one, PLACE, r1)
-            put(two, PLACE, r2)
+            store_vector(one, PLACE, r1)
+            store_vector(two, PLACE, r2)
             one[SURFACE], two[SURFACE] = 0.0, e[SURFACE_LENGTH]
             for j in range(ROOM - FIRST_TANGENT):
                 e[BEST + j] = e[FIRST_TANGENT + j]
@@ -214,11 +216,11 @@ def wrap(
     return code
 
 
-def in_surface(pose: Floats, a: Vector) -> Vector:
+def point_in_surface(pose: Floats, a: Vector) -> Vector:
     """Return a point of ground in the frame of a surface."""
-    return turned_back(pose, minus(a, vector(pose, 9)))
+    return rotate_back(pose, minus(a, vector(pose, 9)))
 
 
-def in_ground(pose: Floats, a: Vector) -> Vector:
+def point_in_ground(pose: Floats, a: Vector) -> Vector:
     """Return a point of a surface in ground."""
-    return plus(vector(pose, 9), turned(pose, a))
+    return plus(vector(pose, 9), rotate(pose, a))

@@ -8,21 +8,21 @@ twice.
 
 from __future__ import annotations
 
-from osimlite.mechanics.kernels.dynamics import clear_wrenches, generalized_forces
-from osimlite.mechanics.kernels.functions import value_at
+from osimlite.mechanics.kernels.dynamics import add_generalized_forces, clear_wrenches
+from osimlite.mechanics.kernels.functions import evaluate_function
 from osimlite.mechanics.kernels.layout import ITEM, MODEL, OUTCOME, STAGE
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call
 from osimlite.mechanics.kernels.points import apply_force, direction, station, velocity
 from osimlite.mechanics.laws.vectors import (
     Vector,
-    along,
+    add_scaled,
     dot,
     minus,
     norm,
     plus,
-    put,
+    rotate,
+    store_vector,
     times,
-    turned,
     vector,
 )
 
@@ -118,10 +118,10 @@ def path_length(
         Length and speed.
     """
     call(model[path + ITEM.LAW], model, reals, data, y, f, path)
-    return known_length(model, data, path)
+    return last_length(model, data, path)
 
 
-def known_length(model: Ints, data: Floats, path: int) -> tuple[float, float]:
+def last_length(model: Ints, data: Floats, path: int) -> tuple[float, float]:
     """Return length (m) and lengthening speed (m/s) of a path as they were computed last.
 
     Returns:
@@ -165,18 +165,20 @@ def place_points(model: Ints, reals: Floats, data: Floats, y: Floats, item: int)
                 # As in OpenSim, the place is that of the clamped coordinate, its derivative that of
                 # the coordinate; of a clamped point that is zero.
                 clamped, t = min(max(value, n[LOW]), n[HIGH]), at(n, TURN)
-                qx, dx, _ = value_at(at(p, node[TABLES]), clamped)
-                qy, dy, _ = value_at(at(p, node[TABLES + 1]), clamped)
-                qz, dz, _ = value_at(at(p, node[TABLES + 2]), clamped)
+                qx, dx, _ = evaluate_function(at(p, node[TABLES]), clamped)
+                qy, dy, _ = evaluate_function(at(p, node[TABLES + 1]), clamped)
+                qz, dz, _ = evaluate_function(at(p, node[TABLES + 2]), clamped)
                 if clamped != value and node[KIND] == CLAMPED:
                     dx = dy = dz = 0.0
                 elif clamped != value:
-                    _, dx, _ = value_at(at(p, node[TABLES]), value)
-                    _, dy, _ = value_at(at(p, node[TABLES + 1]), value)
-                    _, dz, _ = value_at(at(p, node[TABLES + 2]), value)
-                point = plus(point, turned(t, (qx, qy, qz)))
-                put(here, GRADIENT, direction(model, data, node[LINK], turned(t, (dx, dy, dz))))
-        put(here, PLACE, station(model, data, node[LINK], point))
+                    _, dx, _ = evaluate_function(at(p, node[TABLES]), value)
+                    _, dy, _ = evaluate_function(at(p, node[TABLES + 1]), value)
+                    _, dz, _ = evaluate_function(at(p, node[TABLES + 2]), value)
+                point = plus(point, rotate(t, (qx, qy, qz)))
+                store_vector(
+                    here, GRADIENT, direction(model, data, node[LINK], rotate(t, (dx, dy, dz)))
+                )
+        store_vector(here, PLACE, station(model, data, node[LINK], point))
         order[count] = number
         count += 1
     result[COUNT] = count
@@ -195,7 +197,7 @@ def measure_points(model: Ints, data: Floats, y: Floats, item: int) -> float:
         one, two = int(order[k - 1]), int(order[k])
         m, n = at(nodes, NODE_INTS * one), at(nodes, NODE_INTS * two)
         a, b = at(work, NODE_WORK * one), at(work, NODE_WORK * two)
-        way = minus(spot(n, b), spot(m, a))
+        way = minus(line_end(n, b), line_end(m, a))
         distance = norm(way)
         if m[KIND] == TANGENT and n[KIND] == TANGENT and m[OF] == n[OF]:
             length += b[SURFACE]
@@ -204,17 +206,17 @@ def measure_points(model: Ints, data: Floats, y: Floats, item: int) -> float:
         if m[LINK] != n[LINK] or m[KIND] >= MOVING or n[KIND] >= MOVING:
             moves = minus(node_velocity(model, data, y, n, b), node_velocity(model, data, y, m, a))
             speed += norm(moves) if distance < COINCIDENT else dot(moves, way) / distance
-        put(a, ALONG, times(0.0 if distance < SIGNIFICANT else 1.0 / distance, way))
+        store_vector(a, ALONG, times(0.0 if distance < SIGNIFICANT else 1.0 / distance, way))
     result[LENGTH], result[SPEED] = length, speed
     return length
 
 
-def spot(node: Ints, here: Floats) -> Vector:
+def line_end(node: Ints, here: Floats) -> Vector:
     """Return the position of a node for straight lines: of a tangent point where it was when first used."""
     if node[KIND] != TANGENT:
         return vector(here, PLACE)
     if here[IS_KEPT] == 0.0:
-        put(here, KEPT, vector(here, PLACE))
+        store_vector(here, KEPT, vector(here, PLACE))
         here[IS_KEPT] = 1.0
     return vector(here, KEPT)
 
@@ -223,7 +225,7 @@ def node_velocity(model: Ints, data: Floats, y: Floats, node: Ints, here: Floats
     """Return the velocity of a node (m/s); tangent points move with the body of their surface."""
     v = velocity(model, data, node[LINK], vector(here, PLACE))
     if MOVING <= node[KIND] <= CLAMPED and node[OF] >= 0:
-        return along(v, y[model[MODEL.DOFS] + node[OF]], vector(here, GRADIENT))
+        return add_scaled(v, y[model[MODEL.DOFS] + node[OF]], vector(here, GRADIENT))
     return v
 
 
@@ -291,7 +293,7 @@ def pull_each(
             for k in range(size):
                 applied[k] = 0.0
             pull_path(model, reals, data, y, f, model[model[MODEL.ITEM_AT] + number], 1.0)
-            generalized_forces(model, data, applied)
+            add_generalized_forces(model, data, applied)
             for k in range(size):
                 forces[size * (items * row + number) + k] = applied[k]
     return OUTCOME.OK

@@ -32,7 +32,7 @@ laws: dict[int, Law] = {}
 """Laws by the integers that stand for their addresses in Python."""
 
 
-def address(law: Law) -> int:
+def register_law(law: Law) -> int:
     """Register a law and return the integer that stands for its address in Python."""
     laws[id(law)] = law
     return id(law)
@@ -50,7 +50,7 @@ def call(
     return laws[address](model, reals, data, y, f, place)
 
 
-def copy(count: int, values: Floats, to: Floats) -> None:
+def copy_numbers(count: int, values: Floats, to: Floats) -> None:
     """Copy `count` numbers."""
     for k in range(count):
         to[k] = values[k]
@@ -64,7 +64,7 @@ def is_finite(count: int, values: Floats) -> bool:
     return total - total == 0.0
 
 
-def cubic(
+def interpolate_cubic(
     size: int,
     t0: float,
     y0: Floats,

@@ -15,7 +15,16 @@ from osimlite.mechanics.kernels.layout import (
     OPERATION_WORK,
 )
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at
-from osimlite.mechanics.laws.vectors import ZERO, Vector, cross, minus, plus, put, turned, vector
+from osimlite.mechanics.laws.vectors import (
+    ZERO,
+    Vector,
+    cross,
+    minus,
+    plus,
+    rotate,
+    store_vector,
+    vector,
+)
 
 
 def link_ints(model: Ints, link: int) -> Ints:
@@ -38,7 +47,7 @@ def operation_work(model: Ints, data: Floats, operation: int) -> Floats:
     return at(data, model[MODEL.WORK_OPERATION] + OPERATION_WORK.SIZE * operation)
 
 
-def screw(j: Ints, a: Floats, origin: Vector) -> tuple[Vector, Vector]:
+def unit_twist(j: Ints, a: Floats, origin: Vector) -> tuple[Vector, Vector]:
     """Return the motion per unit amount of an operation that is no ball: a twist about `origin`.
 
     Args:
@@ -70,7 +79,7 @@ def station(model: Ints, data: Floats, link: int, point: Vector) -> Vector:
 
 def direction(model: Ints, data: Floats, link: int, along: Vector) -> Vector:
     """Return a direction that is given in a link, along the axes of ground."""
-    return along if link < 0 else turned(link_work(model, data, link), along)
+    return along if link < 0 else rotate(link_work(model, data, link), along)
 
 
 def place_frame(
@@ -90,7 +99,7 @@ def place_frame(
         pose[k], pose[3 + k], pose[6 + k] = direction(
             model, data, link, (rows[k], rows[3 + k], rows[6 + k])
         )
-    put(pose, 9, station(model, data, link, point))
+    store_vector(pose, 9, station(model, data, link, point))
 
 
 def velocity(model: Ints, data: Floats, link: int, point: Vector) -> Vector:
@@ -140,12 +149,14 @@ def apply_force(model: Ints, data: Floats, link: int, point: Vector, force: Vect
         return
     here = link_work(model, data, link)
     load = at(here, LINK_WORK.WRENCH)
-    put(load, 0, plus(vector(load, 0), cross(minus(point, vector(here, LINK_WORK.ORIGIN)), force)))
-    put(load, 3, plus(vector(load, 3), force))
+    store_vector(
+        load, 0, plus(vector(load, 0), cross(minus(point, vector(here, LINK_WORK.ORIGIN)), force))
+    )
+    store_vector(load, 3, plus(vector(load, 3), force))
 
 
 def apply_torque(model: Ints, data: Floats, link: int, torque: Vector) -> None:
     """Add a torque (N m) to the wrench on a link."""
     if link >= 0:
         load = at(link_work(model, data, link), LINK_WORK.WRENCH)
-        put(load, 0, plus(vector(load, 0), torque))
+        store_vector(load, 0, plus(vector(load, 0), torque))

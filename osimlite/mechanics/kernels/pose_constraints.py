@@ -5,9 +5,19 @@ from __future__ import annotations
 from math import inf
 
 from osimlite.mechanics.kernels.layout import MODEL
-from osimlite.mechanics.kernels.linear_algebra import cholesky, factorise, minimum_norm, substitute
-from osimlite.mechanics.kernels.pointers import Floats, at, copy, is_finite
-from osimlite.mechanics.kernels.pose_cost import coupled, equations_of, follow_couplers, look
+from osimlite.mechanics.kernels.linear_algebra import (
+    factorise_cholesky,
+    factorise_equations,
+    solve_cholesky,
+    solve_minimum_norm,
+)
+from osimlite.mechanics.kernels.pointers import Floats, at, copy_numbers, is_finite
+from osimlite.mechanics.kernels.pose_cost import (
+    apply_couplers,
+    count_equations,
+    evaluate_coupler,
+    evaluate_pose,
+)
 from osimlite.mechanics.kernels.pose_record import (
     AT_END,
     COUPLER_AT,
@@ -32,7 +42,7 @@ from osimlite.mechanics.kernels.pose_record import (
     VARIABLE,
     Fit,
 )
-from osimlite.mechanics.kernels.pose_step import equations_for, list_free
+from osimlite.mechanics.kernels.pose_step import free_equations, list_free
 from osimlite.mechanics.kernels.projection import REDUNDANT
 
 EXACT = 1e-13
@@ -41,7 +51,7 @@ ASIDE = 1e-5
 """Step of the finite differences of equations (rad or m)."""
 
 
-def settle(m: Fit, y: Floats) -> bool:
+def fulfil_constraints(m: Fit, y: Floats) -> bool:
     """Move a pose into the ranges, to prescribed values, and onto couplers and equations; return success."""
     p, c, v, size = m.p, m.c, m.v, m.model[MODEL.DOFS]
     ranges, resolved = at(c, p[RANGES_AT]), at(p, p[RESOLVED_AT])
@@ -51,26 +61,26 @@ def settle(m: Fit, y: Floats) -> bool:
     values = at(v, p[MEASURED] + 3 * p[MARKERS] + 9 * p[SENSORS] + p[GOALS])
     for k in range(p[HELD]):
         y[p[p[HELD_AT] + k]] = values[k]
-    couple_all(m, y)
-    return equations_of(m) == 0 or restore(m, y)
+    set_dependents(m, y)
+    return count_equations(m) == 0 or restore_equations(m, y)
 
 
-def couple_all(m: Fit, y: Floats) -> None:
+def set_dependents(m: Fit, y: Floats) -> None:
     """Set all dependent coordinates by their couplers."""
     p, size = m.p, m.model[MODEL.DOFS]
     for number in range(p[COUPLERS]):
         i = at(p, p[p[COUPLER_AT] + number])
-        y[i[DEPENDENT_OF]], _ = coupled(m, i, y, at(m.v, p[ROOM]), at(m.v, p[ROOM] + size))
+        y[i[DEPENDENT_OF]], _ = evaluate_coupler(m, i, y, at(m.v, p[ROOM]), at(m.v, p[ROOM] + size))
 
 
-def restore(m: Fit, y: Floats) -> bool:
+def restore_equations(m: Fit, y: Floats) -> bool:
     """Move a pose onto the equations by minimum-norm Newton steps of the free coordinates; return success."""
     p, v, size = m.p, m.v, m.model[MODEL.DOFS]
-    count, errors, step = equations_of(m), at(v, p[ERRORS]), at(v, p[STEP])
+    count, errors, step = count_equations(m), at(v, p[ERRORS]), at(v, p[STEP])
     ranges, before = at(m.c, p[RANGES_AT]), inf
     for _ in range(50):
-        look(m, y)
-        follow_couplers(m, y)
+        evaluate_pose(m, y)
+        apply_couplers(m, y)
         off = 0.0
         for k in range(count):
             off = max(off, abs(errors[k]))
@@ -80,9 +90,9 @@ def restore(m: Fit, y: Floats) -> bool:
             return True
         before = off
         free = list_free(m)
-        factor, right, room = equations_for(m, free, 0)
-        rank = factorise(count, free, factor, REDUNDANT * count)
-        minimum_norm(count, free, factor, rank, right, room, step)
+        factor, right, room = free_equations(m, free, 0)
+        rank = factorise_equations(count, free, factor, REDUNDANT * count)
+        solve_minimum_norm(count, free, factor, rank, right, room, step)
         furthest = 0.0
         for k in range(free):
             furthest = max(furthest, abs(step[k]))
@@ -91,26 +101,26 @@ def restore(m: Fit, y: Floats) -> bool:
             freedom = p[p[FREE_AT] + k]
             to = y[freedom] + part * step[k]
             y[freedom] = min(max(to, ranges[2 * freedom]), ranges[2 * freedom + 1])
-        couple_all(m, y)
+        set_dependents(m, y)
         if not is_finite(size, y):
             return False
     return False
 
 
-def forget_bends(m: Fit) -> None:
+def clear_curvature(m: Fit) -> None:
     """Set the equations' part of the Hessian to zero."""
     size = m.model[MODEL.DOFS]
-    if equations_of(m) > 0:
+    if count_equations(m) > 0:
         for k in range(size * size):
             m.v[m.p[CURVES] + k] = 0.0
 
 
-def bend_equations(m: Fit, y: Floats) -> None:
+def compute_curvature(m: Fit, y: Floats) -> None:
     """Compute the equations' part of the Hessian: their second derivatives times their multipliers.
 
     The derivatives of the cost must be known, and are lost.
     """
-    p, v, size, count = m.p, m.v, m.model[MODEL.DOFS], equations_of(m)
+    p, v, size, count = m.p, m.v, m.model[MODEL.DOFS], count_equations(m)
     rows, slope, curves = at(v, p[ROWS]), at(v, p[SLOPE]), at(v, p[CURVES])
     pulls, trial = at(curves, size * size), at(v, p[TRIAL])
     free, normal = list_free(m), at(v, p[ROOM] + 2 * size)
@@ -124,19 +134,19 @@ def bend_equations(m: Fit, y: Floats) -> None:
                 freedom = p[p[FREE_AT] + k]
                 total += rows[size * i + freedom] * rows[size * j + freedom]
             normal[count * i + j] = total
-    forget_bends(m)
-    if not cholesky(count, normal, 0.0):
+    clear_curvature(m)
+    if not factorise_cholesky(count, normal, 0.0):
         return
-    substitute(count, normal, pulls)
+    solve_cholesky(count, normal, pulls)
     for k in range(free):
         freedom = p[p[FREE_AT] + k]
         for side in range(2):
             factor = (0.5 - side) / ASIDE
-            copy(size, y, trial)
+            copy_numbers(size, y, trial)
             trial[freedom] += ASIDE if side == 0 else -ASIDE
-            couple_all(m, trial)
-            look(m, trial)
-            follow_couplers(m, trial)
+            set_dependents(m, trial)
+            evaluate_pose(m, trial)
+            apply_couplers(m, trial)
             for i in range(count):
                 for j in range(size):
                     change = 0.5 * factor * pulls[i] * rows[size * i + j]

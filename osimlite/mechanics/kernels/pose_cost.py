@@ -12,13 +12,13 @@ The Hessian omits the second derivatives of functions of several coordinates.
 
 from __future__ import annotations
 
-from osimlite.mechanics.kernels.constrained_dynamics import bind
-from osimlite.mechanics.kernels.dynamics import momentum
-from osimlite.mechanics.kernels.functions import MONOMIALS, several_at, value_at
+from osimlite.mechanics.kernels.constrained_dynamics import evaluate_constraints
+from osimlite.mechanics.kernels.dynamics import spatial_momentum
+from osimlite.mechanics.kernels.functions import MONOMIALS, evaluate_function, evaluate_monomials
 from osimlite.mechanics.kernels.layout import CONSTRAINED, DOF, LINK, LINK_WORK, MODEL, STAGE
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call
 from osimlite.mechanics.kernels.points import link_ints, link_work, station
-from osimlite.mechanics.kernels.pose_curvature import bend_joint, twisted
+from osimlite.mechanics.kernels.pose_curvature import add_joint_curvature, displaced_moment
 from osimlite.mechanics.kernels.pose_record import (
     ARGUMENTS_OF,
     BALL_AT,
@@ -45,26 +45,26 @@ from osimlite.mechanics.kernels.pose_record import (
     WEIGHTS,
     Fit,
 )
-from osimlite.mechanics.kernels.pose_sensors import sensors_turn
-from osimlite.mechanics.kernels.projection import position_errors, rows_by_values
+from osimlite.mechanics.kernels.pose_sensors import add_sensors
+from osimlite.mechanics.kernels.projection import collect_position_errors, write_position_jacobian
 from osimlite.mechanics.laws.rotations import sine_cosine
 from osimlite.mechanics.laws.vectors import (
     cross,
     dot,
     minus,
     plus,
-    put,
+    store_vector,
     times,
     vector,
 )
 
 
-def cost(m: Fit, y: Floats) -> float:
+def evaluate_cost(m: Fit, y: Floats) -> float:
     """Return the cost of a pose; compute its gradient and both parts of its Hessian by all free coordinates."""
     model, data, p, v, size = m.model, m.data, m.p, m.v, m.model[MODEL.DOFS]
-    look(m, y)
+    evaluate_pose(m, y)
     for k in range(p[BALLS]):
-        turn_by_angles(m, y, at(model, p[p[BALL_AT] + k]))
+        convert_ball_columns(m, y, at(model, p[p[BALL_AT] + k]))
     slope, stiffness, bend = at(v, p[SLOPE]), at(v, p[STIFFNESS]), at(v, p[BEND])
     for k in range(size):
         slope[k] = 0.0
@@ -79,8 +79,8 @@ def cost(m: Fit, y: Floats) -> float:
             here[k] = 0.0
         for k in range(9):
             turned[k] = 0.0
-    value = markers_pull(m) + sensors_turn(m)
-    gather(m, y)
+    value = add_markers(m) + add_sensors(m)
+    gather_derivatives(m, y)
     goals = 3 * p[MARKERS] + 9 * p[SENSORS]
     for k in range(p[GOALS]):
         freedom, weight = p[p[GOAL_AT] + k], v[p[WEIGHTS] + p[MARKERS] + p[SENSORS] + k]
@@ -89,11 +89,11 @@ def cost(m: Fit, y: Floats) -> float:
             value += 0.5 * weight * off * off
             slope[freedom] += weight * off
             stiffness[size * freedom + freedom] += weight
-    follow_couplers(m, y)
+    apply_couplers(m, y)
     return value
 
 
-def look(m: Fit, y: Floats) -> None:
+def evaluate_pose(m: Fit, y: Floats) -> None:
     """Evaluate a pose: links, columns of the coordinates, and equations."""
     model, p, v, size = m.model, m.p, m.v, m.model[MODEL.DOFS]
     for k in range(size):
@@ -101,12 +101,12 @@ def look(m: Fit, y: Floats) -> None:
         y[size + k] = 1.0
     call(model[MODEL.LAWS], model, m.reals, m.data, y, m.f, STAGE.VELOCITY)
     if model[MODEL.CONSTRAINED] > 0:
-        bind(model, m.reals, m.data, y, m.f)
-        position_errors(model, m.data, at(v, p[ERRORS]))
-        rows_by_values(model, m.data, y, at(v, p[ROWS]))
+        evaluate_constraints(model, m.reals, m.data, y, m.f)
+        collect_position_errors(model, m.data, at(v, p[ERRORS]))
+        write_position_jacobian(model, m.data, y, at(v, p[ROWS]))
 
 
-def turn_by_angles(m: Fit, y: Floats, angles: Ints) -> None:
+def convert_ball_columns(m: Fit, y: Floats, angles: Ints) -> None:
     """Convert the columns of the speeds of a ball to those of the rates of its angles."""
     columns = at(m.data, m.model[MODEL.WORK_COLUMN])
     s1, c1 = sine_cosine(y[angles[0]])
@@ -122,7 +122,7 @@ def turn_by_angles(m: Fit, y: Floats, angles: Ints) -> None:
         three[k] = s2 * a - s1 * c2 * b + c1 * c2 * c
 
 
-def markers_pull(m: Fit) -> float:
+def add_markers(m: Fit) -> float:
     """Add the masses and springs of the markers to the links; return their cost."""
     model, data, p, v, value = m.model, m.data, m.p, m.v, 0.0
     for k in range(p[MARKERS]):
@@ -153,16 +153,16 @@ def markers_pull(m: Fit) -> float:
         i[7] -= mx * b
         i[8] -= mx * c
         i[9] -= my * c
-        put(load, 0, plus(vector(load, 0), cross(arm, pull)))
-        put(load, 3, plus(vector(load, 3), pull))
+        store_vector(load, 0, plus(vector(load, 0), cross(arm, pull)))
+        store_vector(load, 3, plus(vector(load, 3), pull))
         px, py, pz = pull
-        put(turned, 0, plus(vector(turned, 0), times(px, arm)))
-        put(turned, 3, plus(vector(turned, 3), times(py, arm)))
-        put(turned, 6, plus(vector(turned, 6), times(pz, arm)))
+        store_vector(turned, 0, plus(vector(turned, 0), times(px, arm)))
+        store_vector(turned, 3, plus(vector(turned, 3), times(py, arm)))
+        store_vector(turned, 6, plus(vector(turned, 6), times(pz, arm)))
     return value
 
 
-def gather(m: Fit, y: Floats) -> None:
+def gather_derivatives(m: Fit, y: Floats) -> None:
     """Compute gradient and Hessian by the degrees of freedom, inwards from the leaves."""
     model, data, p, v, size = m.model, m.data, m.p, m.v, m.model[MODEL.DOFS]
     freedoms, columns = at(model, model[MODEL.DOF_AT]), at(data, model[MODEL.WORK_COLUMN])
@@ -179,8 +179,8 @@ def gather(m: Fit, y: Floats) -> None:
                 c = at(columns, 6 * freedom)
                 turn, shift = vector(c, 0), vector(c, 3)
                 slope[freedom] += dot(turn, vector(load, 0)) + dot(shift, vector(load, 3))
-                angular, linear = momentum(i, turn, shift)
-                carried = twisted(load, turned, turn, shift)
+                angular, linear = spatial_momentum(i, turn, shift)
+                carried = displaced_moment(load, turned, turn, shift)
                 k = freedom
                 while k >= 0:
                     c = at(columns, 6 * k)
@@ -191,7 +191,7 @@ def gather(m: Fit, y: Floats) -> None:
                             vector(c, 0), carried
                         )
                     k = freedoms[DOF.SIZE * k + DOF.ABOVE]
-            bend_joint(m, y, link, load, turned)
+            add_joint_curvature(m, y, link, load, turned)
         if j[LINK.PARENT] >= 0:
             above = at(link_work(model, data, j[LINK.PARENT]), LINK_WORK.INERTIA)
             # The wrench stands behind the inertia.
@@ -202,7 +202,7 @@ def gather(m: Fit, y: Floats) -> None:
                 above[k] += turned[k]
 
 
-def follow_couplers(m: Fit, y: Floats) -> None:
+def apply_couplers(m: Fit, y: Floats) -> None:
     """Convert the derivatives and the equations to those by the independent coordinates."""
     p, v, size = m.p, m.v, m.model[MODEL.DOFS]
     slope, stiffness, bend, rows = (
@@ -217,7 +217,7 @@ def follow_couplers(m: Fit, y: Floats) -> None:
     for number in range(p[COUPLERS] - 1, -1, -1):
         i = at(p, p[p[COUPLER_AT] + number])
         dependent = i[DEPENDENT_OF]
-        _, bent = coupled(m, i, y, gradient, rates)
+        _, bent = evaluate_coupler(m, i, y, gradient, rates)
         for k in range(i[COUNT_OF]):
             freedom = i[ARGUMENTS_OF + k]
             if freedom < 0:
@@ -232,11 +232,11 @@ def follow_couplers(m: Fit, y: Floats) -> None:
             if i[COUNT_OF] == 1:
                 bend[size * freedom + freedom] += bent * slope[dependent]
             slope[freedom] += gain * slope[dependent]
-            for j in range(equations_of(m)):
+            for j in range(count_equations(m)):
                 rows[size * j + freedom] += gain * rows[size * j + dependent]
 
 
-def equations_of(m: Fit) -> int:
+def count_equations(m: Fit) -> int:
     """Return the number of equations that constrain positions."""
     return (
         m.model[m.model[MODEL.CONSTRAINED] + CONSTRAINED.POSITIONS]
@@ -245,7 +245,9 @@ def equations_of(m: Fit) -> int:
     )
 
 
-def coupled(m: Fit, i: Ints, y: Floats, gradient: Floats, rates: Floats) -> tuple[float, float]:
+def evaluate_coupler(
+    m: Fit, i: Ints, y: Floats, gradient: Floats, rates: Floats
+) -> tuple[float, float]:
     """Evaluate a coordinate that depends on others, and fill the derivatives by these.
 
     Args:
@@ -260,11 +262,13 @@ def coupled(m: Fit, i: Ints, y: Floats, gradient: Floats, rates: Floats) -> tupl
     """
     size, constants = i[COUNT_OF], at(m.c, i[NUMBERS_OF])
     if int(constants[size]) >= MONOMIALS:
-        value, _, bent = several_at(size, at(i, ARGUMENTS_OF), constants, y, rates, gradient)
+        value, _, bent = evaluate_monomials(
+            size, at(i, ARGUMENTS_OF), constants, y, rates, gradient
+        )
         return value, bent
     argument = 0.0
     if size > 0:
         argument = y[i[ARGUMENTS_OF]] if i[ARGUMENTS_OF] >= 0 else constants[0]
-    value, slope, bent = value_at(at(constants, size), argument)
+    value, slope, bent = evaluate_function(at(constants, size), argument)
     gradient[0] = slope
     return value, bent

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from osimlite.mechanics.kernels.ball_joint import last_axis
+from osimlite.mechanics.kernels.ball_joint import third_axis
 from osimlite.mechanics.kernels.layout import LINK_WORK, MODEL, MOTION, OPERATION, OPERATION_WORK
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at
 from osimlite.mechanics.kernels.points import link_work, operation_ints, operation_work
@@ -16,20 +16,20 @@ from osimlite.mechanics.laws.rotations import sine_cosine
 from osimlite.mechanics.laws.vectors import (
     ZERO,
     Vector,
-    along,
+    add_scaled,
     component,
     cross,
     dot,
-    elementwise,
     minus,
+    multiply_elementwise,
     plus,
     times,
     vector,
 )
-from osimlite.mechanics.laws.vectors import turned as turned_by
+from osimlite.mechanics.laws.vectors import rotate as turned_by
 
 
-def twisted(load: Floats, turned: Floats, turn: Vector, shift: Vector) -> Vector:
+def displaced_moment(load: Floats, turned: Floats, turn: Vector, shift: Vector) -> Vector:
     """Return the moment of the springs' forces at arms that a motion displaces.
 
     It is the sum over the springs of (shift + turn x arm) x force.
@@ -42,11 +42,13 @@ def twisted(load: Floats, turned: Floats, turn: Vector, shift: Vector) -> Vector
     """
     trace = turned[0] + turned[4] + turned[8]
     x, y, z = turn
-    result = along(along(times(x, vector(turned, 0)), y, vector(turned, 3)), z, vector(turned, 6))
-    return along(plus(cross(shift, vector(load, 3)), result), -trace, turn)
+    result = add_scaled(
+        add_scaled(times(x, vector(turned, 0)), y, vector(turned, 3)), z, vector(turned, 6)
+    )
+    return add_scaled(plus(cross(shift, vector(load, 3)), result), -trace, turn)
 
 
-def bend_joint(m: Fit, y: Floats, link: int, load: Floats, turned: Floats) -> None:
+def add_joint_curvature(m: Fit, y: Floats, link: int, load: Floats, turned: Floats) -> None:
     """Add to the Hessian the contribution of the axes of one joint.
 
     Args:
@@ -60,20 +62,20 @@ def bend_joint(m: Fit, y: Floats, link: int, load: Floats, turned: Floats) -> No
     places = at(p, p[AXES_AT])
     for one in range(places[link], places[link + 1]):
         turn, shift = axis_column(m, y, link, one)
-        carried = twisted(load, turned, turn, shift)
+        carried = displaced_moment(load, turned, turn, shift)
         for other in range(places[link], one + 1):
             around, _ = axis_column(m, y, link, other)
             amount = dot(around, carried)
-            spread(m, y, other, one, amount)
+            add_axis_product(m, y, other, one, amount)
             if other < one:
-                spread(m, y, one, other, amount)
-        bend_axis(m, y, one, dot(turn, vector(load, 0)) + dot(shift, vector(load, 3)))
+                add_axis_product(m, y, one, other, amount)
+        add_axis_curvature(m, y, one, dot(turn, vector(load, 0)) + dot(shift, vector(load, 3)))
 
 
-def bend_axis(m: Fit, y: Floats, number: int, pull: float) -> None:
+def add_axis_curvature(m: Fit, y: Floats, number: int, pull: float) -> None:
     """Add to the Hessian the second derivative of the function of one axis."""
     model, size, bend = m.model, m.model[MODEL.DOFS], at(m.v, m.p[BEND])
-    axis = axis_of(m, number)
+    axis = axis_ints(m, number)
     j = operation_ints(model, axis[0])
     first = model[j[OPERATION.ARGUMENTS]] if j[OPERATION.ARGUMENT_COUNT] > 0 else -1
     if axis[1] >= SLIDES:
@@ -92,7 +94,7 @@ def bend_axis(m: Fit, y: Floats, number: int, pull: float) -> None:
         )
 
 
-def axis_of(m: Fit, number: int) -> Ints:
+def axis_ints(m: Fit, number: int) -> Ints:
     """Return the operation of an axis, and its part of a ball."""
     return at(m.p, m.p[AXES_AT] + m.model[MODEL.LINKS] + 1 + 2 * number)
 
@@ -103,7 +105,7 @@ def axis_column(m: Fit, y: Floats, link: int, number: int) -> tuple[Vector, Vect
     Returns:
         Angular and linear part.
     """
-    model, data, axis = m.model, m.data, axis_of(m, number)
+    model, data, axis = m.model, m.data, axis_ints(m, number)
     j, a = (
         operation_ints(model, axis[0]),
         operation_work(model, data, axis[0]),
@@ -117,8 +119,8 @@ def axis_column(m: Fit, y: Floats, link: int, number: int) -> tuple[Vector, Vect
         around = vector(
             data, model[MODEL.WORK_COLUMN] + 6 * model[j[OPERATION.ARGUMENTS] + axis[1]]
         )
-        far = elementwise(
-            vector(m.reals, j[OPERATION.EXTRA]), last_axis(y, at(model, j[OPERATION.ARGUMENTS]))
+        far = multiply_elementwise(
+            vector(m.reals, j[OPERATION.EXTRA]), third_axis(y, at(model, j[OPERATION.ARGUMENTS]))
         )
         center = plus(center, turned_by(a, far))
     elif j[OPERATION.MOTION] != MOTION.TURN:
@@ -128,35 +130,35 @@ def axis_column(m: Fit, y: Floats, link: int, number: int) -> tuple[Vector, Vect
     )
 
 
-def spread(m: Fit, y: Floats, one: int, two: int, amount: float) -> None:
+def add_axis_product(m: Fit, y: Floats, one: int, two: int, amount: float) -> None:
     """Add to the Hessian a multiple of the product of two axes' derivatives by all coordinates."""
     size, bend = m.model[MODEL.DOFS], at(m.v, m.p[BEND])
-    for k in range(arguments_of(m, one)):
-        first, gain = argument(m, y, one, k)
+    for k in range(count_arguments(m, one)):
+        first, gain = axis_argument(m, y, one, k)
         if first < 0:
             continue
-        for other in range(arguments_of(m, two)):
-            second, more = argument(m, y, two, other)
+        for other in range(count_arguments(m, two)):
+            second, more = axis_argument(m, y, two, other)
             if second >= 0:
                 bend[size * first + second] += amount * gain * more
 
 
-def arguments_of(m: Fit, number: int) -> int:
+def count_arguments(m: Fit, number: int) -> int:
     """Return the number of coordinates that an axis depends on."""
-    model, axis = m.model, axis_of(m, number)
+    model, axis = m.model, axis_ints(m, number)
     j = operation_ints(model, axis[0])
     if axis[1] >= SLIDES:
         return 2
     return 1 if axis[1] >= 0 or j[OPERATION.DOF] >= 0 else j[OPERATION.ARGUMENT_COUNT]
 
 
-def argument(m: Fit, y: Floats, number: int, k: int) -> tuple[int, float]:
+def axis_argument(m: Fit, y: Floats, number: int, k: int) -> tuple[int, float]:
     """Return a coordinate that an axis depends on, and the derivative of its amount by it.
 
     Returns:
         Degree of freedom and derivative.
     """
-    model, axis = m.model, axis_of(m, number)
+    model, axis = m.model, axis_ints(m, number)
     j = operation_ints(model, axis[0])
     if axis[1] >= SLIDES:
         part = axis[1] - SLIDES

@@ -12,10 +12,14 @@ from __future__ import annotations
 from math import floor, inf, pi
 
 from osimlite.mechanics.kernels.layout import MODEL, OUTCOME
-from osimlite.mechanics.kernels.pointers import Floats, Ints, at, copy, is_finite
+from osimlite.mechanics.kernels.pointers import Floats, Ints, at, copy_numbers, is_finite
 from osimlite.mechanics.kernels.points import station
-from osimlite.mechanics.kernels.pose_constraints import bend_equations, forget_bends, settle
-from osimlite.mechanics.kernels.pose_cost import cost, equations_of, look
+from osimlite.mechanics.kernels.pose_constraints import (
+    clear_curvature,
+    compute_curvature,
+    fulfil_constraints,
+)
+from osimlite.mechanics.kernels.pose_cost import count_equations, evaluate_cost, evaluate_pose
 from osimlite.mechanics.kernels.pose_record import (
     GOALS,
     HELD,
@@ -37,16 +41,16 @@ from osimlite.mechanics.kernels.pose_record import (
     WEIGHTS,
     Fit,
 )
-from osimlite.mechanics.kernels.pose_sensors import turn_of
+from osimlite.mechanics.kernels.pose_sensors import sensor_rotation
 from osimlite.mechanics.kernels.pose_starts import (
     INWARDS,
     ROUND,
-    go_round,
-    leave_ends,
-    move_inwards,
-    turn_over,
-    turn_round,
-    unwind,
+    remove_full_turns,
+    start_full_turn,
+    start_inwards,
+    start_off_ends,
+    start_turned,
+    start_upside_down,
 )
 from osimlite.mechanics.kernels.pose_step import (
     find_ends,
@@ -55,7 +59,7 @@ from osimlite.mechanics.kernels.pose_step import (
     list_free,
     solve_free,
 )
-from osimlite.mechanics.laws.vectors import put
+from osimlite.mechanics.laws.vectors import store_vector
 
 FITTED = 0.0
 """Status of a frame with the best pose."""
@@ -119,9 +123,9 @@ def fit_frames(
     )
     for number in range(count):
         result = at(results, width * number)
-        copy(input_size, at(frames, input_size * number), at(v, p[MEASURED]))
+        copy_numbers(input_size, at(frames, input_size * number), at(v, p[MEASURED]))
         value, steps, status = fit_frame(m, y)
-        copy(size, y, result)
+        copy_numbers(size, y, result)
         for k in range(markers):
             position = station(
                 model,
@@ -129,9 +133,9 @@ def fit_frames(
                 p[p[MARKER_AT] + k],
                 (c[MARKER_NUMBERS * k], c[MARKER_NUMBERS * k + 1], c[MARKER_NUMBERS * k + 2]),
             )
-            put(result, size + 3 * k, position)
+            store_vector(result, size + 3 * k, position)
         for k in range(sensors):
-            put(result, size + 3 * (markers + k), turn_of(m, k))
+            store_vector(result, size + 3 * (markers + k), sensor_rotation(m, k))
         end = at(result, size + 3 * (markers + sensors))
         end[0], end[1], end[2] = value, float(steps), status
     return OUTCOME.OK
@@ -150,14 +154,14 @@ def fit_frame(m: Fit, y: Floats) -> tuple[float, int, float]:
     v, p, size = m.v, m.p, m.model[MODEL.DOFS]
     history = at(v, p[HISTORY])
     previous_count, last, trial = int(history[0]), at(history, 1), at(v, p[TRIAL])
-    seen = weigh(m)
+    seen = compute_weights(m)
     if previous_count > 0:
-        copy(size, last, y)
-    if not settle(m, y):
-        look(m, y)
+        copy_numbers(size, last, y)
+    if not fulfil_constraints(m, y):
+        evaluate_pose(m, y)
         return inf, 0, APART
     if not seen:
-        look(m, y)
+        evaluate_pose(m, y)
         return 0.0, 0, UNSEEN
     note_pattern(m, y)
     value, is_vague = inf, v[p[PATTERN] + p[MARKERS] + p[SENSORS] + p[GOALS]] > 0.0
@@ -165,19 +169,19 @@ def fit_frame(m: Fit, y: Floats) -> tuple[float, int, float]:
         before = at(last, size)
         for k in range(size):
             trial[k] = y[k] if p[p[RESOLVED_AT] + k] == IDLE else 2.0 * last[k] - before[k]
-        if settle(m, trial):
-            value = cost(m, trial)
+        if fulfil_constraints(m, trial):
+            value = evaluate_cost(m, trial)
     # A jump is no reason to leave the pose before.
     if not value < 4.0 * history[1 + POSES * size] + 1e-8:
-        other = cost(m, y)
+        other = evaluate_cost(m, y)
         if not value < other:
-            copy(size, y, trial)
-        value = other if not value < other else cost(m, trial)
+            copy_numbers(size, y, trial)
+        value = other if not value < other else evaluate_cost(m, trial)
     lightest, start = VAGUE if is_vague else LIGHTEST, at(history, 2 + POSES * size)
     if previous_count == 0:
-        copy(size, trial, last)
-    copy(size, trial, start)
-    value, steps, status = descend(m, trial, y, value, lightest, lightest)
+        copy_numbers(size, trial, last)
+    copy_numbers(size, trial, start)
+    value, steps, status = descend_to_minimum(m, trial, y, value, lightest, lightest)
     if previous_count == 0:
         # From far away there are several ways down; small steps find others than large ones, and
         # what begins away from the ends of its range is not held there before it is known where it
@@ -185,39 +189,41 @@ def fit_frame(m: Fit, y: Floats) -> tuple[float, int, float]:
         value, more, status = descend_again(m, start, y, value, status, FIRST_DAMPING, lightest)
         steps += more
         for inwards in range(2):
-            move_inwards(m, last, start, 2.0 * INWARDS * (1 + inwards))
+            start_inwards(m, last, start, 2.0 * INWARDS * (1 + inwards))
             value, more, status = descend_again(m, start, y, value, status, SMALL_STEPS, lightest)
             steps += more
         for number in range(2 * size):
-            if turn_round(m, last, start, number // 2, ROUND if number % 2 == 0 else -ROUND):
+            if start_turned(m, last, start, number // 2, ROUND if number % 2 == 0 else -ROUND):
                 value, more, status = descend_again(
                     m, start, y, value, status, SMALL_STEPS, lightest
                 )
                 steps += more
-    if leave_ends(m, y, start):
+    if start_off_ends(m, y, start):
         value, more, status = descend_again(m, start, y, value, status, lightest, lightest)
         steps += more
-    value, more, status = come_round(m, start, y, value, status, lightest)
+    value, more, status = try_other_ends(m, start, y, value, status, lightest)
     steps += more
     for number in range(size):
-        if turn_over(m, y, start, number):
+        if start_upside_down(m, y, start, number):
             upright = value
             value, more, status = descend_again(m, start, y, value, status, SMALL_STEPS, lightest)
             steps += more
             if value < upright:
-                value, more, status = come_round(m, start, y, value, status, lightest)
+                value, more, status = try_other_ends(m, start, y, value, status, lightest)
                 steps += more
-    if previous_count == 0 and unwind(m, y, last, start, value):
-        value, more, status = descend(m, start, y, cost(m, start), lightest, lightest)
+    if previous_count == 0 and remove_full_turns(m, y, last, start, value):
+        value, more, status = descend_to_minimum(
+            m, start, y, evaluate_cost(m, start), lightest, lightest
+        )
         steps += more
     free_ends(m)
     before = at(last, size)
     for k in range(size):
         # A whole turn, from one end of a range to the other, is no movement to go on with.
         before[k] = last[k] + 2.0 * pi * floor((y[k] - last[k]) / (2.0 * pi) + 0.5)
-    copy(size, y, last)
+    copy_numbers(size, y, last)
     history[0], history[1 + POSES * size] = min(previous_count + 1.0, float(POSES)), value
-    look(m, y)
+    evaluate_pose(m, y)
     return value, steps, status
 
 
@@ -235,7 +241,7 @@ def note_pattern(m: Fit, y: Floats) -> None:
     for k in range(size):
         if resolved[k] == IDLE:
             resolved[k] = VARIABLE
-    cost(m, y)
+    evaluate_cost(m, y)
     for k in range(size):
         if (
             resolved[k] == VARIABLE
@@ -267,19 +273,19 @@ def descend_again(
     """
     size = m.model[MODEL.DOFS]
     best, trial = at(start, size), at(m.v, m.p[TRIAL])
-    copy(size, y, best)
-    copy(size, start, trial)
+    copy_numbers(size, y, best)
+    copy_numbers(size, start, trial)
     free_ends(m)
-    if not settle(m, trial):
+    if not fulfil_constraints(m, trial):
         return value, 0, status
-    new, steps, result = descend(m, trial, y, cost(m, trial), damping, lightest)
+    new, steps, result = descend_to_minimum(m, trial, y, evaluate_cost(m, trial), damping, lightest)
     if new < value * (1.0 - 1e-7) - 1e-20:
         return new, steps, result
-    copy(size, best, y)
+    copy_numbers(size, best, y)
     return value, steps, status
 
 
-def come_round(
+def try_other_ends(
     m: Fit, start: Floats, y: Floats, value: float, status: float, lightest: float
 ) -> tuple[float, int, float]:
     """Try each angle at an end of its range at the other end, and keep the best pose.
@@ -297,13 +303,13 @@ def come_round(
     """
     steps = 0
     for number in range(m.model[MODEL.DOFS]):
-        if go_round(m, y, start, number):
+        if start_full_turn(m, y, start, number):
             value, more, status = descend_again(m, start, y, value, status, lightest, lightest)
             steps += more
     return value, steps, status
 
 
-def weigh(m: Fit) -> bool:
+def compute_weights(m: Fit) -> bool:
     """Compute the weights of this frame, normalized over the measured markers and sensors.
 
     Returns:
@@ -319,8 +325,8 @@ def weigh(m: Fit) -> bool:
         weights[markers + k] = (
             numbers[SENSOR_NUMBERS * k + 9] if is_finite(9, at(rotations, 9 * k)) else 0.0
         )
-    seen = share(markers, weights)
-    seen = share(sensors, at(weights, markers)) or seen
+    seen = normalize_weights(markers, weights)
+    seen = normalize_weights(sensors, at(weights, markers)) or seen
     numbers, goals = at(numbers, SENSOR_NUMBERS * sensors), at(measured, 3 * markers + 9 * sensors)
     for k in range(p[GOALS]):
         weights[markers + sensors + k] = numbers[k] if is_finite(1, at(goals, k)) else 0.0
@@ -328,7 +334,7 @@ def weigh(m: Fit) -> bool:
     return seen
 
 
-def share(count: int, weights: Floats) -> bool:
+def normalize_weights(count: int, weights: Floats) -> bool:
     """Normalize weights to a sum of one; return whether any is positive."""
     total = 0.0
     for k in range(count):
@@ -338,7 +344,7 @@ def share(count: int, weights: Floats) -> bool:
     return total > 0.0
 
 
-def descend(
+def descend_to_minimum(
     m: Fit, start: Floats, y: Floats, value: float, damping: float, lightest: float
 ) -> tuple[float, int, float]:
     """Descend from a pose whose cost and derivatives are known to the best one nearby.
@@ -357,14 +363,14 @@ def descend(
     p, v, size = m.p, m.v, m.model[MODEL.DOFS]
     step = at(v, p[STEP])
     before, bends, status = inf, damping == LIGHTEST, STUCK
-    copy(size, start, y)
+    copy_numbers(size, start, y)
     steps = 0
-    forget_bends(m)
+    clear_curvature(m)
     while steps < MOST_STEPS:
         steps += 1
-        if equations_of(m) > 0 and steps % RENEWED == 0:
-            bend_equations(m, y)
-            cost(m, y)
+        if count_equations(m) > 0 and steps % RENEWED == 0:
+            compute_curvature(m, y)
+            evaluate_cost(m, y)
         find_ends(m, y)
         if not find_step(m, y, damping, bends) and not find_step(m, y, damping, False):
             damping = max(10.0 * damping, FIRST_DAMPING)
@@ -375,11 +381,11 @@ def descend(
         for k in range(size):
             length = max(length, abs(step[k]))
             start[k] = y[k] + step[k]
-        is_settled = settle(m, start)
-        new = cost(m, start) if is_settled else inf
+        is_settled = fulfil_constraints(m, start)
+        new = evaluate_cost(m, start) if is_settled else inf
         # Of tiny steps rounding hides whether they lead down.
         if new <= value or (length <= 1e-6 and new <= value * (1.0 + 1e-9) + 1e-24):
-            copy(size, start, y)
+            copy_numbers(size, start, y)
             value = new
             shrinking = length / before if before < inf else 1.0
             if length <= FINEST or (
@@ -400,5 +406,5 @@ def descend(
             damping, bends, before = max(10.0 * damping, FIRST_DAMPING), steps >= PATIENCE, inf
             if damping > HEAVIEST:
                 break
-            cost(m, y)
+            evaluate_cost(m, y)
     return value, steps, status

@@ -30,15 +30,15 @@ from osimlite.mechanics.laws.rotations import sine_cosine
 from osimlite.mechanics.laws.vectors import (
     ZERO,
     Vector,
-    along,
+    add_scaled,
     component,
     cross,
     dot,
-    elementwise,
     minus,
+    multiply_elementwise,
     plus,
-    put,
-    replaced,
+    replace_component,
+    store_vector,
     times,
     vector,
 )
@@ -49,14 +49,14 @@ NEARLY_BACK = -0.99
 """Cosine below which the axis of a rotation follows from its symmetric part, as the other vanishes."""
 
 
-def sensors_turn(m: Fit) -> float:
+def add_sensors(m: Fit) -> float:
     """Add the torsion springs of the sensors to the links; return their cost."""
     model, data, p, v, value = m.model, m.data, m.p, m.v, 0.0
     for k in range(p[SENSORS]):
         weight, link = v[p[WEIGHTS] + p[MARKERS] + k], p[p[SENSOR_AT] + k]
         if not weight > 0.0:
             continue
-        off = turn_of(m, k)
+        off = sensor_rotation(m, k)
         square = dot(off, off)
         value += 0.5 * weight * square
         if link < 0:
@@ -67,7 +67,7 @@ def sensors_turn(m: Fit) -> float:
             at(here, LINK_WORK.WRENCH),
             at(v, p[TURNED] + 9 * link),
         )
-        x, y, z = times(weight * evenness(sqrt(square)), off)
+        x, y, z = times(weight * squared_factor(sqrt(square)), off)
         a, b, c = off
         i[4] += weight - (y * b + z * c)
         i[5] += weight - (x * a + z * c)
@@ -75,15 +75,15 @@ def sensors_turn(m: Fit) -> float:
         i[7] += x * b
         i[8] += x * c
         i[9] += y * c
-        put(load, 0, along(vector(load, 0), weight, off))
+        store_vector(load, 0, add_scaled(vector(load, 0), weight, off))
         a, b, c = times(0.5 * weight, off)
-        put(turned, 0, plus(vector(turned, 0), (0.0, -c, b)))
-        put(turned, 3, plus(vector(turned, 3), (c, 0.0, -a)))
-        put(turned, 6, plus(vector(turned, 6), (-b, a, 0.0)))
+        store_vector(turned, 0, plus(vector(turned, 0), (0.0, -c, b)))
+        store_vector(turned, 3, plus(vector(turned, 3), (c, 0.0, -a)))
+        store_vector(turned, 6, plus(vector(turned, 6), (-b, a, 0.0)))
     return value
 
 
-def evenness(angle: float) -> float:
+def squared_factor(angle: float) -> float:
     """Return the factor c of the squared rotation in the inverse left Jacobian."""
     if angle < SMALL:
         return 1.0 / 12.0
@@ -91,14 +91,14 @@ def evenness(angle: float) -> float:
     return (1.0 - 0.5 * angle * cosine / sine) / (angle * angle)
 
 
-def turn_of(m: Fit, sensor: int) -> Vector:
+def sensor_rotation(m: Fit, sensor: int) -> Vector:
     """Return the rotation vector (rad, in ground) from the measured orientation of a sensor to its own."""
     rows = at(m.c, MARKER_NUMBERS * m.p[MARKERS] + SENSOR_NUMBERS * sensor)
     target = at(m.v, m.p[MEASURED] + 3 * m.p[MARKERS] + 9 * sensor)
-    return turn_between(m.model, m.data, m.p[m.p[SENSOR_AT] + sensor], rows, target)
+    return rotation_between(m.model, m.data, m.p[m.p[SENSOR_AT] + sensor], rows, target)
 
 
-def turn_between(model: Ints, data: Floats, link: int, rows: Floats, target: Floats) -> Vector:
+def rotation_between(model: Ints, data: Floats, link: int, rows: Floats, target: Floats) -> Vector:
     """Return the rotation vector (rad, in ground) from a target orientation to that of a frame of a link.
 
     Args:
@@ -113,17 +113,17 @@ def turn_between(model: Ints, data: Floats, link: int, rows: Floats, target: Flo
         is_axis = direction(model, data, link, (rows[k], rows[3 + k], rows[6 + k]))
         axis = target[k], target[3 + k], target[6 + k]
         twist = plus(twist, cross(axis, is_axis))
-        diagonal = plus(diagonal, elementwise(axis, is_axis))
+        diagonal = plus(diagonal, multiply_elementwise(axis, is_axis))
     cosine, sine = 0.5 * (dot(diagonal, (1.0, 1.0, 1.0)) - 1.0), 0.5 * sqrt(dot(twist, twist))
     if cosine < NEARLY_BACK:
-        return turn_back(model, data, link, rows, target, twist, diagonal)
+        return rotation_near_half_turn(model, data, link, rows, target, twist, diagonal)
     if not sine > 1e-12:
         return times(0.5, twist)
     angle = acos(cosine) if cosine < 0.7 else sine_angle(sine)
     return times(0.5 * angle / sine, twist)
 
 
-def turn_back(
+def rotation_near_half_turn(
     model: Ints,
     data: Floats,
     link: int,
@@ -149,11 +149,11 @@ def turn_back(
     for k in range(3):
         is_axis = direction(model, data, link, (rows[k], rows[3 + k], rows[6 + k]))
         measured = target[k], target[3 + k], target[6 + k]
-        row = along(
-            along(row, component(is_axis, axis), measured), component(measured, axis), is_axis
+        row = add_scaled(
+            add_scaled(row, component(is_axis, axis), measured), component(measured, axis), is_axis
         )
     cosine, sine = 0.5 * (x + y + z - 1.0), 0.5 * sqrt(dot(twist, twist))
-    row = minus(times(0.5, row), replaced(ZERO, axis, cosine))
+    row = minus(times(0.5, row), replace_component(ZERO, axis, cosine))
     length = sqrt(dot(row, row))
     angle = pi - sine_angle(sine)
     return times((angle if dot(row, twist) >= 0.0 else -angle) / length, row)

@@ -5,10 +5,10 @@ from __future__ import annotations
 from math import floor, inf, pi
 
 from osimlite.mechanics.kernels.layout import GRAVITY_AT, LINK, MODEL
-from osimlite.mechanics.kernels.pointers import Floats, at, copy
+from osimlite.mechanics.kernels.pointers import Floats, at, copy_numbers
 from osimlite.mechanics.kernels.points import link_ints
-from osimlite.mechanics.kernels.pose_constraints import settle
-from osimlite.mechanics.kernels.pose_cost import cost, look
+from osimlite.mechanics.kernels.pose_constraints import fulfil_constraints
+from osimlite.mechanics.kernels.pose_cost import evaluate_cost, evaluate_pose
 from osimlite.mechanics.kernels.pose_record import (
     AT_END,
     RANGES_AT,
@@ -30,7 +30,7 @@ SAME = 1e-9
 """Distance from an end of a range below which a coordinate counts as at the end (rad or m)."""
 
 
-def move_inwards(m: Fit, from_pose: Floats, start: Floats, inwards: float) -> None:
+def start_inwards(m: Fit, from_pose: Floats, start: Floats, inwards: float) -> None:
     """Write a start in which no coordinate with a range is near an end of it."""
     ranges = at(m.c, m.p[RANGES_AT])
     for k in range(m.model[MODEL.DOFS]):
@@ -40,7 +40,7 @@ def move_inwards(m: Fit, from_pose: Floats, start: Floats, inwards: float) -> No
             start[k] = min(max(start[k], low + inner), high - inner)
 
 
-def turn_round(m: Fit, from_pose: Floats, start: Floats, freedom: int, angle: float) -> bool:
+def start_turned(m: Fit, from_pose: Floats, start: Floats, freedom: int, angle: float) -> bool:
     """Write a start in which the subtree of a joint to ground is turned about the vertical.
 
     Subjects walk in both directions, and a descent from half a turn away may end elsewhere.
@@ -56,7 +56,7 @@ def turn_round(m: Fit, from_pose: Floats, start: Floats, freedom: int, angle: fl
         Whether the degree of freedom is such a coordinate.
     """
     model, p, ranges = m.model, m.p, at(m.c, m.p[RANGES_AT])
-    move_inwards(m, from_pose, start, 2.0 * INWARDS)
+    start_inwards(m, from_pose, start, 2.0 * INWARDS)
     start[freedom] += angle
     is_inside = ranges[2 * freedom] <= start[freedom] <= ranges[2 * freedom + 1]
     if not (
@@ -65,7 +65,7 @@ def turn_round(m: Fit, from_pose: Floats, start: Floats, freedom: int, angle: fl
         and p[p[RESOLVED_AT] + freedom] in (VARIABLE, AT_END)
     ):
         return False
-    look(m, from_pose)
+    evaluate_pose(m, from_pose)
     down, turn = (
         vector(m.reals, GRAVITY_AT),
         vector(at(m.data, model[MODEL.WORK_COLUMN]), 6 * freedom),
@@ -99,7 +99,7 @@ def is_at_end(m: Fit, y: Floats, freedom: int) -> bool:
     return high - low < inf and (y[freedom] <= low + SAME) != (y[freedom] >= high - SAME)
 
 
-def go_round(m: Fit, y: Floats, start: Floats, freedom: int) -> bool:
+def start_full_turn(m: Fit, y: Floats, start: Floats, freedom: int) -> bool:
     """Write a start in which an angle at an end of its range is a full turn further, or at the other end.
 
     A subject that turns on the spot makes full turns. Other joints than those to ground do so only if
@@ -114,15 +114,15 @@ def go_round(m: Fit, y: Floats, start: Floats, freedom: int) -> bool:
         high - low > pi + SAME or joint_to_ground(m, freedom) >= 0
     ):
         return False
-    copy(m.model[MODEL.DOFS], y, start)
+    copy_numbers(m.model[MODEL.DOFS], y, start)
     start[freedom] = (
         min(high, low + 2.0 * pi) if y[freedom] <= low + SAME else max(low, high - 2.0 * pi)
     )
-    look(m, y)
+    evaluate_pose(m, y)
     return is_angle(m, freedom)
 
 
-def turn_over(m: Fit, y: Floats, start: Floats, freedom: int) -> bool:
+def start_upside_down(m: Fit, y: Floats, start: Floats, freedom: int) -> bool:
     """Write a start with the two other angles of a joint to ground half a turn further.
 
     Where the second of three angles is a right angle this is the same pose, and the continuation of a
@@ -134,8 +134,8 @@ def turn_over(m: Fit, y: Floats, start: Floats, freedom: int) -> bool:
     link, others = joint_to_ground(m, freedom), 0
     if link < 0 or not is_at_end(m, y, freedom):
         return False
-    copy(m.model[MODEL.DOFS], y, start)
-    look(m, y)
+    copy_numbers(m.model[MODEL.DOFS], y, start)
+    evaluate_pose(m, y)
     j, ranges = link_ints(m.model, link), at(m.c, m.p[RANGES_AT])
     for k in range(j[LINK.FIRST_DOF], j[LINK.END_DOF]):
         if k != freedom and is_angle(m, k):
@@ -146,7 +146,7 @@ def turn_over(m: Fit, y: Floats, start: Floats, freedom: int) -> bool:
     return others == 2 and is_angle(m, freedom)
 
 
-def leave_ends(m: Fit, y: Floats, start: Floats) -> bool:
+def start_off_ends(m: Fit, y: Floats, start: Floats) -> bool:
     """Write a start in which coordinates at ends of their ranges are inside; return whether there are any."""
     ranges, result = at(m.c, m.p[RANGES_AT]), False
     for k in range(m.model[MODEL.DOFS]):
@@ -157,7 +157,7 @@ def leave_ends(m: Fit, y: Floats, start: Floats) -> bool:
     return result
 
 
-def unwind(m: Fit, y: Floats, first: Floats, start: Floats, value: float) -> bool:
+def remove_full_turns(m: Fit, y: Floats, first: Floats, start: Floats, value: float) -> bool:
     """Write a pose without the full turns that were made from the first one, if it costs no more.
 
     Returns:
@@ -169,14 +169,17 @@ def unwind(m: Fit, y: Floats, first: Floats, start: Floats, value: float) -> boo
         at(m.v, m.p[TRIAL]),
         False,
     )
-    copy(size, y, start)
+    copy_numbers(size, y, start)
     for k in range(size):
         turns = floor((y[k] - first[k]) / (2.0 * pi) + 0.5)
         near = y[k] - 2.0 * pi * turns
         if turns != 0.0 and ranges[2 * k] <= near <= ranges[2 * k + 1]:
-            copy(size, start, trial)
+            copy_numbers(size, start, trial)
             trial[k] = near
-            if settle(m, trial) and cost(m, trial) <= value * (1.0 + 1e-9) + 1e-20:
-                copy(size, trial, start)
+            if (
+                fulfil_constraints(m, trial)
+                and evaluate_cost(m, trial) <= value * (1.0 + 1e-9) + 1e-20
+            ):
+                copy_numbers(size, trial, start)
                 result = True
     return result

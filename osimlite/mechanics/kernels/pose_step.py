@@ -8,14 +8,14 @@ from __future__ import annotations
 
 from osimlite.mechanics.kernels.layout import MODEL
 from osimlite.mechanics.kernels.linear_algebra import (
-    cholesky,
-    factorise,
-    minimum_norm,
-    substitute,
+    factorise_cholesky,
+    factorise_equations,
+    solve_cholesky,
+    solve_minimum_norm,
     write_null_space,
 )
 from osimlite.mechanics.kernels.pointers import Floats, at
-from osimlite.mechanics.kernels.pose_cost import equations_of
+from osimlite.mechanics.kernels.pose_cost import count_equations
 from osimlite.mechanics.kernels.pose_record import (
     AT_END,
     BEND,
@@ -50,7 +50,7 @@ def list_free(m: Fit) -> int:
     return count
 
 
-def equations_for(m: Fit, free: int, has_step: int) -> tuple[Floats, Floats, Floats]:
+def free_equations(m: Fit, free: int, has_step: int) -> tuple[Floats, Floats, Floats]:
     """Return the equations for the free coordinates.
 
     Args:
@@ -62,7 +62,7 @@ def equations_for(m: Fit, free: int, has_step: int) -> tuple[Floats, Floats, Flo
         Workspace of their factor, which begins with the left sides; right sides; workspace after them.
     """
     p, v, size = m.p, m.v, m.model[MODEL.DOFS]
-    count, rows, errors, step = equations_of(m), at(v, p[ROWS]), at(v, p[ERRORS]), at(v, p[STEP])
+    count, rows, errors, step = count_equations(m), at(v, p[ROWS]), at(v, p[ERRORS]), at(v, p[STEP])
     factor = at(v, p[ROOM] + 2 * size)
     right = at(factor, count * size + count * count + 3 * count + 1)
     for k in range(count):
@@ -152,7 +152,7 @@ def solve_free(m: Fit, free: int, damping: float, bent: float, smallest: float) 
         at(v, p[SLOPE]),
         at(v, p[STEP]),
     )
-    count = equations_of(m)
+    count = count_equations(m)
     offset = p[ROOM] + 2 * size + (count * size + count * count + 3 * count + 1) + 2 * count
     solution, matrix = at(v, offset), at(v, offset + size)
     for k in range(free):
@@ -170,14 +170,14 @@ def solve_free(m: Fit, free: int, damping: float, bent: float, smallest: float) 
                 matrix[free * k + j] += bent * constraint_row[other]
         matrix[free * k + k] += damping * (row[freedom] + SOFTEST)
     if count == 0:
-        if not cholesky(free, matrix, smallest):
+        if not factorise_cholesky(free, matrix, smallest):
             return -1
-        substitute(free, matrix, solution)
+        solve_cholesky(free, matrix, solution)
         return offset
-    return solve_along(m, free, offset, smallest)
+    return solve_constrained(m, free, offset, smallest)
 
 
-def solve_along(m: Fit, free: int, offset: int, smallest: float) -> int:
+def solve_constrained(m: Fit, free: int, offset: int, smallest: float) -> int:
     """Compute the step of the free coordinates in the null space of the equations.
 
     Args:
@@ -189,14 +189,14 @@ def solve_along(m: Fit, free: int, offset: int, smallest: float) -> int:
     Returns:
         The offset of the step in the workspace, or -1 if the model is not convex.
     """
-    v, size, count = m.v, m.model[MODEL.DOFS], equations_of(m)
+    v, size, count = m.v, m.model[MODEL.DOFS], count_equations(m)
     solution, matrix = at(v, offset), at(v, offset + size)
     across = at(matrix, size * size)
     directions = at(across, size)
     reduced = at(directions, size * size)
-    factor, right, work = equations_for(m, free, 1)
-    rank = factorise(count, free, factor, REDUNDANT * count)
-    minimum_norm(count, free, factor, rank, right, work, across)
+    factor, right, work = free_equations(m, free, 1)
+    rank = factorise_equations(count, free, factor, REDUNDANT * count)
+    solve_minimum_norm(count, free, factor, rank, right, work, across)
     left = free - rank
     write_null_space(free, factor, rank, directions)
     for k in range(free):
@@ -220,9 +220,9 @@ def solve_along(m: Fit, free: int, offset: int, smallest: float) -> int:
             for i in range(free):
                 total += second[i] * product[i]
             reduced[left * k + other] = reduced[left * other + k] = total
-    if not cholesky(left, reduced, smallest):
+    if not factorise_cholesky(left, reduced, smallest):
         return -1
-    substitute(left, reduced, rhs)
+    solve_cholesky(left, reduced, rhs)
     for j in range(free):
         total = across[j]
         for k in range(left):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import nan
 
-from osimlite.mechanics.kernels.dynamics import clear_wrenches, generalized_forces
+from osimlite.mechanics.kernels.dynamics import add_generalized_forces, clear_wrenches
 from osimlite.mechanics.kernels.layout import ITEM, MODEL, OUTCOME, STAGE, WORK
 from osimlite.mechanics.kernels.paths import pull_path
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call
@@ -137,7 +137,7 @@ def push_each(
                 data[actuator_record[1]], to[freedoms] = 0.0, 1.0
                 if status != OUTCOME.OK:
                     return status
-            generalized_forces(model, data, applied)
+            add_generalized_forces(model, data, applied)
             for k in range(freedoms):
                 to[k] = applied[k]
     return OUTCOME.OK

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at
-from osimlite.mechanics.kernels.table import written
+from osimlite.mechanics.kernels.table import compile_text
 from osimlite.mechanics.laws import formulas
 from osimlite.mechanics.laws.formulas import FUNCTIONS, OF_TWO, divide, larger, power, smaller
 
@@ -18,7 +18,7 @@ LINES = [
     for line in (f"if kind == {number}:", f"    return {law}(a)")
 ]
 """Text of the branches of `of_one`."""
-of_one = written(
+of_one = compile_text(
     "of_one",
     __name__,
     "\n    ".join(['def of_one(kind: "int", a: "float") -> "float":', *LINES, "return 0.0\n"]),
@@ -26,7 +26,9 @@ of_one = written(
 )
 
 
-def compute(steps: Ints, count: int, constants: Floats, registers: Floats, variables: int) -> float:
+def run_program(
+    steps: Ints, count: int, constants: Floats, registers: Floats, variables: int
+) -> float:
     """Run a program and return its result.
 
     Args:
@@ -65,7 +67,9 @@ def compute(steps: Ints, count: int, constants: Floats, registers: Floats, varia
     return value
 
 
-def of_two(one: float, two: float, steps: Ints, constants: Floats, registers: Floats) -> float:
+def run_binary_program(
+    one: float, two: float, steps: Ints, constants: Floats, registers: Floats
+) -> float:
     """Run a program of two variables that is preceded by its number of steps, and return its result."""
     registers[0], registers[1] = one, two
-    return compute(at(steps, 1), steps[0], constants, registers, 2)
+    return run_program(at(steps, 1), steps[0], constants, registers, 2)

@@ -11,9 +11,9 @@ from __future__ import annotations
 
 from math import inf, sqrt
 
-from osimlite.mechanics.kernels.constrained_dynamics import bind
+from osimlite.mechanics.kernels.constrained_dynamics import evaluate_constraints
 from osimlite.mechanics.kernels.layout import CONSTRAINED, CONSTRAINT, MODEL, OUTCOME, STAGE, WORK
-from osimlite.mechanics.kernels.linear_algebra import factored, solved
+from osimlite.mechanics.kernels.linear_algebra import factorise_by_law, solve_by_law
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call
 from osimlite.mechanics.laws.rotations import sine_cosine
 
@@ -48,7 +48,7 @@ def project(
     trial = at(data, h[CONSTRAINED.WORK_TRIAL])
     for k in range(2 * size):
         trial[k] = y[k]
-    status = bound(model, reals, data, trial)
+    status = evaluate_equations(model, reals, data, trial)
     if status == OUTCOME.OK:
         status = project_values(
             model, reals, data, trial, state_errors, has_errors, tolerance, limit
@@ -63,12 +63,12 @@ def project(
     return status
 
 
-def bound(model: Ints, reals: Floats, data: Floats, y: Floats) -> int:
+def evaluate_equations(model: Ints, reals: Floats, data: Floats, y: Floats) -> int:
     """Evaluate all constraint equations at a state; return the outcome."""
     f = at(data, model[model[MODEL.CONSTRAINED] + CONSTRAINED.WORK_TRIAL] + 2 * model[MODEL.DOFS])
     status = call(model[MODEL.LAWS], model, reals, data, y, f, STAGE.VELOCITY)
     if status == OUTCOME.OK:
-        bind(model, reals, data, y, f)
+        evaluate_constraints(model, reals, data, y, f)
     return status
 
 
@@ -109,22 +109,22 @@ def project_values(
         at(errors, 2 * count),
         at(data, h[CONSTRAINED.WORK_TRIAL] + 4 * size),
     )
-    norm = position_errors(model, data, errors)
+    norm = collect_position_errors(model, data, errors)
     if norm <= tolerance:
         return OUTCOME.OK
     if not norm <= limit:
         return OUTCOME.FAR
     for iteration in range(ITERATIONS):
-        rows_by_values(model, data, y, jacobian)
+        write_position_jacobian(model, data, y, jacobian)
         for k in range(count * size):
             factor[k] = jacobian[k]
-        factored(model, data, count, factor, REDUNDANT * count)
-        solved(model, count, factor, errors, work, step)
+        factorise_by_law(model, data, count, factor, REDUNDANT * count)
+        solve_by_law(model, count, factor, errors, work, step)
         for k in range(size):
             following[k], following[size + k] = y[k] - step[k], y[size + k]
         before, norm = norm, inf
-        if bound(model, reals, data, following) == OUTCOME.OK:
-            norm = position_errors(model, data, errors)
+        if evaluate_equations(model, reals, data, following) == OUTCOME.OK:
+            norm = collect_position_errors(model, data, errors)
         if iteration > 0 and not norm <= before:
             norm = before
             break
@@ -135,10 +135,10 @@ def project_values(
     if not norm <= tolerance:
         return OUTCOME.FAR
     if has_errors > 0:
-        across(model, count, jacobian, factor, state_errors, errors, work, step)
+        normal_component(model, count, jacobian, factor, state_errors, errors, work, step)
         for k in range(size):
             state_errors[k] -= step[k]
-    return bound(model, reals, data, y)
+    return evaluate_equations(model, reals, data, y)
 
 
 def project_speeds(
@@ -176,7 +176,7 @@ def project_speeds(
         at(y, size),
     )
     work, step = at(errors, count), at(errors, 2 * count)
-    norm = speed_errors(model, data, u, errors)
+    norm = compute_speed_errors(model, data, u, errors)
     if norm <= tolerance:
         return OUTCOME.OK
     if not norm <= limit:
@@ -186,25 +186,25 @@ def project_speeds(
     for i in range(count):
         for k in range(size):
             factor[size * i + k] = scales[k] * rows[size * i + k]
-    factored(model, data, count, factor, REDUNDANT * count)
+    factorise_by_law(model, data, count, factor, REDUNDANT * count)
     # The rows do not depend on the speeds: one step does, a second one mends its rounding.
     for _ in range(2):
-        solved(model, count, factor, errors, work, step)
+        solve_by_law(model, count, factor, errors, work, step)
         for k in range(size):
             u[k] -= scales[k] * step[k]
-        norm = speed_errors(model, data, u, errors)
+        norm = compute_speed_errors(model, data, u, errors)
         if norm <= max(OVERSHOOT * tolerance, FINEST):
             break
     if not norm <= tolerance:
         return OUTCOME.FAR
     if has_errors > 0:
-        across(model, count, rows, factor, state_errors, errors, work, step)
+        normal_component(model, count, rows, factor, state_errors, errors, work, step)
         for k in range(size):
             state_errors[k] -= scales[k] * step[k]
     return OUTCOME.OK
 
 
-def across(
+def normal_component(
     model: Ints,
     count: int,
     rows: Floats,
@@ -231,10 +231,10 @@ def across(
         values[i] = 0.0
         for k in range(size):
             values[i] += rows[size * i + k] * state_errors[k]
-    solved(model, count, factor, values, work, normal)
+    solve_by_law(model, count, factor, values, work, normal)
 
 
-def position_errors(model: Ints, data: Floats, errors: Floats) -> float:
+def collect_position_errors(model: Ints, data: Floats, errors: Floats) -> float:
     """Collect the errors of the positions; return their root mean square."""
     h, count, total = at(model, model[MODEL.CONSTRAINED]), 0, 0.0
     for number in range(h[CONSTRAINED.CONSTRAINTS]):
@@ -248,7 +248,7 @@ def position_errors(model: Ints, data: Floats, errors: Floats) -> float:
     return sqrt(total / max(count + h[CONSTRAINED.LOCKS], 1))
 
 
-def speed_errors(model: Ints, data: Floats, u: Floats, errors: Floats) -> float:
+def compute_speed_errors(model: Ints, data: Floats, u: Floats, errors: Floats) -> float:
     """Compute the errors G u - b of the speeds; return their root mean square."""
     h, size, total = at(model, model[MODEL.CONSTRAINED]), model[MODEL.DOFS], 0.0
     rows, rates = at(data, h[CONSTRAINED.WORK_ROWS]), at(data, h[CONSTRAINED.WORK_RATES])
@@ -261,7 +261,7 @@ def speed_errors(model: Ints, data: Floats, u: Floats, errors: Floats) -> float:
     return sqrt(total / max(h[CONSTRAINED.EQUATIONS] + h[CONSTRAINED.LOCKS], 1))
 
 
-def rows_by_values(model: Ints, data: Floats, y: Floats, rows: Floats) -> None:
+def write_position_jacobian(model: Ints, data: Floats, y: Floats, rows: Floats) -> None:
     """Write the derivatives of the position errors by the coordinates (not by the speeds)."""
     h, size, count = at(model, model[MODEL.CONSTRAINED]), model[MODEL.DOFS], 0
     for number in range(h[CONSTRAINED.CONSTRAINTS]):

@@ -5,9 +5,16 @@ from __future__ import annotations
 from math import inf, sqrt
 from typing import NamedTuple
 
-from osimlite.mechanics.kernels.error_control import ACCEPTED, projected
+from osimlite.mechanics.kernels.error_control import ACCEPTED, project_by_law
 from osimlite.mechanics.kernels.layout import CONTACT_WORK, MODEL, STAGE, WORK
-from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call, copy, cubic
+from osimlite.mechanics.kernels.pointers import (
+    Floats,
+    Ints,
+    at,
+    call,
+    copy_numbers,
+    interpolate_cubic,
+)
 from osimlite.mechanics.kernels.points import station
 from osimlite.mechanics.laws.vectors import dot, vector
 
@@ -102,13 +109,13 @@ class Motion(NamedTuple):
     levels: Floats
 
 
-def evaluated(m: Motion, t: float, y: Floats, f: Floats, stage: int) -> int:
+def evaluate_state(m: Motion, t: float, y: Floats, f: Floats, stage: int) -> int:
     """Evaluate a state at a time; return the outcome."""
     m.data[WORK.TIME] = t
     return call(m.model[MODEL.LAWS], m.model, m.reals, m.data, y, f, stage)
 
 
-def inside(
+def interpolate_state(
     m: Motion,
     t0: float,
     y0: Floats,
@@ -132,9 +139,9 @@ def inside(
         t: time within the step (s).
         y: filled with the state.
     """
-    cubic(m.model[MODEL.STATE_SIZE], t0, y0, f0, t1, y1, f1, t, y)
+    interpolate_cubic(m.model[MODEL.STATE_SIZE], t0, y0, f0, t1, y1, f1, t, y)
     if m.model[MODEL.CONSTRAINED] > 0:
-        projected(
+        project_by_law(
             m.model, m.reals, m.data, t, y, y, 0, m.data[m.sizes[METHOD_AT] + ACCEPTED] / 10.0, inf
         )
 
@@ -156,10 +163,10 @@ def note_step(m: Motion, t: float, y: Floats, f: Floats) -> None:
     size, row = m.model[MODEL.STATE_SIZE], m.counts[LOGGED]
     log = at(m.log, (1 + 2 * size) * row)
     log[0] = t
-    copy(size, y, at(log, 1))
-    copy(size, f, at(log, 1 + size))
+    copy_numbers(size, y, at(log, 1))
+    copy_numbers(size, f, at(log, 1 + size))
     for pair in range(m.model[MODEL.CONTACTS]):
-        copy(
+        copy_numbers(
             3,
             at(m.data, m.model[MODEL.WORK_CONTACT] + CONTACT_WORK.SIZE * pair),
             at(m.forces, 3 * (m.model[MODEL.CONTACTS] * row + pair)),
@@ -167,7 +174,7 @@ def note_step(m: Motion, t: float, y: Floats, f: Floats) -> None:
     m.counts[LOGGED] += 1
 
 
-def levels_at(m: Motion, y: Floats, levels: Floats) -> None:
+def compute_levels(m: Motion, y: Floats, levels: Floats) -> None:
     """Compute the levels of contacts and watches, whose changes of sign are events.
 
     Args:
@@ -232,10 +239,10 @@ def note_events(
             middle = 0.5 * (low + high)
             if not low < middle < high:
                 break
-            inside(m, t0, y0, f0, t1, y1, f1, middle, ya)
+            interpolate_state(m, t0, y0, f0, t1, y1, f1, middle, ya)
             touch = number < pairs or m.watches[3 * (number - pairs)] == TOUCH
-            evaluated(m, middle, ya, fa, STAGE.FORCE if touch else STAGE.POSITION)
-            levels_at(m, ya, result)
+            evaluate_state(m, middle, ya, fa, STAGE.FORCE if touch else STAGE.POSITION)
+            compute_levels(m, ya, result)
             if (result[number] > 0.0) == rises:
                 high = middle
             else:
@@ -244,9 +251,9 @@ def note_events(
         if number >= pairs and m.watches[3 * (number - pairs) + 2] == (1 if rises else -1):
             t = high
             stop = min(stop, t)
-        row = insert(m, first, t, number, rises)
+        row = insert_event(m, first, t, number, rises)
         if row < m.sizes[MOST_EVENTS] and event > 3:
-            inside(m, t0, y0, f0, t1, y1, f1, t, at(events, event * row + 3))
+            interpolate_state(m, t0, y0, f0, t1, y1, f1, t, at(events, event * row + 3))
     # What lies behind the end of the run has not happened.
     while counts[EVENTS] > first and counts[EVENTS] <= m.sizes[MOST_EVENTS]:
         if events[event * (counts[EVENTS] - 1)] <= stop:
@@ -255,7 +262,7 @@ def note_events(
     return stop
 
 
-def insert(m: Motion, first: int, t: float, number: int, rises: bool) -> int:
+def insert_event(m: Motion, first: int, t: float, number: int, rises: bool) -> int:
     """Insert an event among those of its step, sorted by time; return its row, which may not exist.
 
     Args:
@@ -270,7 +277,7 @@ def insert(m: Motion, first: int, t: float, number: int, rises: bool) -> int:
     if row >= m.sizes[MOST_EVENTS]:
         return row
     while row > first and events[length * (row - 1)] > t:
-        copy(length, at(events, length * (row - 1)), at(events, length * row))
+        copy_numbers(length, at(events, length * (row - 1)), at(events, length * row))
         row -= 1
     event = at(events, length * row)
     event[0], event[1], event[2] = t, number, 1.0 if rises else 0.0

@@ -17,7 +17,7 @@ from math import cos, floor, log, pi, sqrt
 
 from osimlite.mechanics.kernels.layout import Record
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at
-from osimlite.mechanics.kernels.sensors import SOURCE, ahead, felt
+from osimlite.mechanics.kernels.sensors import SOURCE, foot_lead, read_source
 
 EARLY_STANCE = 0
 """State of a leg that carries load with the foot ahead."""
@@ -112,7 +112,7 @@ class LIMITS(metaclass=Record):
     CONTROL_NOISE, CONTROL_PART, SENSOR_NOISE, SENSOR_PART, HEAD = range(SEED + 1, SEED + 6)
 
 
-def note_senses(
+def record_sensors(
     model: Ints, data: Floats, i: Ints, p: Floats, frames: int, row: Floats, history: Floats
 ) -> None:
     """Add the current sensors, with noise, to the history.
@@ -130,12 +130,12 @@ def note_senses(
     newest = at(history, sensors * (frames % i[REFLEXES.KEPT]))
     sources = at(i, REFLEXES.HEAD + TERM.SIZE * i[REFLEXES.TERMS] + OF_GATE * i[REFLEXES.GATES])
     for k in range(sensors):
-        newest[k] = felt(model, data, at(sources, SOURCE.SIZE * k), p, row)
+        newest[k] = read_source(model, data, at(sources, SOURCE.SIZE * k), p, row)
     if i[REFLEXES.IS_NOISY] > 0:
         for k in range(sensors):
             width = p[LIMITS.SENSOR_NOISE] + p[LIMITS.SENSOR_PART] * abs(newest[k])
             if width > 0.0:
-                newest[k] += width * normal(int(p[LIMITS.SEED]), OF_SENSORS, frames, k)
+                newest[k] += width * draw_normal(int(p[LIMITS.SEED]), OF_SENSORS, frames, k)
 
 
 def add_noise(i: Ints, p: Floats, step: int, count: int, controls: Floats) -> None:
@@ -144,10 +144,10 @@ def add_noise(i: Ints, p: Floats, step: int, count: int, controls: Floats) -> No
         for k in range(count):
             width = p[LIMITS.CONTROL_NOISE] + p[LIMITS.CONTROL_PART] * controls[k]
             if width > 0.0:
-                controls[k] += width * normal(int(p[LIMITS.SEED]), OF_CONTROLS, step, k)
+                controls[k] += width * draw_normal(int(p[LIMITS.SEED]), OF_CONTROLS, step, k)
 
 
-def felt_before(i: Ints, frames: int, history: Floats, sensor: int, delay: float) -> float:
+def delayed_sensor(i: Ints, frames: int, history: Floats, sensor: int, delay: float) -> float:
     """Return a delayed sensor by linear interpolation; before the start it has its first value.
 
     Args:
@@ -167,7 +167,7 @@ def felt_before(i: Ints, frames: int, history: Floats, sensor: int, delay: float
     return value + part * (other - value)
 
 
-def go_on(
+def update_leg_states(
     senses: Ints, i: Ints, p: Floats, frames: int, row: Floats, history: Floats, legs: Floats
 ) -> None:
     """Advance the states of two legs by one control step.
@@ -181,19 +181,26 @@ def go_on(
         history: ring buffer of sensors.
         legs: states of the legs (2,); changed.
     """
-    one, two = felt_before(i, frames, history, 0, p[0]), felt_before(i, frames, history, 1, p[0])
-    first, second = ahead(senses, row, 0), ahead(senses, row, 1)
+    one, two = (
+        delayed_sensor(i, frames, history, 0, p[0]),
+        delayed_sensor(i, frames, history, 1, p[0]),
+    )
+    first, second = foot_lead(senses, row, 0), foot_lead(senses, row, 1)
     of_one, of_two, is_direct = (
         at(p, 1),
         at(p, 1 + LIMITS.OF_LEG),
         i[REFLEXES.SWINGS_FROM_STANCE] > 0,
     )
     states = int(legs[0]), int(legs[1])
-    legs[0] = after(states[0], of_one, one, two > of_two[LIMITS.STANDS], first, second, is_direct)
-    legs[1] = after(states[1], of_two, two, one > of_one[LIMITS.STANDS], second, first, is_direct)
+    legs[0] = next_leg_state(
+        states[0], of_one, one, two > of_two[LIMITS.STANDS], first, second, is_direct
+    )
+    legs[1] = next_leg_state(
+        states[1], of_two, two, one > of_one[LIMITS.STANDS], second, first, is_direct
+    )
 
 
-def after(
+def next_leg_state(
     state: int,
     limits: Floats,
     load: float,
@@ -255,11 +262,11 @@ def add_reflexes(
         value = own[1]
         if term[TERM.SENSOR] >= 0:
             gate = term[TERM.GATE]
-            if gate >= 0 and is_closed(
+            if gate >= 0 and is_suppressed(
                 i, at(gates, OF_GATE * gate), at(numbers, OF_EACH * (count + gate)), frames, history
             ):
                 continue
-            value = felt_before(i, frames, history, term[TERM.SENSOR], own[0]) - own[2]
+            value = delayed_sensor(i, frames, history, term[TERM.SENSOR], own[0]) - own[2]
             if term[TERM.KIND] == OF_SENSOR:
                 value = max(value, 0.0)
             value *= own[1]
@@ -274,14 +281,14 @@ def add_reflexes(
         result[term[TERM.TARGET]] += value
 
 
-def is_closed(i: Ints, gate: Ints, own: Floats, frames: int, history: Floats) -> bool:
+def is_suppressed(i: Ints, gate: Ints, own: Floats, frames: int, history: Floats) -> bool:
     """Return whether a gate suppresses a term: its coordinate is beyond the range and moves further away."""
-    value = felt_before(i, frames, history, gate[0], own[0])
-    speed = felt_before(i, frames, history, gate[1], own[0])
+    value = delayed_sensor(i, frames, history, gate[0], own[0])
+    speed = delayed_sensor(i, frames, history, gate[1], own[0])
     return (value < own[1] and speed < 0.0) or (value > own[2] and speed >= 0.0)
 
 
-def normal(seed: int, what: int, step: int, number: int) -> float:
+def draw_normal(seed: int, what: int, step: int, number: int) -> float:
     """Return a normally distributed number of mean 0 and deviation 1, by the method of Box and Muller.
 
     Args:

@@ -12,7 +12,11 @@ from __future__ import annotations
 
 from math import inf
 
-from osimlite.mechanics.kernels.condensation import condense, correct, linearise
+from osimlite.mechanics.kernels.condensation import (
+    condense_system,
+    linearise_state,
+    solve_condensed,
+)
 from osimlite.mechanics.kernels.error_control import (
     ACCEPTED,
     ERRORS,
@@ -23,10 +27,10 @@ from osimlite.mechanics.kernels.error_control import (
     MEMORY,
     NEXT_STEP,
     REACHED,
-    step_error,
+    project_and_measure,
 )
 from osimlite.mechanics.kernels.layout import MODEL, OUTCOME, STAGE, WORK
-from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call, copy, is_finite
+from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call, copy_numbers, is_finite
 
 IS_NEW = MEMORY
 """Index in the method's record of 1.0 if the derivatives are those at the start of the step."""
@@ -66,7 +70,7 @@ estimate is as large as the errors at the end are.
 """
 
 
-def _by_gamma(row: tuple[float, ...]) -> tuple[float, ...]:
+def _divide_by_gamma(row: tuple[float, ...]) -> tuple[float, ...]:
     """Return a row times the inverse of GAMMA."""
     result = [0.0] * STAGES
     for j in range(STAGES - 1, -1, -1):
@@ -77,17 +81,17 @@ def _by_gamma(row: tuple[float, ...]) -> tuple[float, ...]:
 
 UNIT = tuple(tuple(float(i == j) for j in range(STAGES)) for i in range(STAGES))
 """Unit matrix."""
-PLACES = tuple(value for row in ALPHA for value in _by_gamma(row))
+PLACES = tuple(value for row in ALPHA for value in _divide_by_gamma(row))
 """ALPHA times the inverse of GAMMA, by rows.
 
 In terms of the transformed stages no product with J occurs (E. Hairer, G. Wanner, Solving Ordinary
 Differential Equations II, chapter IV.7).
 """
-CARRIED = tuple(-DIAGONAL * value for row in UNIT for value in _by_gamma(row))
+CARRIED = tuple(-DIAGONAL * value for row in UNIT for value in _divide_by_gamma(row))
 """Coefficients of the transformed earlier stages on the right side of a stage, by rows."""
-ENDS = _by_gamma(WEIGHTS)
+ENDS = _divide_by_gamma(WEIGHTS)
 """Coefficients of the transformed stages in the result."""
-MISSES = _by_gamma(tuple(one - other for one, other in zip(WEIGHTS, EMBEDDED, strict=True)))
+MISSES = _divide_by_gamma(tuple(one - other for one, other in zip(WEIGHTS, EMBEDDED, strict=True)))
 """Coefficients of the transformed stages in the error estimate."""
 TIMES = tuple(sum(row) for row in ALPHA)
 """Times of the stages, as part of the step; at 0 the derivative is known."""
@@ -125,24 +129,24 @@ def rosenbrock(model: Ints, reals: Floats, data: Floats, y0: Floats, y1: Floats,
     c, error = DIAGONAL * step, inf
     if h[IS_NEW] == 0.0:
         data[WORK.TIME] = t0
-        copy(size, y0, y1)
+        copy_numbers(size, y0, y1)
         h[IS_NEW] = (
             1.0
-            if linearise(model, reals, data, y1, f1, work, h[IS_EVALUATED]) == OUTCOME.OK
+            if linearise_state(model, reals, data, y1, f1, work, h[IS_EVALUATED]) == OUTCOME.OK
             else 0.0
         )
     h[IS_EVALUATED] = 0.0
     if (
         h[IS_NEW] > 0.0
-        and condense(model, c, work)
-        and staged(model, reals, data, t0, step, c, y0, y1, stages, work)
+        and condense_system(model, c, work)
+        and compute_stages(model, reals, data, t0, step, c, y0, y1, stages, work)
     ):
         for k in range(size):
             y1[k], errors[k] = y0[k], 0.0
             for i in range(STAGES):
                 y1[k] += ENDS[i] * stages[size * i + k]
                 errors[k] += MISSES[i] * stages[size * i + k]
-        error = step_error(model, reals, data, t1, y0, y1, errors, h, 1)
+        error = project_and_measure(model, reals, data, t1, y0, y1, errors, h, 1)
     factor = SAFETY * (accuracy / max(error, 1e-9 * accuracy)) ** (1.0 / 3.0)
     if not error <= accuracy:
         # Near the resolution of the time, the step was longer than it was to be.
@@ -154,7 +158,7 @@ def rosenbrock(model: Ints, reals: Floats, data: Floats, y0: Floats, y1: Floats,
     return OUTCOME.OK
 
 
-def staged(
+def compute_stages(
     model: Ints,
     reals: Floats,
     data: Floats,
@@ -200,5 +204,5 @@ def staged(
             stage[k] = c * rates[k]
             for j in range(i):
                 stage[k] += CARRIED[STAGES * i + j] * stages[size * j + k]
-        correct(model, c, work, stage)
+        solve_condensed(model, c, work, stage)
     return True

@@ -17,11 +17,11 @@ from osimlite.mechanics.kernels.error_control import (
     NEXT_STEP,
     REACHED,
     SHORTEST,
-    projected,
+    project_by_law,
     shortest_step,
 )
 from osimlite.mechanics.kernels.layout import MODEL, OUTCOME, STAGE
-from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call, copy, is_finite
+from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call, copy_numbers, is_finite
 from osimlite.mechanics.kernels.record import (
     ATTEMPTED,
     COUNTED,
@@ -45,9 +45,9 @@ from osimlite.mechanics.kernels.record import (
     TOO_MANY,
     WATCHES,
     Motion,
-    evaluated,
-    inside,
-    levels_at,
+    compute_levels,
+    evaluate_state,
+    interpolate_state,
     note_events,
     note_peaks,
     note_step,
@@ -99,7 +99,7 @@ def run_several(
         last: end of the runs.
     """
     for k in range(first, last):
-        m = run_of(
+        m = select_run(
             model,
             reals,
             data,
@@ -118,11 +118,11 @@ def run_several(
             levels,
             k,
         )
-        endings[k] = run(m, at(states, k * model[MODEL.STATE_SIZE]), False)
+        endings[k] = integrate_run(m, at(states, k * model[MODEL.STATE_SIZE]), False)
     return OUTCOME.OK
 
 
-def run_of(
+def select_run(
     model: Ints,
     reals: Floats,
     data: Floats,
@@ -161,7 +161,7 @@ def run_of(
     )
 
 
-def run(m: Motion, y: Floats, is_going: bool) -> int:
+def integrate_run(m: Motion, y: Floats, is_going: bool) -> int:
     """Integrate from the state y, which is changed, until a condition ends the run.
 
     Args:
@@ -179,27 +179,27 @@ def run(m: Motion, y: Floats, is_going: bool) -> int:
     before = at(work, STATES * size)
     after = at(before, model[MODEL.CONTACTS] + sizes[WATCHES])
     is_kept = model[MODEL.CONSTRAINED] == 0 or sizes[START_HOLDS] > 0
-    if not is_kept and not projected(
+    if not is_kept and not project_by_law(
         model, m.reals, m.data, clock[0], y, f0, 0, h[ACCEPTED] / 10.0, inf
     ):
         return FAILED
-    copy(size, y, y0)
-    status = OUTCOME.OK if is_going else evaluated(m, clock[0], y0, f0, STAGE.ACCELERATION)
+    copy_numbers(size, y, y0)
+    status = OUTCOME.OK if is_going else evaluate_state(m, clock[0], y0, f0, STAGE.ACCELERATION)
     if counts[TAKEN] == 0 and counts[EVALUATIONS] == 0:
         counts[EVALUATIONS], h[MEMORY] = 0 if is_going else 1, 0.0
     if status != OUTCOME.OK or not is_finite(size, f0):
         return FAILED
     h[IS_EVALUATED] = 0.0 if is_going else 1.0
-    levels_at(m, y0, before)
+    compute_levels(m, y0, before)
     note_peaks(m, clock[0])
     while counts[REPORTED] < sizes[TIMES] and m.times[counts[REPORTED]] <= clock[0]:
-        copy(size, y0, at(m.reports, size * counts[REPORTED]))
+        copy_numbers(size, y0, at(m.reports, size * counts[REPORTED]))
         counts[REPORTED] += 1
     while clock[0] < h[LAST_TIME]:
         if sizes[MOST_LOGGED] > 0 and sizes[MOST_LOGGED] == counts[LOGGED]:
             return FULL
         t0 = clock[0]
-        t1 = step(m, t0, y0, y1)
+        t1 = take_step(m, t0, y0, y1)
         if t1 <= t0:
             return FAILED if t1 < t0 else TOO_MANY
         if not is_evaluated(m, t1, y1, f1):
@@ -218,29 +218,29 @@ def run(m: Motion, y: Floats, is_going: bool) -> int:
         h[IS_EVALUATED] = 1.0 if h[HAS_DERIVATIVE] == 0.0 and model[MODEL.CONSTRAINED] == 0 else 0.0
         if sizes[MOST_EVENTS] > 0 or sizes[WATCHES] > 0:
             h[IS_EVALUATED] = 0.0
-            levels_at(m, y1, after)
+            compute_levels(m, y1, after)
             end = note_events(m, t0, y0, f0, t1, y1, f1, before, after)
             stopped = end <= t1
             end = min(end, t1)
-            copy(model[MODEL.CONTACTS] + sizes[WATCHES], after, before)
+            copy_numbers(model[MODEL.CONTACTS] + sizes[WATCHES], after, before)
         while counts[REPORTED] < sizes[TIMES] and m.times[counts[REPORTED]] <= end:
             t, report = m.times[counts[REPORTED]], at(m.reports, size * counts[REPORTED])
             if t == t1:
-                copy(size, y1, report)
+                copy_numbers(size, y1, report)
             else:
-                inside(m, t0, y0, f0, t1, y1, f1, t, report)
+                interpolate_state(m, t0, y0, f0, t1, y1, f1, t, report)
             counts[REPORTED] += 1
         if stopped:
             if end < t1:
-                inside(m, t0, y0, f0, t1, y1, f1, end, y)
+                interpolate_state(m, t0, y0, f0, t1, y1, f1, end, y)
             else:
-                copy(size, y1, y)
+                copy_numbers(size, y1, y)
             clock[0] = end
             return STOPPED
         y0, y1 = y1, y0
         f0, f1 = f1, f0
-        copy(size, y0, y)
-    copy(size, f0, at(work, size))
+        copy_numbers(size, y0, y)
+    copy_numbers(size, f0, at(work, size))
     return DONE
 
 
@@ -255,12 +255,12 @@ def is_evaluated(m: Motion, t1: float, y1: Floats, f1: Floats) -> bool:
     ):
         return is_finite(m.model[MODEL.STATE_SIZE], f1)
     m.counts[EVALUATIONS] += 1
-    return evaluated(m, t1, y1, f1, STAGE.ACCELERATION) == OUTCOME.OK and is_finite(
+    return evaluate_state(m, t1, y1, f1, STAGE.ACCELERATION) == OUTCOME.OK and is_finite(
         m.model[MODEL.STATE_SIZE], f1
     )
 
 
-def step(m: Motion, t0: float, y0: Floats, y1: Floats) -> float:
+def take_step(m: Motion, t0: float, y0: Floats, y1: Floats) -> float:
     """Find a step whose error is accepted.
 
     Args:

@@ -12,9 +12,19 @@ from __future__ import annotations
 from math import atan2, sqrt
 
 from osimlite.mechanics.kernels.layout import CONTACT_WORK, MODEL, Record
-from osimlite.mechanics.kernels.pointers import Floats, Ints, at, copy
+from osimlite.mechanics.kernels.pointers import Floats, Ints, at, copy_numbers
 from osimlite.mechanics.kernels.points import angular_velocity, direction, station, velocity
-from osimlite.mechanics.laws.vectors import ZERO, Vector, along, dot, norm, over, plus, put, vector
+from osimlite.mechanics.laws.vectors import (
+    ZERO,
+    Vector,
+    add_scaled,
+    divide,
+    dot,
+    norm,
+    plus,
+    store_vector,
+    vector,
+)
 
 OF_MUSCLES = "fiber_length", "fiber_velocity", "tension", "activation", "active_fiber_force"
 """Results of a muscle that a row uses."""
@@ -89,7 +99,7 @@ class SOURCE(metaclass=Record):
     KIND, PLACE, MORE, SIZE = range(4)
 
 
-def felt(model: Ints, data: Floats, source: Ints, p: Floats, row: Floats) -> float:
+def read_source(model: Ints, data: Floats, source: Ints, p: Floats, row: Floats) -> float:
     """Return the value of a source after the row has been filled.
 
     Args:
@@ -123,7 +133,7 @@ def felt(model: Ints, data: Floats, source: Ints, p: Floats, row: Floats) -> flo
     )
 
 
-def feel(model: Ints, data: Floats, y: Floats, i: Ints, p: Floats, row: Floats) -> None:
+def fill_sensor_row(model: Ints, data: Floats, y: Floats, i: Ints, p: Floats, row: Floats) -> None:
     """Fill a sensor row after an evaluation of the state y.
 
     Args:
@@ -144,7 +154,7 @@ def feel(model: Ints, data: Floats, y: Floats, i: Ints, p: Floats, row: Floats) 
         row[i[SENSES.FORCES] + k] = data[places[2]] / strengths[k]
         row[i[SENSES.ACTIVATIONS] + k] = data[places[3]]
         row[i[SENSES.ACTIVE] + k] = data[places[4]]
-    copy(2 * freedoms, y, at(row, i[SENSES.VALUES]))
+    copy_numbers(2 * freedoms, y, at(row, i[SENSES.VALUES]))
     limits, moments = at(muscle_ints, OF_MUSCLE * muscles), at(row, i[SENSES.MOMENTS])
     for k in range(freedoms):
         moments[k] = 0.0
@@ -154,10 +164,10 @@ def feel(model: Ints, data: Floats, y: Floats, i: Ints, p: Floats, row: Floats) 
     centres = at(strengths, muscles + 2 * i[SENSES.CONTROLS])
     for k in range(bodies):
         position = station(model, data, links[k], vector(centres, 3 * k))
-        put(row, i[SENSES.PLACES] + 3 * k, position)
-        total = along(total, centres[3 * bodies + k], position)
+        store_vector(row, i[SENSES.PLACES] + 3 * k, position)
+        total = add_scaled(total, centres[3 * bodies + k], position)
         rise += centres[3 * bodies + k] * velocity(model, data, links[k], position)[1]
-    put(row, i[SENSES.CENTRE], over(total, p[SENSED.MASS]))
+    store_vector(row, i[SENSES.CENTRE], divide(total, p[SENSED.MASS]))
     row[i[SENSES.RISE]] = rise / p[SENSED.MASS]
     for k in range(i[SENSES.LEGS]):
         leg, push = at(links, bodies + OF_LEG * k), ZERO
@@ -171,14 +181,14 @@ def contact_force(model: Ints, data: Floats, pair: int) -> Vector:
     return vector(data, model[MODEL.WORK_CONTACT] + CONTACT_WORK.SIZE * pair + CONTACT_WORK.FORCE)
 
 
-def foot(i: Ints, row: Floats, leg: int) -> float:
+def foot_position(i: Ints, row: Floats, leg: int) -> float:
     """Return the position of the foot of a leg along x (m)."""
     return row[i[SENSES.PLACES] + 3 * leg_ints(i, leg)[1]]
 
 
-def ahead(i: Ints, row: Floats, leg: int) -> float:
+def foot_lead(i: Ints, row: Floats, leg: int) -> float:
     """Return how far the foot of a leg is ahead of the pelvis along x (m)."""
-    return foot(i, row, leg) - row[i[SENSES.PLACES] + 3 * leg_ints(i, leg)[0]]
+    return foot_position(i, row, leg) - row[i[SENSES.PLACES] + 3 * leg_ints(i, leg)[0]]
 
 
 def leg_ints(i: Ints, leg: int) -> Ints:

@@ -89,7 +89,7 @@ LAW_NUMBERS = {name: number for number, name in enumerate(LAW_MODULES)}
 """Index of each kernel's address among the addresses from `layout.MODEL.LAWS` on."""
 
 
-def own_function(name: str) -> Callable[..., Any]:
+def load_kernel(name: str) -> Callable[..., Any]:
     """Return the kernel of a name in the table."""
     function: Callable[..., Any] = getattr(
         import_module(f"{__package__}.{LAW_MODULES[name]}"), name
@@ -99,11 +99,11 @@ def own_function(name: str) -> Callable[..., Any]:
 
 RECORDS = {record.__name__: record for record in (MODEL, ITEM, RUN, WORK, OUTCOME)}
 """Records of the layout that generated kernels refer to."""
-GIVEN = 'model: "Ints", reals: "Floats", data: "Floats", y: "Floats", f: "Floats"'
+PARAMETERS = 'model: "Ints", reals: "Floats", data: "Floats", y: "Floats", f: "Floats"'
 """Parameters that every kernel begins with, as text."""
 
 
-def written(name: str, module: str, source: str, **scope: Any) -> Callable[..., int]:
+def compile_text(name: str, module: str, source: str, **scope: Any) -> Callable[..., int]:
     """Return the function that a text defines.
 
     Args:

@@ -9,10 +9,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from osimlite.mechanics.kernels.criteria import begin_criteria, judged
+from osimlite.mechanics.kernels.criteria import begin_criteria, update_criteria
 from osimlite.mechanics.kernels.error_control import HAS_DERIVATIVE, LAST_TIME, MEMORY
 from osimlite.mechanics.kernels.layout import MODEL, OUTCOME, STAGE
-from osimlite.mechanics.kernels.pointers import Floats, Ints, at, copy, is_finite
+from osimlite.mechanics.kernels.pointers import Floats, Ints, at, copy_numbers, is_finite
 from osimlite.mechanics.kernels.record import (
     COUNTED,
     DONE,
@@ -20,7 +20,7 @@ from osimlite.mechanics.kernels.record import (
     FAILED,
     METHOD_AT,
     Motion,
-    evaluated,
+    evaluate_state,
 )
 from osimlite.mechanics.kernels.reflexes import (
     EARLY_STANCE,
@@ -28,11 +28,11 @@ from osimlite.mechanics.kernels.reflexes import (
     UNKNOWN,
     add_noise,
     add_reflexes,
-    go_on,
-    note_senses,
+    record_sensors,
+    update_leg_states,
 )
-from osimlite.mechanics.kernels.runs import run, run_of
-from osimlite.mechanics.kernels.sensors import SENSED, SENSES, feel
+from osimlite.mechanics.kernels.runs import integrate_run, select_run
+from osimlite.mechanics.kernels.sensors import SENSED, SENSES, fill_sensor_row
 
 FEEL = -1
 """Order to fill the sensor rows only, in place of a number of control steps."""
@@ -113,12 +113,14 @@ def hold_several(
     for k in range(first, last):
         for number in range(held_by):
             reals[places[number]] = controls[held_by * k + number]
-        m = motion_of(model, reals, data, sizes, clocks, counts, peaks, places, k)
-        going[k] = 1 if held(m, at(states, model[MODEL.STATE_SIZE] * k), False) else 0
+        m = select_motion(model, reals, data, sizes, clocks, counts, peaks, places, k)
+        going[k] = (
+            1 if integrate_control_step(m, at(states, model[MODEL.STATE_SIZE] * k), False) else 0
+        )
     return OUTCOME.OK
 
 
-def motion_of(
+def select_motion(
     model: Ints,
     reals: Floats,
     data: Floats,
@@ -137,12 +139,12 @@ def motion_of(
     )
 
 
-def held(m: Motion, y: Floats, has_derivative: bool) -> bool:
+def integrate_control_step(m: Motion, y: Floats, has_derivative: bool) -> bool:
     """Integrate a state over one control step, as a run of its own; return whether it reaches the end."""
     m.clock[0] = 0.0
     for k in range(COUNTED):
         m.counts[k] = 0
-    return run(m, y, has_derivative) == DONE and is_finite(m.model[MODEL.STATE_SIZE], y)
+    return integrate_run(m, y, has_derivative) == DONE and is_finite(m.model[MODEL.STATE_SIZE], y)
 
 
 def walk_several(
@@ -202,7 +204,7 @@ def walk_several(
     """
     size, status = model[MODEL.STATE_SIZE], OUTCOME.OK
     for k in range(first, last):
-        m = motion_of(model, reals, data, sizes, clocks, counts, peaks, senses, k)
+        m = select_motion(model, reals, data, sizes, clocks, counts, peaks, senses, k)
         walk = Walk(
             m,
             senses,
@@ -220,33 +222,33 @@ def walk_several(
         )
         y = at(states, size * k)
         if order < 0:
-            status = max(status, begun(walk, y, order))
+            status = max(status, begin_walk(walk, y, order))
         else:
-            go(walk, y, order, k == 0)
+            take_control_steps(walk, y, order, k == 0)
     return status
 
 
-def begun(a: Walk, y: Floats, order: int) -> int:
+def begin_walk(a: Walk, y: Floats, order: int) -> int:
     """Fill the sensor row of a state, and start reflexes or criteria; return the outcome."""
     m = a.m
     for k in range(a.senses[SENSES.CONTROLS]):
         m.reals[a.driven[k]] = 0.0
-    status = evaluated(m, 0.0, y, at(m.data, m.model[MODEL.WORK_STATE]), STAGE.FORCE)
+    status = evaluate_state(m, 0.0, y, at(m.data, m.model[MODEL.WORK_STATE]), STAGE.FORCE)
     if status != OUTCOME.OK:
         return status
-    feel(m.model, m.data, y, a.senses, a.known, a.row)
+    fill_sensor_row(m.model, m.data, y, a.senses, a.known, a.row)
     if order == BEGIN:
         for k in range(LEGS):
             a.room[k] = UNKNOWN if a.plan[REFLEXES.HAS_STATES] > 0 else EARLY_STANCE
         a.progress[STEPS], a.progress[FRAMES], a.progress[GOING], a.progress[FORCES] = 0, 1, 1, 0
-        note_senses(m.model, m.data, a.plan, a.numbers, 0, a.row, at(a.room, LEGS))
-        excite(a)
+        record_sensors(m.model, m.data, a.plan, a.numbers, 0, a.row, at(a.room, LEGS))
+        update_excitations(a)
     elif order == START:
-        begin_criteria(a.senses, a.criteria, a.row, judged_room(a))
+        begin_criteria(a.senses, a.criteria, a.row, criteria_work(a))
     return status
 
 
-def go(a: Walk, y: Floats, steps: int, is_recorded: bool) -> None:
+def take_control_steps(a: Walk, y: Floats, steps: int, is_recorded: bool) -> None:
     """Simulate at most `steps` control steps.
 
     As in SCONE, a step may begin with the derivative at the end of the previous one, which belongs to
@@ -255,25 +257,25 @@ def go(a: Walk, y: Floats, steps: int, is_recorded: bool) -> None:
     m, progress, lags = a.m, a.progress, a.known[SENSED.LAGS] > 0.0
     size, controls = m.model[MODEL.STATE_SIZE], a.senses[SENSES.CONTROLS]
     if lags:
-        hold(a)
+        apply_excitations(a)
         previous = at(m.data, m.model[MODEL.WORK_STATE])
-        copy(size, y, previous)
-        evaluated(m, a.known[SENSED.STEP], previous, at(previous, size), STAGE.ACCELERATION)
+        copy_numbers(size, y, previous)
+        evaluate_state(m, a.known[SENSED.STEP], previous, at(previous, size), STAGE.ACCELERATION)
     for number in range(steps):
         if progress[GOING] == 0:
             return
-        excite(a)
+        update_excitations(a)
         if is_recorded:
             record = at(a.record, (size + controls + a.senses[SENSES.LEGS]) * number)
-            copy(size, y, record)
-            copy(controls, a.excitations, at(record, size))
-            copy(
+            copy_numbers(size, y, record)
+            copy_numbers(controls, a.excitations, at(record, size))
+            copy_numbers(
                 a.senses[SENSES.LEGS],
                 at(a.row, a.senses[SENSES.LOADS]),
                 at(record, size + controls),
             )
-        hold(a)
-        has_reached_end = held(m, y, lags)
+        apply_excitations(a)
+        has_reached_end = integrate_control_step(m, y, lags)
         progress[STEPS] += 1
         progress[FORCES] += m.counts[EVALUATIONS]
         if not has_reached_end:
@@ -281,31 +283,35 @@ def go(a: Walk, y: Floats, steps: int, is_recorded: bool) -> None:
             return
         if m.model[MODEL.CONTACTS] == 0 and m.data[m.sizes[METHOD_AT] + HAS_DERIVATIVE] > 0.0:
             # The method has not looked at the forces at the end.
-            evaluated(m, m.clock[0], y, at(m.data, m.model[MODEL.WORK_STATE]), STAGE.FORCE)
-        feel(m.model, m.data, y, a.senses, a.known, a.row)
-        note_senses(m.model, m.data, a.plan, a.numbers, progress[FRAMES], a.row, at(a.room, LEGS))
+            evaluate_state(m, m.clock[0], y, at(m.data, m.model[MODEL.WORK_STATE]), STAGE.FORCE)
+        fill_sensor_row(m.model, m.data, y, a.senses, a.known, a.row)
+        record_sensors(
+            m.model, m.data, a.plan, a.numbers, progress[FRAMES], a.row, at(a.room, LEGS)
+        )
         progress[FRAMES] += 1
         t = progress[STEPS] * a.known[SENSED.STEP]
-        if judged(a.senses, a.known, a.criteria, a.bounds, t, a.row, a.excitations, judged_room(a)):
+        if update_criteria(
+            a.senses, a.known, a.criteria, a.bounds, t, a.row, a.excitations, criteria_work(a)
+        ):
             progress[GOING] = 0
 
 
-def hold(a: Walk) -> None:
+def apply_excitations(a: Walk) -> None:
     """Write the excitations to the actuators."""
     for k in range(a.senses[SENSES.CONTROLS]):
         a.m.reals[a.driven[k]] = a.excitations[k]
 
 
-def judged_room(a: Walk) -> Floats:
+def criteria_work(a: Walk) -> Floats:
     """Return the workspace of the criteria."""
     return at(a.room, LEGS + a.plan[REFLEXES.KEPT] * a.plan[REFLEXES.SENSORS])
 
 
-def excite(a: Walk) -> None:
+def update_excitations(a: Walk) -> None:
     """Advance the states of the legs, and compute the excitations by reflexes, within their bounds."""
     history, frames, count = at(a.room, LEGS), a.progress[FRAMES], a.senses[SENSES.CONTROLS]
     if a.plan[REFLEXES.HAS_STATES] > 0:
-        go_on(a.senses, a.plan, a.numbers, frames, a.row, history, a.room)
+        update_leg_states(a.senses, a.plan, a.numbers, frames, a.row, history, a.room)
     for k in range(count):
         a.excitations[k] = 0.0
     add_reflexes(a.plan, a.numbers, frames, history, a.room, a.excitations)
@@ -352,7 +358,7 @@ def run_by_reflexes(
     The arguments are those of `run_several` and of `walk_several`, with one row per run.
     """
     for k in range(first, last):
-        m = run_of(
+        m = select_run(
             model,
             reals,
             data,
@@ -383,19 +389,19 @@ def run_by_reflexes(
             at(room, plan[REFLEXES.ROOM] * k),
             at(rows, senses[SENSES.SIZE] * k),
             at(excitations, senses[SENSES.CONTROLS] * k),
-            at(record, plan[REFLEXES.ROWS] * k * decided_size(senses, plan)),
+            at(record, plan[REFLEXES.ROWS] * k * control_record_size(senses, plan)),
             at(progress, COUNTS * k),
         )
-        endings[k] = run_on(walk, at(states, k * model[MODEL.STATE_SIZE]))
+        endings[k] = integrate_with_reflexes(walk, at(states, k * model[MODEL.STATE_SIZE]))
     return OUTCOME.OK
 
 
-def decided_size(senses: Ints, plan: Ints) -> int:
+def control_record_size(senses: Ints, plan: Ints) -> int:
     """Return the length of the record of a control step."""
     return int(plan[REFLEXES.SENSORS] + LEGS + senses[SENSES.CONTROLS] + 1)
 
 
-def run_on(a: Walk, y: Floats) -> int:
+def integrate_with_reflexes(a: Walk, y: Floats) -> int:
     """Integrate from the state y as `integrate_run` does, with new controls at each control step.
 
     A control step also begins at the very end of the run.
@@ -404,19 +410,19 @@ def run_on(a: Walk, y: Floats) -> int:
     h = at(m.data, m.sizes[METHOD_AT])
     end, ending = h[LAST_TIME], DONE
     while ending == DONE:
-        if m.clock[0] >= progress[STEPS] * a.known[SENSED.STEP] and not decide(a, y):
+        if m.clock[0] >= progress[STEPS] * a.known[SENSED.STEP] and not begin_control_step(a, y):
             ending = FAILED
         elif m.clock[0] >= end:
             break
         else:
-            hold(a)
+            apply_excitations(a)
             h[LAST_TIME] = min(progress[STEPS] * a.known[SENSED.STEP], end)
-            ending = run(m, y, False)
+            ending = integrate_run(m, y, False)
     h[LAST_TIME] = end
     return ending
 
 
-def decide(a: Walk, y: Floats) -> bool:
+def begin_control_step(a: Walk, y: Floats) -> bool:
     """Begin a control step and record it; return whether the evaluation succeeded.
 
     The record holds the remembered sensors, the states of the legs, the excitations, and the step that
@@ -425,24 +431,24 @@ def decide(a: Walk, y: Floats) -> bool:
     m, progress, sensors = a.m, a.progress, a.plan[REFLEXES.SENSORS]
     # No method knows what was, as the motion has a kink here.
     at(m.data, m.sizes[METHOD_AT])[MEMORY] = 0.0
-    hold(a)
+    apply_excitations(a)
     m.counts[EVALUATIONS] += 1
     if (
-        evaluated(m, m.clock[0], y, at(m.data, m.model[MODEL.WORK_STATE]), STAGE.FORCE)
+        evaluate_state(m, m.clock[0], y, at(m.data, m.model[MODEL.WORK_STATE]), STAGE.FORCE)
         != OUTCOME.OK
     ):
         return False
-    feel(m.model, m.data, y, a.senses, a.known, a.row)
-    note_senses(m.model, m.data, a.plan, a.numbers, progress[FRAMES], a.row, at(a.room, LEGS))
+    fill_sensor_row(m.model, m.data, y, a.senses, a.known, a.row)
+    record_sensors(m.model, m.data, a.plan, a.numbers, progress[FRAMES], a.row, at(a.room, LEGS))
     progress[FRAMES] += 1
-    excite(a)
+    update_excitations(a)
     row = progress[STEPS] - a.plan[REFLEXES.FIRST]
     if row < a.plan[REFLEXES.ROWS]:
-        record = at(a.record, row * decided_size(a.senses, a.plan))
+        record = at(a.record, row * control_record_size(a.senses, a.plan))
         kept = sensors * ((progress[FRAMES] - 1) % a.plan[REFLEXES.KEPT])
-        copy(sensors, at(a.room, LEGS + kept), record)
-        copy(LEGS, a.room, at(record, sensors))
-        copy(a.senses[SENSES.CONTROLS], a.excitations, at(record, sensors + LEGS))
-        record[decided_size(a.senses, a.plan) - 1] = m.clock[1]
+        copy_numbers(sensors, at(a.room, LEGS + kept), record)
+        copy_numbers(LEGS, a.room, at(record, sensors))
+        copy_numbers(a.senses[SENSES.CONTROLS], a.excitations, at(record, sensors + LEGS))
+        record[control_record_size(a.senses, a.plan) - 1] = m.clock[1]
     progress[STEPS] += 1
     return True

@@ -9,7 +9,7 @@ from __future__ import annotations
 from math import cos, isnan, nan, pi, sin, sqrt
 
 from osimlite.mechanics.kernels.layout import ITEM
-from osimlite.mechanics.kernels.path_wraps import BACK, BEST, POSE, WRAP_INTS, in_ground
+from osimlite.mechanics.kernels.path_wraps import BACK, BEST, POSE, WRAP_INTS, point_in_ground
 from osimlite.mechanics.kernels.paths import (
     COUNT,
     NODE_INTS,
@@ -21,16 +21,16 @@ from osimlite.mechanics.kernels.paths import (
     WRAPS,
 )
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call
-from osimlite.mechanics.kernels.wrap_ellipsoid import around_axis, inverted
-from osimlite.mechanics.kernels.wrap_torus import in_cylinder, out_of_cylinder
+from osimlite.mechanics.kernels.wrap_ellipsoid import invert_components, polar_coordinates
+from osimlite.mechanics.kernels.wrap_torus import point_from_cylinder, point_in_cylinder
 from osimlite.mechanics.kernels.wrapping import CURVE, FIRST_TANGENT, SECOND_TANGENT, SIZES
 from osimlite.mechanics.laws.vectors import (
     Vector,
-    along,
+    add_scaled,
     cross,
     dot,
-    elementwise,
-    put,
+    multiply_elementwise,
+    store_vector,
     times,
     unit,
     vector,
@@ -61,7 +61,7 @@ def trace_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, i
     count = 0
     for k in range(int(result[COUNT])):
         number = int(order[k])
-        put(f, 3 * count, vector(work, NODE_WORK * number + PLACE))
+        store_vector(f, 3 * count, vector(work, NODE_WORK * number + PLACE))
         count += 1
         wrap = (number - points) // 2
         if number >= points and number == points + 2 * wrap and own[WRAP_INTS * wraps + wrap] != 0:
@@ -72,7 +72,7 @@ def trace_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, i
     return count
 
 
-def pieces(angle: float) -> int:
+def count_segments(angle: float) -> int:
     """Return the number of segments with which an angle (rad) is drawn."""
     return int(min(1.0 + abs(angle) / ANGLE, MOST)) if not isnan(angle) else 1
 
@@ -83,9 +83,11 @@ def trace_cylinder(
     """Write the points of a helix about z; return their number."""
     e = at(data, model[item + ITEM.RECORD])
     one, two, turn = vector(e, FIRST), vector(e, SECOND), e[SHAPE]
-    count = pieces(turn)
+    count = count_segments(turn)
     for k in range(1, count):
-        put(f, 3 * (k - 1), in_ground(at(e, POSE), on_helix(one, two, turn, k / count)))
+        store_vector(
+            f, 3 * (k - 1), point_in_ground(at(e, POSE), helix_point(one, two, turn, k / count))
+        )
     return count - 1
 
 
@@ -94,17 +96,17 @@ def trace_torus(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, 
     p, e = at(reals, model[item + ITEM.NUMBERS]), at(data, model[item + ITEM.RECORD])
     ring, outwards = p[SIZES + 1], (e[SHAPE + 1], e[SHAPE + 2], 0.0)
     one, two = (
-        in_cylinder(vector(e, FIRST), outwards, ring),
-        in_cylinder(vector(e, SECOND), outwards, ring),
+        point_in_cylinder(vector(e, FIRST), outwards, ring),
+        point_in_cylinder(vector(e, SECOND), outwards, ring),
     )
-    count = pieces(e[SHAPE])
+    count = count_segments(e[SHAPE])
     for k in range(1, count):
-        point = out_of_cylinder(on_helix(one, two, e[SHAPE], k / count), outwards, ring)
-        put(f, 3 * (k - 1), in_ground(at(e, POSE), point))
+        point = point_from_cylinder(helix_point(one, two, e[SHAPE], k / count), outwards, ring)
+        store_vector(f, 3 * (k - 1), point_in_ground(at(e, POSE), point))
     return count - 1
 
 
-def on_helix(one: Vector, two: Vector, turn: float, part: float) -> Vector:
+def helix_point(one: Vector, two: Vector, turn: float, part: float) -> Vector:
     """Return the point of a helix about z at a fraction of its length."""
     x, y, z = one
     _, _, end = two
@@ -117,13 +119,13 @@ def trace_sphere(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats,
     e = at(data, model[item + ITEM.RECORD])
     one, turn = vector(e, FIRST), e[SHAPE]
     across = cross(unit(cross(one, vector(e, SECOND))), one)
-    count = pieces(turn)
+    count = count_segments(turn)
     for k in range(1, count):
         angle = turn * k / count
-        put(
+        store_vector(
             f,
             3 * (k - 1),
-            in_ground(at(e, POSE), along(times(cos(angle), one), sin(angle), across)),
+            point_in_ground(at(e, POSE), add_scaled(times(cos(angle), one), sin(angle), across)),
         )
     return count - 1
 
@@ -139,21 +141,27 @@ def trace_ellipsoid(
     a, b, c = vector(p, SIZES)
     factor = 3.0 / (a + b + c)
     one, two = times(factor, vector(e, FIRST)), times(factor, vector(e, SECOND))
-    centre, to_one, across, turn = around_axis(one, two, vector(e, SHAPE), e[SHAPE + 3])
+    centre, to_one, across, turn = polar_coordinates(one, two, vector(e, SHAPE), e[SHAPE + 3])
     turn -= 2.0 * pi * e[SHAPE + 4]
-    scale = times(1.0 / factor, inverted((a, b, c)))
-    count = pieces(turn)
+    scale = times(1.0 / factor, invert_components((a, b, c)))
+    count = count_segments(turn)
     for k in range(1, count):
         angle = turn * k / count
-        way = along(times(cos(angle), to_one), sin(angle), across)
-        size = reach(elementwise(scale, centre), elementwise(scale, way))
+        way = add_scaled(times(cos(angle), to_one), sin(angle), across)
+        size = distance_to_sphere(
+            multiply_elementwise(scale, centre), multiply_elementwise(scale, way)
+        )
         if isnan(size):
             return 0
-        put(f, 3 * (k - 1), in_ground(at(e, POSE), times(1.0 / factor, along(centre, size, way))))
+        store_vector(
+            f,
+            3 * (k - 1),
+            point_in_ground(at(e, POSE), times(1.0 / factor, add_scaled(centre, size, way))),
+        )
     return count - 1
 
 
-def reach(start: Vector, way: Vector) -> float:
+def distance_to_sphere(start: Vector, way: Vector) -> float:
     """Return the multiple of a direction that leads from a point to the unit sphere, NaN if it misses."""
     square, half = dot(way, way), dot(start, way)
     inner = half * half - square * (dot(start, start) - 1.0)

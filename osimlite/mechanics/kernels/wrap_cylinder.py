@@ -29,20 +29,20 @@ from osimlite.mechanics.kernels.wrapping import (
     SIDE,
     SIZES,
     SURFACE_LENGTH,
-    action,
+    decide_wrapping,
+    find_tangents,
+    is_on_side,
     nearest_pair,
-    on_side,
-    tangents,
 )
 from osimlite.mechanics.laws.vectors import (
     EPSILON,
     Vector,
-    along,
+    add_scaled,
     cross,
     dot,
     minus,
     plus,
-    put,
+    store_vector,
     unit,
     vector,
 )
@@ -65,12 +65,12 @@ def wrap_cylinder(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats
     """Bend a segment around a WrapCylinder, see :mod:`osimlite.mechanics.kernels.wrapping`."""
     p, e = at(reals, model[item + ITEM.NUMBERS]), at(data, model[item + ITEM.RECORD])
     first, second = vector(e, FIRST_END), vector(e, SECOND_END)
-    return around_cylinder(
+    return bend_around_cylinder(
         first, second, p[SIZES], p[SIZES + 1], int(p[AXIS]), p[SIDE], p[ALONE] == 1.0, e
     )
 
 
-def around_cylinder(
+def bend_around_cylinder(
     first: Vector,
     second: Vector,
     radius: float,
@@ -101,16 +101,16 @@ def around_cylinder(
         return INSIDE
     closest, crosses = closest_to_axis(first, second, radius)
     if side != 0.0:
-        active = on_side(first, axis, side), on_side(second, axis, side)
-        code = action(*active, on_side(closest, axis, side), crosses)
+        active = is_on_side(first, axis, side), is_on_side(second, axis, side)
+        code = decide_wrapping(*active, is_on_side(closest, axis, side), crosses)
     else:
         code = MANDATORY if crosses else NONE
     if code == NONE:
         return NONE
 
-    flat_first, flat_second = lifted(first, 0.0), lifted(second, 0.0)
-    a1, b1 = tangents(flat_first, radius, (0.0, 0.0, 1.0))
-    a2, b2 = tangents(flat_second, radius, (0.0, 0.0, 1.0))
+    flat_first, flat_second = set_height(first, 0.0), set_height(second, 0.0)
+    a1, b1 = find_tangents(flat_first, radius, (0.0, 0.0, 1.0))
+    a2, b2 = find_tangents(flat_second, radius, (0.0, 0.0, 1.0))
     if side == 0.0:
         one, two = nearest_pair(a1, b1, a2, b2)
         far = long = False
@@ -118,7 +118,13 @@ def around_cylinder(
         # One way around the cylinder is from a to b, the other from b to a.
         wide = dot(a1, b2) < dot(b1, a2)
         from_a = starts_at_a(
-            lifted(a1, pz), lifted(b1, pz), lifted(a2, qz), lifted(b2, qz), wide, axis, side
+            set_height(a1, pz),
+            set_height(b1, pz),
+            set_height(a2, qz),
+            set_height(b2, qz),
+            wide,
+            axis,
+            side,
         )
         one, two = (a1, b2) if from_a else (b1, a2)
         far = from_a == wide
@@ -146,10 +152,10 @@ def around_cylinder(
         angle = 2.0 * pi - angle
         turn = -angle
     if not alone:
-        z1, z2 = settled(first, second, (x1, y1, z1), (x2, y2, z2), radius * angle, turn)
-    put(e, FIRST_TANGENT, (x1, y1, z1))
-    put(e, SECOND_TANGENT, (x2, y2, z2))
-    e[SURFACE_LENGTH], e[CURVE] = helix(radius * angle, z2 - z1), turn
+        z1, z2 = smooth_heights(first, second, (x1, y1, z1), (x2, y2, z2), radius * angle, turn)
+    store_vector(e, FIRST_TANGENT, (x1, y1, z1))
+    store_vector(e, SECOND_TANGENT, (x2, y2, z2))
+    e[SURFACE_LENGTH], e[CURVE] = helix_length(radius * angle, z2 - z1), turn
     return code
 
 
@@ -165,11 +171,11 @@ def closest_to_axis(first: Vector, second: Vector, radius: float) -> tuple[Vecto
     if across <= PARALLEL * (across + dz * dz):
         return (0.0, 0.0, 0.0), False
     part = -(x * dx + y * dy) / across
-    x, y, _ = closest = along(first, part, way)
+    x, y, _ = closest = add_scaled(first, part, way)
     return closest, x * x + y * y < radius * radius and 0.0 < part < 1.0
 
 
-def lifted(point: Vector, height: float) -> Vector:
+def set_height(point: Vector, height: float) -> Vector:
     """Return a point moved to another height."""
     x, y, _ = point
     return x, y, height
@@ -191,10 +197,10 @@ def starts_at_a(
         axis: axis of the quadrant.
         side: its sign.
     """
-    a_active = on_side(a1, axis, side)
-    if a_active != on_side(b1, axis, side):
+    a_active = is_on_side(a1, axis, side)
+    if a_active != is_on_side(b1, axis, side):
         return a_active
-    return not on_side(a2, axis, side) and (a_active or on_side(b2, axis, side) or wide)
+    return not is_on_side(a2, axis, side) and (a_active or is_on_side(b2, axis, side) or wide)
 
 
 def apex_between(first: Vector, second: Vector, radius: float, far: bool) -> Vector:
@@ -207,7 +213,7 @@ def apex_between(first: Vector, second: Vector, radius: float, far: bool) -> Vec
     px, py, pz = first
     qx, qy, qz = second
     d1, d2 = sqrt(px * px + py * py), sqrt(qx * qx + qy * qy)
-    x, y, z = along(first, d1 / (d1 + d2), minus(second, first))
+    x, y, z = add_scaled(first, d1 / (d1 + d2), minus(second, first))
     nx, ny, _ = unit(cross((px, py, pz - z), (qx, qy, qz - z)))
     ux, uy, _ = unit((-ny, nx, 0.0))
     if (x * ux + y * uy > 0.0) == far:
@@ -233,12 +239,12 @@ def edge_height(point: Vector, end_height: float, end: Vector, normal: Vector) -
     return z if abs(z - end_height) <= FARTHEST else end_height
 
 
-def helix(arc: float, rise: float) -> float:
+def helix_length(arc: float, rise: float) -> float:
     """Return the length of a helix (m)."""
     return sqrt(arc * arc + rise * rise)
 
 
-def settled(
+def smooth_heights(
     first: Vector, second: Vector, one: Vector, two: Vector, arc: float, turn: float
 ) -> tuple[float, float]:
     """Return the heights of the tangent points at which the lines continue as the helix with little bend.
@@ -264,27 +270,29 @@ def settled(
     leg1 = leg2 = (0.0, 0.0, 0.0, 0.0)
     for _ in range(ROUNDS):
         rise = z2 - z1
-        length = helix(arc, rise) / PIECE
+        length = helix_length(arc, rise) / PIECE
         if not 2.0 <= length < inf:
             break
         count = int(length)
         if count != pieces:
             pieces, part = count, 1.0 / count
             c, s = cos(part * turn), sin(part * turn)
-            leg1 = leg(first, one, (c * x1 - s * y1, s * x1 + c * y1, 0.0))
-            leg2 = leg(second, two, (c * x2 + s * y2, c * y2 - s * x2, 0.0))
+            leg1 = edge_constants(first, one, (c * x1 - s * y1, s * x1 + c * y1, 0.0))
+            leg2 = edge_constants(second, two, (c * x2 + s * y2, c * y2 - s * x2, 0.0))
         _, _, height1 = first
         _, _, height2 = second
-        w1 = moved(leg1, height1, z1, z1 + part * rise)
+        w1 = next_height(leg1, height1, z1, z1 + part * rise)
         # By now the helix has moved with its first point.
-        w2 = moved(leg2, height2, z2, w1 + (1.0 - part) * rise)
+        w2 = next_height(leg2, height2, z2, w1 + (1.0 - part) * rise)
         if w1 == z1 and w2 == z2:
             break
         z1, z2 = w1, w2
     return z1, z2
 
 
-def leg(end: Vector, tangent: Vector, next_point: Vector) -> tuple[float, float, float, float]:
+def edge_constants(
+    end: Vector, tangent: Vector, next_point: Vector
+) -> tuple[float, float, float, float]:
     """Compute what stays constant as a tangent point slides along its edge.
 
     Args:
@@ -305,7 +313,7 @@ def leg(end: Vector, tangent: Vector, next_point: Vector) -> tuple[float, float,
     return sqrt(lx * lx + ly * ly), sqrt(nx * nx + ny * ny), 1.5 * share, 1.5 * (1.0 - share)
 
 
-def moved(
+def next_height(
     leg: tuple[float, float, float, float], end: float, tangent: float, next_point: float
 ) -> float:
     """Return the next height of a tangent point, unchanged if the path hardly bends there.

@@ -13,7 +13,11 @@ from __future__ import annotations
 
 from math import acos, cos, isnan, nan, pi, sin, sqrt
 
-from osimlite.mechanics.kernels.closest_on_ellipsoid import closest_in_plane, closest_point, fan
+from osimlite.mechanics.kernels.closest_on_ellipsoid import (
+    closest_in_plane,
+    closest_point,
+    mean_way_out,
+)
 from osimlite.mechanics.kernels.layout import ITEM
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at
 from osimlite.mechanics.kernels.wrapping import (
@@ -33,21 +37,21 @@ from osimlite.mechanics.kernels.wrapping import (
     SIDE,
     SIZES,
     SURFACE_LENGTH,
-    nowhere,
-    on_side,
+    clear_tangents,
+    is_on_side,
 )
 from osimlite.mechanics.laws.vectors import (
     Vector,
-    along,
+    add_scaled,
     component,
     cross,
     dot,
-    elementwise,
     minus,
+    multiply_elementwise,
     norm,
     plus,
-    put,
-    replaced,
+    replace_component,
+    store_vector,
     times,
     unit,
     vector,
@@ -84,12 +88,12 @@ def wrap_ellipsoid(
     factor, axis, side = 3.0 / (a + b + c), int(p[AXIS]), p[SIDE]
     radii = times(factor, (a, b, c))
     first, second = times(factor, vector(e, FIRST_END)), times(factor, vector(e, SECOND_END))
-    first_height, second_height = height(radii, first), height(radii, second)
+    first_height, second_height = ellipsoid_height(radii, first), ellipsoid_height(radii, second)
     if first_height < -CLOSE or second_height < -CLOSE:
         return INSIDE
     way = minus(first, second)
-    enters, leaves = crossings(radii, second, way)
-    one, two = along(second, enters, way), along(second, leaves, way)
+    enters, leaves = find_crossings(radii, second, way)
+    one, two = add_scaled(second, enters, way), add_scaled(second, leaves, way)
     if abs(dot(unit(first), unit(second)) - 1.0) < CLOSE or not (enters < 1.0 and leaves > 0.0):
         return NONE
     support, by_fan, starts = support_point(
@@ -97,11 +101,13 @@ def wrap_ellipsoid(
     )
     if starts:
         one = two = support
-    if side != 0.0 and not on_side(support, axis, side):
+    if side != 0.0 and not is_on_side(support, axis, side):
         outwards = -component(support, axis)
-        one = two = support = replaced(support, axis, outwards)
+        one = two = support = replace_component(support, axis, outwards)
         if by_fan > 0.0:
-            support = closest_point(radii, replaced(support, axis, outwards - by_fan * outwards))
+            support = closest_point(
+                radii, replace_component(support, axis, outwards - by_fan * outwards)
+            )
     normal = unit(cross(way, minus(first, support)))
     offset = dot(normal, support)
     one = tangent_point(radii, one, first, normal, offset) if abs(first_height) >= CLOSE else first
@@ -111,40 +117,42 @@ def wrap_ellipsoid(
 
     length = norm(minus(one, two)) / factor
     if isnan(length):
-        return nowhere(e, MANDATORY)
-    put(e, CURVE, normal)
+        return clear_tangents(e, MANDATORY)
+    store_vector(e, CURVE, normal)
     e[CURVE + 3], e[CURVE + 4] = offset, 0.0
     if length >= PIECE:
         pieces = int(min(length / PIECE, 1.0 * PIECES))
-        length, next_one, next_two = curve(radii, one, two, normal, offset, pieces, False)
+        length, next_one, next_two = measure_polyline(
+            radii, one, two, normal, offset, pieces, False
+        )
         if (
             side != 0.0
             and pieces > 1
             and (bends_back(first, one, next_one) or bends_back(second, two, next_two))
         ):
-            length, _, _ = curve(radii, one, two, normal, offset, pieces, True)
+            length, _, _ = measure_polyline(radii, one, two, normal, offset, pieces, True)
             e[CURVE + 4] = 1.0
         length /= factor
-    put(e, FIRST_TANGENT, times(1.0 / factor, one))
-    put(e, SECOND_TANGENT, times(1.0 / factor, two))
+    store_vector(e, FIRST_TANGENT, times(1.0 / factor, one))
+    store_vector(e, SECOND_TANGENT, times(1.0 / factor, two))
     e[SURFACE_LENGTH] = length
     return MANDATORY
 
 
-def height(radii: Vector, point: Vector) -> float:
+def ellipsoid_height(radii: Vector, point: Vector) -> float:
     """Return (x/a)^2 + (y/b)^2 + (z/c)^2 - 1, negative inside."""
     x, y, z = point
     a, b, c = radii
     return (x / a) * (x / a) + (y / b) * (y / b) + (z / c) * (z / c) - 1.0
 
 
-def inverted(a: Vector) -> Vector:
+def invert_components(a: Vector) -> Vector:
     """Return the reciprocal of each component."""
     x, y, z = a
     return 1.0 / x, 1.0 / y, 1.0 / z
 
 
-def crossings(radii: Vector, point: Vector, way: Vector) -> tuple[float, float]:
+def find_crossings(radii: Vector, point: Vector, way: Vector) -> tuple[float, float]:
     """Return the multiples of the direction, the larger first, at which a line intersects the surface.
 
     Args:
@@ -155,7 +163,10 @@ def crossings(radii: Vector, point: Vector, way: Vector) -> tuple[float, float]:
     Returns:
         Two multiples; NaN if the line misses the surface.
     """
-    way, point = elementwise(inverted(radii), way), elementwise(inverted(radii), point)
+    way, point = (
+        multiply_elementwise(invert_components(radii), way),
+        multiply_elementwise(invert_components(radii), point),
+    )
     a, b, c = dot(way, way), 2.0 * dot(way, point), dot(point, point) - 1.0
     square = b * b - 4.0 * a * c
     if not (square >= 0.0 and a > 0.0):
@@ -179,12 +190,12 @@ def support_point(
     Returns:
         The point, the weight of the fan, and whether the search for tangent points starts there.
     """
-    middle = along(start, 0.5, chord)
+    middle = add_scaled(start, 0.5, chord)
     if method == MIDPOINT:
         return closest_point(radii, middle), 0.0, True
-    axis = longest(way)
+    axis = longest_axis(way)
     passes = -component(start, axis) / component(chord, axis)
-    axial = closest_in_plane(radii, along(start, passes, chord), axis)
+    axial = closest_in_plane(radii, add_scaled(start, passes, chord), axis)
     if method == AXIAL:
         return axial, 0.0, 0.0 < passes < 1.0
     cosine = abs(component(unit(way), axis))
@@ -193,14 +204,18 @@ def support_point(
         cosine = ALL_FAN + fade * (cosine - ALL_FAN)
     if cosine >= NO_FAN:
         return axial, 0.0, True
-    fanned = closest_point(radii, plus(middle, fan(radii, start, chord, room)))
+    fanned = closest_point(radii, plus(middle, mean_way_out(radii, start, chord, room)))
     if cosine <= ALL_FAN:
         return fanned, 1.0, True
     part = (cosine - ALL_FAN) / (NO_FAN - ALL_FAN)
-    return closest_point(radii, along(times(part, axial), 1.0 - part, fanned)), 1.0 - part, True
+    return (
+        closest_point(radii, add_scaled(times(part, axial), 1.0 - part, fanned)),
+        1.0 - part,
+        True,
+    )
 
 
-def longest(a: Vector) -> int:
+def longest_axis(a: Vector) -> int:
     """Return the axis of the component with the largest absolute value."""
     x, y, z = a
     if abs(z) > max(abs(x), abs(y)):
@@ -225,18 +240,18 @@ def tangent_point(
         normal: unit normal of the plane.
         offset: offset of the plane along it.
     """
-    weights = inverted(elementwise(radii, radii))
-    by_end = times(2.0, elementwise(weights, end))
+    weights = invert_components(multiply_elementwise(radii, radii))
+    by_end = times(2.0, multiply_elementwise(weights, end))
     r, step, d_step = start, (0.0, 0.0, 0.0), 0.0
-    d = -2.0 * dot(elementwise(weights, r), r)
-    e0, e1, e2, e3 = misfits(weights, by_end, normal, offset, r, d)
+    d = -2.0 * dot(multiply_elementwise(weights, r), r)
+    e0, e1, e2, e3 = tangent_residuals(weights, by_end, normal, offset, r, d)
     error = before = e0 * e0 + e1 * e1 + e2 * e2 + e3 * e3
     damping = 0.01
     for _ in range(ROUNDS):
         if not error > EXACT:
             break
-        n = times(2.0, elementwise(weights, r))
-        downhill = minus(times(-e0, normal), along(times(e1 + 2.0 * e2, n), e3, by_end))
+        n = times(2.0, multiply_elementwise(weights, r))
+        downhill = minus(times(-e0, normal), add_scaled(times(e1 + 2.0 * e2, n), e3, by_end))
         cosine = dot(unit(minus(end, r)), unit(end))
         size = (1.0 - cosine**100 if cosine > 0.1 else 1.0) / STEPS
         for _ in range(TRIALS):
@@ -245,7 +260,7 @@ def tangent_point(
             step, d_step = damped_step(normal, n, by_end, downhill, -e2 - e3, damping)
             step, d_step = times(size, step), size * d_step
             r, d = plus(r, step), d + d_step
-            e0, e1, e2, e3 = misfits(weights, by_end, normal, offset, r, d)
+            e0, e1, e2, e3 = tangent_residuals(weights, by_end, normal, offset, r, d)
             before, error = error, e0 * e0 + e1 * e1 + e2 * e2 + e3 * e3
             damping *= 4.0
         damping /= 8.0
@@ -254,16 +269,16 @@ def tangent_point(
             if not error <= before:
                 break
             longer *= 2.0
-            r, d = along(r, longer, step), d + longer * d_step
-            e0, e1, e2, e3 = misfits(weights, by_end, normal, offset, r, d)
+            r, d = add_scaled(r, longer, step), d + longer * d_step
+            e0, e1, e2, e3 = tangent_residuals(weights, by_end, normal, offset, r, d)
             before, error = error, e0 * e0 + e1 * e1 + e2 * e2 + e3 * e3
-        r, d = along(r, -longer, step), d - longer * d_step
-        e0, e1, e2, e3 = misfits(weights, by_end, normal, offset, r, d)
+        r, d = add_scaled(r, -longer, step), d - longer * d_step
+        e0, e1, e2, e3 = tangent_residuals(weights, by_end, normal, offset, r, d)
         before = error = e0 * e0 + e1 * e1 + e2 * e2 + e3 * e3
     return r
 
 
-def misfits(
+def tangent_residuals(
     weights: Vector, by_end: Vector, normal: Vector, offset: float, r: Vector, d: float
 ) -> tuple[float, float, float, float]:
     """Return the residuals of the four equations of `tangent_point`.
@@ -271,7 +286,7 @@ def misfits(
     Returns:
         Four residuals.
     """
-    square = dot(elementwise(weights, r), r)
+    square = dot(multiply_elementwise(weights, r), r)
     return dot(normal, r) - offset, square - 1.0, 2.0 * square + d, dot(by_end, r) + d
 
 
@@ -298,23 +313,23 @@ def damped_step(
     nx, ny, nz = n
     qx, qy, qz = by_end
     more = 1.0 + damping
-    x = along(along(times(px, normal), 5.0 * nx, n), qx, by_end)
-    y = along(along(times(py, normal), 5.0 * ny, n), qy, by_end)
-    z = along(along(times(pz, normal), 5.0 * nz, n), qz, by_end)
-    x = replaced(x, 0, more * component(x, 0))
-    y = replaced(y, 1, more * component(y, 1))
-    z = replaced(z, 2, more * component(z, 2))
+    x = add_scaled(add_scaled(times(px, normal), 5.0 * nx, n), qx, by_end)
+    y = add_scaled(add_scaled(times(py, normal), 5.0 * ny, n), qy, by_end)
+    z = add_scaled(add_scaled(times(pz, normal), 5.0 * nz, n), qz, by_end)
+    x = replace_component(x, 0, more * component(x, 0))
+    y = replace_component(y, 1, more * component(y, 1))
+    z = replace_component(z, 2, more * component(z, 2))
     # Without d, and then by Cramer's rule.
-    mixed = along(by_end, 2.0, n)
+    mixed = add_scaled(by_end, 2.0, n)
     bx, by, bz = times(-0.5 / more, mixed)
-    x, y, z = along(x, bx, mixed), along(y, by, mixed), along(z, bz, mixed)
-    rest = along(downhill, -0.5 / more * d_downhill, mixed)
+    x, y, z = add_scaled(x, bx, mixed), add_scaled(y, by, mixed), add_scaled(z, bz, mixed)
+    rest = add_scaled(downhill, -0.5 / more * d_downhill, mixed)
     yz, zx, xy = cross(y, z), cross(z, x), cross(x, y)
     step = times(1.0 / dot(x, yz), (dot(rest, yz), dot(rest, zx), dot(rest, xy)))
     return step, 0.5 / more * (d_downhill - dot(mixed, step))
 
 
-def curve(
+def measure_polyline(
     radii: Vector, one: Vector, two: Vector, normal: Vector, offset: float, pieces: int, far: bool
 ) -> tuple[float, Vector, Vector]:
     """Compute the length of a polyline on the surface in a plane.
@@ -334,12 +349,16 @@ def curve(
     Returns:
         The length, and the corners next to the first and the last point.
     """
-    centre, a, b, angle = around_axis(one, two, normal, offset)
+    centre, a, b, angle = polar_coordinates(one, two, normal, offset)
     to_one, to_two = minus(one, centre), minus(two, centre)
     # A corner is at centre + m (c a + s b), where c and s are cosine and sine of its angle: in the
     # plane at m (c, s).
-    scale = inverted(radii)
-    u, v, w = elementwise(scale, a), elementwise(scale, b), elementwise(scale, centre)
+    scale = invert_components(radii)
+    u, v, w = (
+        multiply_elementwise(scale, a),
+        multiply_elementwise(scale, b),
+        multiply_elementwise(scale, centre),
+    )
     uu, uv, vv, uw, vw, ww = dot(u, u), dot(u, v), dot(v, v), dot(u, w), dot(v, w), dot(w, w) - 1.0
     piece = (angle - 2.0 * pi if far else angle) / pieces
     c_piece, s_piece = cos(piece), sin(piece)
@@ -353,13 +372,13 @@ def curve(
         length += sqrt((m * c - x) * (m * c - x) + (m * s - y) * (m * s - y))
         x, y = m * c, m * s
         if k == 1:
-            next_one = along(along(centre, x, a), y, b)
-    next_two = along(along(centre, x, a), y, b)
+            next_one = add_scaled(add_scaled(centre, x, a), y, b)
+    next_two = add_scaled(add_scaled(centre, x, a), y, b)
     dx, dy = dot(to_two, a) - x, dot(to_two, b) - y
     return length + sqrt(dx * dx + dy * dy), next_one, next_two
 
 
-def around_axis(
+def polar_coordinates(
     one: Vector, two: Vector, normal: Vector, offset: float
 ) -> tuple[Vector, Vector, Vector, float]:
     """Return polar coordinates of two points of a plane, about its intersection with an axis.
@@ -376,9 +395,9 @@ def around_axis(
         The intersection, unit vectors to the first point and, perpendicular to that, towards the
         second, and the angle between the points.
     """
-    axis = longest(normal)
+    axis = longest_axis(normal)
     across = component(normal, axis)
-    centre = replaced((0.0, 0.0, 0.0), axis, offset / across if across != 0.0 else nan)
+    centre = replace_component((0.0, 0.0, 0.0), axis, offset / across if across != 0.0 else nan)
     a, b = unit(minus(one, centre)), unit(minus(two, centre))
     cosine = dot(a, b)
     return centre, a, cross(unit(cross(a, b)), a), acos(cosine) if abs(cosine) <= 1.0 else nan

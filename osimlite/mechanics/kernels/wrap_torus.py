@@ -11,7 +11,7 @@ from math import nan, sqrt
 
 from osimlite.mechanics.kernels.layout import ITEM
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at
-from osimlite.mechanics.kernels.wrap_cylinder import around_cylinder
+from osimlite.mechanics.kernels.wrap_cylinder import bend_around_cylinder
 from osimlite.mechanics.kernels.wrapping import (
     ALONE,
     AXIS,
@@ -24,17 +24,17 @@ from osimlite.mechanics.kernels.wrapping import (
     SIDE,
     SIZES,
     WRAPPED,
-    nowhere,
-    on_side,
+    clear_tangents,
+    is_on_side,
 )
 from osimlite.mechanics.laws.vectors import (
     Vector,
-    along,
+    add_scaled,
     cross,
     dot,
     minus,
     norm,
-    put,
+    store_vector,
     times,
     vector,
 )
@@ -63,8 +63,8 @@ def wrap_torus(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, i
     closer = distance_from_ring(one, ring) < distance_from_ring(two, ring)
     if p[SIDE] != 0.0:
         one_active, two_active = (
-            on_side(one, int(p[AXIS]), p[SIDE]),
-            on_side(two, int(p[AXIS]), p[SIDE]),
+            is_on_side(one, int(p[AXIS]), p[SIDE]),
+            is_on_side(two, int(p[AXIS]), p[SIDE]),
         )
         if not (one_active or two_active):
             return NONE
@@ -72,31 +72,33 @@ def wrap_torus(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, i
     rx, ry, _ = one if closer else two
     distance = sqrt(rx * rx + ry * ry)
     if not distance > 0.0:
-        return nowhere(e, WRAPPED)
+        return clear_tangents(e, WRAPPED)
     outwards = (rx / distance, ry / distance, 0.0)
-    a, b = in_cylinder(first, outwards, ring), in_cylinder(second, outwards, ring)
-    if around_cylinder(a, b, p[SIZES], LENGTH, 0, 1.0, p[ALONE] == 1.0, e) <= NONE:
-        return nowhere(e, WRAPPED)
+    a, b = point_in_cylinder(first, outwards, ring), point_in_cylinder(second, outwards, ring)
+    if bend_around_cylinder(a, b, p[SIZES], LENGTH, 0, 1.0, p[ALONE] == 1.0, e) <= NONE:
+        return clear_tangents(e, WRAPPED)
     for place in (FIRST_TANGENT, SECOND_TANGENT):
-        put(e, place, out_of_cylinder(vector(e, place), outwards, ring))
+        store_vector(e, place, point_from_cylinder(vector(e, place), outwards, ring))
     e[CURVE + 1], e[CURVE + 2], _ = outwards
     return WRAPPED
 
 
-def in_cylinder(point: Vector, outwards: Vector, ring: float) -> Vector:
+def point_in_cylinder(point: Vector, outwards: Vector, ring: float) -> Vector:
     """Return a point in the frame of the cylinder at the ring in a direction.
 
     Its x axis points to the middle of the torus, its y axis down, its z axis along the ring.
     """
-    away, inwards = along(point, -ring, outwards), times(-1.0, outwards)
+    away, inwards = add_scaled(point, -ring, outwards), times(-1.0, outwards)
     return dot(inwards, away), dot(DOWN, away), dot(cross(inwards, DOWN), away)
 
 
-def out_of_cylinder(point: Vector, outwards: Vector, ring: float) -> Vector:
+def point_from_cylinder(point: Vector, outwards: Vector, ring: float) -> Vector:
     """Return a point of the frame of the cylinder in the frame of the torus."""
     x, y, z = point
     inwards = times(-1.0, outwards)
-    return along(along(along(times(ring, outwards), x, inwards), y, DOWN), z, cross(inwards, DOWN))
+    return add_scaled(
+        add_scaled(add_scaled(times(ring, outwards), x, inwards), y, DOWN), z, cross(inwards, DOWN)
+    )
 
 
 def distance_from_ring(point: Vector, ring: float) -> float:
@@ -119,10 +121,10 @@ def near_ring(first: Vector, second: Vector, ring: float) -> Vector:
         dx * dx + dy * dy,
         x * x + y * y,
     )
-    return along(first, least_squares(start, flat_start, flat, square, ring), way)
+    return add_scaled(first, minimize_residual(start, flat_start, flat, square, ring), way)
 
 
-def residual(
+def compute_residual(
     u: float, start: float, flat_start: float, flat: float, square: float, ring: float
 ) -> float:
     """Return the slope of OpenSim's objective at a distance u from the first end, which is to vanish.
@@ -143,7 +145,7 @@ def residual(
     return 2.0 * start + 2.0 * u - 4.0 * ring * (flat * u + flat_start) / sqrt(apart)
 
 
-def least_squares(
+def minimize_residual(
     start: float, flat_start: float, flat: float, square: float, ring: float
 ) -> float:
     """Return the distance u that minimizes the squared residual, with lmdif's steps from 0.
@@ -152,13 +154,13 @@ def least_squares(
     """
     u = damping = scale = 0.0
     value, radius, moved, evaluations = (
-        residual(u, start, flat_start, flat, square, ring),
+        compute_residual(u, start, flat_start, flat, square, ring),
         FIRST_RADIUS,
         False,
         1,
     )
     while True:
-        slope = (residual(u + STEP, start, flat_start, flat, square, ring) - value) / STEP
+        slope = (compute_residual(u + STEP, start, flat_start, flat, square, ring) - value) / STEP
         if not abs(slope * value) > 0.0:
             return u
         scale = max(scale, abs(slope))
@@ -167,7 +169,7 @@ def least_squares(
             size = scale * abs(step)
             if not moved:
                 radius = min(radius, size)
-            next_value = residual(u + step, start, flat_start, flat, square, ring)
+            next_value = compute_residual(u + step, start, flat_start, flat, square, ring)
             evaluations += 1
             falls = 0.1 * abs(next_value) < abs(value)
             actual = 1.0 - (next_value / value) ** 2 if falls else -1.0

@@ -21,14 +21,14 @@ from osimlite.mechanics.kernels.layout import ITEM
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at
 from osimlite.mechanics.laws.vectors import (
     Vector,
-    along,
+    add_scaled,
     component,
     cross,
     dot,
     minus,
     norm,
     plus,
-    put,
+    store_vector,
     times,
     unit,
     vector,
@@ -81,12 +81,12 @@ MANDATORY = 2
 """Result of a law: the segment must wrap."""
 
 
-def on_side(point: Vector, axis: int, side: float) -> bool:
+def is_on_side(point: Vector, axis: int, side: float) -> bool:
     """Return whether a point is on the active side; points between the sides belong to the positive one."""
     return (component(point, axis) >= 0.0) == (side > 0.0)
 
 
-def action(first: bool, second: bool, closest: bool, crosses: bool) -> int:
+def decide_wrapping(first: bool, second: bool, closest: bool, crosses: bool) -> int:
     """Return whether a segment wraps, from which of its points are on the active side.
 
     Args:
@@ -102,7 +102,7 @@ def action(first: bool, second: bool, closest: bool, crosses: bool) -> int:
     return WRAPPED if first != second and not closest else NONE
 
 
-def tangents(point: Vector, radius: float, axis: Vector) -> tuple[Vector, Vector]:
+def find_tangents(point: Vector, radius: float, axis: Vector) -> tuple[Vector, Vector]:
     """Return the two tangent points of a circle about the origin, seen from a point of its plane.
 
     Args:
@@ -117,7 +117,7 @@ def tangents(point: Vector, radius: float, axis: Vector) -> tuple[Vector, Vector
     sine = radius / distance
     foot, across = times(sine * sine, point), cross(axis, point)
     reach = radius * sqrt(1.0 - sine * sine) / distance
-    return along(foot, reach, across), along(foot, -reach, across)
+    return add_scaled(foot, reach, across), add_scaled(foot, -reach, across)
 
 
 def nearest_pair(a1: Vector, b1: Vector, a2: Vector, b2: Vector) -> tuple[Vector, Vector]:
@@ -142,10 +142,10 @@ def nearest_pair(a1: Vector, b1: Vector, a2: Vector, b2: Vector) -> tuple[Vector
     return b1, b2
 
 
-def nowhere(e: Floats, code: int) -> int:
+def clear_tangents(e: Floats, code: int) -> int:
     """Return a code after setting the tangent points to NaN, where OpenSim finds none."""
-    put(e, FIRST_TANGENT, (nan, nan, nan))
-    put(e, SECOND_TANGENT, (nan, nan, nan))
+    store_vector(e, FIRST_TANGENT, (nan, nan, nan))
+    store_vector(e, SECOND_TANGENT, (nan, nan, nan))
     e[SURFACE_LENGTH] = nan
     return code
 
@@ -165,35 +165,37 @@ def wrap_sphere(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, 
     first, second, radius = vector(e, FIRST_END), vector(e, SECOND_END), p[SIZES]
     if norm(first) < radius or norm(second) < radius:
         return INSIDE
-    if not crosses(first, second, radius):
+    if not crosses_sphere(first, second, radius):
         return NONE
     way = unit(minus(first, second))
     normal = cross(way, unit(second))
     if norm(normal) < STRAIGHT:
-        return nowhere(e, WRAPPED)
+        return clear_tangents(e, WRAPPED)
     normal = unit(normal)
-    a1, b1 = tangents(first, radius, normal)
-    a2, b2 = tangents(second, radius, normal)
+    a1, b1 = find_tangents(first, radius, normal)
+    a2, b2 = find_tangents(second, radius, normal)
     one, two = nearest_pair(a1, b1, a2, b2)
     code, far = WRAPPED, False
     if p[SIDE] != 0.0:
         axis, side = int(p[AXIS]), p[SIDE]
-        active = on_side(first, axis, side), on_side(second, axis, side)
+        active = is_on_side(first, axis, side), is_on_side(second, axis, side)
         before = dot(first, way)
-        code = action(*active, on_side(along(first, -before, way), axis, side), before < 1.0)
+        code = decide_wrapping(
+            *active, is_on_side(add_scaled(first, -before, way), axis, side), before < 1.0
+        )
         if code == NONE:
             return NONE
         if not (active[0] and active[1]):
             one, two, far = pair_on_side(first, second, a1, b1, a2, b2, axis, side)
     angle = atan2(norm(cross(one, two)), dot(one, two))
-    put(e, FIRST_TANGENT, one)
-    put(e, SECOND_TANGENT, two)
+    store_vector(e, FIRST_TANGENT, one)
+    store_vector(e, SECOND_TANGENT, two)
     e[CURVE] = angle - 2.0 * pi if far else angle
     e[SURFACE_LENGTH] = radius * e[CURVE]
     return code
 
 
-def crosses(first: Vector, second: Vector, radius: float) -> bool:
+def crosses_sphere(first: Vector, second: Vector, radius: float) -> bool:
     """Return whether a segment enters and leaves a sphere between its ends."""
     way = minus(first, second)
     a, b, c = dot(way, way), 2.0 * dot(second, way), dot(second, second) - radius * radius

@@ -54,7 +54,7 @@ def curve_size(sections: int) -> int:
     return HEAD + (1 + SECTION) * sections
 
 
-def curve(points: Sequence[Point], curviness: Sequence[float]) -> Numbers:
+def make_curve(points: Sequence[Point], curviness: Sequence[float]) -> Numbers:
     """Return the numbers of a curve through points.
 
     Args:
@@ -65,7 +65,7 @@ def curve(points: Sequence[Point], curviness: Sequence[float]) -> Numbers:
         ValueError: the lines through two points do not meet in a corner between them.
     """
     sections = zip(points, points[1:], curviness, strict=False)
-    numbers = [x for item in sections for x in _section(*item)]
+    numbers = [x for item in sections for x in _make_section(*item)]
     return (
         float(len(curviness)),
         *points[0],
@@ -76,7 +76,7 @@ def curve(points: Sequence[Point], curviness: Sequence[float]) -> Numbers:
 
 
 @lru_cache(maxsize=1024)
-def _section(first: Point, last: Point, curviness: float) -> Numbers:
+def _make_section(first: Point, last: Point, curviness: float) -> Numbers:
     """Return the numbers of a section."""
     (x0, y0, slope0), (x1, y1, slope1) = first, last
     if not 0.0 <= curviness <= 1.0:
@@ -91,17 +91,17 @@ def _section(first: Point, last: Point, curviness: float) -> Numbers:
     if not max(hypot(x - x0, y - y0), hypot(x - x1, y - y1)) < hypot(x1 - x0, y1 - y0):
         raise ValueError(f"its slopes at {x0:g} and {x1:g} make no corner between these")
     c = 0.1 + 0.8 * curviness
-    _, *of_x = _polynomial(x0, x0 + c * (x - x0), x1 + c * (x - x1), x1)
-    of_y = _polynomial(y0, y0 + c * (y - y0), y1 + c * (y - y1), y1)
-    return (x0, NODES / (x1 - x0), *of_x, *of_y, *_starts(of_x, x1 - x0))
+    _, *of_x = _section_coefficients(x0, x0 + c * (x - x0), x1 + c * (x - x1), x1)
+    of_y = _section_coefficients(y0, y0 + c * (y - y0), y1 + c * (y - y1), y1)
+    return (x0, NODES / (x1 - x0), *of_x, *of_y, *_list_starts(of_x, x1 - x0))
 
 
-def _polynomial(p: float, q: float, r: float, s: float) -> tuple[float, ...]:
+def _section_coefficients(p: float, q: float, r: float, s: float) -> tuple[float, ...]:
     """Return coefficients, by rising powers, for the control points p, q, q, r, r, s."""
     return p, 5 * (q - p), 10 * (p - q), 10 * (r - p), 5 * (p + 2 * q - 3 * r), s - p + 5 * (r - q)
 
 
-def _starts(x: Sequence[float], width: float) -> list[float]:
+def _list_starts(x: Sequence[float], width: float) -> list[float]:
     """Return the start values of the search for u; they need not be exact."""
     result: list[float] = []
     u = step = 0.0
@@ -109,24 +109,27 @@ def _starts(x: Sequence[float], width: float) -> list[float]:
         low, high, u = u, 1.0, min(u + step, 1.0)
         for _ in range(ROUNDS):
             # Newton's method, or halves where it would leave the interval.
-            off, slope = _times_u(x, u) - width * node / NODES, _derivative(x, u)
+            off, slope = (
+                _evaluate_without_constant(x, u) - width * node / NODES,
+                _evaluate_derivative(x, u),
+            )
             low, high = (u, high) if off < 0.0 else (low, u)
             before, u = u, u - off / slope if slope > 0.0 else -1.0
             if not low <= u <= high:
                 u = 0.5 * (low + high)
             if abs(u - before) < NEAR * NEAR:
                 break
-        slope = _derivative(x, u)
+        slope = _evaluate_derivative(x, u)
         step = width / NODES / slope if slope > 0.0 else 0.0
         result += [u, step]
     return result
 
 
-def _times_u(x: Sequence[float], u: float) -> float:
+def _evaluate_without_constant(x: Sequence[float], u: float) -> float:
     return u * (x[0] + u * (x[1] + u * (x[2] + u * (x[3] + u * x[4]))))
 
 
-def _derivative(x: Sequence[float], u: float) -> float:
+def _evaluate_derivative(x: Sequence[float], u: float) -> float:
     return x[0] + u * (2.0 * x[1] + u * (3.0 * x[2] + u * (4.0 * x[3] + u * 5.0 * x[4])))
 
 
@@ -141,12 +144,12 @@ def curve_value(c: Sequence[float], x: float) -> tuple[float, float]:
     if x > c[LAST]:
         return c[LAST + 1] + c[LAST + 2] * (x - c[LAST]), c[LAST + 2]
     known = plain(x)
-    k, rest, u = first_place(c, known)
-    _, _, y, slope = on_section(c, k + X, 1, u, rest, ROUNDS)
+    k, rest, u = find_section(c, known)
+    _, _, y, slope = search_section(c, k + X, 1, u, rest, ROUNDS)
     return settled(y, slope * (known - x), 1.0), slope
 
 
-def first_place(c: Sequence[float], x: float) -> tuple[int, float, float]:
+def find_section(c: Sequence[float], x: float) -> tuple[int, float, float]:
     """Find the section that contains x, and a start value of u.
 
     Args:
@@ -172,7 +175,7 @@ def first_place(c: Sequence[float], x: float) -> tuple[int, float, float]:
     return k, rest, u
 
 
-def on_section(
+def search_section(
     c: Sequence[float], p: int, apart: int, u: float, rest: float, rounds: int
 ) -> tuple[float, bool, float, float]:
     """Find u on a section by Halley's method, and evaluate y there.
@@ -190,14 +193,14 @@ def on_section(
     """
     goes_on = True
     for _ in range(rounds):
-        u, goes_on = nearer_place(c, p, apart, u, rest)
+        u, goes_on = take_halley_step(c, p, apart, u, rest)
         if not goes_on:
             break
-    y, slope = value_at(c, p, apart, u)
+    y, slope = evaluate_section(c, p, apart, u)
     return u, goes_on, y, slope
 
 
-def nearer_place(
+def take_halley_step(
     c: Sequence[float], p: int, apart: int, u: float, rest: float
 ) -> tuple[float, bool]:
     """Take one step of Halley's method; the arguments are those of `search_section`.
@@ -218,7 +221,7 @@ def nearer_place(
     return u, leads_on and not abs(step) < NEAR
 
 
-def value_at(c: Sequence[float], p: int, apart: int, u: float) -> tuple[float, float]:
+def evaluate_section(c: Sequence[float], p: int, apart: int, u: float) -> tuple[float, float]:
     """Return y and slope at u; the arguments are those of `search_section`.
 
     Returns:
@@ -239,14 +242,14 @@ def value_at(c: Sequence[float], p: int, apart: int, u: float) -> tuple[float, f
     return (g + u * h) + v * ((i + u * j) + v * (k + u * m)), rise / run
 
 
-def missed(c: Sequence[float], p: int, apart: int, u: float, rest: float) -> float:
+def search_residual(c: Sequence[float], p: int, apart: int, u: float, rest: float) -> float:
     """Return the residual of the search; the arguments are those of `search_section`."""
     a, b, d, e, f = c[p], c[p + apart], c[p + 2 * apart], c[p + 3 * apart], c[p + 4 * apart]
     v = u * u
     return u * ((a + u * b) + v * ((d + u * e) + v * f)) - rest
 
 
-def value_of_sum(c: Sequence[float], of_y: float, of_x: float, total: float) -> tuple[float, float]:
+def solve_sum(c: Sequence[float], of_y: float, of_x: float, total: float) -> tuple[float, float]:
     """Find y of a curve where ``of_y * y + of_x * x`` has a total.
 
     On a section the sum is a polynomial in u, too, which is increasing for an increasing curve and
@@ -261,10 +264,10 @@ def value_of_sum(c: Sequence[float], of_y: float, of_x: float, total: float) -> 
     Returns:
         y, and the residual of the sum.
     """
-    end = end_of_sum(c, of_y, of_x, total)
+    end = end_beyond_sum(c, of_y, of_x, total)
     if end > 0:
-        return beyond_sum(c, of_y, of_x, total, end), total - total
-    k, rest, u = first_place_of_sum(c, of_y, of_x, total)
+        return extrapolate_sum(c, of_y, of_x, total, end), total - total
+    k, rest, u = find_section_of_sum(c, of_y, of_x, total)
     # As numbers in a row, which on_section takes.
     own = (
         of_y * c[k + Y + 1] + of_x * c[k + X],
@@ -279,24 +282,24 @@ def value_of_sum(c: Sequence[float], of_y: float, of_x: float, total: float) -> 
         c[k + Y + 4],
         c[k + Y + 5],
     )
-    u, _, y, _ = on_section(own, 0, 1, u, rest, ROUNDS)
-    return y, missed(own, 0, 1, u, rest)
+    u, _, y, _ = search_section(own, 0, 1, u, rest, ROUNDS)
+    return y, search_residual(own, 0, 1, u, rest)
 
 
-def end_of_sum(c: Sequence[float], of_y: float, of_x: float, total: float) -> int:
+def end_beyond_sum(c: Sequence[float], of_y: float, of_x: float, total: float) -> int:
     """Return the end of a curve that a sum is beyond, FIRST or LAST; 0 if neither."""
     if not total >= of_y * c[FIRST + 1] + of_x * c[FIRST]:
         return FIRST
     return LAST if total > of_y * c[LAST + 1] + of_x * c[LAST] else 0
 
 
-def beyond_sum(c: Sequence[float], of_y: float, of_x: float, total: float, end: int) -> float:
+def extrapolate_sum(c: Sequence[float], of_y: float, of_x: float, total: float, end: int) -> float:
     """Return y beyond an end of a curve, where a sum has a total."""
     x, y, slope = c[end], c[end + 1], c[end + 2]
     return y + slope * ((total - (of_y * y + of_x * x)) / (of_y * slope + of_x))
 
 
-def first_place_of_sum(
+def find_section_of_sum(
     c: Sequence[float], of_y: float, of_x: float, total: float
 ) -> tuple[int, float, float]:
     """Find the section that contains a sum, and a rough start value of u.
@@ -326,16 +329,16 @@ def curve_integral(c: Sequence[float], x: float) -> float:
     total, off = 0.0, x - c[FIRST]
     if off <= 0.0:
         return (c[FIRST + 1] + 0.5 * c[FIRST + 2] * off) * off
-    at, rest, u = first_place(c, min(x, c[LAST]))
-    u, *_ = on_section(c, at + X, 1, u, rest, ROUNDS)
+    at, rest, u = find_section(c, min(x, c[LAST]))
+    u, *_ = search_section(c, at + X, 1, u, rest, ROUNDS)
     for k in range(HEAD + int(c[SECTIONS]), at, SECTION):
-        total += _area(c, k, 1.0)
-    total += _area(c, at, u)
+        total += _section_integral(c, k, 1.0)
+    total += _section_integral(c, at, u)
     off = max(x - c[LAST], 0.0)
     return total + (c[LAST + 1] + 0.5 * c[LAST + 2] * off) * off
 
 
-def _area(c: Sequence[float], k: int, u: float) -> float:
+def _section_integral(c: Sequence[float], k: int, u: float) -> float:
     """Return the integral of y over x of a section up to u."""
     x, y = c[k + X : k + Y], c[k + Y : k + STARTS]
     return sum(

@@ -193,7 +193,7 @@ def thelen_lengthening(
     )
 
 
-def fitted(path_length: float, length: float, m: OldMuscle) -> Guess:
+def make_guess(path_length: float, length: float, m: OldMuscle) -> Guess:
     """Return a guess with a fiber length (m), which is adjusted so that the tendon is not shorter than slack."""
     cos = cos_upright(length, m.height)
     tendon = path_length - length * cos

@@ -11,16 +11,16 @@ friction as in Simbody's ElasticFoundationForce (friction as in
 
 from __future__ import annotations
 
-from osimlite.mechanics.laws.hunt_crossley import friction
+from osimlite.mechanics.laws.hunt_crossley import friction_coefficient
 from osimlite.mechanics.laws.vectors import (
     ZERO,
     Vector,
-    along,
+    add_scaled,
     cross,
+    divide,
     dot,
     minus,
     norm,
-    over,
     plus,
     times,
 )
@@ -38,7 +38,7 @@ def spring_in_half_space(o: Vector, n: Vector, middle: Vector) -> tuple[float, V
         Depth and point (m). The spring acts where the depth is positive.
     """
     d = dot(minus(o, middle), n)
-    return d, along(middle, d, n)
+    return d, add_scaled(middle, d, n)
 
 
 def spring_in_sphere(center: Vector, r: float, middle: Vector) -> tuple[float, Vector]:
@@ -56,7 +56,9 @@ def spring_in_sphere(center: Vector, r: float, middle: Vector) -> tuple[float, V
     """
     way = minus(middle, center)
     distance = norm(way)
-    return (r - distance, along(center, r / distance, way)) if distance > 0.0 else (0.0, center)
+    return (
+        (r - distance, add_scaled(center, r / distance, way)) if distance > 0.0 else (0.0, center)
+    )
 
 
 def spring_load(
@@ -98,13 +100,15 @@ def spring_load(
     d = norm(way)
     if d == 0.0:
         return ZERO, ZERO, 0.0
-    energy, n, arm = 0.5 * k * d * d, over(way, d), minus(end, about)
+    energy, n, arm = 0.5 * k * d * d, divide(way, d), minus(end, about)
     here = plus(v, cross(turning, arm))
     vn = dot(here, n)
     f = k * d * (1.0 + c * vn)
     if f <= 0.0:
         return ZERO, ZERO, energy
-    slip = along(here, -vn, n)
+    slip = add_scaled(here, -vn, n)
     w = norm(slip)
-    force = along(times(f, n), f * friction(w, us, ud, uv, vt) / w if w > 0.0 else 0.0, slip)
+    force = add_scaled(
+        times(f, n), f * friction_coefficient(w, us, ud, uv, vt) / w if w > 0.0 else 0.0, slip
+    )
     return force, cross(arm, force), energy

@@ -13,13 +13,13 @@ from osimlite.mechanics.laws.rotations import Axes
 from osimlite.mechanics.laws.vectors import (
     ZERO,
     Vector,
-    along,
+    add_scaled,
     cross,
+    divide,
     dot,
-    elementwise,
     minus,
+    multiply_elementwise,
     norm,
-    over,
     plus,
     times,
 )
@@ -50,10 +50,10 @@ def half_space_ellipsoid(
     d = reach - dot(minus(center, o), n)
     if d <= 0.0:
         return d, 0.0, ZERO
-    lx, ly, lz = over(times(-1.0, elementwise(u, radii)), reach)
-    point = along(along(along(center, lx, one), ly, two), lz, three)
+    lx, ly, lz = divide(times(-1.0, multiply_elementwise(u, radii)), reach)
+    point = add_scaled(add_scaled(add_scaled(center, lx, one), ly, two), lz, three)
     # The product of the curvatures of the section is (reach / (rx ry rz))^2.
-    return d, sqrt(rx * ry * rz / reach), along(point, d * (1.0 - a), n)
+    return d, sqrt(rx * ry * rz / reach), add_scaled(point, d * (1.0 - a), n)
 
 
 def ellipsoid_ellipsoid(
@@ -84,11 +84,11 @@ def ellipsoid_ellipsoid(
     distance = norm(centre_line)
     if distance == 0.0:
         return 0.0, 0.0, ZERO, ZERO
-    n = over(centre_line, distance)
-    squares1, squares2 = elementwise(radii1, radii1), elementwise(radii2, radii2)
+    n = divide(centre_line, distance)
+    squares1, squares2 = multiply_elementwise(radii1, radii1), multiply_elementwise(radii2, radii2)
     tries, least, known, step = 0, inf, n, ZERO
     while True:
-        g1, g2 = stretched(axes1, squares1, n), stretched(axes2, squares2, n)
+        g1, g2 = stretch_by_squares(axes1, squares1, n), stretch_by_squares(axes2, squares2, n)
         s1, s2 = sqrt(dot(g1, n)), sqrt(dot(g2, n))
         h = s1 + s2 - dot(n, centre_line)
         if h <= 0.0:
@@ -99,13 +99,13 @@ def ellipsoid_ellipsoid(
             # Too long a step: half of it.
             step = times(0.5, step)
             n = plus(known, step)
-            n = over(n, norm(n))
+            n = divide(n, norm(n))
             continue
         least, known = h, n
-        g1, g2 = over(g1, s1), over(g2, s2)
-        u, v = across(n)
-        gu1, gv1, huu1, huv1, hvv1 = slopes(axes1, squares1, g1, s1, u, v)
-        gu2, gv2, huu2, huv2, hvv2 = slopes(axes2, squares2, g2, s2, u, v)
+        g1, g2 = divide(g1, s1), divide(g2, s2)
+        u, v = make_perpendiculars(n)
+        gu1, gv1, huu1, huv1, hvv1 = differentiate_support(axes1, squares1, g1, s1, u, v)
+        gu2, gv2, huu2, huv2, hvv2 = differentiate_support(axes2, squares2, g2, s2, u, v)
         # How fast the overlap grows along u and v.
         fu, fv = gu1 + gu2 - dot(centre_line, u), gv1 + gv2 - dot(centre_line, v)
         if fu * fu + fv * fv <= 1e-26 * (s1 + s2) * (s1 + s2) or tries >= 100:
@@ -116,18 +116,18 @@ def ellipsoid_ellipsoid(
             huu += h
             hvv += h
         determinant = huu * hvv - huv * huv
-        step = along(
+        step = add_scaled(
             times((huv * fv - hvv * fu) / determinant, u), (huv * fu - huu * fv) / determinant, v
         )
         n = plus(known, step)
-        n = over(n, norm(n))
+        n = divide(n, norm(n))
     one, two = huu1 * hvv1 - huv1 * huv1, huu2 * hvv2 - huv2 * huv2
     huv = huv1 + huv2
     R = sqrt(one * two / ((huu1 + huu2) * (hvv1 + hvv2) - huv * huv))
-    return h, R, n, along(plus(c1, g1), -a * h, n)
+    return h, R, n, add_scaled(plus(c1, g1), -a * h, n)
 
 
-def stretched(axes: Axes, squares: Vector, x: Vector) -> Vector:
+def stretch_by_squares(axes: Axes, squares: Vector, x: Vector) -> Vector:
     """Return B x, where the matrix B has the axes of an ellipsoid and the squares of its half axes.
 
     s = sqrt(n B n) is the distance to the tangent plane perpendicular to n, and B n / s leads to the
@@ -140,10 +140,12 @@ def stretched(axes: Axes, squares: Vector, x: Vector) -> Vector:
     """
     one, two, three = axes
     p, q, r = squares
-    return along(along(times(p * dot(one, x), one), q * dot(two, x), two), r * dot(three, x), three)
+    return add_scaled(
+        add_scaled(times(p * dot(one, x), one), q * dot(two, x), two), r * dot(three, x), three
+    )
 
 
-def across(n: Vector) -> tuple[Vector, Vector]:
+def make_perpendiculars(n: Vector) -> tuple[Vector, Vector]:
     """Return unit vectors u and v that are perpendicular to the unit vector n and each other.
 
     Returns:
@@ -151,11 +153,11 @@ def across(n: Vector) -> tuple[Vector, Vector]:
     """
     nx, ny, nz = n
     u = (0.0, nz, -ny) if abs(nx) < 0.6 else (-nz, 0.0, nx)
-    u = over(u, norm(u))
+    u = divide(u, norm(u))
     return u, cross(n, u)
 
 
-def slopes(
+def differentiate_support(
     axes: Axes, squares: Vector, g: Vector, s: float, u: Vector, v: Vector
 ) -> tuple[float, float, float, float, float]:
     """Return first and second derivatives of s = sqrt(n B n) as n turns towards u and v.
@@ -172,7 +174,7 @@ def slopes(
         (gu, gv, huu, huv, hvv), m.
     """
     gu, gv = dot(g, u), dot(g, v)
-    bu, bv = stretched(axes, squares, u), stretched(axes, squares, v)
+    bu, bv = stretch_by_squares(axes, squares, u), stretch_by_squares(axes, squares, v)
     return (
         gu,
         gv,

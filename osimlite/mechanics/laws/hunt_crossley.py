@@ -17,7 +17,16 @@ from __future__ import annotations
 
 from math import sqrt
 
-from osimlite.mechanics.laws.vectors import ZERO, Vector, along, dot, minus, norm, over, times
+from osimlite.mechanics.laws.vectors import (
+    ZERO,
+    Vector,
+    add_scaled,
+    divide,
+    dot,
+    minus,
+    norm,
+    times,
+)
 
 
 def combine_materials(
@@ -91,7 +100,7 @@ def half_space_sphere(
     """
     s = dot(minus(center, o), n)
     d = r - s
-    return (d, along(center, -(s + a * d), n)) if d > 0.0 else (d, ZERO)
+    return (d, add_scaled(center, -(s + a * d), n)) if d > 0.0 else (d, ZERO)
 
 
 def sphere_sphere(
@@ -118,11 +127,11 @@ def sphere_sphere(
     d = r1 + r2 - distance
     if d <= 0.0 or distance == 0.0:
         return min(d, 0.0), 0.0, ZERO, ZERO
-    n = over(centre_line, distance)
-    return d, r1 * r2 / (r1 + r2), n, along(c1, r1 - a * d, n)
+    n = divide(centre_line, distance)
+    return d, r1 * r2 / (r1 + r2), n, add_scaled(c1, r1 - a * d, n)
 
 
-def friction(w: float, us: float, ud: float, uv: float, vt: float) -> float:
+def friction_coefficient(w: float, us: float, ud: float, uv: float, vt: float) -> float:
     """Return the coefficient of friction min(r, 1) (ud + 2 (us - ud) / (1 + r^2)) + uv w, with r = w / vt.
 
     At w = vt it is us + uv vt and has a kink. With us < ud / 2 it is negative for small r: friction
@@ -158,7 +167,7 @@ def contact_force(
     """Return the force on surface 2 at the point of application.
 
     f = (4/3) k d sqrt(R k d) (1 + (3/2) c vn) along n, zero where that is not positive (no contact
-    pulls); and f mu along the slip of surface 1 over surface 2, where mu is its `friction`.
+    pulls); and f mu along the slip of surface 1 over surface 2, where mu is its `friction_coefficient`.
 
     Args:
         d: depth (m); no force where d <= 0.
@@ -181,11 +190,11 @@ def contact_force(
     f = (4.0 / 3.0) * k * d * sqrt(R * k * d) * (1.0 + 1.5 * c * vn)
     if f <= 0.0:
         return ZERO
-    slip = along(v, -vn, n)
+    slip = add_scaled(v, -vn, n)
     w = norm(slip)
     if w == 0.0:
         return times(f, n)
-    return along(times(f, n), f * friction(w, us, ud, uv, vt) / w, slip)
+    return add_scaled(times(f, n), f * friction_coefficient(w, us, ud, uv, vt) / w, slip)
 
 
 def contact_derivatives(
@@ -214,8 +223,8 @@ def contact_derivatives(
     if f <= 0.0:
         return 0.0, 0.0, 0.0
     # Without slip it is the limit: the coefficient grows in proportion.
-    w = max(norm(along(v, -vn, n)), 1e-6 * vt, 1e-12)
-    return 1.5 * f / d, 1.5 * c * elastic, f * friction(w, us, ud, uv, vt) / w
+    w = max(norm(add_scaled(v, -vn, n)), 1e-6 * vt, 1e-12)
+    return 1.5 * f / d, 1.5 * c * elastic, f * friction_coefficient(w, us, ud, uv, vt) / w
 
 
 def contact_energy(d: float, R: float, k: float) -> float:

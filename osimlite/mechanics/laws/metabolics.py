@@ -59,7 +59,7 @@ def umberger2010(
     effort = excitation if excitation > activation else (excitation + activation) / 2.0
     slow = m.ratio_slow_twitch_fibers
     if m.use_Bhargava_recruitment_model:
-        of_slow, of_fast = recruited(excitation, slow)
+        of_slow, of_fast = recruit_fibers(excitation, slow)
         slow = 1.0 if excitation == 0.0 else of_slow / (of_slow + of_fast)
     upkeep = shortening = work = 0.0
     if forbids or m.activation_maintenance_rate_on:
@@ -145,7 +145,9 @@ def bhargava2004(
     forbids = m.forbid_negative_total_power
     active_force *= m.muscle_effort_scaling_factor
     total = active_force + passive_force
-    slow, fast = recruited(m.muscle_effort_scaling_factor * excitation, m.ratio_slow_twitch_fibers)
+    slow, fast = recruit_fibers(
+        m.muscle_effort_scaling_factor * excitation, m.ratio_slow_twitch_fibers
+    )
     starting = keeping = shortening = work = 0.0
     if forbids or m.activation_rate_on:
         starting = m.mass * (
@@ -181,7 +183,7 @@ def bhargava2004(
     return heat + (work if m.mechanical_work_rate_on else 0.0)
 
 
-def recruited(excitation: float, ratio_slow_twitch_fibers: float) -> tuple[float, float]:
+def recruit_fibers(excitation: float, ratio_slow_twitch_fibers: float) -> tuple[float, float]:
     """Return the excited parts of all fibers, of slow and of fast ones.
 
     Returns:
@@ -193,7 +195,7 @@ def recruited(excitation: float, ratio_slow_twitch_fibers: float) -> tuple[float
     )
 
 
-class Smoothed(NamedTuple):
+class SmoothTransitions(NamedTuple):
     """Further parameters of the smooth model."""
 
     form: float  # of the transitions: 0 is none, 1 the hyperbolic tangent, 2 the function of Huber
@@ -211,7 +213,7 @@ def bhargava2004_smoothed(
     force_length: float,
     maintained: float,
     m: Bhargava2004,
-    by: Smoothed,
+    by: SmoothTransitions,
 ) -> tuple[float, float, float, float, float]:
     """Return the powers by Bhargava's model with smooth transitions (W).
 
@@ -223,7 +225,9 @@ def bhargava2004_smoothed(
     """
     active_force *= m.muscle_effort_scaling_factor
     total = active_force + passive_force
-    slow, fast = recruited(m.muscle_effort_scaling_factor * excitation, m.ratio_slow_twitch_fibers)
+    slow, fast = recruit_fibers(
+        m.muscle_effort_scaling_factor * excitation, m.ratio_slow_twitch_fibers
+    )
     starting = m.mass * (
         m.activation_constant_slow_twitch * slow + m.activation_constant_fast_twitch * fast
     )
@@ -236,23 +240,23 @@ def bhargava2004_smoothed(
             m.muscle_effort_scaling_factor * activation * force_length * m.max_isometric_force
         )
         ends = 0.16 * isometric + 0.18 * total, 0.157 * total
-        factor = transition(velocity, *ends, by.velocity_smoothing, -1.0, min(by.form, 1.0))
+        factor = blend_values(velocity, *ends, by.velocity_smoothing, -1.0, min(by.form, 1.0))
     else:
-        factor = transition(velocity, 0.25 * total, 0.0, by.velocity_smoothing, -1.0, by.form)
+        factor = blend_values(velocity, 0.25 * total, 0.0, by.velocity_smoothing, -1.0, by.form)
     shortening = -factor * velocity
     work = -active_force * fiber_velocity
     if not m.include_negative_mechanical_work:
-        work = transition(velocity, work, 0.0, by.velocity_smoothing, -1.0, by.form)
+        work = blend_values(velocity, work, 0.0, by.velocity_smoothing, -1.0, by.form)
     if m.forbid_negative_total_power:
         power = starting + keeping + shortening + work
-        shortening -= transition(-power, 0.0, power, by.power_smoothing, 1.0, by.form)
+        shortening -= blend_values(-power, 0.0, power, by.power_smoothing, 1.0, by.form)
     heat = starting + keeping + shortening
     if m.enforce_minimum_heat_rate_per_muscle:
-        heat = transition(m.mass - heat, heat, m.mass, by.heat_rate_smoothing, 1.0, by.form)
+        heat = blend_values(m.mass - heat, heat, m.mass, by.heat_rate_smoothing, 1.0, by.form)
     return heat + work, starting, keeping, shortening, work
 
 
-def transition(
+def blend_values(
     x: float, left: float, right: float, sharpness: float, direction: float, form: float
 ) -> float:
     """Return a smooth blend from `left` for negative x to `right` for positive x.
@@ -263,7 +267,7 @@ def transition(
         right: value for positive x.
         sharpness: steepness of the transition.
         direction: direction of the Huber function, 1 or -1.
-        form: form of the transition, see :class:`Smoothed`.
+        form: form of the transition, see :class:`SmoothTransitions`.
     """
     if form == 0.0:
         return left if x <= 0.0 else right

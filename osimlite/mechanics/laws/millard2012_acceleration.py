@@ -60,7 +60,7 @@ class AccelerationCurves(NamedTuple):
     steep: Sequence[float]  # force against steep fibers over the cosine of pennation
 
 
-class Moment(NamedTuple):
+class MuscleDynamics(NamedTuple):
     """Forces and accelerations of fibers, tendon and the mass between them."""
 
     cos: float  # of pennation
@@ -74,7 +74,7 @@ class Moment(NamedTuple):
     tendon_stiffness: float  # N/m
 
 
-def moment(
+def evaluate_dynamics(
     m: Millard2012Acceleration,
     active: float,
     fiber: float,
@@ -82,7 +82,7 @@ def moment(
     tendon: float,
     rate: float,
     curves: AccelerationCurves,
-) -> Moment:
+) -> MuscleDynamics:
     """Compute forces and accelerations at a fiber length.
 
     See calcAccelerationMuscleInfo and calcMuscleDynamicsInfo of OpenSim's class.
@@ -145,7 +145,7 @@ def moment(
     # What damps the fibers themselves is no passive force to OpenSim.
     told = m.strength * (stretch * stretched - short * shortened - steep * steepened * cos)
     stiffness /= cos - fiber * sin * turn
-    return Moment(
+    return MuscleDynamics(
         cos, by_length, by_velocity, told, tension, acceleration, slope, stiffness, tendon_stiffness
     )
 
@@ -163,7 +163,7 @@ def millard2012_acceleration(
     fiber_length, velocity = now.fiber_length, now.fiber_velocity
     cos = cos_pennation(fiber_length, m.height, m.shortest, m.largest_sin, m.least_cos)
     tendon, rate = now.length - fiber_length * cos, now.rate - velocity / cos
-    at = moment(m, now.activation, fiber_length, velocity, tendon, rate, curves)
+    at = evaluate_dynamics(m, now.activation, fiber_length, velocity, tendon, rate, curves)
     pull = now.activation * at.by_length * at.by_velocity * m.strength
     change = first_order_activation_rate(
         now.excitation, now.activation, m.rising, m.falling, m.least
@@ -221,7 +221,7 @@ def millard2012_acceleration_equilibrium(
             break
         cos = cos_pennation(fiber, m.height, m.shortest, m.largest_sin, m.least_cos)
         velocity = (rate - tendon_rate) * cos
-        at = moment(m, now.activation, fiber, velocity, tendon, tendon_rate, curves)
+        at = evaluate_dynamics(m, now.activation, fiber, velocity, tendon, tendon_rate, curves)
         if abs(at.acceleration) <= tolerance:
             return True, fiber, velocity
         if not SIGNIFICANT < abs(at.slope) < inf:

@@ -17,7 +17,7 @@ from collections.abc import Sequence
 from math import isnan, nan
 from typing import NamedTuple
 
-from osimlite.mechanics.laws.bezier import curve_integral, curve_value, value_of_sum
+from osimlite.mechanics.laws.bezier import curve_integral, curve_value, solve_sum
 from osimlite.mechanics.laws.dual_numbers import plain, settled
 from osimlite.mechanics.laws.muscles import (
     SIGNIFICANT,
@@ -75,7 +75,7 @@ class MillardCurves(NamedTuple):
     tendon: Sequence[float]  # force over tendon length
 
 
-class Fibers(NamedTuple):
+class MillardFibers(NamedTuple):
     """Intermediate results of a muscle; before a curve is evaluated, its argument is in place of its value."""
 
     told_by: float  # see NONE
@@ -145,7 +145,9 @@ def millard2012_again(
     return muscle_with(fibers, m, True, velocity, by_velocity, by_length, elastic, tendon)
 
 
-def fibers_resting(now: MuscleInputs, m: Millard2012Equilibrium, curves: MillardCurves) -> Fibers:
+def fibers_resting(
+    now: MuscleInputs, m: Millard2012Equilibrium, curves: MillardCurves
+) -> MillardFibers:
     """Evaluate the curves over length, but not those over velocity."""
     fibers, tendon = fibers_at(now, m), 0.0
     by_length, _ = curve_value(curves.active, fibers.by_length)
@@ -162,12 +164,12 @@ def fibers_resting(now: MuscleInputs, m: Millard2012Equilibrium, curves: Millard
         fibers.cos,
         fibers.change,
     )
-    return Fibers(
+    return MillardFibers(
         told_by, velocity, by_velocity, active, length, cos, by_length, elastic, tendon, change
     )
 
 
-def fibers_at(now: MuscleInputs, m: Millard2012Equilibrium) -> Fibers:
+def fibers_at(now: MuscleInputs, m: Millard2012Equilibrium) -> MillardFibers:
     """Compute the arguments of all curves."""
     active = min(max(now.excitation if m.is_excited else now.activation, m.least), 1.0)
     fiber = now.fiber_length
@@ -189,11 +191,15 @@ def fibers_at(now: MuscleInputs, m: Millard2012Equilibrium) -> Fibers:
         now.excitation, now.activation, m.rising, m.falling, m.least
     )
     over = fiber / m.optimal
-    return Fibers(told_by, velocity, 1.0, active, fiber, cos, over, over, tendon, change)
+    return MillardFibers(told_by, velocity, 1.0, active, fiber, cos, over, over, tendon, change)
 
 
 def fibers_loaded(
-    fibers: Fibers, m: Millard2012Equilibrium, by_length: float, elastic: float, tendon: float
+    fibers: MillardFibers,
+    m: Millard2012Equilibrium,
+    by_length: float,
+    elastic: float,
+    tendon: float,
 ) -> tuple[float, float, float, float, float]:
     """Combine the values of the curves over length.
 
@@ -211,7 +217,9 @@ def fibers_loaded(
     return velocity, by_velocity, by_length, elastic, tendon
 
 
-def fibers_asking(fibers: Fibers, m: Millard2012Equilibrium) -> tuple[int, float, float, float]:
+def fibers_asking(
+    fibers: MillardFibers, m: Millard2012Equilibrium
+) -> tuple[int, float, float, float]:
     """Return which of the curves of velocity (0) and its inverse (1) is requested, and for what sum.
 
     The curve itself is requested where the first factor is 0 and the second 1.
@@ -225,7 +233,7 @@ def fibers_asking(fibers: Fibers, m: Millard2012Equilibrium) -> tuple[int, float
 
 
 def fibers_moved(
-    fibers: Fibers, m: Millard2012Equilibrium, value: float, missed: float
+    fibers: MillardFibers, m: Millard2012Equilibrium, value: float, missed: float
 ) -> tuple[float, float, float]:
     """Combine the value of the requested curve.
 
@@ -243,7 +251,7 @@ def fibers_moved(
 
 
 def muscle_of(
-    fibers: Fibers, m: Millard2012Equilibrium
+    fibers: MillardFibers, m: Millard2012Equilibrium
 ) -> tuple[float, float, float, float, float, float, float, float, bool, float, float, float]:
     """Return the results of `millard2012_equilibrium`, after all curves have been evaluated.
 
@@ -257,7 +265,7 @@ def muscle_of(
 
 
 def muscle_with(
-    fibers: Fibers,
+    fibers: MillardFibers,
     m: Millard2012Equilibrium,
     is_found: bool,
     velocity: float,
@@ -341,7 +349,7 @@ def damped_velocity(
         Whether there is one, the velocity, and the factor of the active force there.
     """
     share, borne = active * by_length, tendon / cos - elastic
-    factor, missed = value_of_sum(curves.velocity, share, m.damping, borne)
+    factor, missed = solve_sum(curves.velocity, share, m.damping, borne)
     is_found, velocity = damped_by(m, share, borne, factor, missed)
     return is_found, velocity, factor
 
@@ -404,7 +412,7 @@ def millard2012_equilibrium_length(
     fiber = max(
         fiber_length_along(length - 1.01 * m.slack, m.height, m.shortest, m.least_cos), m.smallest
     )
-    error, slope = imbalance(m, length, fiber, active, curves)
+    error, slope = force_imbalance(m, length, fiber, active, curves)
     for _ in range(LENGTH_ROUNDS):
         if not abs(error) > tolerance:
             break
@@ -415,14 +423,14 @@ def millard2012_equilibrium_length(
                 # Perhaps the other direction leads on.
                 step, part = -SMALLEST if step > 0.0 else SMALLEST if step < 0.0 else 0.0, 0.0
             fiber = max(last + step, m.smallest)
-            error, slope = imbalance(m, length, fiber, active, curves)
+            error, slope = force_imbalance(m, length, fiber, active, curves)
             if part <= SMALLEST:
                 break
             part *= 0.5
     return abs(error) < tolerance or (fiber <= m.smallest and not isnan(error)), fiber
 
 
-def imbalance(
+def force_imbalance(
     m: Millard2012Equilibrium, length: float, fiber: float, active: float, curves: MillardCurves
 ) -> tuple[float, float]:
     """Return the force of resting fibers along the tendon less the tendon force, and its derivative.

@@ -13,7 +13,7 @@ from __future__ import annotations
 from functools import lru_cache
 from math import cos, radians
 
-from osimlite.mechanics.laws.bezier import Numbers, curve, curve_size
+from osimlite.mechanics.laws.bezier import Numbers, curve_size, make_curve
 
 ACTIVE_SIZE = curve_size(5)
 """Length of an active force-length curve."""
@@ -28,11 +28,11 @@ COMPRESSIVE_SIZE = curve_size(1)
 NEAREST = 2.0**-26
 """Difference up to which two lengths count as equal."""
 
-_kept = lru_cache(maxsize=256)
+_cache_curves = lru_cache(maxsize=256)
 """Cache of curves, since most muscles of a model have the same."""
 
 
-@_kept
+@_cache_curves
 def active_force_length(
     shortest: float, transition: float, longest: float, slope: float, least: float
 ) -> Numbers:
@@ -53,11 +53,11 @@ def active_force_length(
         "its min_norm_active_fiber_length, transition_norm_fiber_length, 1, max_norm_active_fiber_length do not rise",
     )
     _require(least >= 0.0, "its minimum_value is negative")
-    _below(slope, (1.0 - least) / (1.0 - transition), "shallow_ascending_slope")
+    _require_below(slope, (1.0 - least) / (1.0 - transition), "shallow_ascending_slope")
     half = 0.05
     knee = 1.0 - slope * (1.0 - half - transition)
     top = 1.0 + half
-    return curve(
+    return make_curve(
         (
             (shortest, least, 0.0),
             (
@@ -74,7 +74,7 @@ def active_force_length(
     )
 
 
-@_kept
+@_cache_curves
 def force_velocity(
     concentric_end: float,
     concentric_near: float,
@@ -104,7 +104,7 @@ def force_velocity(
         ValueError: there is no such curve.
     """
     _require(most > 1.0, "its max_eccentric_velocity_force_multiplier is not above 1")
-    _below(concentric_end, concentric_near, "concentric_slope_at_vmax")
+    _require_below(concentric_end, concentric_near, "concentric_slope_at_vmax")
     _require(
         concentric_near < 1.0 or (concentric_near == 1.0 and not inverse),
         "its concentric_slope_near_vmax is not less than 1",
@@ -115,7 +115,7 @@ def force_velocity(
         "its eccentric_slope_at_vmax is not from 0 to the slope near vmax",
     )
     _require(eccentric_near >= NEAREST, f"its eccentric_slope_near_vmax is less than {NEAREST:.2e}")
-    _below(eccentric_near, most - 1.0, "eccentric_slope_near_vmax")
+    _require_below(eccentric_near, most - 1.0, "eccentric_slope_near_vmax")
     points = [
         (-1.0, 0.0, concentric_end),
         (
@@ -133,10 +133,10 @@ def force_velocity(
     ]
     if inverse:
         points = [(y, x, 1.0 / slope) for x, y, slope in points]
-    return curve(points, [concentric_curviness] * 2 + [eccentric_curviness] * 2)
+    return make_curve(points, [concentric_curviness] * 2 + [eccentric_curviness] * 2)
 
 
-@_kept
+@_cache_curves
 def fiber_force_length(
     zero: float,
     one: float,
@@ -160,22 +160,22 @@ def fiber_force_length(
         one > zero,
         f"its strain_at_zero_force is not less than its strain_at_one_norm_force, {one:.4g}",
     )
-    low, stiffness, curviness = _given_or(
+    low, stiffness, curviness = _complete_properties(
         (low, stiffness, curviness), (0.2, 2.0 / (one - zero), 0.75), "stiffness_at_low_force"
     )
     mean = 1.0 / (one - zero)
-    _above(stiffness, mean, "stiffness_at_one_norm_force")
-    _below(low, mean, "stiffness_at_low_force")
+    _require_above(stiffness, mean, "stiffness_at_one_norm_force")
+    _require_below(low, mean, "stiffness_at_low_force")
     start, end = 1.0 + zero, 1.0 + one
     foot = start + min(0.1 / stiffness, 0.1 * (end - start))
     middle = start + 0.5 * (foot - start)
-    return curve(
+    return make_curve(
         ((start, 0.0, 0.0), (foot, low * (foot - middle), low), (end, 1.0, stiffness)),
         [curviness] * 2,
     )
 
 
-@_kept
+@_cache_curves
 def tendon_force_length(
     one: float,
     stiffness: float | None = None,
@@ -194,22 +194,22 @@ def tendon_force_length(
         ValueError: there is no such curve.
     """
     _require(one > NEAREST, f"its strain_at_one_norm_force is not above {NEAREST:.1e}")
-    stiffness, toe, curviness = _given_or(
+    stiffness, toe, curviness = _complete_properties(
         (stiffness, toe, curviness), (1.375 / one, 2.0 / 3.0, 0.5), "stiffness_at_one_norm_force"
     )
     _require(0.0 < toe < 1.0, "its norm_force_at_toe_end is not between 0 and 1")
-    _above(stiffness, 1.0 / one, "stiffness_at_one_norm_force")
+    _require_above(stiffness, 1.0 / one, "stiffness_at_one_norm_force")
     end = (toe - 1.0) / stiffness + 1.0 + one
     foot, middle = 1.0 + (end - 1.0) / 10.0, (0.5 * toe - 1.0) / stiffness + 1.0 + one
     slope = 0.5 * toe / (middle - foot)
     control = foot + 0.5 * (middle - foot)
-    return curve(
+    return make_curve(
         ((1.0, 0.0, 0.0), (control, slope * (control - foot), slope), (end, toe, stiffness)),
         [curviness] * 2,
     )
 
 
-@_kept
+@_cache_curves
 def fiber_compressive_force_length(
     zero: float, stiffness: float | None = None, curviness: float | None = None
 ) -> Numbers:
@@ -224,16 +224,16 @@ def fiber_compressive_force_length(
         ValueError: there is no such curve.
     """
     _require(zero > 0.0, "its norm_length_at_zero_force is not positive")
-    stiffness, curviness = _given_or(
+    stiffness, curviness = _complete_properties(
         (stiffness, curviness), (-2.0 / zero, 0.5), "stiffness_at_zero_length"
     )
     _require(
         stiffness < -1.0 / zero, f"its stiffness_at_zero_length is not less than {-1.0 / zero:.4g}"
     )
-    return curve(((0.0, 1.0, stiffness), (zero, 0.0, 0.0)), [curviness])
+    return make_curve(((0.0, 1.0, stiffness), (zero, 0.0, 0.0)), [curviness])
 
 
-@_kept
+@_cache_curves
 def fiber_compressive_force_cos_pennation(
     angle: float, stiffness: float | None = None, curviness: float | None = None
 ) -> Numbers:
@@ -249,14 +249,14 @@ def fiber_compressive_force_cos_pennation(
     """
     zero = cos(radians(angle))
     _require(0.0 < zero < 1.0, "its engagement_angle_in_degrees is not between 0 and 90")
-    stiffness, curviness = _given_or(
+    stiffness, curviness = _complete_properties(
         (stiffness, curviness), (-2.0 / zero, 0.1), "stiffness_at_perpendicular"
     )
     _require(
         stiffness < -1.0 / zero,
         f"its stiffness_at_perpendicular is not less than {-1.0 / zero:.4g}",
     )
-    return curve(((0.0, 1.0, stiffness), (zero, 0.0, 0.0)), [curviness])
+    return make_curve(((0.0, 1.0, stiffness), (zero, 0.0, 0.0)), [curviness])
 
 
 def _require(holds: bool, otherwise: str) -> None:
@@ -264,15 +264,15 @@ def _require(holds: bool, otherwise: str) -> None:
         raise ValueError(otherwise)
 
 
-def _below(slope: float, limit: float, name: str) -> None:
+def _require_below(slope: float, limit: float, name: str) -> None:
     _require(0.0 <= slope < limit, f"its {name} is not from 0 to less than {limit:.4g}")
 
 
-def _above(slope: float, limit: float, name: str) -> None:
+def _require_above(slope: float, limit: float, name: str) -> None:
     _require(slope > limit, f"its {name} is not above {limit:.4g}")
 
 
-def _given_or(
+def _complete_properties(
     given: tuple[float | None, ...], usual: tuple[float, ...], first: str
 ) -> tuple[float, ...]:
     """Return optional properties, or their defaults if all are omitted; `first` is the name of the first."""

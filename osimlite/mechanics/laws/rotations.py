@@ -21,7 +21,7 @@ Z = (0.0, 0.0, 1.0)
 """Unit vector along z."""
 
 
-def along_axes(axes: Axes, a: Vector) -> Vector:
+def combine_axes(axes: Axes, a: Vector) -> Vector:
     """Return the vector with these components along axes."""
     x, y, z = a
     one, two, three = axes
@@ -32,19 +32,19 @@ def along_axes(axes: Axes, a: Vector) -> Vector:
     )
 
 
-def turned_axes(axes: Axes, others: Axes) -> Axes:
+def multiply_rotations(axes: Axes, others: Axes) -> Axes:
     """Return axes whose components along `axes` are `others`: the product of both rotations."""
     one, two, three = others
-    return along_axes(axes, one), along_axes(axes, two), along_axes(axes, three)
+    return combine_axes(axes, one), combine_axes(axes, two), combine_axes(axes, three)
 
 
-def transposed(axes: Axes) -> Axes:
+def transpose_rotation(axes: Axes) -> Axes:
     """Return the inverse rotation."""
     one, two, three = axes
     return (one[0], two[0], three[0]), (one[1], two[1], three[1]), (one[2], two[2], three[2])
 
 
-def about_axis(axis: Vector, s: float, c: float) -> Axes:
+def rotation_about_axis(axis: Vector, s: float, c: float) -> Axes:
     """Return the rotation about a unit vector by an angle with sine s and cosine c (Rodrigues' formula)."""
     x, y, z = axis
     d = 1.0 - c
@@ -55,7 +55,7 @@ def about_axis(axis: Vector, s: float, c: float) -> Axes:
     )
 
 
-def body_fixed(s1: float, c1: float, s2: float, c2: float, s3: float, c3: float) -> Axes:
+def rotation_from_xyz(s1: float, c1: float, s2: float, c2: float, s3: float, c3: float) -> Axes:
     """Return the rotation Rx(a) Ry(b) Rz(c) from sines and cosines of body-fixed X-Y-Z angles a, b, c."""
     return (
         (c2 * c3, c1 * s3 + s1 * s2 * c3, s1 * s3 - c1 * s2 * c3),

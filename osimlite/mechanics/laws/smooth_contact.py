@@ -15,8 +15,8 @@ from __future__ import annotations
 
 from math import cosh, log, sqrt, tanh
 
-from osimlite.mechanics.laws.hunt_crossley import friction
-from osimlite.mechanics.laws.vectors import Vector, along, dot, times
+from osimlite.mechanics.laws.hunt_crossley import friction_coefficient
+from osimlite.mechanics.laws.vectors import Vector, add_scaled, dot, times
 
 
 def smooth_hertz(d: float, R: float, E: float, cf: float, bd: float) -> float:
@@ -67,9 +67,9 @@ def smooth_contact_force(
     f = hertz * (1.0 + 1.5 * c * vn)
     if c != 0.0:
         f *= 0.5 + 0.5 * tanh(bv * (vn + 2.0 / (3.0 * c)))
-    slip = along(v, -vn, n)
+    slip = add_scaled(v, -vn, n)
     w = sqrt(dot(slip, slip) + cf)
-    return along(times(f, n), f * friction(w, us, ud, uv, vt) / w, slip)
+    return add_scaled(times(f, n), f * friction_coefficient(w, us, ud, uv, vt) / w, slip)
 
 
 def smooth_contact_derivatives(
@@ -93,12 +93,12 @@ def smooth_contact_derivatives(
         t = tanh(bv * (vn + 2.0 / (3.0 * c)))
         slope = (0.5 + 0.5 * t) * (slope + part * bv * (1.0 - t))
         part *= 0.5 + 0.5 * t
-    slip = along(v, -vn, n)
+    slip = add_scaled(v, -vn, n)
     w = sqrt(dot(slip, slip) + cf)
     return (
         hertz * part * growth,
         hertz * slope,
-        hertz * part * friction(w, us, ud, uv, vt) / w,
+        hertz * part * friction_coefficient(w, us, ud, uv, vt) / w,
         growth,
     )
 

@@ -78,7 +78,7 @@ def smooth_activation_rate(
     return ((0.5 + f) / (rising * z) + (0.5 - f) * z / falling) * lacking
 
 
-def bell(x: float, height: float, middle: float, width: float, growth: float) -> float:
+def skewed_gaussian(x: float, height: float, middle: float, width: float, growth: float) -> float:
     """Return height exp(-d^2 / 2) with d = (x - middle) / (width + growth x), a skewed Gaussian."""
     distance = (x - middle) / (width + growth * x)
     return height * exp(-0.5 * distance * distance)
@@ -93,9 +93,13 @@ def degroote_active(length: float, scale: float) -> float:
     """
     x = (length - 1.0) / scale + 1.0
     return (
-        bell(x, 0.8150671134243542, 1.055033428970575, 0.162384573599574, 0.063303448465465)
-        + bell(x, 0.433004984392647, 0.716775413397760, -0.029947116970696, 0.200356847296188)
-        + bell(x, 0.1, 1.0, 0.353553390593274, 0.0)
+        skewed_gaussian(
+            x, 0.8150671134243542, 1.055033428970575, 0.162384573599574, 0.063303448465465
+        )
+        + skewed_gaussian(
+            x, 0.433004984392647, 0.716775413397760, -0.029947116970696, 0.200356847296188
+        )
+        + skewed_gaussian(x, 0.1, 1.0, 0.353553390593274, 0.0)
     )
 
 
@@ -249,11 +253,13 @@ def meyer_active(length: float, scale: float) -> float:
     """
     x = (length - 1.0) / scale + 1.0
     return (
-        bell(x, 0.8174335195120225, 1.054348561163096, 0.16194288662761705, 0.06381565266097716)
-        + bell(
+        skewed_gaussian(
+            x, 0.8174335195120225, 1.054348561163096, 0.16194288662761705, 0.06381565266097716
+        )
+        + skewed_gaussian(
             x, 0.43130780147182907, 0.7163004817144202, -0.029060905806803296, 0.19835014521987723
         )
-        + bell(x, 0.1, 1.0, 0.353553390593274, 0.0)
+        + skewed_gaussian(x, 0.1, 1.0, 0.353553390593274, 0.0)
     )
 
 

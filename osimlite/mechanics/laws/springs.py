@@ -67,7 +67,7 @@ def path_spring_energy(length: float, l0: float, k: float) -> float:
     return 0.5 * k * (length - l0) * (length - l0) if length > l0 else 0.0
 
 
-def stretch(length: float, l0: float, clamped: bool) -> float:
+def path_stretch(length: float, l0: float, clamped: bool) -> float:
     """Return l - l0, not less than 0 if `clamped` (m).
 
     Args:

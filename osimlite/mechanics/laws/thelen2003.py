@@ -58,7 +58,7 @@ class Thelen2003(NamedTuple):
     passive_factor: float  # 1 / (exp(KshapePassive) - 1)
 
 
-class Fibers(NamedTuple):
+class ThelenFibers(NamedTuple):
     """Fibers of a given length in a muscle: forces of fibers and tendon, and their slopes."""
 
     length: float  # m
@@ -72,7 +72,7 @@ class Fibers(NamedTuple):
     passive_slope: float  # over the normalized length
 
 
-def fibers_at(m: Thelen2003, path_length: float, length: float) -> Fibers:
+def fibers_at(m: Thelen2003, path_length: float, length: float) -> ThelenFibers:
     """Evaluate the curves for a path length and a fiber length (m)."""
     cos = cos_pennation(length, m.height, m.shortest, m.largest_sin, m.least_cos)
     tendon_length = path_length - length * cos
@@ -82,7 +82,7 @@ def fibers_at(m: Thelen2003, path_length: float, length: float) -> Fibers:
     active, active_slope = active_force(length / m.optimal, m.width)
     passive, passive_slope = passive_force(length / m.optimal, m.passive_growth, m.passive_factor)
     is_taut = tendon_length > m.slack
-    return Fibers(
+    return ThelenFibers(
         length, cos, is_taut, tendon, tendon_slope, active, active_slope, passive, passive_slope
     )
 
@@ -208,7 +208,7 @@ def force_at_velocity(
     return nan
 
 
-def tolerance(m: Thelen2003) -> float:
+def equilibrium_tolerance(m: Thelen2003) -> float:
     """Return the accepted residual of an equilibrium (N)."""
     return max(1e-8 * m.strength, 10.0 * SIGNIFICANT)
 
@@ -293,12 +293,12 @@ def thelen2003_equilibrium(now: MuscleInputs, m: Thelen2003) -> tuple[bool, floa
     fibers = fibers_at(
         m, length, fiber_length_along(length - 1.01 * m.slack, m.height, m.shortest, m.least_cos)
     )
-    stiffness, _ = stiffnesses(m, fibers, active, 0.0)
-    by_velocity = shared(m, fibers, active, now.rate, stiffness)
-    borne, error = balance(m, fibers, active * by_velocity)
-    stiffness, of_tendon = stiffnesses(m, fibers, active * by_velocity, borne)
+    stiffness, _ = force_stiffnesses(m, fibers, active, 0.0)
+    by_velocity = shared_velocity_factor(m, fibers, active, now.rate, stiffness)
+    borne, error = fiber_balance(m, fibers, active * by_velocity)
+    stiffness, of_tendon = force_stiffnesses(m, fibers, active * by_velocity, borne)
     for _ in range(ROUNDS):
-        if not abs(error) > tolerance(m):
+        if not abs(error) > equilibrium_tolerance(m):
             break
         before, last, part = error, fibers.length, 1.0
         while abs(error) >= abs(before):
@@ -307,18 +307,18 @@ def thelen2003_equilibrium(now: MuscleInputs, m: Thelen2003) -> tuple[bool, floa
                 # Perhaps the other direction leads on.
                 step, part = -SMALLEST if step > 0.0 else SMALLEST if step < 0.0 else 0.0, 0.0
             fibers = fibers_at(m, length, max(last + step, m.shortest))
-            borne, error = balance(m, fibers, active * by_velocity)
+            borne, error = fiber_balance(m, fibers, active * by_velocity)
             if part <= SMALLEST:
                 break
             part *= 0.5
-        stiffness, of_tendon = stiffnesses(m, fibers, active * by_velocity, borne)
-        by_velocity = shared(m, fibers, active, now.rate, stiffness)
+        stiffness, of_tendon = force_stiffnesses(m, fibers, active * by_velocity, borne)
+        by_velocity = shared_velocity_factor(m, fibers, active, now.rate, stiffness)
     if isnan(by_velocity):
         return False, fibers.length
-    return abs(error) < tolerance(m) or fibers.length <= m.shortest, fibers.length
+    return abs(error) < equilibrium_tolerance(m) or fibers.length <= m.shortest, fibers.length
 
 
-def balance(m: Thelen2003, fibers: Fibers, active: float) -> tuple[float, float]:
+def fiber_balance(m: Thelen2003, fibers: ThelenFibers, active: float) -> tuple[float, float]:
     """Return the force of the fibers, and its component along the tendon less the tendon force (N).
 
     Args:
@@ -333,7 +333,9 @@ def balance(m: Thelen2003, fibers: Fibers, active: float) -> tuple[float, float]
     return borne, borne * fibers.cos - fibers.tendon * m.strength
 
 
-def stiffnesses(m: Thelen2003, fibers: Fibers, active: float, borne: float) -> tuple[float, float]:
+def force_stiffnesses(
+    m: Thelen2003, fibers: ThelenFibers, active: float, borne: float
+) -> tuple[float, float]:
     """Return the derivatives of both forces along the tendon by the fiber length (N/m).
 
     Args:
@@ -355,8 +357,8 @@ def stiffnesses(m: Thelen2003, fibers: Fibers, active: float, borne: float) -> t
     return stiffness * fibers.cos + borne * sin * sin / (length * cos), of_tendon
 
 
-def shared(
-    m: Thelen2003, fibers: Fibers, activation: float, rate: float, stiffness: float
+def shared_velocity_factor(
+    m: Thelen2003, fibers: ThelenFibers, activation: float, rate: float, stiffness: float
 ) -> float:
     """Return the factor of the active force by velocity, if the stiffer part moves less.
 
@@ -365,7 +367,7 @@ def shared(
         fibers: its fibers.
         activation: activation within its bounds.
         rate: lengthening speed of the path (m/s).
-        stiffness: stiffness of the fibers, see `stiffnesses` (N/m).
+        stiffness: stiffness of the fibers, see `force_stiffnesses` (N/m).
     """
     if rate == 0.0:
         return 1.0
@@ -374,4 +376,6 @@ def shared(
     if fibers.is_taut and abs(along + of_tendon) > SIGNIFICANT:
         of_rate = along / (along + of_tendon) * rate
     velocity = (rate - of_rate) * fibers.cos / (m.fastest * m.optimal)
-    return force_at_velocity(m, velocity, activation, activation * fibers.active, tolerance(m))
+    return force_at_velocity(
+        m, velocity, activation, activation * fibers.active, equilibrium_tolerance(m)
+    )

@@ -20,7 +20,7 @@ def vector(numbers: Numbers, offset: int) -> Vector:
     return numbers[offset], numbers[offset + 1], numbers[offset + 2]
 
 
-def put(numbers: Numbers, offset: int, a: Vector) -> None:
+def store_vector(numbers: Numbers, offset: int, a: Vector) -> None:
     """Store a vector in the three numbers of an array from an offset on."""
     numbers[offset], numbers[offset + 1], numbers[offset + 2] = a
 
@@ -31,7 +31,7 @@ def component(a: Vector, axis: int) -> float:
     return x if axis == 0 else (y if axis == 1 else z)
 
 
-def replaced(a: Vector, axis: int, value: float) -> Vector:
+def replace_component(a: Vector, axis: int, value: float) -> Vector:
     """Return the vector with another component on axis 0, 1 or 2."""
     x, y, z = a
     return value if axis == 0 else x, value if axis == 1 else y, value if axis == 2 else z
@@ -57,20 +57,20 @@ def times(k: float, a: Vector) -> Vector:
     return k * x, k * y, k * z
 
 
-def over(a: Vector, k: float) -> Vector:
+def divide(a: Vector, k: float) -> Vector:
     """Return a / k."""
     x, y, z = a
     return x / k, y / k, z / k
 
 
-def along(a: Vector, k: float, b: Vector) -> Vector:
+def add_scaled(a: Vector, k: float, b: Vector) -> Vector:
     """Return a + k b."""
     ax, ay, az = a
     bx, by, bz = b
     return ax + k * bx, ay + k * by, az + k * bz
 
 
-def elementwise(a: Vector, b: Vector) -> Vector:
+def multiply_elementwise(a: Vector, b: Vector) -> Vector:
     """Return the products of the components."""
     ax, ay, az = a
     bx, by, bz = b
@@ -102,7 +102,7 @@ def unit(a: Vector) -> Vector:
     return times(1.0 / size, a) if size >= EPSILON else (0.0, 0.0, 0.0)
 
 
-def turned(rows: Numbers, a: Vector) -> Vector:
+def rotate(rows: Numbers, a: Vector) -> Vector:
     """Return R a for a rotation R that is stored by rows."""
     x, y, z = a
     return (
@@ -112,7 +112,7 @@ def turned(rows: Numbers, a: Vector) -> Vector:
     )
 
 
-def turned_back(rows: Numbers, a: Vector) -> Vector:
+def rotate_back(rows: Numbers, a: Vector) -> Vector:
     """Return Rᵀ a for a rotation R that is stored by rows."""
     x, y, z = a
     return (

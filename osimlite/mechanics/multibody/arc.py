@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 from osimlite.base.records import dataclass
-from osimlite.mechanics.kernels.constant_curvature import arc_at
+from osimlite.mechanics.kernels.constant_curvature import evaluate_arc
 from osimlite.mechanics.kernels.functions import ARC
 from osimlite.mechanics.multibody.functions import Arguments, Evaluated, Function, make_floats
 
@@ -42,5 +42,5 @@ class ArcPoint(Function):
     def evaluate(self, arguments: Arguments) -> Evaluated:
         """Value, gradient (2,) and Hessian (2, 2) at the two angles."""
         one, two = (float(own + start) for own, start in zip(arguments, self.neutral, strict=True))
-        value, a, b, aa, ab, bb = arc_at(make_floats(self.table), one, two)
+        value, a, b, aa, ab, bb = evaluate_arc(make_floats(self.table), one, two)
         return value, [a, b], [[aa, ab], [ab, bb]]

@@ -18,7 +18,7 @@ from osimlite.mechanics.kernels.constraint_equations import (
     SLIP,
 )
 from osimlite.mechanics.kernels.layout import COORDINATE
-from osimlite.mechanics.kernels.linear_algebra import factor_room
+from osimlite.mechanics.kernels.linear_algebra import factor_size
 from osimlite.mechanics.multibody import body_constraints as b
 from osimlite.mechanics.multibody.constraints import Constraint, Coupler, Lock, Prescribed
 from osimlite.mechanics.multibody.function_tables import function_table, table_of_one
@@ -108,7 +108,7 @@ def room_for(equations: int, size: int, entries: int) -> dict[str, int]:
         "WORK_RATES": equations,
         "WORK_DRIFTS": equations,
         "WORK_KEPT": rows,
-        "WORK_FACTOR": factor_room(equations, size),
+        "WORK_FACTOR": factor_size(equations, size),
         "WORK_SYSTEM": entries + size + max(by_multipliers, by_directions),
         "WORK_TRIAL": 6 * size,
     }

@@ -17,10 +17,10 @@ from osimlite.base.records import dataclass
 from osimlite.errors import SimulationError
 from osimlite.mechanics.kernels.constrained_dynamics import constrained_dynamics
 from osimlite.mechanics.kernels.dynamics import (
-    accelerate,
+    add_accelerations,
+    add_generalized_forces,
     composite_rigid_body,
-    generalized_forces,
-    solve,
+    solve_accelerations,
     spatial_inertias_and_bias,
 )
 from osimlite.mechanics.kernels.layout import LINK_WORK, MODEL, OUTCOME
@@ -100,7 +100,7 @@ def missing_forces(state: Kinematics, udot: Array, gravity: Array) -> Array:
     model, udots = program.model, make_floats(udot[program.order].tolist())
     data, missing = _load_inertias(state, gravity, udots), make_floats([0.0] * len(udot))
     with check_finite(data):
-        generalized_forces(model, data, missing)
+        add_generalized_forces(model, data, missing)
     return -np.array(missing)[program.freedoms]
 
 
@@ -118,7 +118,7 @@ def _load_inertias(state: Kinematics, gravity: Array, udot: Floats | None = None
             for k, part in enumerate(gravity.tolist()):
                 acceleration[k] -= part
         if udot is not None:
-            accelerate(model, data, udot)
+            add_accelerations(model, data, udot)
         spatial_inertias_and_bias(model, reals, data)
     return data
 
@@ -146,7 +146,9 @@ def accelerations(state: Kinematics, applied: Array) -> Array:
     status = OUTCOME.SINGULAR_MASS
     with suppress(ArithmeticError, ValueError):
         if not size or not program.constraints:
-            status = OUTCOME.OK if solve(model, data, right) < 0 else OUTCOME.SINGULAR_MASS
+            status = (
+                OUTCOME.OK if solve_accelerations(model, data, right) < 0 else OUTCOME.SINGULAR_MASS
+            )
         else:
             status = constrained_dynamics(model, program.heavy, data, y, derivative, 0)
     udot: Array = np.array(right)[program.freedoms]

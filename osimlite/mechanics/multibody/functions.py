@@ -21,8 +21,8 @@ from osimlite.mechanics.kernels.functions import (
     PIECES,
     SINE,
     STEP,
-    several_at,
-    value_at,
+    evaluate_function,
+    evaluate_monomials,
 )
 
 if TYPE_CHECKING:
@@ -71,7 +71,7 @@ class Univariate(Function):
         """Value, first and second derivative at `x`, all three as plain numbers; NaN where `x` is not finite."""
         numbers: Any = memoryview(self._numbers)
         try:
-            return value_at(numbers, x) if math.isfinite(x) else _NOTHING
+            return evaluate_function(numbers, x) if math.isfinite(x) else _NOTHING
         except ValueError:
             # The sine of what is too large for a float.
             return _NOTHING
@@ -102,7 +102,7 @@ class Multivariate(Function):
         def at_rates(*moving: int) -> tuple[float, float]:
             """Value, and second derivative while some arguments change by 1."""
             rates = make_floats([float(k in moving) for k in places])
-            value, _, curvature = several_at(size, places, table, given, rates, gradient)
+            value, _, curvature = evaluate_monomials(size, places, table, given, rates, gradient)
             return value, curvature
 
         value, hessian = at_rates()[0], make_zero_derivatives(size)[2]

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from osimlite.mechanics.kernels.constrained_dynamics import bind
+from osimlite.mechanics.kernels.constrained_dynamics import evaluate_constraints
 from osimlite.mechanics.kernels.layout import LINK_WORK, MODEL, WORK
-from osimlite.mechanics.kernels.motion import move, place
+from osimlite.mechanics.kernels.motion import move_links, place_links
 from osimlite.mechanics.kernels.pointers import Floats
 from osimlite.mechanics.multibody.constraints import Constraint, Equations
 from osimlite.mechanics.multibody.program import Program
@@ -79,8 +79,8 @@ class Kinematics:
         """Work vector, state, and rates, when the links have been moved; no numbers where they cannot be."""
         model, reals, (data, y, f) = self.program.model, self.program.reals, self._unmoved
         with check_finite(data):
-            place(model, reals, data, y, f)
-            move(model, reals, data, y, f)
+            place_links(model, reals, data, y, f)
+            move_links(model, reals, data, y, f)
         return data, y, f
 
     def equations(self, constraint: Constraint) -> Equations:
@@ -111,7 +111,7 @@ class Kinematics:
         data, y, f = self.vectors if balls or program.on_bodies else self._unmoved
         if program.constraints:
             with check_finite(data):
-                bind(program.model, program.reals, data, y, f)
+                evaluate_constraints(program.model, program.reals, data, y, f)
         return program.equations(data)
 
     @cached_property

@@ -17,7 +17,7 @@ import numpy as np
 
 from osimlite.base.records import dataclass, field
 from osimlite.errors import SimulationError
-from osimlite.mechanics.kernels.ball_joint import angle_drift, angle_row
+from osimlite.mechanics.kernels.ball_joint import angle_acceleration_bias, angle_rate_row
 from osimlite.mechanics.laws.rotations import X, Y, Z
 from osimlite.mechanics.multibody.functions import (
     IDENTITY,
@@ -187,13 +187,15 @@ class SphericalMotion(Motion):
     def rates(self, q: Array) -> Array:
         """N (3, 3); SimulationError where the second angle makes it singular."""
         own: Any = self._angles(q)
-        return np.array([angle_row(own, _FIRST, part) for part in range(3)])
+        return np.array([angle_rate_row(own, _FIRST, part) for part in range(3)])
 
     def rate_bias(self, q: Array, u: Array) -> Array:
         """Ndot u (3,); SimulationError where the second angle makes N singular."""
         own, rows = self._angles(q), self.rates(q)
         rates: Any = (rows @ u[list(self.coordinates)]).tolist()
-        return np.array([angle_drift(own, rates, _FIRST, tuple(row)) for row in rows.tolist()])
+        return np.array(
+            [angle_acceleration_bias(own, rates, _FIRST, tuple(row)) for row in rows.tolist()]
+        )
 
     def _angles(self, q: Array) -> Any:
         angles = q[list(self.coordinates)].tolist()

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from osimlite.mechanics.kernels.layout import CONSTRAINED, CONSTRAINT, DOF, GRAVITY_AT, MODEL
-from osimlite.mechanics.kernels.pointers import Floats, Ints, address
-from osimlite.mechanics.kernels.table import LAW_NUMBERS, own_function
+from osimlite.mechanics.kernels.pointers import Floats, Ints, register_law
+from osimlite.mechanics.kernels.table import LAW_NUMBERS, load_kernel
 from osimlite.mechanics.multibody.constraints import Constraint, Equations
 from osimlite.mechanics.multibody.functions import make_floats
 from osimlite.mechanics.multibody.links import LinkPacker, Tree
@@ -55,7 +55,7 @@ class Program:
         ints[MODEL.STATE_SIZE], ints[MODEL.WORK_SIZE] = 2 * len(order), packer.work
         self.laws, self.tree = [*dict.fromkeys(packer.laws)], tree
         for name in self.laws:
-            ints[MODEL.LAWS + LAW_NUMBERS[name]] = address(own_function(name))
+            ints[MODEL.LAWS + LAW_NUMBERS[name]] = register_law(load_kernel(name))
         integers: Any = memoryview(array("q", ints))
         self.model: Ints = integers
         self.reals, self.heavy = make_floats(packer.numbers), make_floats(packer.numbers)

@@ -7,7 +7,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from osimlite.mechanics.laws.rotations import about_axis, body_fixed, transposed
+from osimlite.mechanics.laws.rotations import (
+    rotation_about_axis,
+    rotation_from_xyz,
+    transpose_rotation,
+)
 
 Array = NDArray[np.float64]
 
@@ -37,14 +41,18 @@ def skew_matrices(vectors: Array) -> Array:
 def rotation_about(axis: Array, angle: float) -> Array:
     """Rotation matrix (3, 3) by `angle` (rad) about the unit vector `axis` (Rodrigues' formula)."""
     return np.array(
-        transposed(about_axis(axis.tolist(), float(np.sin(angle)), float(np.cos(angle))))
+        transpose_rotation(
+            rotation_about_axis(axis.tolist(), float(np.sin(angle)), float(np.cos(angle)))
+        )
     )
 
 
 def rotation_xyz(angles: Array) -> Array:
     """Rotation matrix Rx(a) Ry(b) Rz(c) of body-fixed X-Y-Z `angles` (rad)."""
     return np.array(
-        transposed(body_fixed(*np.stack((np.sin(angles), np.cos(angles)), axis=1).ravel().tolist()))
+        transpose_rotation(
+            rotation_from_xyz(*np.stack((np.sin(angles), np.cos(angles)), axis=1).ravel().tolist())
+        )
     )
 
 

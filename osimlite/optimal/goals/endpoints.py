@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from osimlite.derivatives.symbolic import make_symbolic
 from osimlite.derivatives.symbols import Vector, casadi
 from osimlite.errors import ModelError, SettingError
-from osimlite.mechanics.kernels.programs import compute
+from osimlite.mechanics.kernels.programs import run_program
 from osimlite.mechanics.multibody import formula as expressions
 from osimlite.optimal.point import CONSTRAINT_FIRST, COST_FIRST, Endpoints, Formula, GoalTerms
 from osimlite.optimal.tendons import EXPLICIT, IMPLICIT, TendonEquations
@@ -156,7 +156,7 @@ def build_expression_based_parameter_goal(
             numbers[path] if path in numbers else ends.start.p[known.index(path)] for path in paths
         ]
         registers = Vector([*arguments, *[0.0] * len(formula.steps)])
-        return make_symbolic(compute)(
+        return make_symbolic(run_program)(
             Vector(steps), len(formula.steps), Vector(constants), registers, len(arguments)
         )
 

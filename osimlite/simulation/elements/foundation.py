@@ -15,7 +15,7 @@ import numpy as np
 from osimlite.base.records import dataclass
 from osimlite.errors import ModelError
 from osimlite.mechanics.kernels.layout import ITEM, LINK_WORK, MODEL
-from osimlite.mechanics.kernels.mesh_contacts import MESH_WORK, load_mesh
+from osimlite.mechanics.kernels.mesh_contacts import MESH_WORK, apply_mesh_load
 from osimlite.mechanics.kernels.pointers import Floats, Ints
 from osimlite.mechanics.kernels.points import angular_velocity, station, velocity
 from osimlite.mechanics.laws.elastic_foundation import spring_load
@@ -264,7 +264,7 @@ class _Meshes:
             load = self.springs.load(
                 one, two, point, v, minus(*(angular_velocity(model, data, link) for link in links))
             )
-        load_mesh(model, data, item, point, *load)
+        apply_mesh_load(model, data, item, point, *load)
 
     @staticmethod
     def _find_pose(model: Ints, data: Floats, placement: Placement) -> Pose:

@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from osimlite.base.records import dataclass
 from osimlite.mechanics.kernels.batched_curves import (
     LANES,
-    answer,
-    ask,
-    ask_sum,
-    missed_of,
-    value_of,
+    compute_requests,
+    request_residual,
+    request_result,
+    request_sum,
+    request_value,
 )
 from osimlite.mechanics.kernels.condensation import WIDTH
 from osimlite.mechanics.kernels.layout import ITEM
-from osimlite.mechanics.kernels.table import GIVEN, written
+from osimlite.mechanics.kernels.table import PARAMETERS, compile_text
 from osimlite.mechanics.laws.dual_numbers import carrying, carrying_room, slope_of
 from osimlite.simulation.elements.laws import BATCHED, EQUILIBRIUM, OFF, RESPONSE, RIGID
 from osimlite.simulation.elements.registry import FORCE_TYPES
@@ -197,7 +197,7 @@ class KernelText:
             places[name], number = f"i[ITEM.NUMBERS] + {number}", number + term.size
         count = len(first.curves)
         asks = [
-            f"ask(reals, lanes, asked + {k}, {places[curve]}, {known[name]})"
+            f"request_value(reals, lanes, asked + {k}, {places[curve]}, {known[name]})"
             for k, (curve, name) in enumerate(first.curves.items())
         ]
         lines = [
@@ -212,13 +212,13 @@ class KernelText:
                 ]
             ),
         ]
-        answers = ", ".join(f"value_of(lanes, {count} * asked + {k})" for k in range(count))
+        answers = ", ".join(f"request_result(lanes, {count} * asked + {k})" for k in range(count))
         place = places[second.curves[-1]]
         for number, curve in reversed([*enumerate(second.curves[:-1])]):
             place = f"{places[curve]} if which == {number} else {place}"
         # A force requests its second lookup in the lane of its first, whose result is used.
         lines += [
-            "answer(lanes, asked, 1)",
+            "compute_requests(lanes, asked, 1)",
             "asked = 0",
             *self._write_loop(
                 [
@@ -226,17 +226,17 @@ class KernelText:
                     f"which, of_curve, of_argument, total = asking({told})",
                     f"place = {place}",
                     "if of_curve == 0.0 and of_argument == 1.0:",
-                    "    ask(reals, lanes, asked, place, total)",
+                    "    request_value(reals, lanes, asked, place, total)",
                     "else:",
-                    "    ask_sum(reals, lanes, asked, place, of_curve, of_argument, total)",
+                    "    request_sum(reals, lanes, asked, place, of_curve, of_argument, total)",
                     "asked += 1",
                 ]
             ),
         ]
-        lines += [f"answer(lanes, asked, {SEARCH_ITERATIONS})", "asked = 0"]
+        lines += [f"compute_requests(lanes, asked, {SEARCH_ITERATIONS})", "asked = 0"]
         found = ", ".join(known[name] for name in second.results)
         ended = [
-            f"{found} = found_law({told}, value_of(lanes, asked), missed_of(lanes, asked))",
+            f"{found} = found_law({told}, request_result(lanes, asked), request_residual(lanes, asked))",
             "asked += 1",
         ]
         end = [f"{', '.join(force_type.outputs)} = end({told})"]
@@ -256,11 +256,11 @@ class KernelText:
             **{
                 "found_law": second.law,
                 "end": made.end,
-                "ask": ask,
-                "ask_sum": ask_sum,
-                "answer": answer,
+                "request_value": request_value,
+                "request_sum": request_sum,
+                "compute_requests": compute_requests,
             },
-            **{"value_of": value_of, "missed_of": missed_of},
+            **{"request_result": request_result, "request_residual": request_residual},
         )
 
     def _write_loop(self, lines: Sequence[str]) -> list[str]:
@@ -326,7 +326,7 @@ class KernelText:
         force_type, name = self.force_type, self.force_type.name + form
         source = "\n    ".join(
             [
-                f'def {name}({GIVEN}, {place}: "int") -> "int":',
+                f'def {name}({PARAMETERS}, {place}: "int") -> "int":',
                 *lines,
                 "return OUTCOME.OK\n",
             ]
@@ -338,7 +338,7 @@ class KernelText:
         }
         if force_type.inputs_type is not None:
             scope[force_type.inputs_type.__name__] = force_type.inputs_type
-        return written(
+        return compile_text(
             name,
             FORCE_TYPES.module_of(force_type.component),
             source,

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from osimlite.mechanics.kernels.table import LAW_MODULES, own_function
+from osimlite.mechanics.kernels.table import LAW_MODULES, load_kernel
 from osimlite.simulation.elements.registry import FORCE_TYPES, PROBE_TYPES
 
 EQUILIBRIUM, OFF, RESPONSE, RIGID, BATCHED = (
@@ -92,7 +92,7 @@ def find_function(name: str) -> Callable[..., Any]:
     """Return the function of a law by its name without directions."""
     function: Callable[..., Any]
     if name in LAW_MODULES:
-        function = own_function(name)
+        function = load_kernel(name)
     elif (probe := PROBE_TYPES.find_kernel(name)) is not None:
         function = probe.kernel
     else:

@@ -6,11 +6,11 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
-from osimlite.mechanics.kernels.functions import value_at
+from osimlite.mechanics.kernels.functions import evaluate_function
 from osimlite.mechanics.kernels.pointers import Floats
 from osimlite.mechanics.laws.metabolics import (
     Bhargava2004,
-    Smoothed,
+    SmoothTransitions,
     Umberger2010,
     bhargava2004,
     bhargava2004_smoothed,
@@ -132,7 +132,7 @@ def compute_bhargava(
         curve: maintenance factor over normalized fiber length.
         m: parameters of the muscle and the probe.
     """
-    maintained, _, _ = value_at(curve, fiber_length / m.optimal_fiber_length)
+    maintained, _, _ = evaluate_function(curve, fiber_length / m.optimal_fiber_length)
     return bhargava2004(
         activation,
         excitation,
@@ -204,8 +204,10 @@ def _read_smoothed(
     path = builder.path(component)
     forms = {"tanh": 1.0, "huber": 2.0}
     form = forms[component.smoothing_type or "tanh"] if component.use_smoothing else 0.0
-    sharpness = (getattr(component, name) for name in Smoothed._fields[1:])
-    smoothed = Smoothed(form, *(10.0 if number is None else number for number in sharpness))
+    sharpness = (getattr(component, name) for name in SmoothTransitions._fields[1:])
+    smoothed = SmoothTransitions(
+        form, *(10.0 if number is None else number for number in sharpness)
+    )
     subjects = []
     labels = [f"{path}|total_{rate}_rate" for rate in RATE_NAMES]
     for item in component.muscle_parameters:
@@ -226,8 +228,8 @@ def _measure_smoothed(
     rates = []
     for places, numbers in zip(probe.places, probe.numbers, strict=True):
         m, by = (
-            Bhargava2004(*numbers[: -len(Smoothed._fields)]),
-            Smoothed(*numbers[-len(Smoothed._fields) :]),
+            Bhargava2004(*numbers[: -len(SmoothTransitions._fields)]),
+            SmoothTransitions(*numbers[-len(SmoothTransitions._fields) :]),
         )
         activation, control, active, passive, length, velocity, factor = (
             system.recorded(*place) for place in places

@@ -8,7 +8,7 @@ from typing import Any
 
 from osimlite.base.records import dataclass
 from osimlite.errors import ModelError
-from osimlite.mechanics.kernels.functions import with_reflex
+from osimlite.mechanics.kernels.functions import add_reflex
 from osimlite.mechanics.multibody.formula import Formula, program
 from osimlite.mechanics.multibody.function_tables import table_of_one
 from osimlite.mechanics.multibody.functions import Function
@@ -362,11 +362,11 @@ class ReflexControl(Control):
 
     def write_arguments(self, head: int, number: int) -> list[str]:
         """Return the expression of the control with the reflex."""
-        return [f"with_reflex(data, model[MODEL.WORK_CONTROL] + i[{head}], p[{number}], rate)"]
+        return [f"add_reflex(data, model[MODEL.WORK_CONTROL] + i[{head}], p[{number}], rate)"]
 
     def list_functions(self) -> dict[str, Callable[..., Any]]:
         """Return the function that adds the reflex, by name."""
-        return {"with_reflex": with_reflex}
+        return {"add_reflex": add_reflex}
 
     def pack(
         self, value: tuple[int, float], tail: Tail, where: str

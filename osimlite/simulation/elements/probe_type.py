@@ -22,7 +22,7 @@ from osimlite.base.records import dataclass
 from osimlite.base.text import suggest_name
 from osimlite.errors import ModelError, UnsupportedError
 from osimlite.mechanics.kernels.layout import ITEM
-from osimlite.mechanics.kernels.table import GIVEN, written
+from osimlite.mechanics.kernels.table import PARAMETERS, compile_text
 from osimlite.mechanics.multibody.function_tables import table_of_one
 from osimlite.mechanics.multibody.functions import Function
 from osimlite.mechanics.multibody.links import Places
@@ -85,7 +85,7 @@ class ProbeType:
     def kernel(self) -> Callable[..., int]:
         """Function that computes one probe."""
         scope = {"law": self.law, self.numbers.__name__: self.numbers}
-        return written(self.name, PROBE_TYPES.module_of(self.component), self.source, **scope)
+        return compile_text(self.name, PROBE_TYPES.module_of(self.component), self.source, **scope)
 
     @property
     def source(self) -> str:
@@ -95,7 +95,7 @@ class ProbeType:
         given += [f"at(p, i[{HEAD - 1}])"] if self.has_curve else []
         given.append(f"{self.numbers.__name__}({', '.join(f'b[{k}]' for k in range(size))})")
         lines = [
-            f'def {self.name}({GIVEN}, item: "int") -> "int":',
+            f'def {self.name}({PARAMETERS}, item: "int") -> "int":',
             "i = at(model, item)",
             "p, found = at(reals, i[ITEM.NUMBERS]), at(data, i[ITEM.RECORD])",
             "first, total = i[ITEM.OWN + 1], p[0]",

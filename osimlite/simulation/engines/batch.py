@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from osimlite.mechanics import kernels
 from osimlite.mechanics.kernels import record
-from osimlite.mechanics.kernels.condensation import condensation_room
+from osimlite.mechanics.kernels.condensation import condensation_size
 from osimlite.mechanics.kernels.error_control import ERRORS
 from osimlite.mechanics.kernels.layout import MODEL
 from osimlite.mechanics.kernels.pointers import Floats, Ints
@@ -76,7 +76,7 @@ class Batch:
         self._room = self._method_at + method.HEAD + method.STATES * size
         if method.IS_IMPLICIT:
             program.link_responses(options.integrator)
-            self._room += condensation_room(int(s[MODEL.DOFS]), int(s[MODEL.RESPONSES]))
+            self._room += condensation_size(int(s[MODEL.DOFS]), int(s[MODEL.RESPONSES]))
         sizes = (
             options.most_tries,
             len(self._times),

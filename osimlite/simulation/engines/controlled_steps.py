@@ -11,9 +11,9 @@ from weakref import WeakKeyDictionary
 
 from osimlite.errors import SettingError, SimulationError
 from osimlite.mechanics.kernels import record
-from osimlite.mechanics.kernels.error_control import shortest_step, weight
+from osimlite.mechanics.kernels.error_control import error_weight, shortest_step
 from osimlite.mechanics.kernels.layout import MODEL
-from osimlite.mechanics.kernels.pointers import Floats, cubic
+from osimlite.mechanics.kernels.pointers import Floats, interpolate_cubic
 from osimlite.simulation.batches import BatchOptions
 from osimlite.simulation.engines.batch import Batch
 from osimlite.simulation.options import (
@@ -116,7 +116,7 @@ class ControlledSteps(Stepper):
 
         def held(t: float) -> list[float]:
             y: Any = [0.0] * size
-            cubic(size, *ends, t, y)  # type: ignore[arg-type]
+            interpolate_cubic(size, *ends, t, y)  # type: ignore[arg-type]
             return engine.projected(t, y, tolerance) or y
 
         return held
@@ -222,7 +222,7 @@ class ControlledSteps(Stepper):
         # It may cease to exist behind this state.
         self._evaluate(t0 + h, [y + h * f for y, f in zip(y0, f0, strict=True)])
         off = [
-            abs(e) * (weight(y) if k >= size else 1.0)
+            abs(e) * (error_weight(y) if k >= size else 1.0)
             for k, (e, y) in enumerate(zip(errors, y0, strict=True))
         ]
         index = max(range(len(off)), key=lambda k: off[k] if isfinite(off[k]) else inf)

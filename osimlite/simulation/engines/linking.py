@@ -190,7 +190,7 @@ class _Python(Code):
 
     def address(self, function: str) -> int:
         law = find_function(function)
-        return pointers.address(carried_by(law) if function.endswith(RESPONSE) else law)
+        return pointers.register_law(carried_by(law) if function.endswith(RESPONSE) else law)
 
     def entry(self, function: str) -> Callable[..., int]:
         kernel = find_function(function)
@@ -203,7 +203,7 @@ class _Python(Code):
         return lambda number: kernel(*arrays, number)
 
     def callback(self, python: Callable[..., int], sizes: Sequence[int]) -> tuple[int, Any]:
-        return pointers.address(python), None
+        return pointers.register_law(python), None
 
 
 class PythonTangents(_Python):
@@ -218,7 +218,7 @@ class PythonTangents(_Python):
 
     def address(self, function: str) -> int:
         """Return what stands for the address of a function of the kernels."""
-        return pointers.address(carried_by(find_function(function)))
+        return pointers.register_law(carried_by(find_function(function)))
 
     def entry(self, function: str) -> Callable[..., int]:
         """Return a function of the kernels, called with contiguous arrays and integers."""
@@ -238,7 +238,7 @@ class PythonTangents(_Python):
                 *(part.values if isinstance(part, DualVector) else part for part in parts)
             )
 
-        return pointers.address(called), None
+        return pointers.register_law(called), None
 
 
 def _to_duals(part: Any) -> Any:

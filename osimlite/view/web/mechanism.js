@@ -26,7 +26,7 @@
       if (this.q === q) return;
       this.q = q;
       this.order.forEach((c, k) => { this.y[k] = q[c]; });
-      this.kernels.place(...this.given);
+      this.kernels.place_links(...this.given);
     }
 
     // Coordinate values with those of dependent coordinates made to fit; couplers may depend on each other.
@@ -86,15 +86,15 @@
     over(k, c, q) {
       const { s, w, y, f, kernels, given } = this, n = q.length, own = this.order.indexOf(c), u = y.subarray(n);
       this.place(q);
-      kernels.move(...given);
+      kernels.move_links(...given);
       const length = this.length(k, q);
       f.fill(0);
       kernels.clear_wrenches(s, w);
       kernels.pull_path(...given, this.items[k], 1);
-      kernels.generalized_forces(s, w, f.subarray(n));
+      kernels.add_generalized_forces(s, w, f.subarray(n));
       u[own] = 1;
       if (this.bound) {
-        kernels.bind(...given);
+        kernels.evaluate_constraints(...given);
         kernels.project_speeds(s, w, y, f, 0, 0, Infinity);
       }
       // One that cannot move has none.

@@ -47,7 +47,7 @@ def edited(function, old, new):
 
 
 def test_an_edited_function_concerns_those_that_call_it(changed):
-    reflect = linear_algebra.reflect
+    reflect = linear_algebra.apply_reflection
     result = changed(linear_algebra, "reflect", edited(reflect, "0.0", "0.5"))
     # `project` solves by the addresses of these laws.
     paths = {"cable_path", "geodesic_path"}
@@ -68,7 +68,7 @@ def test_a_changed_number_concerns_those_that_use_it(changed):
 
 
 def test_words_and_layout_concern_nobody(changed):
-    reflect = linear_algebra.reflect
+    reflect = linear_algebra.apply_reflection
     document = reflect.__doc__
     moved = edited(
         reflect, f'"""{document}"""', '"""Other words."""\n    # A comment, and an empty line.\n'

@@ -11,9 +11,9 @@ from osimlite.mechanics.laws.springs import (
     mckibben_tension,
     path_spring_energy,
     path_spring_tension,
+    path_stretch,
     point_spring_tension,
     spring_energy,
-    stretch,
 )
 
 LENGTHS = st.floats(0.1, 3.0)
@@ -56,7 +56,7 @@ def test_values_worked_out_by_hand():
     assert path_spring_tension(1.4, 0.5, 1.5, 10.0, 0.2) == 0.0
     # Faster than 1 / d it pushes, as in OpenSim.
     assert path_spring_tension(2.0, -10.0, 1.5, 10.0, 0.2) == pytest.approx(-5.0)
-    assert [stretch(1.0, 1.5, clamped) for clamped in (True, False)] == [0.0, -0.5]
+    assert [path_stretch(1.0, 1.5, clamped) for clamped in (True, False)] == [0.0, -0.5]
     assert blankevoort_tension(2.2, 0.0, 2.0, 100.0, 0.06, 8.0) == pytest.approx(7.0)
 
 

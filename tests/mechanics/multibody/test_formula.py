@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from osimlite.errors import ModelError
-from osimlite.mechanics.kernels.programs import STEPS, of_two
+from osimlite.mechanics.kernels.programs import STEPS, run_binary_program
 from osimlite.mechanics.laws.formulas import FUNCTIONS
 from osimlite.mechanics.multibody.formula import Formula, program
 
@@ -16,7 +16,9 @@ from osimlite.mechanics.multibody.formula import Formula, program
 def value(text, q=0.7, u=-1.3):
     steps, constants = program(Formula.parse(text, ("q", "u"), "the expression"))
     count = len(steps) // 3
-    return of_two(q, u, np.array([count, *steps]), np.array(constants), np.zeros(2 + count))
+    return run_binary_program(
+        q, u, np.array([count, *steps]), np.array(constants), np.zeros(2 + count)
+    )
 
 
 @pytest.mark.parametrize(
@@ -192,6 +194,8 @@ def assert_derivatives(text, q=0.7, u=-1.3, step=1e-6):
     for variable, (dq, du) in enumerate(((step, 0.0), (0.0, step))):
         steps, constants = program(formula.derivative(variable))
         count = len(steps) // 3
-        result = of_two(q, u, np.array([count, *steps]), np.array(constants), np.zeros(2 + count))
+        result = run_binary_program(
+            q, u, np.array([count, *steps]), np.array(constants), np.zeros(2 + count)
+        )
         expected = (value(text, q + dq, u + du) - value(text, q - dq, u - du)) / (2 * step)
         assert result == pytest.approx(expected, rel=1e-8, abs=1e-9)

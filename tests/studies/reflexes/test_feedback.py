@@ -9,7 +9,7 @@ import pytest
 
 import osimlite
 from osimlite.errors import OsimliteError
-from osimlite.mechanics.kernels.reflexes import normal, philox
+from osimlite.mechanics.kernels.reflexes import draw_normal, philox
 from osimlite.models.walking import write_scenario
 from osimlite.simulation.control_steps import HeldRuns
 from osimlite.simulation.trajectory import Interrupted
@@ -355,7 +355,9 @@ def test_philox_is_that_of_its_authors(counter, key, words) -> None:
 
 
 def test_noise_is_normal() -> None:
-    drawn = np.array([normal(7, 0, step, number) for step in range(500) for number in range(8)])
+    drawn = np.array(
+        [draw_normal(7, 0, step, number) for step in range(500) for number in range(8)]
+    )
     assert abs(drawn.mean()) < 0.05 and drawn.std() == pytest.approx(1.0, abs=0.05)
     assert np.mean(np.abs(drawn) < 1.0) == pytest.approx(0.6827, abs=0.03)
     assert len(np.unique(drawn)) == len(drawn)
@@ -371,7 +373,7 @@ def test_noise_is_as_large_as_it_is_asked_for(model) -> None:
         simulate(model, 0.2, controller=noisy(base_noise=base, proportional_noise=part)).controller
         for base, part in ((0.0, 0.0), (0.004, 0.02))
     )
-    value, drawn = calm["/forceset/flexor"][0], normal(123, 0, 0, 0)
+    value, drawn = calm["/forceset/flexor"][0], draw_normal(123, 0, 0, 0)
     assert 0.1 < value < 0.9
     assert rough["/forceset/flexor"][0] == pytest.approx(
         value + (0.004 + 0.02 * value) * drawn, abs=1e-12
@@ -382,7 +384,7 @@ def test_noise_is_as_large_as_it_is_asked_for(model) -> None:
     first, place = calm.rows[0], calm.columns.index("elbow.value")
     width = 0.01 + 0.1 * abs(first[place])
     assert felt.rows[0, place] == pytest.approx(
-        first[place] + width * normal(123, 1, 0, place), abs=1e-12
+        first[place] + width * draw_normal(123, 1, 0, place), abs=1e-12
     )
 
 

@@ -14,7 +14,12 @@ from osimlite.io.document.upgrade.draft import (
     list_members,
     parse_reals,
 )
-from osimlite.mechanics.laws.rotations import Axes, along_axes, body_fixed, turned_axes
+from osimlite.mechanics.laws.rotations import (
+    Axes,
+    combine_axes,
+    multiply_rotations,
+    rotation_from_xyz,
+)
 from osimlite.mechanics.laws.vectors import Vector, plus
 
 
@@ -118,9 +123,9 @@ def compose_transforms(outer: str | None, inner: str | None) -> tuple[str, str] 
     (outer_turn, outer_shift), (inner_turn, inner_shift) = (
         _parse_transform(text) for text in texts
     )
-    angles = _compute_angles(turned_axes(outer_turn, inner_turn))
+    angles = _compute_angles(multiply_rotations(outer_turn, inner_turn))
     return " ".join(map(repr, angles)), " ".join(
-        map(repr, plus(outer_shift, along_axes(outer_turn, inner_shift)))
+        map(repr, plus(outer_shift, combine_axes(outer_turn, inner_shift)))
     )
 
 
@@ -140,7 +145,7 @@ def _parse_transform(text: str | None) -> tuple[Axes, Vector]:
     assert values is not None
     (s1, s2, s3), (c1, c2, c3) = map(sin, values[:3]), map(cos, values[:3])
     x, y, z = values[3:]
-    return body_fixed(s1, c1, s2, c2, s3, c3), (x, y, z)
+    return rotation_from_xyz(s1, c1, s2, c2, s3, c3), (x, y, z)
 
 
 def _compute_angles(axes: Axes) -> Vector:

@@ -2,9 +2,9 @@
 
 from collections.abc import Sequence
 
-from osimlite.mechanics.kernels.functions import value_at
+from osimlite.mechanics.kernels.functions import evaluate_function
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at
-from osimlite.mechanics.kernels.programs import compute
+from osimlite.mechanics.kernels.programs import run_program
 from osimlite.mechanics.laws.bushing import bushing_dissipation, bushing_load
 from osimlite.mechanics.laws.springs import spring_energy
 from osimlite.schema.springs import (
@@ -78,12 +78,12 @@ def compute_function_bushing(
     fz: Floats,
 ) -> None:
     """Fill the loads by one function of each deviation, and add damping."""
-    loads[0], _, _ = value_at(mx, deviations[0])
-    loads[1], _, _ = value_at(my, deviations[1])
-    loads[2], _, _ = value_at(mz, deviations[2])
-    loads[3], _, _ = value_at(fx, deviations[3])
-    loads[4], _, _ = value_at(fy, deviations[4])
-    loads[5], _, _ = value_at(fz, deviations[5])
+    loads[0], _, _ = evaluate_function(mx, deviations[0])
+    loads[1], _, _ = evaluate_function(my, deviations[1])
+    loads[2], _, _ = evaluate_function(mz, deviations[2])
+    loads[3], _, _ = evaluate_function(fx, deviations[3])
+    loads[4], _, _ = evaluate_function(fy, deviations[4])
+    loads[5], _, _ = evaluate_function(fz, deviations[5])
     add_damping(loads, rates, damping)
 
 
@@ -135,7 +135,7 @@ def compute_expression_bushing(
         registers[k] = deviations[k]
     for k in range(6):
         # Each expression is preceded by its number of steps and the offset of its constants.
-        loads[k] = compute(at(steps, 2), steps[0], at(constants, steps[1]), registers, 6)
+        loads[k] = run_program(at(steps, 2), steps[0], at(constants, steps[1]), registers, 6)
         steps = at(steps, 2 + 3 * steps[0])
     add_damping(loads, rates, damping)
 

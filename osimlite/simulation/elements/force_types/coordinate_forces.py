@@ -4,7 +4,7 @@ from math import exp
 from typing import Any
 
 from osimlite.errors import ModelError
-from osimlite.mechanics.kernels.programs import of_two
+from osimlite.mechanics.kernels.programs import run_binary_program
 from osimlite.mechanics.laws.coordinate_limit import (
     limit_constants,
     limit_dissipation,
@@ -61,7 +61,7 @@ register_force_type(
     ForceType(
         ExpressionBasedCoordinateForce,
         COORDINATE,
-        of_two,
+        run_binary_program,
         outputs=("force",),
         parameters=(Expression("expression", ("q", "qdot")),),
         labels={"{name}": "force"},

@@ -14,9 +14,9 @@ from osimlite.mechanics.laws.millard2012_acceleration import (
     millard2012_acceleration_rigid,
 )
 from osimlite.mechanics.laws.millard2012_equilibrium import (
-    Fibers,
     Millard2012Equilibrium,
     MillardCurves,
+    MillardFibers,
     fibers_asking,
     fibers_at,
     fibers_loaded,
@@ -41,7 +41,7 @@ from osimlite.mechanics.laws.muscle_curves import (
     force_velocity,
     tendon_force_length,
 )
-from osimlite.mechanics.laws.muscles import SIGNIFICANT, pennation
+from osimlite.mechanics.laws.muscles import SIGNIFICANT, pennation_constants
 from osimlite.schema.muscles import (
     Millard2012AccelerationMuscle,
     Millard2012EquilibriumMuscle,
@@ -71,7 +71,7 @@ def _read_minimum_activation(force: Any) -> float:
 
 
 def _read_pennation(force: Any) -> tuple[float, ...]:
-    return pennation(
+    return pennation_constants(
         force.optimal_fiber_length, force.pennation_angle_at_optimal, force.maximum_pennation_angle
     )
 
@@ -195,7 +195,7 @@ register_force_type(
         rigid_law=millard2012_rigid,
         law_from_record=millard2012_again,
         batched=BatchedLaw(
-            Fibers,
+            MillardFibers,
             fibers_at,
             LookupStage(
                 {"active": "by_length", "passive": "by_length", "tendon": "tendon"},
@@ -223,7 +223,7 @@ def _read_acceleration_fields(builder: ElementBuilder, force: Any) -> tuple[floa
         own.activation_time_constant,
         own.deactivation_time_constant,
         own.minimum_activation,
-        *pennation(force.optimal_fiber_length, angle, 0.5 * pi),
+        *pennation_constants(force.optimal_fiber_length, angle, 0.5 * pi),
         cos(angle),
     )
 

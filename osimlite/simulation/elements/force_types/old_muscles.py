@@ -4,7 +4,7 @@ from collections.abc import Callable
 from math import nan
 from typing import Any, NamedTuple
 
-from osimlite.mechanics.kernels.functions import value_at
+from osimlite.mechanics.kernels.functions import evaluate_function
 from osimlite.mechanics.kernels.pointers import Floats
 from osimlite.mechanics.laws.deprecated_muscles import (
     NOTHING,
@@ -12,8 +12,8 @@ from osimlite.mechanics.laws.deprecated_muscles import (
     TOLERANCE,
     OldMuscle,
     cos_upright,
-    fitted,
     generic_velocity_factor,
+    make_guess,
     next_length,
     rigid_cos,
     scaled_activation_rate,
@@ -124,7 +124,7 @@ def find_isometric_length(
     """
     if length < m.slack:
         return m.height
-    guess = fitted(length, start, m)
+    guess = make_guess(length, start, m)
     before, error_before = guess.length, 0.0
     for number in range(ROUNDS):
         active, passive, tendon = force_law(guess.length / m.optimal, guess.strain, fields, curves)
@@ -136,7 +136,7 @@ def find_isometric_length(
             error_before = error
         tried = next_length(guess, before, error, error_before, fibers, active + passive, tendon, m)
         before, error_before = guess.length, error
-        guess = fitted(length, tried, m)
+        guess = make_guess(length, tried, m)
     return guess.length
 
 
@@ -236,9 +236,9 @@ def compute_delp_forces(
     Returns:
         The three forces.
     """
-    active, _, _ = value_at(curves.active, length)
-    passive, _, _ = value_at(curves.passive, length)
-    tendon, _, _ = value_at(curves.tendon, strain)
+    active, _, _ = evaluate_function(curves.active, length)
+    passive, _, _ = evaluate_function(curves.passive, length)
+    tendon, _, _ = evaluate_function(curves.tendon, strain)
     return active, passive, tendon if strain >= 0.0 else 0.0
 
 
@@ -257,7 +257,7 @@ def compute_delp(
     cos, active, passive, tendon = fibers
     unit = m.optimal / fields.time
     velocity = now.fiber_velocity / unit
-    factor, _, _ = value_at(curves.velocity, velocity)
+    factor, _, _ = evaluate_function(curves.velocity, velocity)
     pulled = (
         (tendon - (now.activation * active * factor + passive) * cos)
         * cos
@@ -347,10 +347,12 @@ def compute_schutte_forces(
     Returns:
         The three forces.
     """
-    active, _, _ = value_at(curves.active, length)
-    tendon, _, _ = value_at(curves.tendon, strain)
+    active, _, _ = evaluate_function(curves.active, length)
+    tendon, _, _ = evaluate_function(curves.tendon, strain)
     passive = (
-        value_at(curves.passive, length)[0] if fields.has_curve else schutte_passive_force(length)
+        evaluate_function(curves.passive, length)[0]
+        if fields.has_curve
+        else schutte_passive_force(length)
     )
     return active, passive, tendon if strain >= 0.0 else 0.0
 

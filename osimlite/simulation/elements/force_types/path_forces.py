@@ -2,15 +2,15 @@
 
 from collections.abc import Sequence
 
-from osimlite.mechanics.kernels.functions import value_at
+from osimlite.mechanics.kernels.functions import evaluate_function
 from osimlite.mechanics.kernels.pointers import Floats, Ints
-from osimlite.mechanics.kernels.programs import of_two
+from osimlite.mechanics.kernels.programs import run_binary_program
 from osimlite.mechanics.laws.springs import (
     blankevoort_energy,
     blankevoort_tension,
     path_spring_energy,
     path_spring_tension,
-    stretch,
+    path_stretch,
 )
 from osimlite.schema.muscles import ClutchedPathSpring
 from osimlite.schema.path_forces import (
@@ -121,7 +121,7 @@ def compute_ligament(length: float, l0: float, force: float, curve: Floats) -> t
     ratio = length / l0
     if not length > l0:
         return 0.0, ratio
-    value, _, _ = value_at(curve, ratio)
+    value, _, _ = evaluate_function(curve, ratio)
     return force * value, ratio
 
 
@@ -222,7 +222,9 @@ def compute_expression_tension(
         constants: its constants.
         registers: its registers.
     """
-    return of_two(stretch(length, l0, clamped > 0.0), rate, steps, constants, registers)
+    return run_binary_program(
+        path_stretch(length, l0, clamped > 0.0), rate, steps, constants, registers
+    )
 
 
 register_force_type(

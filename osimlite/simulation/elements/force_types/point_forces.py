@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from osimlite.mechanics.kernels.programs import of_two
+from osimlite.mechanics.kernels.programs import run_binary_program
 from osimlite.mechanics.laws.springs import point_spring_tension, spring_energy
 from osimlite.mechanics.multibody.mechanism import GROUND, FramePlacement
 from osimlite.schema.prescribed import PrescribedForce
@@ -47,7 +47,7 @@ register_force_type(
     ForceType(
         ExpressionBasedPointToPointForce,
         BetweenPoints(("body1", "body2"), as_written=True),
-        of_two,
+        run_binary_program,
         outputs=("tension",),
         parameters=(Expression("expression", ("d", "ddot")),),
     )

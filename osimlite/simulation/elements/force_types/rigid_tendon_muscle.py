@@ -3,7 +3,7 @@
 from math import sqrt
 from typing import NamedTuple
 
-from osimlite.mechanics.kernels.functions import value_at
+from osimlite.mechanics.kernels.functions import evaluate_function
 from osimlite.mechanics.kernels.pointers import Floats
 from osimlite.mechanics.laws.muscles import MuscleInputs
 from osimlite.schema.muscles import RigidTendonMuscle
@@ -60,9 +60,9 @@ def compute_rigid_tendon_muscle(
     if m.height > MAX_PARALLEL_HEIGHT_M:
         fiber_length = sqrt(along * along + m.height * m.height)
         cos = along / fiber_length
-    active, _, _ = value_at(curves.active, fiber_length / m.optimal)
-    passive, _, _ = value_at(curves.passive, fiber_length / m.optimal)
-    factor, _, _ = value_at(curves.velocity, now.rate / (m.optimal * m.fastest))
+    active, _, _ = evaluate_function(curves.active, fiber_length / m.optimal)
+    passive, _, _ = evaluate_function(curves.passive, fiber_length / m.optimal)
+    factor, _, _ = evaluate_function(curves.velocity, now.rate / (m.optimal * m.fastest))
     active_force = m.strength * now.excitation * active * factor
     passive_force = m.strength * min(max(passive, 0.0), 10.0)
     tension = (active_force + passive_force) * cos

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from math import exp
 
-from osimlite.mechanics.laws.muscles import pennation
+from osimlite.mechanics.laws.muscles import pennation_constants
 from osimlite.mechanics.laws.thelen2003 import (
     Thelen2003,
     tendon_shape,
@@ -42,7 +42,7 @@ def _read_derived_fields(builder: ElementBuilder, force: Thelen2003Muscle) -> tu
     angles = force.pennation_angle_at_optimal, force.maximum_pennation_angle
     shape = force.KshapePassive
     return (
-        *pennation(force.optimal_fiber_length, *angles),
+        *pennation_constants(force.optimal_fiber_length, *angles),
         *tendon_shape(force.FmaxTendonStrain),
         shape / force.FmaxMuscleStrain,
         1.0 / (exp(shape) - 1.0),

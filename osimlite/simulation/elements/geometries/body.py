@@ -22,9 +22,9 @@ from osimlite.mechanics.laws.vectors import (
     dot,
     minus,
     norm,
-    put,
+    rotate_back,
+    store_vector,
     times,
-    turned_back,
     vector,
 )
 from osimlite.mechanics.multibody.links import Places
@@ -92,10 +92,10 @@ def push_body(
     model: Ints, data: Floats, g: Ints, gp: Floats, torque: Vector, force: Vector
 ) -> None:
     """Apply a torque to a body and a force at a point of it, given along three axes that are rows of `gp`."""
-    apply_torque(model, data, g[0], direction(model, data, g[2], turned_back(at(gp, 3), torque)))
+    apply_torque(model, data, g[0], direction(model, data, g[2], rotate_back(at(gp, 3), torque)))
     point = station(model, data, g[1], vector(gp, 0))
     apply_force(
-        model, data, g[0], point, direction(model, data, g[2], turned_back(at(gp, 3), force))
+        model, data, g[0], point, direction(model, data, g[2], rotate_back(at(gp, 3), force))
     )
 
 
@@ -108,7 +108,7 @@ def compute_station_motion(
         Height (m) and the three components of the velocity (m/s).
     """
     point = station(model, data, g[0], vector(gp, 0))
-    put(work, 0, point)
+    store_vector(work, 0, point)
     vx, vy, vz = velocity(model, data, g[0], point)
     return work[1], vx, vy, vz
 
@@ -116,7 +116,7 @@ def compute_station_motion(
 def push_station(model: Ints, data: Floats, g: Ints, work: Floats, force: Vector) -> None:
     """Apply a force to a station; the record then has the force."""
     apply_force(model, data, g[0], vector(work, 0), force)
-    put(work, 0, force)
+    store_vector(work, 0, force)
 
 
 class Anchors(NamedTuple):

@@ -18,7 +18,7 @@ from osimlite.mechanics.kernels.points import (
     velocity,
 )
 from osimlite.mechanics.laws.bushing import xyz_angles, xyz_moment, xyz_rates
-from osimlite.mechanics.laws.vectors import minus, put, times, turned, turned_back, vector
+from osimlite.mechanics.laws.vectors import minus, rotate, rotate_back, store_vector, times, vector
 from osimlite.mechanics.multibody.links import Places
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.simulation.elements.builder import ElementBuilder
@@ -45,37 +45,37 @@ def compute_deviations(model: Ints, data: Floats, g: Ints, gp: Floats, work: Flo
     """
     d, rates = at(work, DEVIATIONS), at(work, RATES)
     for k in range(3):
-        put(work, AXES + 3 * k, direction(model, data, g[0], vector(gp, 3 * k)))
-        put(work, AXES + 9 + 3 * k, direction(model, data, g[1], vector(gp, 12 + 3 * k)))
+        store_vector(work, AXES + 3 * k, direction(model, data, g[0], vector(gp, 3 * k)))
+        store_vector(work, AXES + 9 + 3 * k, direction(model, data, g[1], vector(gp, 12 + 3 * k)))
     one, two = at(work, AXES), at(work, AXES + 9)
     start, end = (
         station(model, data, g[0], vector(gp, 9)),
         station(model, data, g[1], vector(gp, 21)),
     )
-    put(work, 6, start)
-    put(work, 9, end)
-    x, y, z = turned(one, vector(two, 0)), turned(one, vector(two, 3)), turned(one, vector(two, 6))
-    put(d, 0, xyz_angles(x[0], y[0], z[0], x[1], y[1], z[1], z[2]))
-    put(d, 3, turned(one, minus(end, start)))
+    store_vector(work, 6, start)
+    store_vector(work, 9, end)
+    x, y, z = rotate(one, vector(two, 0)), rotate(one, vector(two, 3)), rotate(one, vector(two, 6))
+    store_vector(d, 0, xyz_angles(x[0], y[0], z[0], x[1], y[1], z[1], z[2]))
+    store_vector(d, 3, rotate(one, minus(end, start)))
     # The rate is that in the first frame, which itself rotates.
-    put(
+    store_vector(
         rates,
         3,
-        turned(one, minus(velocity(model, data, g[1], end), velocity(model, data, g[0], end))),
+        rotate(one, minus(velocity(model, data, g[1], end), velocity(model, data, g[0], end))),
     )
-    wx, wy, wz = turned(
+    wx, wy, wz = rotate(
         two, minus(angular_velocity(model, data, g[1]), angular_velocity(model, data, g[0]))
     )
-    put(rates, 0, xyz_rates(d[1], d[2], wx, wy, wz))
+    store_vector(rates, 0, xyz_rates(d[1], d[2], wx, wy, wz))
 
 
 def load_frames(model: Ints, data: Floats, g: Ints, work: Floats) -> None:
     """Apply the loads to both bodies; the record then has force and moment on the second frame."""
     loads, d = at(work, LOADS), at(work, DEVIATIONS)
-    force = turned_back(at(work, AXES), vector(loads, 3))
-    moment = turned_back(at(work, AXES + 9), xyz_moment(d[1], d[2], loads[0], loads[1], loads[2]))
-    put(work, 0, force)
-    put(work, 3, moment)
+    force = rotate_back(at(work, AXES), vector(loads, 3))
+    moment = rotate_back(at(work, AXES + 9), xyz_moment(d[1], d[2], loads[0], loads[1], loads[2]))
+    store_vector(work, 0, force)
+    store_vector(work, 3, moment)
     apply_force(model, data, g[1], vector(work, 9), force)
     apply_force(model, data, g[0], vector(work, 9), times(-1.0, force))
     apply_torque(model, data, g[1], moment)

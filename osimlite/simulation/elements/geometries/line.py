@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from osimlite.base.records import dataclass
 from osimlite.mechanics.kernels.pointers import Floats, Ints
 from osimlite.mechanics.kernels.points import apply_force, station, velocity
-from osimlite.mechanics.laws.vectors import dot, minus, norm, put, times, vector
+from osimlite.mechanics.laws.vectors import dot, minus, norm, store_vector, times, vector
 from osimlite.mechanics.multibody.links import Places
 from osimlite.simulation.elements.builder import ElementBuilder, Triple, as_triple
 from osimlite.simulation.elements.geometries.geometry import Geometry
@@ -26,9 +26,9 @@ def measure_line(
     between = minus(two, one)
     length = norm(between)
     ahead = times(1.0 / length if length > 0.0 else 0.0, between)
-    put(work, 0, ahead)
-    put(work, 3, one)
-    put(work, 6, two)
+    store_vector(work, 0, ahead)
+    store_vector(work, 3, one)
+    store_vector(work, 6, two)
     return length, dot(
         minus(velocity(model, data, g[1], two), velocity(model, data, g[0], one)), ahead
     )
@@ -39,10 +39,10 @@ def pull_ends(model: Ints, data: Floats, g: Ints, gp: Floats, work: Floats, tens
     pull, back = times(tension, vector(work, 0)), times(-tension, vector(work, 0))
     apply_force(model, data, g[0], vector(work, 3), pull)
     apply_force(model, data, g[1], vector(work, 6), back)
-    put(work, 0, pull)
-    put(work, 3, station(model, data, g[0], vector(gp, 6)))
-    put(work, 6, back)
-    put(work, 9, station(model, data, g[1], vector(gp, 9)))
+    store_vector(work, 0, pull)
+    store_vector(work, 3, station(model, data, g[0], vector(gp, 6)))
+    store_vector(work, 6, back)
+    store_vector(work, 9, station(model, data, g[1], vector(gp, 9)))
 
 
 class Ends(NamedTuple):

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-from osimlite.mechanics.kernels.functions import value_at
+from osimlite.mechanics.kernels.functions import evaluate_function
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at
 from osimlite.mechanics.kernels.points import apply_force, apply_torque, direction, station
-from osimlite.mechanics.laws.vectors import dot, minus, plus, put, turned_back, vector
+from osimlite.mechanics.laws.vectors import dot, minus, plus, rotate_back, store_vector, vector
 from osimlite.mechanics.multibody.function_tables import table_of_one
 from osimlite.mechanics.multibody.functions import Function
 from osimlite.mechanics.multibody.links import Places
@@ -48,12 +48,12 @@ def evaluate_load(g: Ints, gp: Floats, work: Floats, t: float) -> None:
     """Write the values of the tables of a load at time t into the record."""
     for k in range(9):
         if g[3 + k // 3] > 0:
-            work[k], _, _ = value_at(at(gp, g[6 + k]), t)
+            work[k], _, _ = evaluate_function(at(gp, g[6 + k]), t)
 
 
 def turn_vector(model: Ints, data: Floats, link: int, axes: Floats, turning: Floats) -> None:
     """Rotate a vector from the axes of a frame, given by columns in its link, to those of ground."""
-    put(turning, 0, direction(model, data, link, turned_back(axes, vector(turning, 0))))
+    store_vector(turning, 0, direction(model, data, link, rotate_back(axes, vector(turning, 0))))
 
 
 class Load(NamedTuple):

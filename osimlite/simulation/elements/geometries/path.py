@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Protocol
 
-from osimlite.mechanics.kernels.paths import known_length, path_length, pull_path
+from osimlite.mechanics.kernels.paths import last_length, path_length, pull_path
 from osimlite.mechanics.multibody.links import Places
 from osimlite.simulation.elements.builder import ElementBuilder, get_class_name
 from osimlite.simulation.elements.force_records import ForceRecord
@@ -33,9 +33,9 @@ class AlongPath(Geometry):
         "if length != length:",
         "    return OUTCOME.UNSOLVED",
     )
-    recorded_setup_code = ("length, rate = known_length(model, data, item - g[0])",)
+    recorded_setup_code = ("length, rate = last_length(model, data, item - g[0])",)
     apply_code = ("pull_path(model, reals, data, y, f, item - g[0], tension)",)
-    called_functions = (path_length, known_length, pull_path)
+    called_functions = (path_length, last_length, pull_path)
 
     def read(self, builder: ElementBuilder, force: Any) -> Path:
         """Return the path of a force.

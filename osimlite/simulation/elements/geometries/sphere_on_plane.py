@@ -10,7 +10,15 @@ import numpy as np
 from osimlite.errors import ModelError
 from osimlite.mechanics.kernels.pointers import Floats, Ints
 from osimlite.mechanics.kernels.points import apply_force, direction, station, velocity
-from osimlite.mechanics.laws.vectors import Vector, along, dot, minus, put, times, vector
+from osimlite.mechanics.laws.vectors import (
+    Vector,
+    add_scaled,
+    dot,
+    minus,
+    store_vector,
+    times,
+    vector,
+)
 from osimlite.mechanics.multibody.links import Places
 from osimlite.schema.contact import ContactHalfSpace, ContactSphere
 from osimlite.simulation.elements.builder import ElementBuilder, get_class_name
@@ -33,7 +41,7 @@ def compute_sphere_depth(
     center = station(model, data, g[1], vector(gp, 6))
     d = gp[9] - dot(minus(center, o), n)
     # The point of contact is midway between the surfaces.
-    put(work, 3, along(center, 0.5 * d - gp[9], n))
+    store_vector(work, 3, add_scaled(center, 0.5 * d - gp[9], n))
     return d, gp[9], n
 
 
@@ -49,7 +57,7 @@ def push_both(model: Ints, data: Floats, g: Ints, work: Floats, force: Vector) -
 
     The force goes into the record.
     """
-    put(work, 0, force)
+    store_vector(work, 0, force)
     apply_force(model, data, g[1], vector(work, 3), force)
     apply_force(model, data, g[0], vector(work, 3), times(-1.0, force))
 

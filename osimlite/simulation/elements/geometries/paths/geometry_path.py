@@ -15,7 +15,7 @@ import numpy as np
 from osimlite.base.records import dataclass, replace
 from osimlite.errors import ModelError
 from osimlite.mechanics.kernels.cable_surfaces import CYLINDER, ELLIPSOID, SPHERE, TORUS
-from osimlite.mechanics.kernels.geodesic_paths import slots_and_room
+from osimlite.mechanics.kernels.geodesic_paths import layout_slots
 from osimlite.mechanics.kernels.layout import ITEM
 from osimlite.mechanics.kernels.path_wraps import SURFACE_WORK
 from osimlite.mechanics.kernels.paths import (
@@ -185,7 +185,7 @@ class ThroughPoints:
                 wraps += len(numbers), surface.first, surface.last, surface.begin
                 numbers += surface.numbers
             most = max(Counter(surface.first for surface in self.surfaces).values())
-            slots, work = slots_and_room(most, len(self.surfaces), work)
+            slots, work = layout_slots(most, len(self.surfaces), work)
             kernel, wraps = "geodesic_path", wraps + slots
         return [
             *parts,

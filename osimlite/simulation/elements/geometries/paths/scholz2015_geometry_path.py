@@ -27,7 +27,7 @@ from osimlite.mechanics.kernels.cable_paths import (
     TOUCH_NUMBERS,
     TRACKED,
     cable_path,
-    solver_room,
+    solver_size,
 )
 from osimlite.mechanics.kernels.cable_surfaces import (
     CYLINDER,
@@ -38,7 +38,7 @@ from osimlite.mechanics.kernels.cable_surfaces import (
     START,
     STEP,
     TORUS,
-    value,
+    surface_value,
 )
 from osimlite.mechanics.kernels.layout import ITEM
 from osimlite.mechanics.kernels.paths import LENGTH
@@ -162,7 +162,7 @@ class Cable:
             "cable_path",
             (*head, *ints),
             tuple(numbers),
-            record_size=work + solver_room(most),
+            record_size=work + solver_size(most),
             is_part=True,
         )
         return [ForceRecord("pull_cable", is_part=True), path]
@@ -274,7 +274,7 @@ def _is_enclosed(builder: ElementBuilder, point_item: Any, geometry: ContactGeom
         placed = state.transform(point.body) @ np.array([*point.runs, 1.0])
         x, y, z = (frame[:3, :3].T @ (placed[:3] - frame[:3, 3])).tolist()
         # A half-space is solid where x is positive.
-        depth = x if surface is None else value(np.array(surface), (x, y, z))
+        depth = x if surface is None else surface_value(np.array(surface), (x, y, z))
         if depth > 0.0:
             return True
     return False
