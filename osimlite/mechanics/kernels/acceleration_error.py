@@ -49,8 +49,7 @@ def move_drift(
         last = own[TURNS + row]
         if last < 0:
             continue
-        # What Simbody takes for the rates of the angles before this one turns its axis, and should
-        # not.
+        # Simbody rotates the axis of this angle by wrong rates of the angles before it.
         drift = ZERO
         for turn in range(3):
             number = own[TURNS + turn]

@@ -28,9 +28,8 @@ from osimlite.mechanics.kernels.linear_algebra import (
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call, copy_numbers, is_finite
 from osimlite.mechanics.kernels.projection import collect_position_errors, write_position_jacobian
 
-# Integers: the head, then what each degree of freedom is, three arrays (n,), room for a list (n,)
-# of those that are free, and of each coupler the degree of freedom that depends on others and its
-# equation.
+# Integers: the head; three arrays (n,) about the degrees of freedom; workspace for a list of free ones
+# (n,); per coupler the dependent degree of freedom and the number of its equation.
 MOVES_LINKS = 0
 """Offset of 1 if the equations need positions of links, 0 if they need coordinates only."""
 COUPLERS = 1
@@ -175,7 +174,7 @@ def find_nearest(a: Assembly, target: Floats, q: Floats) -> bool:
     list_freed(a)
     trial = at(a.w, 4 * size)
     largest = evaluate_equations(a, q)
-    # OpenSim leaves such a pose as it is; its integrator takes the shortest way to the constraints.
+    # OpenSim leaves an assembled pose unchanged; its integrator projects it onto the constraints.
     is_assembled = largest <= tolerance
     if not is_assembled:
         follow_couplers(a, q)
@@ -183,11 +182,12 @@ def find_nearest(a: Assembly, target: Floats, q: Floats) -> bool:
         return False
     if is_assembled:
         return True
+    # Minimize the change of the coordinates along the constraints.
     before, has_curvature, step = inf, False, at(a.w, size)
     for _ in range(MAX_STEPS):
         value = measure_change(a, target, q)
         if value < tolerance * tolerance:
-            # Nothing that counts has moved.
+            # No coordinate that counts has moved.
             return True
         length = find_step(a, target, q, has_curvature)
         if not has_curvature and length > FAST * before:
@@ -210,7 +210,7 @@ def find_nearest(a: Assembly, target: Floats, q: Floats) -> bool:
             if part < 1e-3:
                 break
         if part < 1e-3:
-            # Nothing is nearer within rounding, or the step without the curvature led astray.
+            # The step does not decrease the cost: rounding, or the missing curvature of the constraints.
             if has_curvature:
                 return True
             has_curvature, before = True, inf
@@ -451,7 +451,7 @@ def add_curvature(
             total = 0.0
             for j in range(free):
                 total += along[free * m + j] * row_change[j]
-            # Half of it on either side of the diagonal, so that rounding does not make it lopsided.
+            # Half on either side of the diagonal keeps the matrix symmetric despite rounding.
             curvature[left * k + m] += 0.5 * total
             curvature[left * m + k] += 0.5 * total
 

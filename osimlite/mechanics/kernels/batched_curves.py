@@ -61,7 +61,7 @@ def request_value(x: Floats, room: Floats, number: int, place: int, z: float) ->
     end = FIRST if not z >= c[FIRST] else LAST
     if end == FIRST or z > c[LAST]:
         lane[LANES * VALUE] = c[end + 1] + c[end + 2] * (z - c[end])
-        # A search that is at its end.
+        # A linear section whose search converges at once.
         lane[LANES * INSIDE] = lane[LANES * REST] = lane[LANES * U] = 0.0
         lane[LANES * OF_X] = 1.0
         return

@@ -382,7 +382,7 @@ def correct_geodesics(
                 )
                 back = at(a, (4 * number - 2) * size + 4 * number)
                 set_far_rows(other, GROUND_END, line, part, GROUND_START, back, size)
-            # Lengths are to change little as long as the path is rough.
+            # Penalize changes of the length in proportion to the kinks, as Scholz et al. do.
             a[(4 * count + number) * size + 4 * number + 3] = rough
             values[4 * count + number] = 0.0
             number, before = number + 1, k

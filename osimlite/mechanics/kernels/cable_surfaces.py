@@ -355,8 +355,7 @@ def extrapolate_step(p: Floats, step: float, work: Floats) -> bool:
             geodesic_derivative(p, new, f)
             for k in range(SIZE):
                 old[k], new[k] = new[k], old[k] + 2.0 * h * f[k]
-        # Neville's scheme towards h = 0: each row takes the place of the one before, from its end
-        # on.
+        # Neville's scheme towards h = 0: each row overwrites the previous one, from its end on.
         error = 0.0
         for other in range(column - 1, -1, -1):
             row, last, ratio = (

@@ -179,7 +179,7 @@ def move_joints(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) 
                 shares,
             )
         else:
-            # The joint stands still, and accelerates all the same.
+            # The joint of a drift has no motion, but an acceleration.
             turn = at(a, OPERATION_WORK.AXIS + part)
             moves[0] = moves[count] = 0.0
             moves[2 * count] = (

@@ -63,7 +63,7 @@ def evaluate_arc(
         Value, first derivatives by a and b, second derivatives by a a, a b and b b.
     """
     sa, ca, sb, cb = sin(a), cos(a), sin(b), cos(b)
-    # The cosine of the whole angle, with its derivatives by the two.
+    # Cosine of the total angle, with its derivatives by both angles.
     c, ga, gb, haa, hab, hbb = ca * cb, -sa * cb, -ca * sb, -ca * cb, sa * sb, -ca * cb
     component = int(table[COMPONENT])
     share, first, second = axial_ratio(table, c) if component == 1 else transverse_ratio(table, c)
@@ -73,7 +73,7 @@ def evaluate_arc(
         first * hbb + second * gb * gb,
     )
     oa, ob = first * ga, first * gb
-    # Times the direction in which it bends.
+    # Factor for the direction in which the rod bends.
     v, va, vb, vaa, vab, vbb = 1.0, 0.0, 0.0, 0.0, 0.0, 0.0
     if component == 0:
         v, vb, vbb = -sb, -cb, sb

@@ -52,7 +52,7 @@ def constrained_dynamics(
     h, size = at(model, model[MODEL.CONSTRAINED]), model[MODEL.DOFS]
     right = at(f, size)
     evaluate_constraints(model, reals, data, y, f)
-    # Of the mass matrix and the forces, nothing is left when they have been solved for.
+    # Copy mass matrix and forces, as the solver overwrites them.
     system, matrix = (
         at(data, h[CONSTRAINED.WORK_SYSTEM]),
         at(data, model[model[MODEL.DOF_AT] + DOF.ROW]),
@@ -137,7 +137,7 @@ def solve_by_multipliers(model: Ints, data: Floats, right: Floats, room: Floats)
         for k in range(size):
             turned[k] *= scales[k]
     factorise_by_law(model, data, count, weighted, SLIGHT * sqrt(count))
-    # The second time mends the rounding of the first.
+    # The second pass removes rounding errors of the first.
     for _ in range(2):
         for i in range(count):
             row, missing = at(rows, size * i), drifts[i]
@@ -201,7 +201,7 @@ def solve_in_null_space(
         at(data, h[CONSTRAINED.WORK_DRIFTS]),
         at(data, h[CONSTRAINED.WORK_FACTOR]),
     )
-    # All equations weigh the same, but those that are rounding errors.
+    # Scale all equations to unit length, and drop those that are rounding errors.
     values, spare = room, at(room, count)
     longest = 0.0
     for i in range(count):

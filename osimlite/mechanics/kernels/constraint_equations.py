@@ -171,7 +171,7 @@ def bind_bodies(
         elif own[0] == DISTANCE:
             length = norm(b)
             error = length - wanted
-            # No direction is better than another to leave a point in.
+            # At zero distance any direction of the rate is as good.
             e, stretch = (1.0, 0.0, 0.0), 0.0
             if length > 0.0:
                 e = divide(b, length)
@@ -231,7 +231,7 @@ def differentiate_vector(
         acceleration(model, reals, data, two, end), acceleration(model, reals, data, one, start)
     )
     if kind[0] == MEETING:
-        # As what carries both sees it.
+        # Subtract the Coriolis acceleration of the nearest common ancestor of both links.
         while one != two:
             if one > two:
                 one = link_ints(model, one)[LINK.PARENT]
@@ -280,7 +280,7 @@ def add_wrench_row(
     model: Ints, data: Floats, link: int, torque: Vector, force: Vector, row: Floats
 ) -> None:
     """Add to a row the generalized forces of a wrench on a link about the origin of its spatial vectors."""
-    # Welded bodies may be links of their own.
+    # Links without degrees of freedom, such as welded bodies, transmit the wrench to their parent.
     while (
         link >= 0 and link_ints(model, link)[LINK.FIRST_DOF] == link_ints(model, link)[LINK.END_DOF]
     ):

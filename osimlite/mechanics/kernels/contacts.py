@@ -226,7 +226,7 @@ def write_response(
     change, (pressed, damped, dragged) = at(data, WORK.SCRATCH), changes
     way, by_depth = n, 0.0
     if axis > 0:
-        # Any two directions across the normal do.
+        # Any two directions perpendicular to the normal and each other serve.
         nx, ny, nz = n
         way = divide(cross(n, (1.0, 0.0, 0.0)), sqrt(ny * ny + nz * nz))
         if abs(nx) > 0.7:

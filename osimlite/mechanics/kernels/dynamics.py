@@ -187,13 +187,14 @@ def spatial_inertias_and_bias(model: Ints, reals: Floats, data: Floats) -> None:
         cx, cy, cz = center
         mx, my, mz = times(m, center)
         one, two, three = vector(r, 0), vector(r, 3), vector(r, 6)
-        # Rows of R I.
+        # Rows of R I, where I is the inertia in the link.
         first, second = (
             multiply_symmetric(at(b, INERTIA.MOMENTS), one),
             multiply_symmetric(at(b, INERTIA.MOMENTS), two),
         )
         third = multiply_symmetric(at(b, INERTIA.MOMENTS), three)
         i[0], i[1], i[2], i[3] = m, mx, my, mz
+        # Inertia about the origin: R I Rᵀ plus the parallel axis terms.
         i[4] = dot(first, one) + my * cy + mz * cz
         i[5] = dot(second, two) + mx * cx + mz * cz
         i[6] = dot(third, three) + mx * cx + my * cy
@@ -201,6 +202,7 @@ def spatial_inertias_and_bias(model: Ints, reals: Floats, data: Floats) -> None:
         i[8] = dot(first, three) - mx * cz
         i[9] = dot(second, three) - my * cz
         spin, velocity = vector(here, LINK_WORK.VELOCITY), vector(here, LINK_WORK.VELOCITY + 3)
+        # Newton-Euler equation: wrench = I a + v x* (I v).
         angular, linear = spatial_momentum(i, spin, velocity)
         torque, force = spatial_momentum(
             i, vector(here, LINK_WORK.ACCELERATION), vector(here, LINK_WORK.ACCELERATION + 3)
@@ -215,7 +217,7 @@ def add_accelerations(model: Ints, data: Floats, udot: Floats) -> None:
     columns = at(data, model[MODEL.WORK_COLUMN])
     for link in range(model[MODEL.LINKS]):
         j, here = link_ints(model, link), link_work(model, data, link)
-        # The wrench is not needed yet; its place has what the links before add.
+        # The wrench is not needed yet: its entries hold the accelerations that parents contribute.
         turn, shift = ZERO, ZERO
         if j[LINK.PARENT] >= 0:
             above = at(link_work(model, data, j[LINK.PARENT]), LINK_WORK.WRENCH)
@@ -306,7 +308,7 @@ def composite_rigid_body(model: Ints, data: Floats, right: Floats) -> None:
                 column += 1
         if j[LINK.PARENT] >= 0:
             above = at(link_work(model, data, j[LINK.PARENT]), LINK_WORK.INERTIA)
-            # The wrench stands behind the inertia.
+            # Inertia (10) and wrench (6) are adjacent, and both are summed.
             for k in range(16):
                 above[k] += i[k]
 
@@ -329,6 +331,7 @@ def solve_accelerations(model: Ints, data: Floats, right: Floats) -> int:
     )
     for k in range(size):
         pivots[k] = data[freedoms[DOF.SIZE * k + DOF.ROW]]
+    # Factorise M = Lᵀ D L from the leaves to the root, and solve with Lᵀ and D on the way.
     for k in range(size - 1, -1, -1):
         j = at(freedoms, DOF.SIZE * k)
         row, depth, i = at(data, j[DOF.ROW]), j[DOF.DEPTH], j[DOF.ABOVE]

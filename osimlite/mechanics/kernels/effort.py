@@ -178,7 +178,7 @@ def minimize_powers(
     targets, compliances, tried = work, at(work, n), at(work, 4 * n + m * (m + 5))
     terms = at(work, 4 * n + 3 * m)
     for _ in range(NEWTON_STEPS):
-        # The largest x is the unit: its powers are neither too large nor too small for floats.
+        # Scale by the largest |x|, so that its powers neither overflow nor underflow.
         unit, stiffest = 0.0, 0.0
         for j in range(n):
             unit = max(unit, abs(x[j]))
@@ -187,7 +187,7 @@ def minimize_powers(
         for j in range(n):
             size = abs(x[j]) / unit
             size = max(size, SMALLEST) if power < 2.0 else size
-            # Below 2 Newton's steps go too far; what bounds |x|ᵖ from above by a square is steeper.
+            # For p < 2 Newton steps overshoot: use the steeper quadratic majorizer of |x|^p.
             compliances[j] = max(power - 1.0, 1.0) * size ** (power - 2.0)
             stiffest = max(stiffest, compliances[j])
         for j in range(n):
@@ -270,6 +270,7 @@ def solve_weighted_least_squares(
             trace += matrix[m * k + k]
         for k in range(m):
             slight[k] = SLIGHT * (trace / m if trace > 0.0 else 1.0)
+        # Newton's method on the dual function with the present proximal term.
         best, since = error, 0
         for _ in range(ROUNDS):
             since += 1
@@ -384,7 +385,7 @@ def compute_residual(
             residual[k] -= term
             terms[k] += abs(term)
     for k in range(m):
-        # An equation without a term holds.
+        # An equation without terms is fulfilled.
         terms[k] = terms[k] if terms[k] > 0.0 else 1.0
         largest = max(largest, abs(residual[k]) / terms[k])
     return largest

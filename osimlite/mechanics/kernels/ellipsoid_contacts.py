@@ -98,7 +98,7 @@ def early_return(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats,
         mean /= count
         for k in range(count):
             spread += abs(centers[3 * k + side] - mean)
-        # Of the first two it is the second where they are equal.
+        # Simbody chooses y over x where both are equal.
         if spread > widest or (side == 1 and spread == widest):
             axis, widest = side, spread
     for k in range(count):

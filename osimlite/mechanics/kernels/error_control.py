@@ -99,12 +99,12 @@ def judge_step(h: Floats, t1: float, error: float, order: float) -> None:
         order: order of the error.
     """
     limit, step, accuracy = h[LAST_TIME], h[NEXT_STEP], h[ACCEPTED]
-    # A step cut much shorter tells nothing about the next.
+    # A step that was cut much shorter is no basis for the size of the next one.
     cut = limit < h[REACHED] + 0.95 * step
     h[NEXT_STEP] = min(
         max(next_step_size(step, error, accuracy, cut, order), h[SHORTEST]), h[LONGEST]
     )
-    # The shortest step that is allowed is taken whatever its error, as in Simbody.
+    # As in Simbody, the shortest allowed step is accepted whatever its error.
     if error <= accuracy or (step <= h[SHORTEST] and error < inf):
         h[REACHED] = t1
 
@@ -128,7 +128,7 @@ def project_by_law(
         data: results of an evaluation.
         t: time (s).
         y: state; changed.
-        state_errors: estimated errors of the state, see `projection.project_state`.
+        state_errors: estimated errors of the state, see `projection.project`.
         has_errors: 0 if no errors are known.
         tolerance: accepted errors of the constraints.
         limit: largest errors to start from.
@@ -173,7 +173,7 @@ def project_and_measure(
         is_strict: whether the largest error of an auxiliary state counts, see `error_norm`.
     """
     error = error_norm(model, y0, errors, h, is_strict)
-    # As in Simbody: what half a step would not mend, neither does the projection.
+    # As in Simbody: a projection cannot repair an error that half a step would not.
     if model[MODEL.CONSTRAINED] == 0 or not error <= 16.0 * h[ACCEPTED]:
         return error
     tolerance = h[ACCEPTED] / 10.0

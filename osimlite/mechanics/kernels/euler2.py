@@ -55,7 +55,7 @@ def euler2(model: Ints, reals: Floats, data: Floats, y0: Floats, y1: Floats, pla
     if take_half_steps(model, reals, data, t0, t1, y0, y1, whole, at(whole, size)) == OUTCOME.OK:
         for k in range(size):
             errors[k] = y1[k] - whole[k]
-        # As in Simbody, whatever the error is, and the error is left as it is.
+        # As in Simbody, project whatever the error is, and keep the error unchanged.
         if model[MODEL.CONSTRAINED] == 0 or project_by_law(
             model, reals, data, t1, y1, errors, 0, tolerance, max(2.0 * tolerance, sqrt(tolerance))
         ):
@@ -138,7 +138,7 @@ def advance_state(
     for k in range(n):
         new[k] = y[k]
     if has_balls(model):
-        # Their rates depend on where they stand.
+        # Rates of ball joints depend on their angles.
         data[WORK.TIME] = t
         status = call(model[MODEL.LAWS], model, reals, data, new, rates, STAGE.VELOCITY)
         if status != OUTCOME.OK:

@@ -224,8 +224,8 @@ def bend_segment(i: Ints, p: Floats, record: Floats, one: int, two: int) -> int:
             for k in range(SLOT * (count + 1)):
                 best[k] = chain[k]
         way += step
-        # There need not be a geodesic where one is looked for on an ellipsoid, but a shortest one
-        # there is; and there is none where surfaces cut each other.
+        # On an ellipsoid there may be no geodesic near the start, but there is a shortest one;
+        # where surfaces intersect there is none.
         if way == WAYS and least == inf and stage < ALONE:
             way, stage = 0, stage + 1
     return most
@@ -285,7 +285,7 @@ def fill_slots(
             if not chain[SLOT * k + GEODESIC + ARC] > 0.0:
                 remove_slot(chain, count, k)
                 count -= 1
-        # What was left is met again, if at all, once the rest is smooth.
+        # A surface that was removed may be inserted again once the rest is smooth.
         if count == before:
             number, place, axis = find_largest_turn(i, p, wraps, poses, one, chain, count, room)
             if (place == 0 and not waits) or (count > 0 and stage == ALONE):
@@ -306,8 +306,8 @@ def fill_slots(
                         if which > 1:
                             axis = cross(axis, unit(minus(b, a)))
                         store_vector(pose, ABOUT, times(-1.0 if which % 2 == 1 else 1.0, axis))
-                        # Elsewhere than first it waits for what else is met: alone it might slide
-                        # back.
+                        # In other directions than the first, wait for further surfaces: alone, the
+                        # segment might slide back.
                         waits = which > 0 and stage < ALONE
                 insert_slot(numbers, pose, chain, count, place, number)
                 if not lay_chain(numbers, pose, chain, count + 1, place, stage, room):
@@ -429,8 +429,8 @@ def find_largest_turn(
                     turn, point, way, _ = start_on_surface(
                         numbers, a, b, pose[HOW], (0.0, 0.0, 0.0), work
                     )
-                    # Which line meets it is told by the shorter way; it is met, also if no other
-                    # way is found.
+                    # The shorter way decides which line meets the surface, even if there is no
+                    # other way.
                     if turn > TOUCH and norm(about) > 0.0:
                         other, there, onwards, _ = start_on_surface(
                             numbers, a, b, pose[HOW], about, work

@@ -195,7 +195,7 @@ def start_on_cylinder(
         == NONE
     ):
         return 0.0, first, second, 0.0
-    # Angles from the middle of the active side; or from the first end.
+    # Angles are measured from the middle of the active side, or from the first end.
     if is_open:
         ux, uy = px, py
     one, two = (
@@ -277,7 +277,7 @@ def start_on_ellipsoid(
         return 0.0, first, way, 0.0
     out = middle
     if p[KIND] == ELLIPSOID or norm(cross(middle, way)) < LEAST:
-        # Of two ways both begin where it is narrow.
+        # Of two opposite directions both start at the narrow side.
         out = way_out(
             radii,
             times(0.0 if norm(about) > 0.0 else 1.0, multiply_elementwise(radii, middle)),
@@ -288,12 +288,12 @@ def start_on_ellipsoid(
         out = times(
             -1.0 if dot(about, cross(out, multiply_elementwise(radii, way))) < 0.0 else 1.0, out
         )
-        # Across the side where it is least deep: another surface may make that the shortest.
+        # Perpendicular to the least deep direction: another surface may make that the shortest.
         other = cross(multiply_elementwise(radii, way), about)
         if p[KIND] == SPHERE and dot(unit(other), unit(out)) < ASIDE:
             out = other
     if side != 0.0 and not is_on_side(out, axis, side):
-        # Towards where a mirror would have it, which itself is near no geodesic.
+        # Towards the mirror image, which itself is near no geodesic.
         mirrored = replace_component(out, axis, -component(out, axis))
         out = times(1.0 if dot(mirrored, out) >= 0.0 else -1.0, out)
     out = multiply_elementwise(scale, out)
@@ -403,7 +403,7 @@ def start_on_string(p: Floats, turn: float, first: Vector, second: Vector, work:
     one, two = BEADS, 0
     while stride > 0:
         for pull in range(PULLS + 1):
-            # Those that are new come first.
+            # The first sweep sets the new beads only.
             for k in range(stride, BEADS, stride if pull > 0 else 2 * stride):
                 bead = times(
                     0.5, plus(vector(work, 3 * (k - stride)), vector(work, 3 * (k + stride)))

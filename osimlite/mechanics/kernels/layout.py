@@ -51,7 +51,7 @@ def _names(record: Record) -> tuple[str, ...]:
     return tuple(offsets[number] for number in range(end))
 
 
-# Integers: a head with counts and offsets, then records.
+# Records of integers in `model`: a head with counts and offsets, then all others.
 class MODEL(metaclass=Record):
     """Head of the model: counts, and the offsets of all other records."""
 
@@ -386,7 +386,7 @@ class JOINT_KIND(metaclass=Record):
     LINE, AMOUNT_OF, ANGLE, ELLIPSOID, ERROR = range(5)
 
 
-# Numbers.
+# Records of floats in `reals` and `data`.
 GRAVITY_AT = 0
 """Offset in reals of gravity in ground (3,), m/s²."""
 INERTIA_AT = 3
@@ -471,7 +471,7 @@ class CONTACT_WORK(metaclass=Record):
     FORCE, DEPTH, RADIUS, SIZE = accumulate((6, 1, 1), initial=0)
 
 
-# Kinds.
+# Alternatives.
 class MOTION(metaclass=Record):
     """Types of motions; those before BALL have one axis.
 

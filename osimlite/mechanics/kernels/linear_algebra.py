@@ -19,9 +19,6 @@ REDUNDANT = 1e-9
 ROUNDING = 1e-13
 """Equations shorter than this (m, rad), or than this part of the longest one, are rounding errors."""
 
-# A factor of count equations for size unknowns: the turned equations with the reflections (count,
-# size), their diagonal and order (2, count), and if there are more equations than count, these
-# turned once more (count, count) with diagonal; at the end how many equations count.
 FACTOR_EXTRA = 3
 """Number of vectors (count,) in a factor: diagonal, order, diagonal of the second reduction.
 
@@ -136,7 +133,7 @@ def factorise_equations(count: int, size: int, a: Floats, smallest: float) -> in
             apply_reflection(r, size, 1, row, 1, at(a, size * i))
         rank += 1
     if rank < count:
-        # The lower trapezoid (count, rank) is turned into a triangle.
+        # Reduce the lower trapezoid (count, rank) to a triangle by reflections of its columns.
         t, corner = at(a, count * size + FACTOR_EXTRA * count), at(a, count * size + 2 * count)
         for i in range(count):
             for k in range(rank):
@@ -169,7 +166,7 @@ def make_reflection(first: int, end: int, stride: int, length: float, v: Floats)
     value = -length if lead > 0.0 else length
     if length > 0.0:
         v[stride * first] = lead - value
-        # So that the square of the vector is 2.
+        # Scale the vector to the squared norm 2, so that the reflection needs no division.
         scale = 1.0 / sqrt(length * (length + abs(lead)))
         for k in range(first, end):
             v[stride * k] *= scale

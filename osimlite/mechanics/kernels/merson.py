@@ -82,7 +82,7 @@ def compute_stages(
     size, h = model[MODEL.STATE_SIZE], t1 - t0
     f0, fa, fb, fc = at(y0, size), stages, at(stages, size), at(stages, 2 * size)
     for stage in range(4):
-        # Where the next evaluation is to be.
+        # Choose the argument and the time of the next evaluation.
         f, t = fa, t1
         if stage == 0:
             c = h / 3.0
@@ -98,7 +98,7 @@ def compute_stages(
             for k in range(size):
                 ya[k] = y0[k] + c * (f0[k] + 3.0 * fb[k])
         else:
-            # Its error is of one order less than that of y1.
+            # This embedded result has an error of one order less than y1.
             c = h / 2.0
             for k in range(size):
                 ya[k] = y0[k] + c * (f0[k] - 3.0 * fb[k] + 4.0 * fc[k])
@@ -109,7 +109,6 @@ def compute_stages(
     c = h / 6.0
     for k in range(size):
         y1[k] = y0[k] + c * (f0[k] + 4.0 * fc[k] + fa[k])
-        # The fifth is taken of each entry, not of the norm: so every rounding is Simbody's, and its
-        # steps too.
+        # Divide each entry by five, not the norm, so that all roundings and steps are Simbody's.
         ya[k] = 0.2 * (y1[k] - ya[k])
     return OUTCOME.OK

@@ -65,6 +65,7 @@ def place_links(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) 
     """
     for link in range(model[MODEL.LINKS]):
         i, here = link_ints(model, link), link_work(model, data, link)
+        # Start from the frame of the parent, or of ground.
         axes, origin = (X, Y, Z), ZERO
         if i[LINK.PARENT] >= 0:
             parent = link_work(model, data, i[LINK.PARENT])
@@ -73,6 +74,7 @@ def place_links(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) 
             record = model[MODEL.OPERATION_AT] + OPERATION.SIZE * operation
             j, a = at(model, record), operation_work(model, data, operation)
             b = at(reals, model[MODEL.FIXED_AT] + FIXED.SIZE * operation)
+            # Apply the fixed transform before the motion.
             if j[OPERATION.BEFORE] != TRANSFORM.NOTHING:
                 origin = plus(origin, combine_axes(axes, vector(b, FIXED.TRANSLATION)))
                 if j[OPERATION.BEFORE] == TRANSFORM.MOVE:
@@ -92,6 +94,7 @@ def place_links(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) 
                         operation,
                     )
                     amount = a[OPERATION_WORK.AMOUNT]
+                # Rotate about z, or translate along the axis; keep the axis for the velocities.
                 if motion == MOTION.TURN:
                     one, two, three = axes
                     store_vector(a, OPERATION_WORK.AXIS, three)
@@ -111,6 +114,7 @@ def place_links(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) 
                 set_frame(frame, axes, origin)
                 call(model[MODEL.LAWS + j[OPERATION.FUNCTION]], model, reals, data, y, f, operation)
                 axes, origin = axes_from_rows(frame), vector(frame, LINK_WORK.POSITION)
+        # All links of a tree share the origin of its first link for their spatial vectors.
         set_frame(here, axes, origin)
         if i[LINK.PARENT] >= 0:
             origin = vector(link_work(model, data, i[LINK.PARENT]), LINK_WORK.ORIGIN)
@@ -158,7 +162,7 @@ def move_links(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) -
     for link in range(model[MODEL.LINKS]):
         i, here = link_ints(model, link), link_work(model, data, link)
         origin = vector(here, LINK_WORK.ORIGIN)
-        # Links that are pushed upwards move in one another as under gravity.
+        # An upward acceleration of ground has the same effect as gravity.
         spin, velocity, spin_rate, acceleration = (
             ZERO,
             ZERO,
@@ -203,7 +207,7 @@ def move_links(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) -
                             )
                 turn, shift = times(rate, turn), times(rate, shift)
             else:
-                # The origin goes to the law, and what it finds comes back.
+                # Pass the origin to the law in SCRATCH, where it returns its results.
                 result = at(data, WORK.SCRATCH)
                 store_vector(result, 0, origin)
                 status = max(
@@ -223,7 +227,7 @@ def move_links(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) -
                     plus(acceleration, vector(result, 6)),
                     plus(spin_rate, vector(result, 9)),
                 )
-            # The axes are carried around by what moved before.
+            # Coriolis terms: earlier motions carry the axes of this one.
             spin_rate = plus(spin_rate, cross(spin, turn))
             acceleration = plus(acceleration, plus(cross(velocity, turn), cross(spin, shift)))
             spin, velocity = plus(spin, turn), plus(velocity, shift)

@@ -183,7 +183,7 @@ def try_multistep(
         y1[size + k] = (psi[k] + d[k]) / c
         newest = DIFFERENCE[constants] * d[k]
         if method == BDF:
-            # Of the states as they were projected; their derivatives are not.
+            # Use differences of the projected states; their derivatives are not projected.
             newest = y1[k]
             for i in range(order + 1):
                 newest -= rows[size * i + k]
@@ -290,8 +290,7 @@ def iterate_newton(
             d[k] += change[k]
         if residual <= SOLVED * h[ACCEPTED]:
             return iteration + 1
-        # Where derivatives have become far too large, all steps are short: only what they leave
-        # tells.
+        # With outdated, too large derivatives all steps are short: check the residuals too.
         if iteration > 0:
             if not (residual < previous_residual and length < previous_length):
                 return 0
@@ -367,7 +366,7 @@ def step_factor(excess: float, order: int) -> float:
 
 def rescale_differences(size: int, method: int, h: Floats, rows: Floats, factor: float) -> None:
     """Change the step by a factor: interpolate the differences on the polynomial through the same values."""
-    # Adams' are of the derivative times the step, behind the state.
+    # Adams' differences are those of h f, and follow the state.
     order, differing = int(h[ORDER]) - method, at(rows, size * method)
     scale = factor if method == ADAMS else 1.0
     new, unit, both = (

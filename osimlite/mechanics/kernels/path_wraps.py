@@ -207,7 +207,7 @@ def wrap_surface(
                 e[BEST + j] = e[FIRST_TANGENT + j]
         if code == MANDATORY:
             break
-    # A law has no points for a piece of which OpenSim has none.
+    # The tangent points are NaN where OpenSim finds none.
     if best >= 0 and one[PLACE] == one[PLACE]:
         for k in range(count - 1, best, -1):
             order[k + 2] = order[k]

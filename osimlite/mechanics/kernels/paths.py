@@ -162,8 +162,8 @@ def place_points(model: Ints, reals: Floats, data: Floats, y: Floats, item: int)
                 if not n[LOW] <= value <= n[HIGH]:
                     continue
             else:
-                # As in OpenSim, the place is that of the clamped coordinate, its derivative that of
-                # the coordinate; of a clamped point that is zero.
+                # As in OpenSim, the position uses the clamped coordinate, and its derivative the
+                # unclamped one; for a CLAMPED node the derivative is zero outside the range.
                 clamped, t = min(max(value, n[LOW]), n[HIGH]), at(n, TURN)
                 qx, dx, _ = evaluate_function(at(p, node[TABLES]), clamped)
                 qy, dy, _ = evaluate_function(at(p, node[TABLES + 1]), clamped)

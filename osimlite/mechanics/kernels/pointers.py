@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
     Ints = NDArray[np.int64]
 else:
-    # As Python, whatever has numbers in a row and slices that are views of them.
+    # In Python: any sequence of numbers whose slices are views.
     Floats = Ints = Any
 
 Law = Callable[[Ints, Floats, Floats, Floats, Floats, int], int]

@@ -130,7 +130,7 @@ def acceleration(model: Ints, reals: Floats, data: Floats, link: int, point: Vec
     px, py, pz = minus(point, vector(here, LINK_WORK.ORIGIN))
     wx, wy, wz = v[0], v[1], v[2]
     vx, vy, vz = v[3] + wy * pz - wz * py, v[4] + wz * px - wx * pz, v[5] + wx * py - wy * px
-    # Links are pushed upwards against gravity.
+    # The accelerations of links are relative to free fall: add gravity.
     return (
         a[3] + g[0] + a[1] * pz - a[2] * py + wy * vz - wz * vy,
         a[4] + g[1] + a[2] * px - a[0] * pz + wz * vx - wx * vz,

@@ -97,7 +97,7 @@ def evaluate_pose(m: Fit, y: Floats) -> None:
     """Evaluate a pose: links, columns of the coordinates, and equations."""
     model, p, v, size = m.model, m.p, m.v, m.model[MODEL.DOFS]
     for k in range(size):
-        # So that the second derivatives of the functions are those by the coordinates.
+        # With unit speeds, curvatures of functions are second derivatives by their coordinate.
         y[size + k] = 1.0
     call(model[MODEL.LAWS], model, m.reals, m.data, y, m.f, STAGE.VELOCITY)
     if model[MODEL.CONSTRAINED] > 0:
@@ -194,7 +194,7 @@ def gather_derivatives(m: Fit, y: Floats) -> None:
             add_joint_curvature(m, y, link, load, turned)
         if j[LINK.PARENT] >= 0:
             above = at(link_work(model, data, j[LINK.PARENT]), LINK_WORK.INERTIA)
-            # The wrench stands behind the inertia.
+            # Inertia (10) and wrench (6) are adjacent, and both are summed.
             for k in range(16):
                 above[k] += i[k]
             above = at(v, p[TURNED] + 9 * j[LINK.PARENT])

@@ -171,7 +171,7 @@ def fit_frame(m: Fit, y: Floats) -> tuple[float, int, float]:
             trial[k] = y[k] if p[p[RESOLVED_AT] + k] == IDLE else 2.0 * last[k] - before[k]
         if fulfil_constraints(m, trial):
             value = evaluate_cost(m, trial)
-    # A jump is no reason to leave the pose before.
+    # If the extrapolated pose costs much more than the previous one, compare it with that.
     if not value < 4.0 * history[1 + POSES * size] + 1e-8:
         other = evaluate_cost(m, y)
         if not value < other:
@@ -183,9 +183,8 @@ def fit_frame(m: Fit, y: Floats) -> tuple[float, int, float]:
     copy_numbers(size, trial, start)
     value, steps, status = descend_to_minimum(m, trial, y, value, lightest, lightest)
     if previous_count == 0:
-        # From far away there are several ways down; small steps find others than large ones, and
-        # what begins away from the ends of its range is not held there before it is known where it
-        # belongs.
+        # From far away a descent may end in several minima. Small steps find others than large
+        # ones, and starts inside the ranges keep coordinates from being held at their ends early.
         value, more, status = descend_again(m, start, y, value, status, FIRST_DAMPING, lightest)
         steps += more
         for inwards in range(2):
@@ -219,7 +218,7 @@ def fit_frame(m: Fit, y: Floats) -> tuple[float, int, float]:
     free_ends(m)
     before = at(last, size)
     for k in range(size):
-        # A whole turn, from one end of a range to the other, is no movement to go on with.
+        # A full turn, from one end of a range to the other, is no motion to extrapolate.
         before[k] = last[k] + 2.0 * pi * floor((y[k] - last[k]) / (2.0 * pi) + 0.5)
     copy_numbers(size, y, last)
     history[0], history[1 + POSES * size] = min(previous_count + 1.0, float(POSES)), value
@@ -383,7 +382,7 @@ def descend_to_minimum(
             start[k] = y[k] + step[k]
         is_settled = fulfil_constraints(m, start)
         new = evaluate_cost(m, start) if is_settled else inf
-        # Of tiny steps rounding hides whether they lead down.
+        # For tiny steps rounding hides whether the cost decreases.
         if new <= value or (length <= 1e-6 and new <= value * (1.0 + 1e-9) + 1e-24):
             copy_numbers(size, start, y)
             value = new
@@ -395,12 +394,12 @@ def descend_to_minimum(
                 break
             before = length if damping == lightest else inf
             damping = max(0.1 * damping, lightest)
-            # Where poses look alike the whole second derivative comes last: far from the best it
-            # leads astray.
+            # Where poses fit alike, use the complete Hessian last: far from the minimum it is
+            # misleading.
             bends = steps >= PATIENCE or (damping < FIRST_DAMPING and lightest == LIGHTEST)
         else:
             if length <= 10.0 * FINEST:
-                # No better pose can be told from this one.
+                # No better pose can be distinguished from this one.
                 status = FITTED
                 break
             damping, bends, before = max(10.0 * damping, FIRST_DAMPING), steps >= PATIENCE, inf

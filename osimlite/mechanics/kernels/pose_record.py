@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from osimlite.mechanics.kernels.pointers import Floats, Ints
 
-# Integers: counts, then places in the integers.
+# Integers: counts, then offsets in the integers.
 MARKERS = 0
 """Index in the integers of the number of markers."""
 SENSORS = 1
@@ -62,14 +62,14 @@ COUNT_OF = 2
 ARGUMENTS_OF = 3
 """Offset of the degrees of freedom of the arguments."""
 
-# Numbers: of each marker place and weight, of each sensor the rotation by rows and weight, of each
-# goal the weight, of each degree of freedom the range; the numbers of the couplers.
+# Numbers: per marker position and weight, per sensor rotation by rows and weight, per goal the
+# weight, per degree of freedom the range; then the numbers of the couplers.
 MARKER_NUMBERS = 4
 """Length of the numbers of a marker: position in the link (m) and weight."""
 SENSOR_NUMBERS = 10
 """Length of the numbers of a sensor: rotation in the link by rows and weight."""
 
-# Work: places of what is there, in its integers.
+# Offsets in the workspace, which are stored in the integers.
 MEASURED = 15
 """Index of the offset in the workspace of the measurements of a frame."""
 WEIGHTS = 16

@@ -84,7 +84,7 @@ def push_each(
         data: workspace of an evaluation.
         y: workspace of a state.
         f: workspace of its derivative.
-        law: address of `inverse_dynamics`.
+        law: address of `dynamics.inverse`.
         states: time, state and accelerations, one after another.
         order: numbers of states and of actuators; per actuator its item, the index of its control, the
             item of its path and the index of its tension per unit control, both -1 without a path.

@@ -187,7 +187,7 @@ def project_speeds(
         for k in range(size):
             factor[size * i + k] = scales[k] * rows[size * i + k]
     factorise_by_law(model, data, count, factor, REDUNDANT * count)
-    # The rows do not depend on the speeds: one step does, a second one mends its rounding.
+    # G does not depend on the speeds: one step is enough, a second one removes its rounding errors.
     for _ in range(2):
         solve_by_law(model, count, factor, errors, work, step)
         for k in range(size):
@@ -276,7 +276,7 @@ def write_position_jacobian(model: Ints, data: Floats, y: Floats, rows: Floats) 
         s1, c1 = sine_cosine(y[a[0]])
         s2, c2 = sine_cosine(y[a[1]])
         for i in range(count):
-            # The speeds are the rates of the angles times their axes.
+            # The angular velocity of a ball is the sum of its axes times the rates of the angles.
             row = at(rows, size * i)
             ux, uy, uz = row[a[0]], row[a[1]], row[a[2]]
             row[a[1]] = c1 * uy + s1 * uz

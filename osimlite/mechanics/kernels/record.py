@@ -91,15 +91,15 @@ class Motion(NamedTuple):
     data: Floats  # room; at METHOD_AT the method's
     sizes: Ints  # see MOST_TRIES
     clock: Floats  # time and next step to try, s; changed
-    # steps taken, tried, evaluations, reports made, steps logged, events; changed. Events beyond
-    # the room for them are counted only.
+    # numbers of steps, tried steps, evaluations, reports, logged steps and events; changed. Events
+    # beyond the workspace are only counted.
     counts: Ints
     times: Floats  # of the reports, s (r,)
     reports: Floats  # states at these times (r, y)
     log: Floats  # of each step the time, y, f (k, 1 + 2y)
     forces: Floats  # of each step the force on surface 2 of each pair (k, P, 3)
     # time, number (of a contact, or P and the number of a watch), 1 if it begins or rises, else 0,
-    # and if there is room the state (e, 3 or 3 + y)
+    # and if the row is long enough the state (e, 3 or 3 + y)
     events: Floats
     peaks: Floats  # largest force of each pair at the end of a step, and its time (P, 2)
     # kind, degree of freedom or link or contact, and -1 or 1 if falling or rising through the level
@@ -235,6 +235,7 @@ def note_events(
         if rises == (before[number] > 0.0):
             continue
         low, high = t0, t1
+        # Bisect the interpolated motion for the change of sign.
         while high - low > TIME_OF_EVENT:
             middle = 0.5 * (low + high)
             if not low < middle < high:
@@ -254,7 +255,7 @@ def note_events(
         row = insert_event(m, first, t, number, rises)
         if row < m.sizes[MOST_EVENTS] and event > 3:
             interpolate_state(m, t0, y0, f0, t1, y1, f1, t, at(events, event * row + 3))
-    # What lies behind the end of the run has not happened.
+    # Drop events after the end of the run.
     while counts[EVENTS] > first and counts[EVENTS] <= m.sizes[MOST_EVENTS]:
         if events[event * (counts[EVENTS] - 1)] <= stop:
             break

@@ -149,7 +149,7 @@ def rosenbrock(model: Ints, reals: Floats, data: Floats, y0: Floats, y1: Floats,
         error = project_and_measure(model, reals, data, t1, y0, y1, errors, h, 1)
     factor = SAFETY * (accuracy / max(error, 1e-9 * accuracy)) ** (1.0 / 3.0)
     if not error <= accuracy:
-        # Near the resolution of the time, the step was longer than it was to be.
+        # Near the resolution of time, the actual step is longer than the requested one.
         h[NEXT_STEP] = min(max(factor, SHRINK) * step, SAFETY * h[NEXT_STEP])
         return OUTCOME.OK
     h[REACHED], h[IS_NEW] = t1, 0.0

@@ -202,8 +202,9 @@ def integrate_run(m: Motion, y: Floats, is_going: bool) -> int:
         t1 = take_step(m, t0, y0, y1)
         if t1 <= t0:
             return FAILED if t1 < t0 else TOO_MANY
+        # A step whose end has no derivative is repeated with a shorter one.
         if not is_evaluated(m, t1, y1, f1):
-            # Simbody ends here; smaller steps lead nearer to where the motion ends.
+            # Simbody ends here; smaller steps come nearer to the point where the motion ends.
             if t1 - t0 <= shortest_step(t0, counts[ATTEMPTED]):
                 return FAILED
             clock[1] = max(0.1 * (t1 - t0), shortest_step(t0, counts[ATTEMPTED]))
@@ -216,6 +217,7 @@ def integrate_run(m: Motion, y: Floats, is_going: bool) -> int:
             note_step(m, t1, y1, f1)
         end, stopped = t1, False
         h[IS_EVALUATED] = 1.0 if h[HAS_DERIVATIVE] == 0.0 and model[MODEL.CONSTRAINED] == 0 else 0.0
+        # Locate events within the step; one of them may end the run.
         if sizes[MOST_EVENTS] > 0 or sizes[WATCHES] > 0:
             h[IS_EVALUATED] = 0.0
             compute_levels(m, y1, after)
@@ -237,6 +239,7 @@ def integrate_run(m: Motion, y: Floats, is_going: bool) -> int:
                 copy_numbers(size, y1, y)
             clock[0] = end
             return STOPPED
+        # The end of this step is the start of the next one.
         y0, y1 = y1, y0
         f0, f1 = f1, f0
         copy_numbers(size, y0, y)

@@ -115,6 +115,6 @@ def compile_text(name: str, module: str, source: str, **scope: Any) -> Callable[
     known = {**RECORDS, "at": pointers.at, "__name__": module, **scope}
     file = f"<kernel {name}>"
     exec(compile(source, file, "exec", dont_inherit=True), known)
-    # Tracebacks and `inspect.getsource` show it as they show a file.
+    # Let tracebacks and `inspect.getsource` show the text as that of a file.
     linecache.cache[file] = (len(source), None, source.splitlines(keepends=True), file)
     return known[name]

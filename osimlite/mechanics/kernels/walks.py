@@ -71,7 +71,8 @@ class Walk(NamedTuple):
     room: Floats  # see LEGS
     row: Floats  # what is felt
     excitations: Floats  # that are held (c,)
-    # of each control step the state at its start, excitations, loads; of other runs see `decide`
+    # per control step the state at its start, excitations, loads; for other runs see
+    # `begin_control_step`
     record: Floats
     progress: Ints  # see STEPS
 
@@ -282,7 +283,7 @@ def take_control_steps(a: Walk, y: Floats, steps: int, is_recorded: bool) -> Non
             progress[GOING] = 0
             return
         if m.model[MODEL.CONTACTS] == 0 and m.data[m.sizes[METHOD_AT] + HAS_DERIVATIVE] > 0.0:
-            # The method has not looked at the forces at the end.
+            # The method has not evaluated the forces at the end.
             evaluate_state(m, m.clock[0], y, at(m.data, m.model[MODEL.WORK_STATE]), STAGE.FORCE)
         fill_sensor_row(m.model, m.data, y, a.senses, a.known, a.row)
         record_sensors(
@@ -429,7 +430,7 @@ def begin_control_step(a: Walk, y: Floats) -> bool:
     the method would try next.
     """
     m, progress, sensors = a.m, a.progress, a.plan[REFLEXES.SENSORS]
-    # No method knows what was, as the motion has a kink here.
+    # The motion has a kink here: the method must forget its history.
     at(m.data, m.sizes[METHOD_AT])[MEMORY] = 0.0
     apply_excitations(a)
     m.counts[EVALUATIONS] += 1

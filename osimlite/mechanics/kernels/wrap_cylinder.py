@@ -115,7 +115,7 @@ def bend_around_cylinder(
         one, two = nearest_pair(a1, b1, a2, b2)
         far = long = False
     else:
-        # One way around the cylinder is from a to b, the other from b to a.
+        # One path around the cylinder is from a1 to b2, the other from b1 to a2.
         wide = dot(a1, b2) < dot(b1, a2)
         from_a = starts_at_a(
             set_height(a1, pz),
@@ -134,8 +134,8 @@ def bend_around_cylinder(
     normal = unit(cross(minus(first, apex), minus(second, apex)))
     z1, z2 = edge_height(one, pz, first, normal), edge_height(two, qz, first, normal)
     if abs(qz) < EPSILON:
-        # OpenSim takes the foot of the second end for a direction, which it is none if that is the
-        # origin: then all heights count as that of the first end.
+        # OpenSim uses the foot of the second end as a direction, which is undefined at the origin:
+        # all heights then count as that of the first end.
         z1, z2 = pz, z2 if pz != qz else qz
     else:
         z1, z2 = (
@@ -282,7 +282,7 @@ def smooth_heights(
         _, _, height1 = first
         _, _, height2 = second
         w1 = next_height(leg1, height1, z1, z1 + part * rise)
-        # By now the helix has moved with its first point.
+        # The helix has moved with its first point.
         w2 = next_height(leg2, height2, z2, w1 + (1.0 - part) * rise)
         if w1 == z1 and w2 == z2:
             break

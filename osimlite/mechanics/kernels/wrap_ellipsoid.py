@@ -319,7 +319,7 @@ def damped_step(
     x = replace_component(x, 0, more * component(x, 0))
     y = replace_component(y, 1, more * component(y, 1))
     z = replace_component(z, 2, more * component(z, 2))
-    # Without d, and then by Cramer's rule.
+    # Eliminate d, then use Cramer's rule.
     mixed = add_scaled(by_end, 2.0, n)
     bx, by, bz = times(-0.5 / more, mixed)
     x, y, z = add_scaled(x, bx, mixed), add_scaled(y, by, mixed), add_scaled(z, bz, mixed)

@@ -81,7 +81,7 @@ def _make_section(first: Point, last: Point, curviness: float) -> Numbers:
     (x0, y0, slope0), (x1, y1, slope1) = first, last
     if not 0.0 <= curviness <= 1.0:
         raise ValueError("its curviness is not from 0 to 1")
-    # Where the lines meet.
+    # Intersection of the lines.
     x = (
         (y1 - y0 - x1 * slope1 + x0 * slope0) / (slope0 - slope1)
         if abs(slope0 - slope1) > 2.0**-26
@@ -108,7 +108,7 @@ def _list_starts(x: Sequence[float], width: float) -> list[float]:
     for node in range(NODES + 1):
         low, high, u = u, 1.0, min(u + step, 1.0)
         for _ in range(ROUNDS):
-            # Newton's method, or halves where it would leave the interval.
+            # Newton's method, or bisection where it would leave the interval.
             off, slope = (
                 _evaluate_without_constant(x, u) - width * node / NODES,
                 _evaluate_derivative(x, u),
@@ -209,7 +209,7 @@ def take_halley_step(
         u, and whether more steps are necessary.
     """
     a, b, d, e, f = c[p], c[p + apart], c[p + 2 * apart], c[p + 3 * apart], c[p + 4 * apart]
-    # In halves, which a processor computes side by side.
+    # Two halves of the polynomial, which a processor evaluates in parallel.
     v = u * u
     off = u * ((a + u * b) + v * ((d + u * e) + v * f)) - rest
     run = (a + u * (2.0 * b)) + v * ((3.0 * d + u * (4.0 * e)) + v * (5.0 * f))
@@ -268,7 +268,7 @@ def solve_sum(c: Sequence[float], of_y: float, of_x: float, total: float) -> tup
     if end > 0:
         return extrapolate_sum(c, of_y, of_x, total, end), total - total
     k, rest, u = find_section_of_sum(c, of_y, of_x, total)
-    # As numbers in a row, which on_section takes.
+    # Coefficients of the sum in one array, as `search_section` takes them.
     own = (
         of_y * c[k + Y + 1] + of_x * c[k + X],
         of_y * c[k + Y + 2] + of_x * c[k + X + 1],

@@ -92,11 +92,11 @@ def ellipsoid_ellipsoid(
         s1, s2 = sqrt(dot(g1, n)), sqrt(dot(g2, n))
         h = s1 + s2 - dot(n, centre_line)
         if h <= 0.0:
-            # A plane across n parts the two.
+            # A plane perpendicular to n separates the ellipsoids.
             return h, 0.0, ZERO, ZERO
         tries += 1
         if h > least * (1.0 + 1e-12) and tries < 100:
-            # Too long a step: half of it.
+            # The step is too long: halve it.
             step = times(0.5, step)
             n = plus(known, step)
             n = divide(n, norm(n))
@@ -106,13 +106,13 @@ def ellipsoid_ellipsoid(
         u, v = make_perpendiculars(n)
         gu1, gv1, huu1, huv1, hvv1 = differentiate_support(axes1, squares1, g1, s1, u, v)
         gu2, gv2, huu2, huv2, hvv2 = differentiate_support(axes2, squares2, g2, s2, u, v)
-        # How fast the overlap grows along u and v.
+        # Gradient of the overlap along u and v.
         fu, fv = gu1 + gu2 - dot(centre_line, u), gv1 + gv2 - dot(centre_line, v)
         if fu * fu + fv * fv <= 1e-26 * (s1 + s2) * (s1 + s2) or tries >= 100:
             break
         huu, huv, hvv = huu1 + huu2 - h, huv1 + huv2, hvv1 + hvv2 - h
         if huu <= 0.0 or huu * hvv - huv * huv <= 0.0:
-            # Deep within each other the overlap is no bowl; without what bends it down it is.
+            # At deep overlap the Hessian is indefinite; without its negative part it is positive.
             huu += h
             hvv += h
         determinant = huu * hvv - huv * huv

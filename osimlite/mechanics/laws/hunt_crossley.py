@@ -222,7 +222,7 @@ def contact_derivatives(
     f = elastic * (1.0 + 1.5 * c * vn)
     if f <= 0.0:
         return 0.0, 0.0, 0.0
-    # Without slip it is the limit: the coefficient grows in proportion.
+    # Without slip use the limit, as the coefficient is proportional to small slip.
     w = max(norm(add_scaled(v, -vn, n)), 1e-6 * vt, 1e-12)
     return 1.5 * f / d, 1.5 * c * elastic, f * friction_coefficient(w, us, ud, uv, vt) / w
 

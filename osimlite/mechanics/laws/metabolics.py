@@ -64,7 +64,7 @@ def umberger2010(
     upkeep = shortening = work = 0.0
     if forbids or m.activation_maintenance_rate_on:
         unscaled = 128.0 * (1.0 - slow) + 25.0
-        # A negative number has no such power.
+        # A negative number has no real power of 0.6.
         upkeep = m.aerobic_factor * (effort**0.6 if effort >= 0.0 else nan)
         upkeep *= unscaled if length <= 1.0 else 0.4 * unscaled + 0.6 * unscaled * force_length
     if forbids or m.shortening_rate_on:
@@ -233,7 +233,7 @@ def bhargava2004_smoothed(
     )
     keeping = m.maintenance_constant_slow_twitch * slow + m.maintenance_constant_fast_twitch * fast
     keeping *= m.mass * maintained
-    # OpenSim keeps the function of Huber away from 0.
+    # OpenSim keeps the argument of the Huber function away from 0.
     velocity = fiber_velocity + 1e-16
     if m.use_force_dependent_shortening_prop_constant:
         isometric = (

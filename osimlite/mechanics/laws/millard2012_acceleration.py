@@ -142,7 +142,7 @@ def evaluate_dynamics(
         + turning * turning
         + 2.0 * fiber * turning * turning_slope
     )
-    # What damps the fibers themselves is no passive force to OpenSim.
+    # OpenSim does not count the fibers' own damping as a passive force.
     told = m.strength * (stretch * stretched - short * shortened - steep * steepened * cos)
     stiffness /= cos - fiber * sin * turn
     return MuscleDynamics(
@@ -259,5 +259,5 @@ def millard2012_acceleration_energy(
     shortened = curve_integral(short, short[LAST]) - curve_integral(short, fiber_length / m.optimal)
     pulled = curve_integral(curves.tendon, (length - fiber_length * cos) / m.slack)
     steepened = curve_integral(steep, steep[LAST]) - curve_integral(steep, cos)
-    # As in OpenSim, the last has no length by which it would be an energy.
+    # As in OpenSim, the last term lacks a factor of length.
     return m.strength * (m.optimal * (stretched + shortened) + m.slack * pulled + steepened)

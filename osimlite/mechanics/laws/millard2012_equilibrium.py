@@ -420,7 +420,7 @@ def millard2012_equilibrium_length(
         while abs(error) >= abs(before):
             step = -part * direction
             if not abs(step) > SIGNIFICANT:
-                # Perhaps the other direction leads on.
+                # Try the opposite direction.
                 step, part = -SMALLEST if step > 0.0 else SMALLEST if step < 0.0 else 0.0, 0.0
             fiber = max(last + step, m.smallest)
             error, slope = force_imbalance(m, length, fiber, active, curves)

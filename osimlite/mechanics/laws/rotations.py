@@ -92,7 +92,7 @@ def sine_cosine(angle: float) -> tuple[float, float]:
     c = (c * a - 1.38888888888730564116e-3) * a + 4.16666666666665929218e-2
     h = 0.5 * a
     t = 1.0 - h
-    # What rounding took from t is given back.
+    # Add the rounding error of t.
     c = t + ((1.0 - t) - h + a * a * c)
     quadrant = int(quarters) & 3
     if quadrant & 1:

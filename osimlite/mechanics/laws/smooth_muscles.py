@@ -51,11 +51,11 @@ class SmoothTendon(NamedTuple):
     """Further parameters of De Groote's muscle."""
 
     passive_strain: float  # passive_fiber_strain_at_one_norm_force
-    # the k of the tendon's force 0.2 (exp(k (l - 1)) - 1) at a length l, see `tendon_growth`
+    # exponent k of the tendon force 0.2 (exp(k (l - 1)) - 1) at a length l, see `tendon_growth`
     growth: float
     elastic: float  # whether the tendon is
-    # whether its force changes so that it stays in equilibrium with the fibers; if not, as a solver
-    # says
+    # whether its force follows from the equilibrium with the fibers; if not, a solver
+    # prescribes its rate
     explicit: float
 
 
@@ -127,7 +127,7 @@ def degroote_factor(velocity: float) -> float:
 def degroote_velocity(factor: float) -> float:
     """Return the normalized velocity at a factor of the active force, the inverse of `degroote_factor`."""
     x = (factor - 0.8825327733249912) / -0.3211346127989808
-    # Where there is no float for it, Python's sinh raises an error.
+    # Python's sinh raises an error on overflow.
     return ((copysign(inf, x) if abs(x) > 710.0 else sinh(x)) + 0.374) / -8.149
 
 

@@ -304,7 +304,7 @@ def thelen2003_equilibrium(now: MuscleInputs, m: Thelen2003) -> tuple[bool, floa
         while abs(error) >= abs(before):
             step = -part * before / (stiffness - of_tendon)
             if not abs(step) > SIGNIFICANT:
-                # Perhaps the other direction leads on.
+                # Try the opposite direction.
                 step, part = -SMALLEST if step > 0.0 else SMALLEST if step < 0.0 else 0.0, 0.0
             fibers = fibers_at(m, length, max(last + step, m.shortest))
             borne, error = fiber_balance(m, fibers, active * by_velocity)
