@@ -48,7 +48,7 @@ def edited(function, old, new):
 
 def test_an_edited_function_concerns_those_that_call_it(changed):
     reflect = linear_algebra.apply_reflection
-    result = changed(linear_algebra, "reflect", edited(reflect, "0.0", "0.5"))
+    result = changed(linear_algebra, "apply_reflection", edited(reflect, "0.0", "0.5"))
     # `project` solves by the addresses of these laws.
     paths = {"cable_path", "geodesic_path"}
     searches = {"fit_frames", "assemble_poses"}
@@ -73,7 +73,7 @@ def test_words_and_layout_concern_nobody(changed):
     moved = edited(
         reflect, f'"""{document}"""', '"""Other words."""\n    # A comment, and an empty line.\n'
     )
-    assert not changed(linear_algebra, "reflect", moved)
+    assert not changed(linear_algebra, "apply_reflection", moved)
 
 
 def test_the_settings_of_a_translator_concern_all():
