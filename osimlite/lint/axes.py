@@ -14,22 +14,22 @@ if TYPE_CHECKING:
 
 
 def list_axes(joint: CustomJoint) -> list[TransformAxis]:
-    """The six axes in order: three rotations, three translations."""
+    """Return the six axes in order: three rotations, three translations."""
     return [*joint.spatial_transform.axes().values()]
 
 
 def list_coordinates(joint: Joint) -> list[Coordinate]:
-    """The coordinates a joint declares. OpenSim leaves out what stands among them and is none."""
+    """Return the coordinates that a joint declares, without other objects among them, which OpenSim ignores."""
     return [item for item in joint.coordinates if isinstance(item, Coordinate)]
 
 
 def list_axis_names(joint: CustomJoint) -> list[str]:
-    """The coordinates that the axes name, each once, in the order in which they are met."""
+    """Return the coordinates that the axes name, each once, in the order of their first use."""
     return list(dict.fromkeys(name for axis in list_axes(joint) for name in axis.names))
 
 
 def refuses_axes(joint: CustomJoint) -> bool:
-    """Whether OpenSim rejects the joint for the coordinates its axes name.
+    """Return whether OpenSim rejects the joint because of the coordinates that its axes name.
 
     OpenSim goes through the names in the order of :func:`list_axis_names` and makes up a coordinate
     for each that the joint does not declare. It fails if the one made up does not come right after
@@ -64,7 +64,7 @@ def refuses_axes(joint: CustomJoint) -> bool:
 
 @cached_per_subject
 def find_made_up_paths(subject: Subject) -> set[str]:
-    """The paths of the coordinates that OpenSim makes up because only an axis names them."""
+    """Return the paths of the coordinates that OpenSim creates because only an axis names them."""
     return {
         f"{subject.path(joint)}/{name}"
         for joint in subject.find_by_class("CustomJoint")

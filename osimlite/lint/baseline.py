@@ -25,7 +25,7 @@ def write_baseline(path: str | Path, report: Report) -> int:
 
 
 def subtract_baseline(path: str | Path, report: Report) -> Report:
-    """The report without what the baseline has, each as often as it has it. Lines may have moved since.
+    """Return the report without the findings of the baseline; line numbers may differ.
 
     Raises:
         OsimliteError: the file is missing or is no baseline.

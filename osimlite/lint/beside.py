@@ -18,14 +18,14 @@ _LARGEST_NEIGHBOUR = 2_000_000
 
 @cache_by_file(4)
 def read_tree(path: str) -> Tree | None:
-    """The component tree of a model; None if it cannot be read."""
+    """Return the component tree of a model file; None if it cannot be read."""
     top = get_object(path)
     return Tree(top) if isinstance(top, Model) else None
 
 
 @cache_by_file(8)
 def read_table(path: str) -> Table | None:
-    """A table; None if it cannot be read."""
+    """Return the table in a file; None if it cannot be read."""
     try:
         return Table(read_file(path), path)
     except (OSError, OsimliteError, ValueError):
@@ -33,7 +33,7 @@ def read_table(path: str) -> Table | None:
 
 
 def list_folders(folder: Path) -> list[Path]:
-    """The folders in a folder."""
+    """Return the folders in a folder, sorted, at most 100 and without hidden ones."""
     try:
         with os.scandir(folder) as entries:
             return sorted(
@@ -47,7 +47,7 @@ def list_folders(folder: Path) -> list[Path]:
 
 @cache_by_file(256)
 def list_documents(folder: str) -> list[str]:
-    """The documents in a folder that may be OpenSim's, other than models."""
+    """Return the documents in a folder, other than models, that seem to be OpenSim's."""
     try:
         with os.scandir(folder) as entries:
             return sorted(
@@ -63,7 +63,7 @@ def list_documents(folder: str) -> list[str]:
 
 
 def read_beginning(file: str) -> bytes:
-    """The first bytes of a file."""
+    """Return the first bytes of a file; empty if it cannot be read."""
     try:
         return read_at_most(file, 2000)
     except OsimliteError:

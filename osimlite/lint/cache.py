@@ -41,7 +41,7 @@ class Cache:
         self._stamps: dict[str, Stamp] = {}
 
     def get(self, file: str, key: str) -> Report | None:
-        """What was found in a file, None unless it was kept for this key and nothing has changed since."""
+        """Return the cached report of a file; None without a valid entry for this key."""
         try:
             match json.loads(read_file(self._entry(file))):
                 case {
@@ -81,7 +81,7 @@ class Cache:
         outside: Iterable[str],
         since: int,
     ) -> None:
-        """Keep what was found.
+        """Cache the report of a file.
 
         Args:
             file: its path.
@@ -122,7 +122,7 @@ class Cache:
 
 
 def make_key(file: str, config: Config) -> str:
-    """What an entry holds for: the path as it was given, the configuration, and the code that checks."""
+    """Return what a cache entry depends on: the path, the configuration, and the version of the code."""
     severity = sorted((word, str(level)) for word, level in config.severity.items())
     thresholds = sorted((name, float(number)) for name, number in config.thresholds.items())
     setting = (
@@ -142,18 +142,22 @@ def make_key(file: str, config: Config) -> str:
 
 
 def fingerprint_text(data: bytes) -> list[object]:
-    """What tells a text from that of an earlier day: its size and its sum."""
+    """Return the size and the checksum of a text.
+
+    Returns:
+        List of the size in bytes and the CRC-32.
+    """
     return [len(data), crc32(data)]
 
 
 def _stamp_file(file: str) -> list[int]:
-    """What is another when a file has changed: its times, its size, and where it is on the disk."""
+    """Return what changes with a file: its times (ns), its size and its inode."""
     result = os.stat(file)
     return [result.st_mtime_ns, result.st_ctime_ns, result.st_size, result.st_ino]
 
 
 def _stamp_if_settled(file: str, moment: int) -> list[int] | None:
-    """The stamp of a file, None if it may have changed after a moment (ns): clocks of file systems tick slowly."""
+    """Return the stamp of a file; None if it may have changed after a moment (ns), since file clocks tick slowly."""
     stamp = _stamp_file(file)
     changed = max(stamp[:2])
     tick = 100_000_000 if changed % 1_000_000_000 else 2_000_000_000
@@ -162,7 +166,7 @@ def _stamp_if_settled(file: str, moment: int) -> list[int] | None:
 
 @cache
 def describe_code_version() -> str:
-    """Which code this is. In a working copy the version stays the same while rules change: the files then tell.
+    """Return a text that identifies the code: in a working copy the newest modification time counts.
 
     What is installed changes as a whole.
     """
@@ -177,7 +181,7 @@ def describe_code_version() -> str:
 
 
 def _check_types(values: Any, *kinds: tuple[type, ...]) -> Any:
-    """A list with one item of each of these kinds; TypeError for anything else. True and False are not numbers."""
+    """Return a list after checking the types of its items; TypeError if it differs. Booleans are not numbers."""
     if type(values) is not list or len(values) != len(kinds):
         raise TypeError
     if not all(type(value) in kind for value, kind in zip(values, kinds, strict=True)):
@@ -193,7 +197,7 @@ _FINDING = (
 
 
 def _parse_outside(values: Any) -> tuple[str, Stamp]:
-    """A path and its stamp as an entry has them; TypeError for anything else."""
+    """Return a path and its stamp from an entry; TypeError for anything else."""
     path, stamp = _check_types(values, _TEXT, _MAYBE_LIST)
     return path, None if stamp is None else tuple(_check_types(stamp, _NUMBER, _NUMBER))
 
@@ -217,7 +221,7 @@ def _dump_finding(finding: Finding) -> list[object]:
 
 
 def _parse_finding(file: str, values: Any) -> Finding:
-    """The finding that `_dump_finding` made a list of; TypeError for anything else."""
+    """Return the finding that `_dump_finding` made a list of; TypeError for anything else."""
     code, name, severity, message, line, column, length, component, suggestion, fix = _check_types(
         values, *_FINDING
     )

@@ -45,11 +45,11 @@ class CheckTarget:
         return self.source.text if self.source is not None else self.data.decode("utf-8", "replace")
 
     def is_for(self, rule: Rule) -> bool:
-        """Whether a rule has anything to look at."""
+        """Return whether a rule applies to this target."""
         return rule.about == self.about
 
     def measure(self, *, anew: bool = True) -> str:
-        """Measure what rules about measures speak of, or recall it; why that cannot be done, if it cannot."""
+        """Measure paths and muscles for the rules that need them, or recall the results; return why not, if that fails."""
         return ""
 
     def find_obstacles(self, *, anew: bool = True) -> str:
@@ -57,21 +57,21 @@ class CheckTarget:
         return ""
 
     def path(self, item: Object | None) -> str:
-        """The absolute path of the component an object belongs to."""
+        """Return the absolute path of the component that an object belongs to."""
         return ""
 
     def position(self, item: Object | None, **where: Unpack[Where]) -> Position | None:
-        """Where something is in the text."""
+        """Return the position of something in the text."""
         return None
 
     def make_replacement(
         self, at: Position, named: object, text: str, *, certain: bool
     ) -> Fix | None:
-        """The fix that puts a text in a place where the words `named` stand; None if something else does."""
+        """Return the fix that replaces the words `named` at a position; None if other words are there."""
         return replace_name(self.source, at, named, text, certain=certain)
 
     def suppressions(self) -> list[Suppression]:
-        """The comments that ignore findings."""
+        """Return the comments that ignore findings."""
         return (
             read_suppressions(self.source)
             if self.source is not None and self.source.remarks
@@ -79,5 +79,5 @@ class CheckTarget:
         )
 
     def list_outside_paths(self) -> list[str] | None:
-        """Every path outside the text that findings may depend on; None if nobody can say."""
+        """Return every path outside the text that findings may depend on; None if that is unknown."""
         return []

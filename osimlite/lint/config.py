@@ -44,21 +44,21 @@ class Config:
             _check_thresholds(self.thresholds)
 
     def includes(self, rule: Rule) -> bool:
-        """Whether a rule runs."""
+        """Return whether a rule runs."""
         if not self.select and not self.ignore:
             return True
         selected = not self.select or any(rule.matches(word) for word in self.select)
         return selected and not any(rule.matches(word) for word in self.ignore)
 
     def severity_of(self, rule: Rule, own: Severity) -> Severity:
-        """The severity of a finding that its rule calls `own`."""
+        """Return the severity of a finding, given the severity `own` of its rule."""
         for word, severity in self.severity.items():
             if rule.matches(word):
                 return severity
         return own
 
     def value_of(self, threshold: Threshold) -> float:
-        """The number that holds for a threshold."""
+        """Return the value of a threshold."""
         return (
             self.thresholds.get(threshold.name, threshold.default)
             if self.thresholds
@@ -88,7 +88,7 @@ def _check_thresholds(given: Mapping[str, float]) -> None:
 
 
 def parse_codes(words: tuple[str, ...] | list[str] | str | None) -> tuple[str, ...]:
-    """Codes or names as a tuple; a text may hold several with commas between.
+    """Return codes or names of rules as a tuple; texts may contain several, separated by commas.
 
     Raises:
         OsimliteError: no rule has such a code or name.

@@ -83,7 +83,11 @@ class Finding:
         return ":".join(parts) or self.component
 
     def as_dict(self) -> dict[str, Any]:
-        """The finding as JSON has it."""
+        """Return the finding as a dictionary for JSON.
+
+        Returns:
+            The fields of the finding by name, and `fixable`.
+        """
         return {
             "code": self.code,
             "name": self.name,
@@ -179,7 +183,7 @@ class Report:
         return notes
 
     def at_least(self, severity: Severity) -> list[Finding]:
-        """The findings that are as bad as `severity` or worse."""
+        """Return the findings of a severity or a worse one."""
         return [finding for finding in self.findings if finding.severity.rank <= severity.rank]
 
     def __iter__(self) -> Iterator[Finding]:
@@ -196,7 +200,7 @@ class Report:
 
 
 def merge_reports(reports: Iterable[Report]) -> Report:
-    """One report of several, in the order given."""
+    """Return one report of several, with findings in the given order."""
     whole = Report(checked=0)
     for report in reports:
         whole.findings.extend(report.findings)

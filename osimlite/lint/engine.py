@@ -24,7 +24,7 @@ from osimlite.schema.registry import register_plugin_classes
 
 
 def check_source(source: Source, config: Config | None = None) -> Report:
-    """Check a text: a table if its file is called so, else a document."""
+    """Check a text: a table if its file name says so, otherwise a document."""
     subject = make_subject(source, config)
     report = run_rules(subject)
     if report.findings and source.file is not None:
@@ -34,7 +34,7 @@ def check_source(source: Source, config: Config | None = None) -> Report:
 
 @pause_collector()
 def make_subject(source: Source, config: Config | None = None) -> CheckTarget:
-    """A text to check; what it is, the name of its file tells."""
+    """Return the check target of a text, chosen by the name of its file."""
     use_classes(config)
     if source.file is not None and is_table(source.file):
         from osimlite.lint.table import Table
@@ -46,7 +46,7 @@ def make_subject(source: Source, config: Config | None = None) -> CheckTarget:
 
 
 def load_subject(file: str, config: Config | None = None) -> CheckTarget:
-    """A file to check; MissingFileError if there is none. What it is, its name tells."""
+    """Return the check target of a file, chosen by its name; MissingFileError if the file is missing."""
     try:
         return make_subject(Source.of_file(file), config)
     except SpecialFileError as fault:
@@ -54,7 +54,7 @@ def load_subject(file: str, config: Config | None = None) -> CheckTarget:
 
 
 def use_classes(config: Config | None) -> None:
-    """Let the classes of plug-ins count that a configuration names, and no others."""
+    """Activate the classes of plug-ins that a configuration names, and no others."""
     if config is None or not config.classes:
         register_plugin_classes({})
         return
@@ -75,7 +75,7 @@ def _make_document_subject(found: Survey, config: Config | None) -> Subject:
 
 @pause_collector()
 def run_rules(subject: CheckTarget, *, measure: bool = True, recall: bool = False) -> Report:
-    """Run every rule that is wanted, and return all findings sorted by place.
+    """Run every selected rule, and return all findings sorted by position.
 
     Args: subject: what is checked. measure: whether rules run that are about what is measured of
         paths and muscles, which takes longer. recall: whether they run too where it was measured
@@ -148,7 +148,7 @@ def _make_ignore_test(comments: list[Suppression]) -> Callable[[Finding], bool]:
 def _apply_suppressions(
     subject: CheckTarget, comments: list[Suppression], findings: list[Finding], left_out: list[Rule]
 ) -> list[Finding]:
-    """The findings without those that a comment of the file ignores, and with one for each comment without use."""
+    """Return the findings that no comment ignores, with a finding for each unused comment."""
     is_ignored = _make_ignore_test(comments)
     kept = [finding for finding in findings if not is_ignored(finding)]
     unused = next(known for known in all_rules() if known.name == "unused-ignore")

@@ -37,7 +37,7 @@ class RuleFault(NamedTuple):
         return self.text.partition(". ")[0].rstrip(".") + "."
 
     def page(self, group: str) -> str:
-        """Its page; `group` is the code and the name of its rule."""
+        """Return the page of the fault; `group` is the code and the name of its rule."""
         why = self.text.partition(". ")[2] or self.text
         return (
             f"{self.summary}\n\n## What it does\nReports each place where this is so. The rule is "
@@ -53,7 +53,7 @@ class RuleFault(NamedTuple):
 
 
 def parse_faults(listed: str, frames: Mapping[str, str]) -> Iterator[RuleFault]:
-    """The faults that a rule lists; `frames` are the documents of their examples by name."""
+    """Yield the faults that a rule lists; `frames` are the documents of their examples by name."""
     parts: list[tuple[str, list[str], list[str]]] = []
     for line in listed.splitlines():
         if line[:2].isdigit():

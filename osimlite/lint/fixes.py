@@ -15,7 +15,7 @@ from osimlite.lint.project_files import is_table
 def replace_text(
     source: Source | None, place: Position | None, text: str | None, *, safe: bool = True
 ) -> Fix | None:
-    """Put another text in a place."""
+    """Return the fix that replaces the text at a position; None without a source, position or text."""
     if source is None or place is None or text is None:
         return None
     start = source.line_start(place.line) + place.column - 1
@@ -25,7 +25,7 @@ def replace_text(
 def replace_name(
     source: Source | None, place: Position, named: object, text: str, *, certain: bool
 ) -> Fix | None:
-    """Put what is meant in the place of a name; None if that name is not what stands there."""
+    """Return the fix that replaces a name; None if another text is at the position."""
     if source is None or not isinstance(named, str) or "'" in text or '"' in text:
         return None
     start = source.line_start(place.line) + place.column - 1
@@ -39,7 +39,7 @@ def replace_name(
 def rename_tag(
     source: Source | None, number: int, tag: str | None, *, safe: bool = True
 ) -> Fix | None:
-    """Give an element another tag."""
+    """Return the fix that gives an element another tag."""
     if source is None or tag is None:
         return None
     span = source.spans[number]
@@ -50,7 +50,7 @@ def rename_tag(
 
 
 def remove_element(source: Source | None, number: int) -> Fix | None:
-    """Take an element out, and its line with it if nothing else stands there."""
+    """Return the fix that deletes an element, with its line if nothing else is on it."""
     if source is None:
         return None
     span = source.spans[number]
@@ -76,7 +76,7 @@ def comment_out(source: Source | None, number: int) -> Fix | None:
 
 
 def remove_attribute(source: Source | None, number: int, name: str) -> Fix | None:
-    """Take an attribute out."""
+    """Return the fix that deletes an attribute."""
     if source is None:
         return None
     result = source.attributes_of(number).get(name)
@@ -84,12 +84,16 @@ def remove_attribute(source: Source | None, number: int, name: str) -> Fix | Non
 
 
 def remove_text(source: Source, start: int, end: int) -> Fix:
-    """Take a text out that means nothing."""
+    """Return the fix that deletes a text without meaning."""
     return Fix((_delete_range(source.text, start, end),), True)
 
 
 def select_edits(findings: Iterable[Finding], *, unsafe: bool = False) -> tuple[list[Edit], int]:
-    """The edits of every fix that does not touch another before it, by place, and how many fixes these are."""
+    """Select the edits of all fixes that do not overlap an earlier fix.
+
+    Returns:
+        The edits sorted by position, and the number of fixes.
+    """
     chosen: list[Edit] = []
     count = 0
     for finding in findings:
@@ -109,13 +113,17 @@ def _get_start(edit: Edit) -> int:
 
 
 def _touches(edit: Edit, chosen: list[Edit]) -> bool:
-    """Whether an edit changes what one of some others does, which are sorted and touch none of each other."""
+    """Return whether an edit overlaps one of some sorted, disjoint edits."""
     before = bisect_left(chosen, edit.end, key=_get_start)
     return before > 0 and chosen[before - 1].end > edit.start
 
 
 def apply_fixes(source: Source, report: Report, *, unsafe: bool = False) -> tuple[bytes, int]:
-    """The bytes of a file with its fixes, and how many there are; raises as `apply_fixes_in_pieces` does."""
+    """Return the bytes of a file after its fixes; raises as `apply_fixes_in_pieces` does.
+
+    Returns:
+        The bytes, and the number of fixes.
+    """
     pieces, count = apply_fixes_in_pieces(source, report, unsafe=unsafe)
     return b"".join(pieces), count
 
@@ -123,7 +131,7 @@ def apply_fixes(source: Source, report: Report, *, unsafe: bool = False) -> tupl
 def apply_fixes_in_pieces(
     source: Source, report: Report, *, unsafe: bool = False
 ) -> tuple[list[bytes | memoryview], int]:
-    """The same in pieces, which of a table are no copies; a document keeps its encoding.
+    """Return the bytes of a file after its fixes in pieces, which are views for a table; a document keeps its encoding.
 
     Raises: OsimliteError: the bytes are in no single encoding, so that they cannot be written back
         as they were.

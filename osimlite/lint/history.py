@@ -39,7 +39,7 @@ class NewProperty(NamedTuple):
 
 @cache
 def load_later_changes(release: str) -> LaterChanges:
-    """What came after a release; OsimliteError if nothing is known of it."""
+    """Return what later releases added to a release; OsimliteError if the release is unknown."""
     if release == NEWEST:
         return LaterChanges(CURRENT_VERSION, {}, {})
     import json
@@ -65,7 +65,7 @@ def load_later_changes(release: str) -> LaterChanges:
 
 @cache
 def find_new_properties(cls: type[Object], release: str) -> list[NewProperty]:
-    """The properties of a class that came after a release."""
+    """Return the properties that a class got after a release."""
     later = load_later_changes(release).properties
     names = {
         spec: (f"{spec.declared_in.tag}.{tag}", f"{cls.tag}.{tag}")

@@ -12,7 +12,7 @@ _EDGES = ((0.0, 1.0, 1.0), (1.0, 0.0, 1.0), (1.0, 1.0, 0.0))
 
 
 def find_possible_inertia(inertia: Sequence[float]) -> Inertia:
-    """The inertia nearest to `inertia` (xx yy zz xy xz yz) whose principal moments obey the triangle inequality.
+    """Return the nearest inertia (xx yy zz xy xz yz) whose principal moments obey the triangle inequality.
 
     Nearest in the Frobenius norm: the principal axes stay, and the principal moments are projected
     onto the cone of those that some distribution of mass has.
@@ -27,7 +27,11 @@ def find_possible_inertia(inertia: Sequence[float]) -> Inertia:
 
 
 def compute_principal_axes(inertia: Sequence[float]) -> tuple[list[float], list[list[float]]]:
-    """Principal moments, and a matrix whose columns are their axes, by Jacobi rotations (J. reine angew. Math. 30)."""
+    """Compute principal moments and axes by Jacobi rotations (J. reine angew. Math. 30).
+
+    Returns:
+        The three moments, and a matrix whose columns are their axes.
+    """
     xx, yy, zz, xy, xz, yz = inertia
     a = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]
     v = [[float(row == column) for column in range(3)] for row in range(3)]
@@ -51,7 +55,7 @@ def compute_principal_axes(inertia: Sequence[float]) -> tuple[list[float], list[
 
 
 def _project_onto_cone(moments: Sequence[float]) -> list[float]:
-    """The point nearest to `moments` that is a mixture of the edges, by looking at every face of the cone."""
+    """Return the point of the cone nearest to `moments`, by trying every face."""
     best, least = [0.0, 0.0, 0.0], math.inf
     faces = [face for count in range(4) for face in combinations(_EDGES, count)]
     for face in faces:
@@ -69,7 +73,7 @@ def _project_onto_cone(moments: Sequence[float]) -> list[float]:
 
 
 def _solve_weights(face: Sequence[Sequence[float]], moments: Sequence[float]) -> list[float]:
-    """The mixture of some edges that comes nearest to `moments`; the weights may be negative."""
+    """Return the weights of the edges whose combination is nearest to `moments`; they may be negative."""
     # Any two edges have the scalar product 1, and each has 2 with itself: the normal equations are
     # solved at once.
     products = [sum(a * b for a, b in zip(edge, moments, strict=True)) for edge in face]

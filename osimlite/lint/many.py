@@ -42,7 +42,7 @@ def check_files(
     processes: int | None = None,
     progress: Progress | None = None,
 ) -> Report:
-    """Check files, each by the settings of its folder and what `given` says besides.
+    """Check files, each with the settings of its folder and the options in `given`.
 
     Args: files: paths, ``-`` for standard input. given: what comes before the settings of the
         project. cached: whether findings of files that have not changed are taken from the cache,
@@ -93,7 +93,7 @@ class SourceTexts(dict[str, str]):
 
 
 def find_settings(file: str) -> Settings:
-    """The settings that hold for a file; for standard input those of the working folder."""
+    """Return the settings of a file; for standard input those of the working folder."""
     return load_settings(
         Path.cwd() if file in ("-", "<stdin>") else resolve_folder(os.path.dirname(file))
     )
@@ -142,7 +142,7 @@ def count_processes(jobs: list[CheckJob]) -> int:
 
 
 def check_job(job: CheckJob) -> Report:
-    """Check one file, and keep what was found."""
+    """Check one file, and cache its report."""
     from osimlite.lint.engine import load_subject, run_rules
     from osimlite.lint.subject import Subject
 

@@ -58,7 +58,7 @@ class Value(NamedTuple):
         return f"'{self.coordinate}' = {self.format_value(self.value, 4)}"
 
     def format_value(self, value: float, digits: int) -> str:
-        """Another value of the coordinate as people read it; angles in degrees."""
+        """Format a value of the coordinate with its unit; angles in degrees."""
         shown, unit = (degrees(value), "deg") if self.unit == "rad" else (value, self.unit)
         return f"{shown:.{digits}g} {unit}".rstrip()
 
@@ -148,20 +148,20 @@ class Measures(NamedTuple):
 
 
 def select_owners(measures: Measures, owners: Container[str]) -> Measures:
-    """What is measured of some paths."""
+    """Return the measurements of some paths."""
     lists: Any = measures[1:]
     kept = {owner: places for owner, places in measures.swept.items() if owner in owners}
     return Measures(kept, *([item for item in items if item.owner in owners] for items in lists))
 
 
 def merge_measures(one: Measures, two: Measures) -> Measures:
-    """What is measured of these paths and of those."""
+    """Return the measurements of two disjoint sets of paths together."""
     lists: Any = zip(one[1:], two[1:], strict=True)
     return Measures(one.swept | two.swept, *([*items, *others] for items, others in lists))
 
 
 def find_swept_coordinates(measures: Measures) -> set[int]:
-    """Places of the coordinates that change the length of a path."""
+    """Return the indices of the coordinates that change the length of a path."""
     return {place for places in measures.swept.values() for place in places}
 
 
@@ -170,12 +170,12 @@ class NoMachineCodeError(OsimliteError):
 
 
 def has_measures(subject: Subject) -> bool:
-    """Whether a model has muscles, or paths whose lengths do not follow from fixed points."""
+    """Return whether a model has muscles, or paths whose lengths do not follow from fixed points."""
     return any(next(subject.find_by_class(name), None) is not None for name in _MEASURED)
 
 
 def measure_subject(subject: Subject, *, anew: bool = True) -> str:
-    """Measure a model; why that cannot be done, if it cannot.
+    """Measure a model, or recall its measurements; return why not, if that fails.
 
     Args:
         subject: with the model.
@@ -229,7 +229,7 @@ def measure_subject(subject: Subject, *, anew: bool = True) -> str:
 
 
 def get_measures(subject: Subject) -> Measures:
-    """What was measured of a model."""
+    """Return the measurements of a model."""
     return cast("Measures", subject.cache[MEASURES])
 
 
@@ -254,7 +254,7 @@ class RememberedMeasures(NamedTuple):
     measures: Measures
 
     def select_unchanged(self, parts: TextParts) -> Measures:
-        """What still holds of it: of the paths that are as they were."""
+        """Return the measurements of the paths whose elements have not changed."""
         return select_owners(
             self.measures,
             {path for path, own in self.paths.items() if parts.paths.get(path) == own},
@@ -265,7 +265,7 @@ remembered: OrderedDict[str, RememberedMeasures] = OrderedDict()
 
 
 def digest_parts(subject: Subject) -> TextParts | None:
-    """The parts of a text; None of what is no text, or does not stand in one file alone."""
+    """Return digests of the parts of a text; None without a text, or if it includes other files."""
     source = subject.source
     if (
         source is None
@@ -301,7 +301,7 @@ def digest_parts(subject: Subject) -> TextParts | None:
 
 
 def recall_measures(parts: TextParts, folder: Path | None) -> RememberedMeasures | None:
-    """What was measured of a model with these parts, but perhaps for those of some paths.
+    """Return cached measurements of a model with these parts; some paths may be missing.
 
     Args:
         parts: of the text.
@@ -323,7 +323,7 @@ def recall_measures(parts: TextParts, folder: Path | None) -> RememberedMeasures
 
 
 def remember_measures(parts: TextParts, measures: Measures, folder: Path | None) -> None:
-    """Keep what was measured.
+    """Cache the measurements of a model.
 
     Args:
         parts: of the text.

@@ -121,7 +121,7 @@ _CONNECTEE = re.compile(r"(?:socket|connector)_(\w+?)(?:_connectee_name)?s?")
 
 
 def successor(cls: type[Object], tag: str) -> Successor | None:
-    """What stands for an old tag in objects of a class; None of a tag that no format had."""
+    """Return what replaces an old tag in objects of a class; None for a tag that no version had."""
     specs = get_field_specs(cls)
     for base in cls.__mro__:
         known = _OLD.get(base.__name__, {}).get(tag)

@@ -26,7 +26,7 @@ _SHORT = {"": "", "safe": "safe", "unsafe": "unsafe", "both": "safe or unsafe"}
 
 
 def format_rule_page(rule: Rule) -> str:
-    """The page of a rule as Markdown: what its findings count as, whether they are fixed, and its settings."""
+    """Return the page of a rule as Markdown: its severity, its fixes, its text and its settings."""
     rows = [
         f"# {rule.name} ({rule.code})",
         "",
@@ -47,13 +47,13 @@ def format_rule_page(rule: Rule) -> str:
 
 
 def format_group_page(group: Rule) -> str:
-    """What the rules of a group have in common, as Markdown."""
+    """Return the common page of the rules of a group as Markdown."""
     summary, what, why = cleandoc(group.check.__doc__ or "").split("\n\n")[:3]
     return f"# {group.name} ({group.code})\n\n{summary}\n\n{what}\n\n{why}"
 
 
 def describe_severity(rule: Rule) -> str:
-    """``error; warning in files of a version before 30500``."""
+    """Return the severity of a rule, such as ``error; warning in files of a version before 30500``."""
     if rule.before is None:
         return rule.severity.value
     return (
@@ -63,7 +63,7 @@ def describe_severity(rule: Rule) -> str:
 
 
 def format_index() -> str:
-    """All rules and thresholds as one Markdown page; ``docs/rules.md`` is this text."""
+    """Return all rules and thresholds as one Markdown page, which is ``docs/rules.md``."""
     rows = [_INTRODUCTION]
     for digit, family in FAMILIES.items():
         rows += [

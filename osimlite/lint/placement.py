@@ -58,21 +58,21 @@ class FramePose(NamedTuple):
     position: Vector = ZERO
 
     def rotate(self, vector: Vector) -> Vector:
-        """A vector of the inner frame, expressed in the outer one."""
+        """Rotate a vector of the inner frame into the outer frame."""
         return combine_axes(self.axes, vector)
 
     def transform_point(self, point: Vector) -> Vector:
-        """A point of the inner frame, in the outer one."""
+        """Transform a point of the inner frame to the outer frame."""
         return plus(combine_axes(self.axes, point), self.position)
 
     def compose(self, inner: FramePose) -> FramePose:
-        """A frame within this one, seen from outside."""
+        """Return a frame inside this one, relative to the outer frame."""
         return FramePose(
             multiply_rotations(self.axes, inner.axes), self.transform_point(inner.position)
         )
 
     def inverse(self) -> FramePose:
-        """The outer frame, seen from the inner one."""
+        """Return the pose of the outer frame in the inner one."""
         back = transpose_rotation(self.axes)
         return FramePose(back, times(-1.0, combine_axes(back, self.position)))
 
@@ -82,7 +82,7 @@ FrameLocation = tuple[Component, FramePose] | None
 
 
 def make_offset(angles: Vector, position: Vector) -> FramePose:
-    """A frame displaced, and turned by body-fixed X-Y-Z angles."""
+    """Return the pose of a frame with an offset and body-fixed X-Y-Z angles."""
     (s1, c1), (s2, c2), (s3, c3) = map(_sine_cosine, angles)
     return FramePose(rotation_from_xyz(s1, c1, s2, c2, s3, c3), position)
 
@@ -92,7 +92,7 @@ def _sine_cosine(angle: float) -> tuple[float, float]:
 
 
 def locate_frame(subject: Subject, frame: Component | None) -> FrameLocation:
-    """The body or ground that a frame is fixed to, and where it is on it; None if that is not known."""
+    """Return the body or ground that a frame is fixed to, and its pose there; None if unknown."""
     pose, seen = FramePose(), 0
     while isinstance(frame, PhysicalOffsetFrame) and seen < 100:
         pose = make_offset(frame.orientation, frame.translation).compose(pose)
@@ -102,13 +102,17 @@ def locate_frame(subject: Subject, frame: Component | None) -> FrameLocation:
 
 @cached_per_subject
 def compute_default_poses(subject: Subject) -> dict[int, FramePose]:
-    """The pose in ground of each body (by identity) whose place is known."""
+    """Return the default pose in ground of each body that can be located.
+
+    Returns:
+        The poses by the identity of the body.
+    """
     return compute_poses(subject)
 
 
 @cached_per_subject
 def _locate_joint_frames(subject: Subject) -> dict[int, tuple[FrameLocation, FrameLocation]]:
-    """Where the frames of the joints are, by the identities of these."""
+    """Return the locations of parent and child frame of each joint, by its identity."""
     links = build_skeleton(subject).links
     return {
         id(link.joint): (locate_frame(subject, link.parent), locate_frame(subject, link.child))
@@ -119,7 +123,7 @@ def _locate_joint_frames(subject: Subject) -> dict[int, tuple[FrameLocation, Fra
 def compute_poses(
     subject: Subject, values: Mapping[str, float] | None = None
 ) -> dict[int, FramePose]:
-    """The pose in ground of each body (by identity) whose place is known.
+    """Return the pose in ground of each body that can be located, by its identity.
 
     Args: subject: the model. values: those of coordinates, rad or m; others have their default
         values. Given, places may be off by some centimetres.
@@ -166,14 +170,14 @@ class _JointMotion(NamedTuple):
     function: Function | None = None
 
     def amount(self, values: Mapping[str, float]) -> float:
-        """How far (rad or m)."""
+        """Return how far the joint moves along this axis (rad or m)."""
         arguments = [values.get(name, 0.0) for name in self.names]
         return arguments[0] if self.function is None else self.function.evaluate(arguments)[0]
 
 
 @cached_per_subject
 def _find_joint_motions(subject: Subject, rough: bool) -> dict[int, list[_JointMotion]]:
-    """The motions of the joints (by identity) whose motion is known; a turn is about an axis that those before turned."""
+    """Return the motions of the joints with known functions, by identity; later axes are rotated by earlier ones."""
     result: dict[int, list[_JointMotion]] = {}
     for link in build_skeleton(subject).links:
         joint, names = link.joint, [item.name for item in link.joint.coordinates]
@@ -204,7 +208,7 @@ def _find_joint_motions(subject: Subject, rough: bool) -> dict[int, list[_JointM
 
 
 def _make_function(axis: TransformAxis, rough: bool) -> Function | None:
-    """What an axis moves by; None if that is not known."""
+    """Return the function of an axis; None if it is not known."""
     from osimlite.mechanics.multibody.schema_functions import convert_function
 
     function: Any = axis.function
@@ -226,7 +230,7 @@ def _make_function(axis: TransformAxis, rough: bool) -> Function | None:
 def _compute_joint_pose(
     joint: Joint, motions: list[_JointMotion], given: Mapping[str, float] | None
 ) -> FramePose:
-    """The child frame of a joint in its parent frame."""
+    """Return the pose of the child frame of a joint in its parent frame."""
     values = {
         item.name: (given or {}).get(item.name, item.default_value) for item in joint.coordinates
     }
@@ -243,7 +247,7 @@ def _compute_joint_pose(
 
 
 def find_rotation_axes(subject: Subject, joint: Joint) -> list[tuple[str, Vector]]:
-    """What the rotations of a gimbal or custom joint turn about in the default pose.
+    """Return the rotation axes of a gimbal or custom joint in the default pose.
 
     Returns: The coordinate of each rotation and its axis, a unit vector in the parent frame.
         Nothing for a joint of another class, and where a rotation does not follow one coordinate of

@@ -16,7 +16,7 @@ from osimlite.schema.tree import is_a
 
 
 def find_angles(setup: Setup) -> set[str]:
-    """The coordinates of the model that are angles."""
+    """Return the names of the coordinates of the model that are angles."""
     joints: Any = [] if setup.tree is None else setup.tree.of_class("Joint").values()
     return {
         name
@@ -27,13 +27,17 @@ def find_angles(setup: Setup) -> set[str]:
 
 
 def coordinate_name(column: str) -> str:
-    """The name of the coordinate whose values a column has."""
+    """Return the name of the coordinate whose values a column has."""
     return column.removesuffix("/value").rpartition("/")[2]
 
 
 @cached_per_subject
 def compute_poses_of_motion(setup: Setup, motion: Table, time: float) -> dict[int, FramePose]:
-    """The pose in ground of each body (by identity), at a time of a motion given as coordinates."""
+    """Return the pose in ground of each body at a time of a motion.
+
+    Returns:
+        The poses by the identity of the body.
+    """
     angles = find_angles(setup)
     turn = (
         math.pi / 180.0
@@ -51,7 +55,11 @@ def compute_poses_of_motion(setup: Setup, motion: Table, time: float) -> dict[in
 
 @cached_per_subject
 def locate_markers(setup: Setup) -> dict[str, Vector]:
-    """Where the markers of the model are in the default pose, in ground, m."""
+    """Return the positions of the markers in ground in the default pose, m.
+
+    Returns:
+        The positions by the names of the markers.
+    """
     model = make_model_subject(setup)
     poses = compute_poses(model, {})
     result: dict[str, Vector] = {}

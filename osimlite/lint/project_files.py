@@ -27,7 +27,7 @@ _COMPOUND = re.compile(r"[a-z][A-Z]|[A-Z]{2}|_|\d")
 
 
 def is_opensim_xml(beginning: bytes) -> bool:
-    """Whether XML that begins so is OpenSim's: by its root, also if that is misspelt, or by what it holds.
+    """Return whether XML with this beginning is OpenSim's: by its root, even misspelt, or its content.
 
     What it holds is OpenSim's if two elements at least are properties of the class that they stand
     in.
@@ -58,7 +58,7 @@ def is_opensim_xml(beginning: bytes) -> bool:
 
 
 def find_misspelt_name(word: str, known: Iterable[str]) -> str | None:
-    """The known name that a word is but for letter case and two letters, None if there is none."""
+    """Return the known name that differs from a word in letter case and at most two letters; None if there is none."""
     from rapidfuzz.distance import OSA
     from rapidfuzz.process import extractOne
 
@@ -69,7 +69,7 @@ def find_misspelt_name(word: str, known: Iterable[str]) -> str | None:
 
 
 def is_root(tag: str) -> bool:
-    """Whether a root is OpenSim's: of a document, or of a setup as old releases wrote them."""
+    """Return whether a root tag is OpenSim's: of a document, or of a setup of an old release."""
     if find_misspelt_name(tag, ["OpenSimDocument"]) is not None:
         return True
     name = _class_name(tag)
@@ -78,7 +78,7 @@ def is_root(tag: str) -> bool:
 
 @cache
 def _class_name(tag: str) -> str | None:
-    """The class that a tag means, although it may be misspelt or an old name."""
+    """Return the class that a tag means, even if it is misspelt or an old name."""
     from osimlite.io.document.upgrade.class_names import RENAMED
     from osimlite.schema.registry import MODULES
 
@@ -89,7 +89,7 @@ def _class_name(tag: str) -> str | None:
 
 @cache
 def _is_property(owner: str, tag: str) -> bool:
-    """Whether an element is a property of what it stands in, and both could hardly be another program's."""
+    """Return whether an element is a property of its parent, and both are unlikely in other programs."""
     name = _class_name(owner)
     if name is None or not (_COMPOUND.search(name) or _COMPOUND.search(tag)):
         return False
@@ -107,12 +107,12 @@ PROJECT = (".osim", *DOCUMENTS, *TABLE_SUFFIXES)
 
 
 def is_table(file: str | None) -> bool:
-    """Whether a file is a table, by its name."""
+    """Return whether a file is a table, by its name."""
     return file is not None and file.lower().endswith(TABLE_SUFFIXES)
 
 
 def is_document(file: str | None) -> bool:
-    """Whether a file may be a document other than a model, by its name; standard input has none."""
+    """Return whether a file may be a document other than a model, by its name; standard input may be one."""
     return file is not None and (file == "<stdin>" or file.lower().endswith(DOCUMENTS))
 
 
@@ -123,7 +123,7 @@ def find_project_files(
     only_ours: bool = False,
     passed: list[str] | None = None,
 ) -> list[str]:
-    """The files that are named, and OpenSim's files with some suffixes below the folders that are named, each once.
+    """Return the named files, and OpenSim's files with some suffixes in the named folders, each once.
 
     With `only_ours`, XML of other programs is passed over even where it is named. What is passed
     over is added to `passed`.
@@ -158,7 +158,7 @@ def find_project_files(
 
 
 def is_opensim_file(file: str) -> bool:
-    """Whether a file is OpenSim's, as far as its name and its beginning tell: other programs write XML too."""
+    """Return whether a file is OpenSim's, by its name and, for XML, its beginning."""
     if not file.lower().endswith(".xml"):
         return True
     try:

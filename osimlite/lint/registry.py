@@ -175,19 +175,19 @@ class Rule:
         return told.rstrip(".")
 
     def severity_in(self, version: int | None) -> Severity:
-        """The severity of its findings in a document of a version; None stands for the current one."""
+        """Return the severity of findings in a document of a version; None stands for the current version."""
         if self.before is not None and version is not None and version < self.before[0]:
             return self.before[1]
         return self.severity
 
     def has_name(self, word: str) -> bool:
-        """Whether `word` is this rule's code, the beginning of it, its name or that of its group."""
+        """Return whether `word` is the code of this rule, a prefix of it, its name, or that of its group."""
         return bool(word) and (
             self.code.startswith(word.upper()) or word in (self.name, self.group)
         )
 
     def matches(self, word: str) -> bool:
-        """Whether the rule is called so, or `word` is its family."""
+        """Return whether `word` names the rule or its family."""
         return self.has_name(word) or word in (self.family, "ALL")
 
 
@@ -316,7 +316,11 @@ def all_rules(about: str = "") -> tuple[Rule, ...]:
 
 
 def rule_groups() -> tuple[Rule, ...]:
-    """What rules with one beginning of their codes have in common, by code."""
+    """Return the groups of rules, sorted by code.
+
+    Returns:
+        One rule for each group, with its code and page.
+    """
     all_rules()
     return tuple(_GROUPS[code] for code in sorted(_GROUPS))
 

@@ -42,7 +42,7 @@ class RowFault(NamedTuple):
     others: int = 0
 
     def describe_rest(self, noun: str = "row") -> str:
-        """What to say of further rows, and of further columns."""
+        """Return a phrase about further rows and columns with the same fault."""
         rows = (
             [f"; the same in {format_count(self.times - 1, f'more {noun}')}"]
             if self.times > 1
@@ -69,7 +69,7 @@ class TableRows:
     unseen: set[int] = field(default_factory=set)
 
     def select(self, *kinds: str) -> list[RowFault]:
-        """The faults of some kinds, by place; of very many the first."""
+        """Return the faults of some kinds sorted by line; of very many the first."""
         result = sorted(
             (fault for fault in self.faults.values() if fault.kind in kinds),
             key=lambda fault: fault.line,
@@ -81,7 +81,7 @@ class TableRows:
         return result
 
     def line_of(self, row: int) -> int:
-        """The line of the file that holds a row, as both are format_count from 0 and 1."""
+        """Return the line of a row; lines count from 1, rows from 0."""
         first = next((place for place in reversed(self.lines) if place[0] <= row), (0, 0))
         return first[1] + row - first[0]
 
@@ -117,7 +117,7 @@ class RowScanner:
     _frame: int = 0
 
     def scan(self, data: bytes, start: int, line: int) -> TableRows:
-        """Look at the rows from an offset on, which is in this line of the file."""
+        """Scan the rows from an offset on, which is in this line of the file."""
         self.rows.cells = self.cells
         if self.markers:
             self.rows.unseen = set(range((self.cells - 2) // 3))
@@ -166,7 +166,7 @@ class RowScanner:
         return self.rows
 
     def _note_rows(self, lines: list[bytes], forms: list[bytes], line: int, zeros: bool) -> None:
-        """Note times and samples of good rows."""
+        """Record times and samples of valid rows."""
         rows = self.rows
         self._note_line_of_row(line)
         if self.markers:
@@ -195,7 +195,7 @@ class RowScanner:
             rows.samples.append(self._read_numbers(lines[0], float))
 
     def _read_marker_times(self, lines: list[bytes], line: int) -> list[float]:
-        """The times of frames, which are looked at; of one without a time the next number after that before."""
+        """Return the times of frames; a missing time becomes the next number after the previous time."""
         heads = [text.split(b"\t", 2)[:2] for text in lines]
         if [frame for frame, _ in heads] != [
             b"%d" % (self._frame + number) for number in range(1, len(heads) + 1)
@@ -214,7 +214,7 @@ class RowScanner:
         return times
 
     def _examine_markers(self, text: bytes, line: int) -> None:
-        """Look for markers at the origin, and for parts of markers."""
+        """Record markers at the origin, and incomplete markers."""
         cells = text.split(b"\t")
         start = 0
         for number, cell in enumerate(cells[: self.cells]):
@@ -228,19 +228,19 @@ class RowScanner:
             start += len(cell) + 1
 
     def _count_missing_samples(self) -> int:
-        """How many more rows are samples."""
+        """Return how many more rows become samples."""
         return max(2, min(_SAMPLES, _SAMPLED // max(1, self.cells * self.parts))) - len(
             self.rows.samples
         )
 
     def _read_numbers(self, text: bytes, read: Callable[[bytes], float]) -> list[float]:
-        """The numbers of a row, NaN where there is none."""
+        """Return the numbers of a row; NaN for other cells."""
         if not self.markers:
             return list(map(read, text.replace(b",", b" ").split()))
         return [read(cell.strip() or b"nan") for cell in text.split(b"\t")]
 
     def examine_odd_line(self, text: bytes, line: int) -> None:
-        """Look at one row that is not good."""
+        """Examine one line that is not a valid row, cell by cell."""
         # A byte for each character, so that places are those of characters.
         text = text.decode("utf-8", "replace").encode("latin-1", "replace").rstrip(b"\r")
         if not text.strip():
@@ -303,7 +303,7 @@ class RowScanner:
                 rows.samples.append(self._read_numbers(text, parse_number))
 
     def _split_cells(self, text: bytes) -> tuple[list[tuple[int, bytes]], int]:
-        """The cells of a row with their places, of too many one more than there should be; and how many there are."""
+        """Return the cells of a row with their offsets, at most one too many, and the number of all cells."""
         if not self.markers:
             words = _WORD.finditer(text)
             cells = [(match.start(), match[0]) for match in islice(words, self.cells + 1)]
@@ -318,11 +318,11 @@ class RowScanner:
         return cells[: len(cells) - ends], count - ends
 
     def _get_last_time(self) -> float:
-        """The time of the last row."""
+        """Return the time of the last row."""
         return self.rows.times[-1] if self.rows.times else -inf
 
     def _note_line_of_row(self, line: int) -> None:
-        """Note in which line the next row is, where it does not follow the one before."""
+        """Record the line of the next row where it does not follow the previous one."""
         if line != self.rows.line_of(self.rows.count):
             self.rows.lines.append((self.rows.count, line))
 
@@ -359,7 +359,7 @@ class RowScanner:
 
 
 def _compute_shapes(block: bytes, layout: Layout) -> tuple[bytes, bool]:
-    """What lines look like, those of markers without NaN, which stands for one that was not seen."""
+    """Return the shapes of lines; missing markers (NaN) count as empty."""
     if b"\r" in block:
         block = block.replace(b"\r\n", b"\n")
     if layout is MARKERS and b"N" in block:
@@ -374,7 +374,7 @@ def _compute_shapes(block: bytes, layout: Layout) -> tuple[bytes, bool]:
 
 @lru_cache(maxsize=256)
 def _find_seen_markers(form: bytes, cells: int) -> frozenset[int] | None:
-    """The markers that are in a row of markers, by what the row looks like; None if that is no row of markers."""
+    """Return the markers that a row of this shape contains; None if it is not a row of markers."""
     numbers = form.split(b"\t")
     if len(numbers) == cells + 1 and not numbers[-1]:
         numbers.pop()
@@ -388,7 +388,7 @@ def _find_seen_markers(form: bytes, cells: int) -> frozenset[int] | None:
 
 
 def _split_blocks(data: bytes, start: int) -> Iterator[bytes]:
-    """Whole lines from an offset on, each with its end; blank lines at the end of all left out."""
+    """Yield blocks of complete lines from an offset on, without blank lines at the end."""
     size = len(data)
     while size > start and data[size - 1] in b"\r\n" and data[size - 2] in b"\r\n":
         size -= 1
@@ -404,5 +404,5 @@ def _split_blocks(data: bytes, start: int) -> Iterator[bytes]:
 
 
 def parse_number(cell: bytes) -> float:
-    """A number; NaN for a text that is none as C++ reads numbers, which knows neither NaN nor infinity."""
+    """Return the number in a cell as C++ reads it; NaN for anything else, including NaN and infinity."""
     return float(cell) if _PLAIN.fullmatch(cell) else nan

@@ -38,7 +38,7 @@ class Settings:
     target_version: str = ""
 
     def config_for(self, path: str | Path, overriding: Config) -> Config:
-        """The configuration of one file; what `overriding` says comes before what the project says."""
+        """Return the configuration of one file; `overriding` has precedence over the project."""
         return Config(
             overriding.select or self.select,
             (*self.ignore, *self._find_ignored_codes(Path(path)), *overriding.ignore),
@@ -66,7 +66,7 @@ class Settings:
 
 @cache
 def load_settings(folder: Path) -> Settings:
-    """The settings that hold in a folder: those of the nearest file that has any.
+    """Return the settings of a folder: those of the nearest file that has any.
 
     Raises:
         OsimliteError: the file is no TOML, or has a setting that does not exist or makes no sense.

@@ -60,7 +60,7 @@ class Setup(Subject):
         self._looked_at: dict[str, None] = {}
 
     def is_for(self, rule: Rule) -> bool:
-        """Whether a rule has anything to look at: what is said of text, tags and values holds of every document."""
+        """Return whether a rule applies: rules on text, tags and values apply to every document."""
         if rule.code == "OSIM004":
             # Setups of every version are read, but not those without one.
             return bool(self.faults)
@@ -92,35 +92,35 @@ class Setup(Subject):
         return [item for item in self.items if id(item) not in inside]
 
     def find_having(self, *properties: str) -> Iterator[Any]:
-        """Every object whose class has these properties, class by class."""
+        """Yield every object whose class has these properties, class by class."""
         for cls, items in self.by_class.items():
             if all(name in cls.model_fields for name in properties):
                 yield from items
 
     def owner(self, item: Object) -> Any:
-        """The object itself: there is no tree of components."""
+        """Return the object itself: a setup has no tree of components."""
         return item
 
     def _find_element(self, item: Object | None) -> int | None:
-        """The element of an object; of one the text does not give, that at the top."""
+        """Return the element of an object; the top element if the text does not contain the object."""
         number = None if item is None else item._index
         return number if number is not None or self.top is None else self.top._index
 
     def list_outside_paths(self) -> list[str] | None:
-        """Every path that was looked at."""
+        """Return every path that the check looked at."""
         known = super().list_outside_paths()
         return None if known is None else [*known, *self._looked_at]
 
     # ------------------------------------------------------------------------------------------------- files
 
     def find_named_files(self, rule: str) -> Iterator[FileReference]:
-        """Every file that an object of the document names by a rule."""
+        """Yield every file that an object of the document names by a rule."""
         for item in self.setup_items:
             for spec, name in list_files(item, rule):
                 yield FileReference(item, spec, name, self.resolve_path(name.strip()))
 
     def resolve_path(self, name: str) -> str:
-        """Where OpenSim finds a file that is named here, if it was started in the folder of the setup."""
+        """Return where OpenSim finds a file of this setup, if it is started in the folder of the setup."""
         folder = str(self.folder or Path())
         path = os.path.join(folder, name)
         self._looked_at[path] = None
@@ -131,7 +131,7 @@ class Setup(Subject):
         return path
 
     def read_table(self, name: str) -> Table | None:
-        """The table in a file that is named here; None if there is none, or it cannot be read."""
+        """Return the table in a file of this setup; None if it is missing or unreadable."""
         return (
             read_table(self.resolve_path(name.strip()))
             if is_given(name) and is_table(name)
@@ -139,14 +139,14 @@ class Setup(Subject):
         )
 
     def iterate_with_tables(self, items: Iterable[Any], tag: str) -> Iterator[tuple[Any, Table]]:
-        """Objects, each with the table that a property of it names; none without one, or with one without labels."""
+        """Yield objects with the table that a property names; objects without a readable table are left out."""
         for item in items:
             table = self.read_table(getattr(item, tag))
             if table is not None and table.labels:
                 yield item, table
 
     def read_document(self, name: str) -> Object | None:
-        """The top of a document that is named here; None if there is none, or it cannot be read."""
+        """Return the top object of a document of this setup; None if it is missing or unreadable."""
         return get_object(self.resolve_path(name.strip())) if is_given(name) else None
 
     # ------------------------------------------------------------------------------------------------- context
@@ -178,7 +178,7 @@ class Setup(Subject):
         return next(self.find_readers(), None)
 
     def find_readers(self) -> Iterator[tuple[str, Object]]:
-        """The tool that this is, or all that read this; with the paths of their setups."""
+        """Yield the tool that this is, or all tools that read this; with the paths of their setups."""
         if self.top is None or self.file is None:
             return
         if _find_model_file(self.top) is not None:
@@ -245,12 +245,12 @@ class Setup(Subject):
         return result
 
     def read_tool_table(self, name: str) -> Table | None:
-        """A table that the tool names."""
+        """Return a table that the tool names; None if it is missing or unreadable."""
         path = self._resolve_tool_path(name) if is_table(name) else None
         return None if path is None else read_table(path)
 
     def _resolve_tool_path(self, name: str) -> str | None:
-        """Where a file is that the tool names, if it names one."""
+        """Return the path of a file that the tool names; None if it names none."""
         if not is_given(name) or self.tool is None:
             return None
         path = os.path.join(os.path.dirname(self.tool[0]), name.strip())
@@ -258,7 +258,7 @@ class Setup(Subject):
         return path
 
     def list_names(self, target: str) -> set[str]:
-        """The names of all components of a class that the tool works with: those of the model and of added sets."""
+        """Return the names of all components of a class, in the model and in added sets."""
         if self.tree is None or self.tool is None:
             return set()
         names = {item.name for item in self.tree.of_class(target).values()}
@@ -267,7 +267,7 @@ class Setup(Subject):
         }
 
     def is_bound(self, name: str) -> bool:
-        """Whether a coordinate of the model is locked, prescribed, or follows from others."""
+        """Return whether a coordinate of the model is locked, prescribed, or determined by others."""
         assert self.tree is not None
         bound: Any = self.tree.of_class("CoordinateCouplerConstraint").values()
         item = self.tree.of_class("Coordinate").get(name)
@@ -286,7 +286,7 @@ class Setup(Subject):
         return [(file, added) for file in files if (added := get_object(file)) is not None]
 
     def find_writer(self, path: str) -> str | None:
-        """The other setup of the project that writes a file, which need not be there yet; None if none does."""
+        """Return another setup of the project that writes a file; None if there is none."""
         wanted = os.path.realpath(path)
         around = self._find_tools(list(Path(wanted).parents)[:3])
         named: dict[int, str] = {}
@@ -313,17 +313,17 @@ class Setup(Subject):
 
 
 def is_given(name: str) -> bool:
-    """Whether a text names a file: one word stands for none, in these letters."""
+    """Return whether a text names a file; the word Unassigned stands for none."""
     return name.strip() not in ("", "Unassigned")
 
 
 def get_content_type(spec: FieldSpec) -> str:
-    """What the file holds that a property names: a class of objects, or what kind of table."""
+    """Return what the file of a property contains: a class of objects, or a type of table."""
     return spec.reference.target.removesuffix(" file")
 
 
 def list_files(item: Object, rule: str) -> Iterator[tuple[FieldSpec, str]]:
-    """Every file that an object names by a rule."""
+    """Yield every file that an object names by a rule."""
     for spec in get_file_specs(type(item), rule):
         value = getattr(item, spec.name)
         for name in value if isinstance(value, tuple) else (value,):
@@ -332,7 +332,7 @@ def list_files(item: Object, rule: str) -> Iterator[tuple[FieldSpec, str]]:
 
 
 def find_motion_file(file: str, tool: Object) -> str:
-    """Where the coordinates are that a tool is given, by the file of its setup; "" if it is given none."""
+    """Return the path of the coordinates that a tool reads; empty if it reads none."""
     name = next(
         (name for spec, name in list_files(tool, "file") if get_content_type(spec) == "motion"), ""
     )
@@ -340,14 +340,14 @@ def find_motion_file(file: str, tool: Object) -> str:
 
 
 def select_members(owner: Any, target: str) -> list[Any]:
-    """The objects of a set, or of a list, that are of a class: a text may put anything there."""
+    """Return the objects of a set or list that have a class; a text may contain others."""
     return [
         item for item in (owner if isinstance(owner, list) else owner.objects) if is_a(item, target)
     ]
 
 
 def _list_read_files(top: Object) -> Iterator[str]:
-    """Every file that is read with a document, as it is named."""
+    """Yield every file that is read with a document, as it is named."""
     for item in top.walk():
         if item.layout is not None and item.layout.include is not None:
             yield item.layout.include.path
@@ -355,7 +355,7 @@ def _list_read_files(top: Object) -> Iterator[str]:
 
 
 def _find_model_file(top: Object) -> str | None:
-    """The file of the model that a tool works on; None of what is no tool."""
+    """Return the model file of a tool; None if the object is not a tool."""
     for item in top.walk():
         if "model_file" in vars(item):
             return str(vars(item)["model_file"])

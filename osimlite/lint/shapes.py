@@ -38,7 +38,7 @@ class Layout(NamedTuple):
 
 
 def _make_layout(kept: bytes, *more: tuple[bytes, int, int]) -> Layout:
-    """A layout in which some separators are kept.
+    """Return a layout with some separators kept in the shapes.
 
     Some characters are said to follow on each other never, though they may: that tells separators
     from each other.
@@ -75,7 +75,7 @@ _NO_SEPARATORS = bytes(set(range(256)) - set(b" \t\n"))
 
 
 def compute_shapes(block: bytes, layout: Layout) -> tuple[bytes, bool]:
-    """What lines look like: a ``0`` for each number, the separators that are kept, and ``!`` where something is wrong.
+    """Return the shapes of lines: ``0`` for each number, separators, and ``!`` where a line is not valid.
 
     Nothing is wrong with a line without ``!``: its numbers are such as C++ reads (no NaN, no
     infinity, no hexadecimal digits). A line with one needs to be looked at.
@@ -128,6 +128,6 @@ def compute_shapes(block: bytes, layout: Layout) -> tuple[bytes, bool]:
 
 @lru_cache(maxsize=4)
 def _make_masks(bits: int) -> tuple[int, int, int]:
-    """A 1 in each of more bytes than so many bits can count, then 2 and 15 in each."""
+    """Return a 1 in each of 2**bits + 1 bytes, then 2 and 15 in each."""
     ones = int.from_bytes(b"\1" * ((1 << bits) + 1), "little")
     return ones, 2 * ones, 15 * ones

@@ -42,14 +42,14 @@ class Skeleton:
         )
 
     def iterate_pairs(self) -> Iterator[tuple[JointLink, Component, Component]]:
-        """The joints that connect two bodies, with the parent and the child."""
+        """Yield the joints between two different bodies, with the parent and the child."""
         for link in self.links:
             parent, child = link.parent_base, link.child_base
             if parent is not None and child is not None and parent is not child:
                 yield link, parent, child
 
     def compute_depths(self) -> dict[int, int]:
-        """How many joints lie between ground and each body (by identity); bodies that none reach are left out."""
+        """Return the number of joints between ground and each reachable body, by its identity."""
         depth = {id(self.ground): 0}
         pending: list[Component] = [self.ground]
         while pending:
@@ -62,7 +62,7 @@ class Skeleton:
         return depth
 
     def find_joints(self, base: Component) -> list[JointLink]:
-        """The joints at a body."""
+        """Return the joints at a body."""
         return [link for link in self.links if base is link.parent_base or base is link.child_base]
 
 
@@ -88,7 +88,7 @@ class TreeGrowth(NamedTuple):
 
 @cached_per_subject
 def grow_tree(subject: Subject) -> TreeGrowth:
-    """What OpenSim does with a skeleton, as far as its joints lead anywhere."""
+    """Return how OpenSim builds a tree from a skeleton."""
     bones = build_skeleton(subject)
     ground, masses = (
         subject.path(bones.ground),
@@ -146,7 +146,7 @@ def _fails_to_build(subject: Subject, edges: list[_Edge], order: dict[str, _Edge
 
 @cached_per_subject
 def build_skeleton(subject: Subject) -> Skeleton:
-    """The skeleton of a model."""
+    """Return the skeleton of a model."""
     assert subject.model is not None
     bones = Skeleton([*subject.find_instances(Body)], subject.model.ground)
     for joint in subject.tree.components:
@@ -161,7 +161,7 @@ def build_skeleton(subject: Subject) -> Skeleton:
 
 
 def has_unknown_joints(subject: Subject) -> bool:
-    """Whether a joint or a body is of a class that is not known, so that the graph has gaps."""
+    """Return whether a joint or a body has an unknown class, so the graph has gaps."""
     model = subject.model
     assert model is not None
     members: list[Object] = [
@@ -173,7 +173,7 @@ def has_unknown_joints(subject: Subject) -> bool:
 
 
 def find_base(subject: Subject, frame: Component | None) -> Component | None:
-    """The body or ground that a frame is fixed to, through any number of offset frames; looked for once per frame."""
+    """Return the body or ground that a frame is fixed to through offset frames; cached for each frame."""
     known = cast("dict[int, Component | None]", subject.cache.setdefault("bases", {}))
     way: set[int] = set()
     while frame is not None and not isinstance(frame, (Body, Ground)) and id(frame) not in known:

@@ -36,7 +36,7 @@ P = ParamSpec("P")
 def cached_per_subject(
     make: Callable[Concatenate[S, P], Cached],
 ) -> Callable[Concatenate[S, P], Cached]:
-    """Let a function work a thing out once per subject, and once for each of its other arguments."""
+    """Cache a function per subject and per value of its other arguments."""
 
     @wraps(make)
     def kept(subject: S, /, *args: P.args, **named: P.kwargs) -> Cached:
@@ -85,7 +85,7 @@ class Subject(CheckTarget):
                 self.notes = [note for note in self.notes if self._is_sure(note)]
 
     def _is_sure(self, note: Note) -> bool:
-        """Whether a note is about what stands before a syntax error; only there elements are numbered rightly."""
+        """Return whether a note is about text before a syntax error, where elements are numbered reliably."""
         assert self.source is not None and self.sure_until is not None
         return (
             note.number < len(self.source.spans)
@@ -93,7 +93,7 @@ class Subject(CheckTarget):
         )
 
     def is_for(self, rule: Rule) -> bool:
-        """Whether a rule has anything to look at; of a text with a syntax error only what is said in one place."""
+        """Return whether a rule applies; after a syntax error only rules on single places do."""
         if rule.about == MEASURES and self.about == "model":
             return self.model is not None and self.sure_until is None and has_measures(self)
         if rule.about == CONSTRUCTION and self.about == "model":
@@ -105,7 +105,7 @@ class Subject(CheckTarget):
         return self.model is not None and (self.sure_until is None or rule.code[4] in "12")
 
     def measure(self, *, anew: bool = True) -> str:
-        """Measure paths and muscles of the model, or recall it; why that cannot be done, if it cannot."""
+        """Measure paths and muscles, or recall the results; return why not, if that fails."""
         return measure_subject(self, anew=anew)
 
     def find_obstacles(self, *, anew: bool = True) -> str:
@@ -149,11 +149,11 @@ class Subject(CheckTarget):
         return result
 
     def find_instances(self, cls: type[T]) -> Iterator[T]:
-        """Every object of a class or of one derived from it."""
+        """Yield every object of a class or of a derived one."""
         return cast("Iterator[T]", self.find_by_class(cls.__name__))
 
     def find_by_class(self, cls: str) -> Iterator[Any]:
-        """Every object of the class with this name or of one derived from it; the class need not be imported."""
+        """Yield every object of the class with this name or of a derived one; the class need not be imported."""
         return chain.from_iterable(self._by_base.get(cls, ()))
 
     @cached_property
@@ -168,7 +168,7 @@ class Subject(CheckTarget):
         return {id(use): resolve(use) for use in self.uses}
 
     def resolution(self, use: Use) -> Resolution:
-        """What a reference leads to."""
+        """Return what a reference resolves to."""
         known = self._resolutions.get(id(use))
         return self.tree.resolve(use) if known is None else known
 
@@ -178,7 +178,7 @@ class Subject(CheckTarget):
         return Unknown in self.by_class
 
     def owner(self, item: Object) -> Component:
-        """The component an object belongs to; the model, of one that OpenSim leaves out."""
+        """Return the component that an object belongs to; the model, for an object that OpenSim ignores."""
         try:
             return self.tree.owner_of(item)
         except KeyError:
@@ -186,22 +186,22 @@ class Subject(CheckTarget):
             return self.model
 
     def path(self, item: Object | None) -> str:
-        """The absolute path of the component an object belongs to."""
+        """Return the absolute path of the component that an object belongs to."""
         if item is None or self.model is None:
             return ""
         return self.tree.path_of(self.owner(item)) or ""
 
     def describe(self, item: Object) -> str:
-        """What people call an object: ``Body 'pelvis'``; a part without a name goes by its owner."""
+        """Return the name of an object for messages, such as ``Body 'pelvis'``; that of its owner if it has no name."""
         owner = self.owner(item)
         return describe_object(item if item.name and item is not owner else owner)
 
     def describe_property(self, item: Object, spec: FieldSpec) -> str:
-        """What people call a property: ``mass of Body 'pelvis'``."""
+        """Return the name of a property for messages, such as ``mass of Body 'pelvis'``."""
         return f"{spec.tag} of {describe_object(item) if item.name else self.describe(item)}"
 
     def describe_part(self, item: Object) -> str:
-        """What people call a part without a name of its own: ``the SimmSpline of Coordinate 'knee'``."""
+        """Return the name of a part for messages, such as ``the SimmSpline of Coordinate 'knee'``."""
         return (
             describe_object(item)
             if item.name
@@ -209,13 +209,17 @@ class Subject(CheckTarget):
         )
 
     def target_of(self, owner: Component, tag: str) -> Component | None:
-        """The component that a single reference of `owner` leads to; what is of another class has none."""
+        """Return the component that a single reference of `owner` resolves to; None if there is none."""
         spec = type(owner).field_specs().get(tag)
         value = None if spec is None else getattr(owner, spec.name)
         return self.tree.resolve(Use(owner, owner, spec, value)).target if spec and value else None
 
     def word_at(self, item: Object, tag: str, index: int) -> tuple[str | None, int]:
-        """The word at `index` in the text of a list, and how many equal ones stand before it."""
+        """Return a word of a list in the text, and how many equal words precede it.
+
+        Returns:
+            The word or None, and the count.
+        """
         number = self.element_of(item, tag)
         if number is None or self.source is None:
             return None, 0
@@ -226,7 +230,7 @@ class Subject(CheckTarget):
         return words[index], words[:index].count(words[index])
 
     def notes_of(self, kind: str) -> list[tuple[Note, Object]]:
-        """What the reader noticed of a kind about objects, with the objects."""
+        """Return the notes of the reader of one kind about objects, with the objects."""
         return [
             (note, note.owner)
             for note in self.notes
@@ -234,7 +238,7 @@ class Subject(CheckTarget):
         ]
 
     def has_note(self, item: Object, spec: FieldSpec) -> bool:
-        """Whether the reader noticed something about the text of this property."""
+        """Return whether the reader made a note about the text of this property."""
         return (id(item), spec.name) in self._noted
 
     @cached_property
@@ -246,7 +250,7 @@ class Subject(CheckTarget):
         }
 
     def element_of(self, item: Object, tag: str) -> int | None:
-        """The number of the element that gives a property of an object."""
+        """Return the index of the element that gives a property of an object; None if there is none."""
         if self.source is None or item._index is None:
             return None
         return self.source.child(item._index, tag)
@@ -261,7 +265,7 @@ class Subject(CheckTarget):
         attribute: str | None = None,
         number: int | None = None,
     ) -> Position | None:
-        """Where something is in the text.
+        """Return the position of something in the text.
 
         Args: item: the object concerned; alone, its start tag. tag: a property of it: its text, or
             the object's start tag where the property is not given. word: the `nth` occurrence of
@@ -288,7 +292,7 @@ class Subject(CheckTarget):
         return self.source.of_tag(number)
 
     def list_outside_paths(self) -> list[str] | None:
-        """Every path outside the text that findings may depend on; None if nobody can say."""
+        """Return every path outside the text that findings may depend on; None if that is unknown."""
         if self.needs_remeasuring or any(note.kind == "include" for note in self.notes):
             return None
         if any(isinstance(fault, SpecialFileError) for fault in self.faults):
@@ -315,7 +319,7 @@ class Subject(CheckTarget):
         return list(result)
 
     def has_explicit_name(self, item: Object) -> bool:
-        """Whether the text gives an object its name; always true of a model made in Python."""
+        """Return whether the text gives an object its name; True for a model made in Python."""
         if self.source is None:
             return True
         if item._index is None:
@@ -323,7 +327,7 @@ class Subject(CheckTarget):
         return "name" in self.source.attributes_of(item._index)
 
     def attribute_name(self, number: int, name: str) -> Position | None:
-        """Where the name of an attribute stands."""
+        """Return the position of the name of an attribute."""
         if self.source is None:
             return None
         result = self.source.attributes_of(number).get(name)
@@ -332,7 +336,7 @@ class Subject(CheckTarget):
         )
 
     def _find_element(self, item: Object | None) -> int | None:
-        """The element of an object; of one the text does not give, that of the component above it."""
+        """Return the element of an object; that of the component above if the text does not contain the object."""
         while item is not None:
             number = cast("int | None", item._index)
             if number is not None:

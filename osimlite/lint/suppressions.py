@@ -28,7 +28,7 @@ class Suppression:
     used: set[str] = field(default_factory=set)
 
     def covers(self, finding: Finding, has_name: Callable[[str], bool]) -> bool:
-        """Whether the finding, of a rule that `has_name` some names, is one of those the comment is about.
+        """Return whether the comment covers a finding, of a rule that `has_name` some names.
 
         It is noted as used then.
         """
@@ -42,7 +42,7 @@ class Suppression:
 
 
 def read_suppressions(source: Source) -> list[Suppression]:
-    """Every ignoring comment of a text.
+    """Return every ignoring comment of a text.
 
     Before the root element it speaks of the whole file, alone on its line of the element that
     follows, at the end of a line of that line.
@@ -67,7 +67,7 @@ def read_suppressions(source: Source) -> list[Suppression]:
 
 
 def read_header_suppressions(lines: list[str]) -> list[Suppression]:
-    """Every ignoring line in the header of a storage file, which OpenSim passes over; it speaks of the whole file."""
+    """Return every ignoring line in the header of a storage file; each applies to the whole file."""
     result = []
     for number, line in enumerate(lines, 1):
         match = _LINE.match(line)

@@ -82,7 +82,7 @@ class Table(CheckTarget):
         return RowScanner(cells, header.parts).scan(self.data, header.rows, header.row_line)
 
     def iterate_rows(self, time: float) -> Iterator[list[bytes]]:
-        """The cells of the rows from a time on; the first is looked for by halving the text."""
+        """Yield the cells of the rows from a time on; the first is found by bisection."""
         data, place = self.data, int(self.is_markers)
         low, high = self.header.rows, len(data)
         while high - low > 2000:
@@ -101,7 +101,7 @@ class Table(CheckTarget):
             low = end
 
     def read_row(self, time: float) -> list[float]:
-        """The numbers of the first row from a time on, NaN for what is none; nothing if there is none."""
+        """Return the numbers of the first row from a time on, NaN for other cells; empty without a row."""
         return [parse_number(cell) for cell in next(self.iterate_rows(time), [])]
 
     @property
@@ -119,7 +119,7 @@ class Table(CheckTarget):
         return median(after - before for before, after in pairwise(times)) if len(times) > 1 else 0
 
     def label_of(self, number: int) -> str:
-        """The label of a column by its number; of a marker file its marker's."""
+        """Return the label of a column by its index; in a marker file that of its marker."""
         place = (number - 2) // 3 if self.is_markers else number
         return (
             "Time"
@@ -130,7 +130,7 @@ class Table(CheckTarget):
         )
 
     def locate_time(self, line: int) -> Position:
-        """Where the time of the row in a line is."""
+        """Return the position of the time in the row of a line."""
         start = self.line_start(line)
         text = self.data[start : self.line_start(2, start)]
         first, *rest = islice(_CELL.finditer(text), 2)
@@ -138,13 +138,13 @@ class Table(CheckTarget):
         return Position(line, result.start() + 1, len(result[0]))
 
     def suppressions(self) -> list[Suppression]:
-        """The lines of the header that ignore findings; a marker file cannot have any."""
+        """Return the lines of the header that ignore findings; a marker file cannot have any."""
         return [] if self.is_markers else read_header_suppressions(self.header.lines)
 
     def make_replacement(
         self, at: Position, named: object, text: str, *, certain: bool
     ) -> Fix | None:
-        """The fix that puts a text in a place of the header, or among the labels; None where nobody knows the bytes.
+        """Return the fix that replaces a text in the header or among the labels; None if the encoding is unknown.
 
         `named` is what stands there, or None for whatever does.
         """
@@ -162,12 +162,12 @@ class Table(CheckTarget):
         return Fix((Edit(start, start + len(old.encode()), text),), safe)
 
     def insert_line(self, number: int, line: str) -> Fix:
-        """The fix that puts a line before another."""
+        """Return the fix that inserts a line before another."""
         start = self.line_start(number)
         return Fix((Edit(start, start, line + ("\r\n" if b"\r\n" in self.data[:1000] else "\n")),))
 
     def line_start(self, number: int, start: int = 0) -> int:
-        """Where a line begins, in bytes, as they are counted from the one that begins at `start`."""
+        """Return the offset in bytes of a line, counted from the line that begins at `start`."""
         for _ in range(number - 1):
             start = self.data.find(b"\n", start) + 1 or len(self.data)
         return start

@@ -124,7 +124,7 @@ class Trial(CheckTarget):
         advice: str,
         kind: str = "",
     ) -> None:
-        """Compare the numbers of a rule with limits: beyond the largest they are bad, beyond the least they are okay.
+        """Compare the measurements of a rule with limits: bad beyond the largest, okay beyond the smallest.
 
         Args:
             report: the collector of the rule's findings.

@@ -10,18 +10,18 @@ from osimlite.schema.base import Object, Unknown
 
 
 def describe_object(item: Object) -> str:
-    """``Body 'pelvis'``, or ``Body`` for one without a name."""
+    """Return class and name of an object, such as ``Body 'pelvis'``, or ``Body`` without a name."""
     kind = item.class_name if isinstance(item, Unknown) else type(item).tag
     return f"{kind} '{item.name}'" if item.name else kind
 
 
 def with_article(noun: str) -> str:
-    """The noun with its article."""
+    """Return the noun with its article."""
     return f"{'an' if noun[:1].lower() in 'aeiou' else 'a'} {noun}"
 
 
 def format_quantity(value: float | tuple[float, ...], unit: str | None = None) -> str:
-    """A number, or several, in few digits and with the unit."""
+    """Format a number, or several, with few digits and the unit."""
     values = value if isinstance(value, tuple) else (value,)
     text = " ".join(
         f"{item:.6g}" if item == item and abs(item) != float("inf") else format_shortest(item)
@@ -31,7 +31,7 @@ def format_quantity(value: float | tuple[float, ...], unit: str | None = None) -
 
 
 def format_value(value: object) -> str:
-    """A value as a file would have it."""
+    """Format a value as a file would contain it."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, float):
@@ -42,7 +42,7 @@ def format_value(value: object) -> str:
 
 
 def find_nearest_name(text: str, right: list[str]) -> str | None:
-    """The find_nearest right text; of paths the last names are compared, so that a long way there does not hide them."""
+    """Return the nearest valid text; paths are compared by their last names. None if none is near."""
     whole = find_nearest(text, right, cutoff=70)
     last = text.rstrip("/").rpartition("/")[2]
     by_last = {word.rpartition("/")[2]: word for word in reversed(right)}
@@ -55,12 +55,12 @@ def find_nearest_name(text: str, right: list[str]) -> str | None:
 
 
 def suggest_names(wrong: Iterable[str], right: Iterable[str]) -> str:
-    """What some texts may stand for, asked at the end of a sentence; nothing if no right one is like them."""
+    """Return a question with suggestions for wrong texts, to end a message; empty without suggestions."""
     known = sorted(right)
     near = [f"'{name}' for '{text}'" for text in wrong if (name := find_nearest_name(text, known))]
     return f"; is it {join_words(near)}?" if near else ""
 
 
 def pick_closest(text: str, right: list[str]) -> str:
-    """The one of some texts that is most like another."""
+    """Return the text that is most similar to another."""
     return right[0] if len(right) == 1 else find_nearest(text, right, cutoff=0) or right[0]

@@ -37,7 +37,7 @@ class JumpSuspect(NamedTuple):
 
 
 def find_jumps(paths: Paths, looked_at: Sequence[Sweep]) -> Iterator[PathJump]:
-    """The greatest jump of the length of each path that has one.
+    """Yield the greatest jump of the length of each path that has one.
 
     They are looked for where conditional points come or go, and between values where a length
     changes otherwise than next to them: there a jump can hardly be greater than the difference.
@@ -92,7 +92,7 @@ def _find_suspects(paths: Paths, sweep: Sweep) -> Iterator[JumpSuspect]:
 
 
 def _bisect_suspects(paths: Paths, suspects: Sequence[JumpSuspect]) -> list[float]:
-    """The value in each interval at which the length of the path changes most, besides the usual change."""
+    """Return the value in each interval at which the path length changes most, besides the usual change."""
     low, high = np.array([item.ends for item in suspects]).T
     first, last, active = low, high, high - low > ASIDE
     begin, end = (np.array([item.sweep.poses[item.pose + k] for item in suspects]) for k in (0, 1))
@@ -118,13 +118,13 @@ def _bisect_suspects(paths: Paths, suspects: Sequence[JumpSuspect]) -> list[floa
 
 
 def _compute_side_poses(suspect: JumpSuspect, value: float) -> Array:
-    """The poses (2, n) on both sides of a value."""
+    """Return the poses (2, n) on both sides of a value."""
     beside = np.array([value - ASIDE, value + ASIDE])
     return suspect.sweep.interpolate_poses(beside, suspect.sweep.find_poses_before(beside))
 
 
 def _find_changed_parts(paths: Paths, name: str, sides: Array) -> tuple[str, ...]:
-    """Names of the points and surfaces that a path runs through on one side only."""
+    """Return the names of the points and surfaces that a path touches on one side only."""
     route = paths.routes[name]
     assert isinstance(route, ThroughPoints)
     before, after = ({number for number, _ in paths.points(q)[name]} for q in sides)

@@ -121,7 +121,7 @@ def measure_model(
 def _find_bad_surface_lengths(
     paths: Paths, start: Array, looked_at: list[Sweep]
 ) -> Iterator[LengthOnSurface]:
-    """The lengths on surfaces that are no lengths, of each path on each surface the first that is found."""
+    """Yield the first negative or NaN length of each path on each surface."""
     poses = [Pose(), *(sweep.pose(value) for sweep in looked_at for value in sweep.values)]
     every = np.concatenate([start[None], *(sweep.poses for sweep in looked_at)])
     for name, surface, lengths in paths.system.all_on_surfaces(every, paths.routes):
@@ -148,7 +148,7 @@ def _refuse_many_loops(mechanism: Mechanism) -> None:
 def _find_length_extremes(
     looked_at: list[Sweep], default: Array
 ) -> Iterator[tuple[tuple[float, Pose], tuple[float, Pose]]]:
-    """Where each path is shortest and where it is longest, by default and in the middle of the ranges."""
+    """Yield where each path is shortest and longest, among the default pose and the middle of the ranges."""
     poses, rows = [Pose()], [default[None]]
     for sweep in looked_at:
         low, high = sweep.info.range

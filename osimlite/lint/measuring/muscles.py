@@ -36,15 +36,23 @@ class MuscleFibers(NamedTuple):
 
     @property
     def is_elastic(self) -> bool:
-        """Whether there is something to bring into equilibrium."""
+        """Whether the muscle has states to equilibrate."""
         return not set(self.kind.solved_states).isdisjoint(list_states(self.component))
 
     def get_start_states(self) -> dict[str, float]:
-        """The states where they start."""
+        """Return the initial states of the muscle.
+
+        Returns:
+            The values by the names of the states.
+        """
         return {state.name: state.initial_value(self.component) for state in self.kind.states}
 
     def equilibrate(self, length: float, states: dict[str, float]) -> dict[str, float]:
-        """The states in equilibrium at a length of the path (m), NaN if there is none."""
+        """Return the equilibrium states at a path length (m); NaN without equilibrium.
+
+        Returns:
+            The values by the names of the states.
+        """
         if not self.is_elastic:
             return states
         is_found, *result = self._call_law(self.kind.equilibrium, length, states)
@@ -53,7 +61,11 @@ class MuscleFibers(NamedTuple):
         )
 
     def evaluate_law(self, length: float, states: dict[str, float]) -> dict[str, float]:
-        """What the law gives by the names of its outputs, the path at rest; tension and fiber length are normalized."""
+        """Evaluate the muscle law for a path at rest.
+
+        Returns:
+            The outputs by name; tension in `max_isometric_force`, fiber length in optimal lengths.
+        """
         known = dict(
             zip(
                 self.kind.outputs,
@@ -82,7 +94,7 @@ class MuscleFibers(NamedTuple):
 def find_fibers(
     model: Model, mechanism: Mechanism, wanted: Container[str]
 ) -> Iterator[MuscleFibers]:
-    """The muscles that pull, whose laws are given numbers: those of Thelen, Millard, De Groote, Meyer.
+    """Yield the muscles whose laws have numeric parameters: Thelen, Millard, De Groote, Meyer.
 
     Args:
         model: whose muscles.
@@ -115,7 +127,7 @@ def find_fibers(
 
 
 def compute_start(fibers: MuscleFibers, length: float) -> MuscleStart | None:
-    """Start and equilibrium at a length of the path, m; None of a muscle that has nothing to bring into equilibrium."""
+    """Compute start and equilibrium at a path length, m; None for a muscle without states to equilibrate."""
     if not fibers.is_elastic:
         return None
     states = fibers.get_start_states()
@@ -128,7 +140,7 @@ def compute_start(fibers: MuscleFibers, length: float) -> MuscleStart | None:
 
 
 def compute_reach(fibers: MuscleFibers, length: float, is_active: bool, pose: Pose) -> FiberReach:
-    """Fibers in equilibrium at a length of the path, m."""
+    """Compute the fibers in equilibrium at a path length, m."""
     known = fibers.evaluate_law(
         length,
         fibers.equilibrate(

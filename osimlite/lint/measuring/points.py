@@ -17,7 +17,7 @@ from osimlite.simulation.paths import Paths
 
 
 def measure_moving_points(paths: Paths) -> Iterator[MovingPoint]:
-    """Each moving point at both ends of the range of its coordinate."""
+    """Yield each moving point at both ends of the range of its coordinate."""
     for name, route in paths.routes.items():
         for point in route.points if isinstance(route, ThroughPoints) else ():
             if point.kind != MOVING:
@@ -38,7 +38,7 @@ def measure_moving_points(paths: Paths) -> Iterator[MovingPoint]:
 
 
 def _evaluate_point(point: Node, value: float) -> tuple[Array, Array]:
-    """Place of a point at a value of its coordinate, and the derivative of it."""
+    """Return the position of a point at a value of its coordinate, and its derivative."""
     result = [function.evaluate(np.array([value])) for function in point.functions]
     return np.array([place for place, _, _ in result]), np.array(
         [slope[0] for _, slope, _ in result]
@@ -46,7 +46,7 @@ def _evaluate_point(point: Node, value: float) -> tuple[Array, Array]:
 
 
 def _find_defined_range(point: Node) -> tuple[float, float]:
-    """The values of the coordinate that all functions of a point are given for."""
+    """Return the values of the coordinate for which all functions of a point are defined."""
     ranges = [_find_function_range(function) for function in point.functions]
     return max(low for low, _ in ranges), min(high for _, high in ranges)
 

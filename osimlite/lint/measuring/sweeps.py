@@ -53,15 +53,15 @@ class Sweep:
         return self.paths.mechanism.coordinates[self.place]
 
     def value(self, value: float) -> Value:
-        """A value of the coordinate, with its name."""
+        """Return a value of the coordinate with its name and unit."""
         return Value(self.info.name, float(value), self.info.unit)
 
     def pose(self, value: float) -> Pose:
-        """What people call the pose at a value of the coordinate."""
+        """Return the pose at a value of the coordinate, for messages."""
         return Pose((self.value(value),))
 
     def interpolate_poses(self, values: Array, place: NDArray[np.intp]) -> Array:
-        """Values (k, n) of all coordinates where this one has a value, along straight lines between the poses.
+        """Return all coordinates (k, n) at values of this one, by linear interpolation between the poses.
 
         Args:
             values: of the coordinate (k,), rad or m.
@@ -72,12 +72,12 @@ class Sweep:
         return before + part[:, None] * (after - before)
 
     def find_poses_before(self, values: Array) -> NDArray[np.intp]:
-        """Numbers (k,) of the poses before values of the coordinate."""
+        """Return the indices (k,) of the poses before values of the coordinate."""
         return np.clip(np.searchsorted(self.values, values), 1, len(self.values) - 1) - 1
 
 
 def sweep_coordinates(paths: Paths, start: Array, others: Container[int] = ()) -> list[Sweep]:
-    """A sweep of each coordinate that changes the length of a path.
+    """Return a sweep of each coordinate that changes the length of a path.
 
     Args:
         paths: that are looked at.
@@ -115,7 +115,7 @@ def sweep_coordinates(paths: Paths, start: Array, others: Container[int] = ()) -
 
 
 def _find_poses(paths: Paths, start: Array, place: int, values: Array, is_tied: bool) -> Array:
-    """The poses with these values of a coordinate, from the default one to where constraints let it go no further."""
+    """Return poses with these values of a coordinate, from the default outwards as far as constraints allow."""
     poses = np.tile(start, (len(values), 1))
     poses[:, place] = values
     if not is_tied:
@@ -132,7 +132,7 @@ def _find_poses(paths: Paths, start: Array, place: int, values: Array, is_tied: 
 
 
 def find_tied_coordinates(paths: Paths, start: Array) -> Array:
-    """Whether each coordinate (n,) is in the equations of a constraint."""
+    """Return whether each coordinate (n,) is in the equations of a constraint."""
     constraints = paths.mechanism.constraints
     if not constraints:
         return np.zeros(len(start), dtype=bool)

@@ -23,7 +23,7 @@ ASIDE, NEAR = 1e-7, 1e-4
 def compare_wrappings(
     geodesic: Paths, paths: Paths, start: Array, looked_at: Sequence[Sweep]
 ) -> Iterator[WrappingError]:
-    """Each path around surfaces: by how much it is longer than along geodesics by default, and where by most.
+    """Yield for each path around surfaces its excess length over geodesics, by default and at worst.
 
     Args:
         geodesic: those of the paths that have surfaces, along geodesics.
@@ -68,7 +68,7 @@ def compare_wrappings(
 
 
 def _sample_poses(start: Array, free: Sequence[Sweep]) -> Array:
-    """Poses (k, n) with values of all coordinates anywhere in their ranges."""
+    """Return poses (k, n) with random values of all free coordinates within their ranges."""
     # Python's own generator, since pydantic has loaded it: `numpy.random` would take five
     # milliseconds more.
     generator = Random(0)
@@ -89,7 +89,7 @@ def _sample_poses(start: Array, free: Sequence[Sweep]) -> Array:
 def _is_certain(
     geodesic: Paths, paths: Paths, own: int, path: int, excess: float, q: Array
 ) -> bool:
-    """Whether a path is as much too long right beside a pose; if not, rounding decides, or what nobody is told of."""
+    """Return whether a path has the same excess right beside a pose; otherwise it is due to rounding."""
     beside = np.array([q - ASIDE, q + ASIDE])
     there = paths.system.lengths_of([path] * 2, beside) - geodesic.system.lengths_of(
         [own] * 2, beside

@@ -153,7 +153,7 @@ def report_no_inertia(subject: Subject, report: FindingCollector) -> None:
 
 
 def _spins_freely(subject: Subject, body: Body) -> bool:
-    """Whether a body without inertia, the last of its chain, turns about its mass center: the mass matrix is singular.
+    """Return whether a body without inertia at the end of its chain rotates about its mass center.
 
     A ball joint, or any that turns about three axes, always has an axis through the mass center.
     """
@@ -213,7 +213,7 @@ class _Suggestion(TypedDict):
 
 
 def _describe_closest(body: Body) -> str:
-    """How far the nearest possible inertia is from that of a body."""
+    """Return a phrase about the nearest possible inertia and its distance."""
     nearest = find_possible_inertia(body.inertia)
     parts = [new - old for new, old in zip(nearest, body.inertia, strict=True)]
     # Each product stands in the matrix twice.
@@ -225,7 +225,7 @@ def _describe_closest(body: Body) -> str:
 
 
 def _suggest_inertia(subject: Subject, body: Body) -> _Suggestion:
-    """The nearest possible inertia, as what to write instead."""
+    """Return the nearest possible inertia as suggestion and fix."""
     text = " ".join(f"{number:.9g}" for number in find_possible_inertia(body.inertia))
     place = (
         subject.position(body, tag="inertia")
@@ -236,7 +236,7 @@ def _suggest_inertia(subject: Subject, body: Body) -> _Suggestion:
 
 
 def _list_inertias(subject: Subject) -> list[tuple[Body, Sequence[float]]]:
-    """Each body with a finite inertia that is not zero, and its principal moments in rising order."""
+    """Return each body with a finite inertia other than zero, and its sorted principal moments."""
     return [
         (body, sorted(compute_principal_axes(body.inertia)[0]))
         for body in subject.find_instances(Body)

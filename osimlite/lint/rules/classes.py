@@ -237,7 +237,7 @@ def report_missing_wrapper(subject: Subject, report: FindingCollector) -> None:
 
 
 def find_wrapper(note: Note, owner: Object) -> str | None:
-    """The list of `owner` that an object standing directly in it belongs in."""
+    """Return the list of `owner` that should contain an object placed directly in it; None if there is none."""
     if note.value is None or find_part(note, owner) is not None:
         return None
     lists = (
@@ -257,7 +257,7 @@ def find_wrapper(note: Note, owner: Object) -> str | None:
 
 
 def find_part(note: Note, owner: Object) -> FieldSpec | None:
-    """The one-object property that takes the class of this element, if it would only be called right."""
+    """Return the property that would accept this object under its name; None if there is none."""
     if note.value is None:
         return None
     for spec in get_field_specs(type(owner)).values():
@@ -272,7 +272,7 @@ def find_part(note: Note, owner: Object) -> FieldSpec | None:
 
 
 def _describe_consequence(subject: Subject, note: Note) -> str:
-    """What OpenSim does with an object it cannot take."""
+    """Return what OpenSim does with an object that it cannot accept."""
     spec = note.spec
     if spec is None or not isinstance(spec.kind, Held):
         return "leaves the object out"
@@ -287,7 +287,7 @@ def _describe_consequence(subject: Subject, note: Note) -> str:
 
 
 def find_set(cls: type[Object] | None) -> str | None:
-    """The set of a model that takes objects of a class."""
+    """Return the set of a model that accepts objects of a class; None if there is none."""
     if cls is None:
         return None
     for spec in get_field_specs(Model).values():

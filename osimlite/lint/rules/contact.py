@@ -161,7 +161,7 @@ _SURFACES = {"ContactGeometry", "ContactSphere", "ContactHalfSpace"}
 
 
 def _find_contact_lists(subject: Subject) -> Iterator[tuple[Component, list[Object], list[Use]]]:
-    """Each force that works through lists of contact geometry: the force, its parameter objects, what they name."""
+    """Yield each force with lists of contact geometry, its parameter objects, and its references."""
     forces: dict[int, tuple[Component, list[Object], list[Use]]] = {}
     for force in subject.find_instances(Force):
         if "contact_parameters" in get_defaults(type(force))[1]:

@@ -209,7 +209,7 @@ _COLLINEAR = 1e-5
 
 
 def _compute_axis_rates(joint: CustomJoint, coordinate: Coordinate) -> list[float]:
-    """How fast each axis moves with a coordinate in the default pose; where nobody can tell, some number but 0."""
+    """Return the rate of each axis with a coordinate in the default pose; unknown rates are arbitrary but not 0."""
     values = {item.name: item.default_value for item in list_coordinates(joint)}
     result = []
     for number, axis in enumerate(list_axes(joint)):
@@ -229,7 +229,7 @@ def _compute_axis_rates(joint: CustomJoint, coordinate: Coordinate) -> list[floa
 
 
 def _compute_slope(function: Function | None, place: int, first: float) -> float | None:
-    """The derivative of a function by one of its variables, of which the first has a value; None if it is not known."""
+    """Return the derivative of a function by one of its variables, at a value of the first; None if unknown."""
     match function:
         case None | Constant():
             return 0.0
@@ -252,7 +252,7 @@ def _compute_slope(function: Function | None, place: int, first: float) -> float
 
 
 def _compute_rank(rows: list[list[float]]) -> int:
-    """The number of rows that no others make up, by elimination."""
+    """Return the number of linearly independent rows, by elimination."""
     rank = 0
     rows = [row[:] for row in rows]
     for column in range(6):

@@ -21,9 +21,12 @@ from osimlite.schema.specs import FieldSpec, get_class_names, get_value_specs
 def describe_consequence(
     cls: type[Object], name: str, number: float, *, rigid_tendon: bool = False
 ) -> tuple[str, bool]:
-    """What happens with `number`, outside its domain, in a property; and whether that is a failure.
+    """Return what OpenSim does with `number`, which is outside the domain of a property.
 
     A rigid tendon may have no length, where an elastic one needs some.
+
+    Returns:
+        The consequence, and whether it is a failure.
     """
     is_allowed = rigid_tendon and name == "tendon_slack_length"
     for base in cls.__mro__:
@@ -219,7 +222,7 @@ _OutsideDomain = tuple[Object, FieldSpec, Any, DomainVerdict]
 
 @cached_per_subject
 def find_outside_domain(subject: Subject) -> list[_OutsideDomain]:
-    """Every number outside its domain."""
+    """Return every number outside its domain."""
     return list(_iterate_outside_domain(subject))
 
 
@@ -260,7 +263,7 @@ def _iterate_outside_domain(subject: Subject) -> Iterator[_OutsideDomain]:
 
 
 def _is_missing(item: Object, spec: FieldSpec, value: Any) -> bool:
-    """Whether a file does not give what has no default. The mass of a body has a rule of its own."""
+    """Return whether a file lacks a property without default. The mass of a body has a separate rule."""
     return spec.tag != "mass" and spec.name not in item.model_fields_set and _has_nan(value)
 
 
@@ -302,7 +305,7 @@ def _report_domain(
 
 
 def _get_domain(cls: type[Object], spec: FieldSpec) -> str:
-    """The numbers that a property of a class may have; what a base has stricter is not so for it."""
+    """Return the domain of a property of a class; a class may widen that of its base."""
     assert isinstance(spec.kind, Value)
     return (
         cls.facts.domains.get(spec.name, spec.kind.domain)
@@ -313,7 +316,7 @@ def _get_domain(cls: type[Object], spec: FieldSpec) -> str:
 
 @cache
 def _list_domains(cls: type[Object]) -> tuple[tuple[FieldSpec, Callable[[float], bool]], ...]:
-    """The properties of a class that have a domain, with the test for it."""
+    """Return the properties of a class that have a domain, with the test for it."""
     result = []
     for spec in get_value_specs(cls):
         assert isinstance(spec.kind, Value)
@@ -324,7 +327,7 @@ def _list_domains(cls: type[Object]) -> tuple[tuple[FieldSpec, Callable[[float],
 
 
 def _find_large_numbers(subject: Subject) -> Iterator[tuple[Object, FieldSpec, Any]]:
-    """Every property that may hold a number that is huge or not finite: a quick test, since there are many numbers."""
+    """Yield every property that may hold a huge or non-finite number, by a quick test."""
     for cls, items in subject.by_class.items():
         specs = _list_real_properties(cls)
         for item in items:
@@ -341,7 +344,7 @@ def _find_large_numbers(subject: Subject) -> Iterator[tuple[Object, FieldSpec, A
 
 @cache
 def _list_real_properties(cls: type[Object]) -> tuple[tuple[FieldSpec, str], ...]:
-    """The properties of a class that hold real numbers, each with its name."""
+    """Return the properties of a class that hold real numbers, each with its name."""
     specs = (
         spec
         for spec in get_value_specs(cls)
@@ -359,7 +362,7 @@ def _has_nan(value: Any) -> bool:
 
 
 def _may_be_infinite(item: Object, spec: FieldSpec) -> bool:
-    """Whether infinity is a way to say that there is no bound."""
+    """Return whether infinity is allowed because it means that there is no bound."""
     if type(item).__name__ == "AnalyzeTool" and spec.tag.endswith("_time"):
         return True
     if any(
@@ -370,7 +373,7 @@ def _may_be_infinite(item: Object, spec: FieldSpec) -> bool:
 
 
 def _find_word(subject: Subject, item: Object, spec: FieldSpec, number: float) -> str | None:
-    """The word of the text that a number was read from."""
+    """Return the word of the text that a number was read from; None if there is none."""
     element = subject.element_of(item, spec.tag)
     if element is None or subject.source is None:
         return None

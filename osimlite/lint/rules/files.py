@@ -149,7 +149,7 @@ def report_included_file(subject: Subject, report: FindingCollector) -> None:
 
 
 def _has_content(source: Source | None, number: int) -> bool:
-    """Whether an element with a ``file`` holds something; of members of a set OpenSim does not look at the file."""
+    """Return whether an element with ``file=`` has content; OpenSim ignores the file of a member of a set."""
     if source is None:
         return False
     # An empty set has empty elements for members and groups.
@@ -218,7 +218,7 @@ class _FolderListings:
         self._known: dict[str, dict[str, str]] = {}
 
     def has(self, place: str, name: str) -> bool:
-        """Whether there is a file `name`, which may have folders in it, in the folder `place`."""
+        """Return whether the folder `place` has a file `name`, which may contain folders."""
         listing, last = self._listing(place, name)
         if last.isascii() and last.lower() not in listing:
             return False
@@ -226,7 +226,7 @@ class _FolderListings:
         return os.path.isfile(os.path.join(place, name))
 
     def in_other_case(self, places: list[str], name: str) -> str | None:
-        """The file in the first of the folders that is called `name` but for upper and lower case."""
+        """Return the first file that differs from `name` in letter case only; None if there is none."""
         for place in places:
             listing, last = self._listing(place, name)
             twin = listing.get(last.lower(), last)
@@ -235,7 +235,7 @@ class _FolderListings:
         return None
 
     def _listing(self, place: str, name: str) -> tuple[dict[str, str], str]:
-        """The names in the folder of a file by their small letters, and the file's own."""
+        """Return the names in the folder of a file by their lower case, and the name of the file."""
         folder, last = place or ".", name
         if "/" in name or os.sep in name:
             before, last = os.path.split(name)

@@ -389,7 +389,7 @@ def _find_functions_of_coordinates(
 
 
 def _find_linear_functions(subject: Subject) -> Iterator[tuple[Object, int, LinearFunction]]:
-    """The linear functions of several variables: what they belong to, how many variables, and the function."""
+    """Yield the linear functions of several variables: their owner, the number of variables, the function."""
     for holder, count, held in _find_functions_of_coordinates(subject):
         function = held
         while isinstance(function, MultiplierFunction):

@@ -108,7 +108,7 @@ def report_wrong_coordinate_count(subject: Subject, report: FindingCollector) ->
 
 
 def _declares_none(subject: Subject, joint: Joint) -> bool:
-    """Whether a text has an element for the coordinates of a joint; an empty one of an older format says nothing."""
+    """Return whether a text has an element for the coordinates of a joint in the current format."""
     number = subject.element_of(joint, "coordinates")
     return (
         number is not None

@@ -69,12 +69,12 @@ def report_unknown_attribute(subject: Subject, report: FindingCollector) -> None
 
 
 def _is_xml_attribute(attribute: str) -> bool:
-    """Whether an attribute is for programs that read any XML."""
+    """Return whether an attribute belongs to XML itself."""
     return attribute == "xmlns" or ":" in attribute
 
 
 def _find_ignored_attributes(subject: Subject) -> Iterator[tuple[int, str, str]]:
-    """Every attribute without a meaning of an element that is no object: the element's number and tag, its name."""
+    """Yield every attribute without meaning on elements that are not objects: element, tag, name."""
     source = subject.source
     if source is None or not source.attributes:
         return
@@ -132,7 +132,7 @@ def report_stray_text(subject: Subject, report: FindingCollector) -> None:
 
 
 def _find_stray_texts(source: Source) -> Iterator[tuple[int, str]]:
-    """Where text stands beside elements, and the text; what stands in a comment is none."""
+    """Yield each text beside elements with its offset; comments do not count."""
     if source.mixed is None:
         plain = _QUOTED.sub(lambda match: match[0].replace(">", "_"), blank_comments(source.text))
         for start, end in {
@@ -273,7 +273,7 @@ def report_not_upgradable(subject: Subject, report: FindingCollector) -> None:
 
 
 def _describe_unreadable(source: Source, number: int, kind: str) -> str:
-    """What an element should hold; empty if it does."""
+    """Return what an element should contain; empty if it does."""
     span, inside = source.spans[number], source.children(number)
     pieces = [
         piece

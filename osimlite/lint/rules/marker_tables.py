@@ -57,7 +57,7 @@ def report_marker_units(table: Table, report: FindingCollector) -> None:
 
 
 def _measure_spread(sample: list[float]) -> float | None:
-    """The diagonal of the box around the markers of a row."""
+    """Return the diagonal of the box around the markers of a row; None with fewer than two markers."""
     axes = [[number for number in sample[2 + axis :: 3] if number == number] for axis in range(3)]
     if any(len(numbers) < 2 for numbers in axes):
         return None

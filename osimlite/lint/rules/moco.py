@@ -105,7 +105,7 @@ def report_impossible_bounds(setup: Setup, report: FindingCollector) -> None:
 
 
 def _find_repeated(items: list[Any]) -> Iterator[Any]:
-    """The objects with a name that one before has."""
+    """Yield the objects whose name an earlier object has."""
     names: set[str] = set()
     for item in items:
         if item.name in names:
@@ -212,7 +212,7 @@ def report_study_data(setup: Setup, report: FindingCollector) -> None:
 
 
 def _describe_guess_fault(setup: Setup, tree: Tree, guess: Table) -> str:
-    """What is wrong with the columns of a trajectory, their counts and their order; nothing if all is right."""
+    """Return what is wrong with the columns of a trajectory; empty if nothing is."""
     wanted = set(find_variables(tree, "state or control variable")) | {
         item.name for item in setup.find_by_class("MocoParameter")
     }
@@ -249,7 +249,7 @@ def _describe_guess_fault(setup: Setup, tree: Tree, guess: Table) -> str:
 
 
 def _find_unknown_columns(setup: Setup, reference: Reference, held: Any, table: Table) -> list[str]:
-    """The columns of a table that are not what they must be names of."""
+    """Return the columns of a table that do not name what they should."""
     tree = setup.tree
     if tree is None or Unknown in tree.by_class or any(setup.find_by_class("ModelOperator")):
         return []
@@ -353,7 +353,7 @@ def report_study_parts(setup: Setup, report: FindingCollector) -> None:
 
 
 def _describe_property_fault(parameter: Any, component: Component) -> str:
-    """What is wrong with the property that a parameter is about, nothing if all is right."""
+    """Return what is wrong with the property of a parameter; empty if nothing is."""
     name, element = parameter.property_name, parameter.property_element
     spec = get_field_specs(type(component)).get(name)
     if spec is None:

@@ -194,7 +194,7 @@ _SHARED_CONSTANTS = (
 
 
 def _locate_path_points(subject: Subject, path: GeometryPath) -> list[Vector]:
-    """Where the points of a path are in the default pose that belong to it there; none if one of them is not known."""
+    """Return the positions of the active points of a path in the default pose; empty if one is unknown."""
     poses, places = compute_default_poses(subject), []
     for point in path.path_point_set.objects:
         placed = locate_frame(subject, subject.target_of(point, "socket_parent_frame"))

@@ -190,7 +190,7 @@ def _should_have_name(subject: Subject, component: Component) -> bool:
 
 
 def _find_fixable_references(subject: Subject, component: Component) -> list[BrokenReference]:
-    """The broken references that a component of this class would fix if it had the right name."""
+    """Return the broken references that this component would resolve if it had the right name."""
     parent = subject.tree.parent_of(component)
     result = []
     for broken in find_broken_references(subject):
@@ -215,7 +215,7 @@ def _find_fixable_references(subject: Subject, component: Component) -> list[Bro
 
 
 def _list_missing_names(subject: Subject, component: Component) -> list[str]:
-    """Names that are missing and that a component of this class would bear."""
+    """Return the unresolved names that a component of this class could have."""
     return list(
         dict.fromkeys(
             _get_last_part(broken.text) for broken in _find_fixable_references(subject, component)
@@ -229,7 +229,7 @@ def _get_last_part(text: str) -> str:
 
 @cached_per_subject
 def _find_holders(subject: Subject) -> dict[int, dict[str, None]]:
-    """Who holds a reference that leads to a component, by its identity."""
+    """Return the components that refer to each component, by its identity."""
     known: dict[int, dict[str, None]] = {}
     for use in subject.uses:
         if use.reference.rule not in ("file", "column", "input"):

@@ -222,7 +222,7 @@ def report_limit_inside_range(subject: Subject, report: FindingCollector) -> Non
 
 
 def _drives_sliding(subject: Subject, material: HuntCrossleyContactParameters) -> bool:
-    """Whether friction at the smallest speeds acts along the sliding, even with the viscous part."""
+    """Return whether friction at the smallest speeds accelerates the sliding, even with viscous friction."""
     force = subject.owner(material)
     viscous = (
         material.viscous_friction * force.transition_velocity
@@ -235,7 +235,7 @@ def _drives_sliding(subject: Subject, material: HuntCrossleyContactParameters) -
 def _find_limits(
     subject: Subject,
 ) -> Iterator[tuple[CoordinateLimitForce, Coordinate, float, float, float]]:
-    """Limit forces with their coordinates, in how many of the forces' units 1 rad or 1 m is, and the range in these.
+    """Yield limit forces with their coordinate, the factor to their unit, and the range in that unit.
 
     A coordinate without a range is left out, and one of which the functions of its joint decide
     what it means.

@@ -220,13 +220,13 @@ class BrokenReference(NamedTuple):
 
 
 def _select_broken(subject: Subject, why: str) -> Iterator[BrokenReference]:
-    """The broken references of one kind."""
+    """Return the broken references of one kind."""
     return (broken for broken in find_broken_references(subject) if broken.why == why)
 
 
 @cached_per_subject
 def find_broken_references(subject: Subject) -> list[BrokenReference]:
-    """Every broken reference of the model."""
+    """Return every broken reference of the model."""
     return list(_iterate_broken_references(subject))
 
 
@@ -259,12 +259,12 @@ def _iterate_broken_references(subject: Subject) -> Iterator[BrokenReference]:
 
 
 def _is_unassigned(use: Use) -> bool:
-    """Whether the text is the word that OpenSim prints for a single name which was never given."""
+    """Return whether the text is the word that OpenSim prints for a name that was never set."""
     return use.value == "UNASSIGNED" and use.position is None and use.spec.name != "name"
 
 
 def _list_uses(subject: Subject) -> Iterator[Use]:
-    """Every reference, but those that lead nowhere by their nature (files, columns, outputs)."""
+    """Yield every reference that must resolve; files, columns and outputs are not among them."""
     for use in subject.uses:
         if use.reference.rule not in ("file", "column", "input", "positional", "point-index"):
             yield use
@@ -325,7 +325,7 @@ def _explain_reference(
 
 
 def _list_right_words(subject: Subject, use: Use) -> list[str]:
-    """Every text that would be right; the same for all references of one kind in one component."""
+    """Return every valid text; it is the same for all references of one kind in one component."""
     known = cast(
         "dict[tuple[str, str, int], list[str]]", subject.cache.setdefault("right words", {})
     )
@@ -341,14 +341,14 @@ def _list_right_words(subject: Subject, use: Use) -> list[str]:
 
 
 def _differs_in_form(text: str, candidates: list[str]) -> bool:
-    """Whether the text differs from a right one in form alone: parts of the path are left out or added."""
+    """Return whether a text differs from a valid one only in missing or extra parts of the path."""
     if "/" not in text.strip("/") or any("/" not in word for word in candidates):
         return True
     return any(word.strip("/") == text.strip("/") for word in candidates)
 
 
 def _find_elsewhere(subject: Subject, use: Use, text: str) -> Component | None:
-    """A component of another class that goes by this name or path."""
+    """Return a component of another class with this name or path; None if there is none."""
     tree = subject.tree
     at_path = tree.by_path.get(normalize_path("/" + text) or "")
     if at_path is not None and not is_a(at_path, use.reference.target):
@@ -361,12 +361,12 @@ def _find_elsewhere(subject: Subject, use: Use, text: str) -> Component | None:
 
 
 def _needs_plain_path(use: Use) -> bool:
-    """Whether OpenSim compares the text itself: a PrescribedController finds its functions by the path as it stands."""
+    """Return whether OpenSim compares the text: a PrescribedController looks up functions by the path as written."""
     return type(use.owner).__name__ == "PrescribedController" and use.spec.tag == "socket_actuators"
 
 
 def _is_made_up(subject: Subject, use: Use) -> bool:
-    """Whether a reference leads to a coordinate that OpenSim makes up, of which another rule speaks."""
+    """Return whether a reference leads to a coordinate that OpenSim creates; another rule reports it."""
     if use.reference.target != "Coordinate" or use.reference.rule == "own-joint-coordinate":
         return False
     paths = find_made_up_paths(subject)
@@ -379,7 +379,7 @@ def _is_made_up(subject: Subject, use: Use) -> bool:
 
 
 def _is_overwritten(subject: Subject, use: Use) -> bool:
-    """Whether OpenSim sets this reference itself: the frame of the geometry that a frame draws."""
+    """Return whether OpenSim overwrites this reference: the frame of the geometry that a frame draws."""
     return (
         isinstance(use.holder, Geometry)
         and use.spec.tag == "socket_frame"
@@ -397,7 +397,7 @@ def _is_drawn_by_frame(subject: Subject, geometry: Geometry) -> bool:
 
 
 def _is_undecided(subject: Subject, use: Use, text: str) -> bool:
-    """Whether the reference may lead into an object of a class that is not known."""
+    """Return whether the reference may lead into an object of an unknown class."""
     if not subject.has_unknown:
         return False
     tree = subject.tree
@@ -415,7 +415,7 @@ def _is_undecided(subject: Subject, use: Use, text: str) -> bool:
 
 
 def _format_subject(subject: Subject, use: Use) -> str:
-    """``HuntCrossleyForce 'foot': geometry names``."""
+    """Return the beginning of a message, such as ``HuntCrossleyForce 'foot': geometry names``."""
     return f"{_describe_holder(subject, use)}: {use.spec.tag} names"
 
 
@@ -424,7 +424,7 @@ def _describe_holder(subject: Subject, use: Use) -> str:
 
 
 def _list_contacts(subject: Subject, frame: Object) -> list[str]:
-    """Names of the contact geometry that is fixed to a frame."""
+    """Return the names of the contact geometry that is fixed to a frame."""
     return [
         use.owner.name
         for use in subject.uses

@@ -107,7 +107,7 @@ _Relation = Callable[[Any, Any], Iterator[Contradiction]]
 
 
 def _make_curve_relation(make: Callable[..., object]) -> _Relation:
-    """The contradiction of a curve of a muscle; `make` takes the properties of the curve and raises what is wrong."""
+    """Return the check of a muscle curve; `make` takes its properties and raises what is wrong."""
 
     def contradiction(curve: Any, owner: Any) -> Iterator[Contradiction]:
         used = {name: getattr(curve, name) for name in type(curve).__annotations__}
@@ -147,7 +147,7 @@ def _check_function_based_path(path: Any, owner: Any) -> Iterator[Contradiction]
 
 
 def _count_arguments(function: Any) -> int | None:
-    """How many arguments OpenSim says that a function takes; None where that is not known."""
+    """Return the number of arguments of a function according to OpenSim; None if it is unknown."""
     if isinstance(function, MultiplierFunction):
         return _count_arguments(function.function)
     if isinstance(function, MultivariatePolynomialFunction):

@@ -120,7 +120,7 @@ def _find_names_in_paths(table: Table) -> set[str]:
 
 
 def _is_state(setup: Setup, column: str) -> bool:
-    """Whether a label may be that of a state: of a component by its path, or in the old way by its name."""
+    """Return whether a label may name a state: by the path of a component, or by its name as in old files."""
     if setup.tree is None:
         return True
     if column.startswith("/"):
@@ -133,7 +133,7 @@ def _is_state(setup: Setup, column: str) -> bool:
 
 
 def _find_missing_states(setup: Setup, table: Table) -> list[str]:
-    """The states of the model that no label of a table names: by its path, the end of it, or in the old way."""
+    """Return the states of the model that no label of a table names, in any format."""
     columns = set(table.columns)
     ends = {"/".join(column.split("/")[-2:]) for column in columns}
     lacking = []
@@ -146,7 +146,7 @@ def _find_missing_states(setup: Setup, table: Table) -> list[str]:
 
 
 def find_motions(setup: Setup) -> Iterator[tuple[Any, str, Table]]:
-    """Every tool that is given a motion as coordinates, with the property and the table."""
+    """Yield every tool that reads a motion as coordinates, with the property and the table."""
     for item, spec, name, _ in setup.find_named_files("file"):
         table = setup.read_table(name) if get_content_type(spec) == "motion" else None
         if table is not None and table.labels and not table.is_markers:

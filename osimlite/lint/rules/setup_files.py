@@ -310,5 +310,5 @@ def report_tools_differ(setup: Setup, report: FindingCollector) -> None:
 
 
 def _is_set(value: str | float) -> bool:
-    """Whether a setting is not left at nothing."""
+    """Return whether a setting has a value."""
     return is_given(value) if isinstance(value, str) else value > 0.0

@@ -164,7 +164,7 @@ def report_swapped_sides(setup: Setup, report: FindingCollector) -> None:
 
 
 def _select_rows(user: Any, table: Table) -> list[list[float]]:
-    """Some rows of markers within the times of a tool, from all over these times where that is known at no cost."""
+    """Return some rows of markers within the time range of a tool, spread over it if that is cheap."""
     span = tuple(getattr(user, "time_range", ()))
     if len(span) != 2 or not span[0] <= span[1]:
         return list(table.rows.samples)
@@ -177,12 +177,12 @@ def _select_rows(user: Any, table: Table) -> list[list[float]]:
 
 
 def _hide_origin(point: Sequence[float]) -> Sequence[float]:
-    """The place of a marker; NaN at 0 0 0, where programs put what they did not see."""
+    """Return the position of a marker; NaN at 0 0 0, where some programs put missing markers."""
     return point if any(point) else (math.nan,) * 3
 
 
 def _find_left_marker(name: str, names: Set[str]) -> str:
-    """The name of the same marker on the left, of one on the right; nothing if there is none."""
+    """Return the name of the left counterpart of a right marker; empty if there is none."""
     for right, left in _SIDES:
         for fellow in (
             left + name.removeprefix(right),
@@ -199,13 +199,13 @@ def _find_left_marker(name: str, names: Set[str]) -> str:
 
 
 def _compute_direction(start: Sequence[float], end: Sequence[float]) -> list[float]:
-    """The direction from one point to another; NaN if one is not known."""
+    """Return the unit vector from one point to another; NaN if one is unknown."""
     length = math.dist(start, end) or math.nan
     return [(b - a) / length for a, b in zip(start, end, strict=True)]
 
 
 def _compute_agreement(ways: list[list[float]]) -> list[float]:
-    """The cosine of each direction with the mean of the others; NaN where there are few, or these do not agree."""
+    """Return the cosine of each direction with the mean of the others; NaN if few are known or they disagree."""
     known = [way for way in ways if way[0] == way[0]]
     whole = [sum(parts) for parts in zip(*known, strict=True)] or [0.0, 0.0, 0.0]
     result = []

@@ -225,7 +225,7 @@ class _LoadSample(NamedTuple):
 
 
 def _sample_load(setup: Setup, force: Any, table: Table | None, motion: Table) -> list[_LoadSample]:
-    """What a force does at those of some times at which it is large."""
+    """Sample a measured force at times at which it is large."""
     if setup.tree is None or table is None or table.span is None or motion.span is None:
         return []
     bodies = setup.tree.members("/bodyset", "Body")

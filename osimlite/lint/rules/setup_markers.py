@@ -16,7 +16,7 @@ from osimlite.lint.words import find_nearest_name
 
 
 def find_marker_users(setup: Setup) -> Iterator[tuple[Any, Table]]:
-    """Every part of a tool that fits markers, with its data."""
+    """Yield every part of a tool that fits markers, with its data."""
     return setup.iterate_with_tables(setup.find_having("ik_task_set", "marker_file"), "marker_file")
 
 
@@ -124,7 +124,7 @@ def report_marker_not_measured(setup: Setup, report: FindingCollector) -> None:
 
 
 def _find_unseen_markers(table: Table, span: tuple[float, ...]) -> set[str]:
-    """The markers that a row between two times lacks."""
+    """Return the markers that are missing in a row between two times."""
     places = list_marker_cells(table)
     return {
         label
@@ -135,7 +135,7 @@ def _find_unseen_markers(table: Table, span: tuple[float, ...]) -> set[str]:
 
 
 def iterate_rows_between(table: Table, span: tuple[float, ...]) -> Iterator[list[float]]:
-    """The numbers of the rows between two times, of a long stretch the first ones."""
+    """Yield the numbers of the rows between two times, at most 1000."""
     if table.is_markers and len(span) == 2:
         for cells in islice(table.iterate_rows(span[0]), 1000):
             row = [parse_number(cell.strip()) for cell in cells]
@@ -145,7 +145,7 @@ def iterate_rows_between(table: Table, span: tuple[float, ...]) -> Iterator[list
 
 
 def list_marker_cells(table: Table) -> list[tuple[str, slice]]:
-    """The markers of a table, each with its cells in a row."""
+    """Return the markers of a table, each with its cells in a row."""
     return [
         (label, slice(2 + 3 * number, 5 + 3 * number)) for number, label in enumerate(table.columns)
     ]

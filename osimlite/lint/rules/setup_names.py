@@ -134,7 +134,7 @@ def report_unknown_name(setup: Setup, report: FindingCollector) -> None:
 
 
 def _get_kind(kind: Reference) -> str | None:
-    """What a text of this kind names in the model, None of what it does not look for there."""
+    """Return what a reference names in the model; None if it is not looked up there."""
     by_rule = (what for what in _KINDS if kind.rule.startswith(what))
     return kind.target if kind.rule in _PATHS else next(by_rule, None)
 
@@ -142,7 +142,11 @@ def _get_kind(kind: Reference) -> str | None:
 def _look_up_text(
     setup: Setup, tree: Tree, use: Use, text: str
 ) -> tuple[str | None, str, Component | None]:
-    """What a text should name, if that is in the model, the text as it is looked up, and what it leads to."""
+    """Look up a text in the model.
+
+    Returns:
+        What it should name or None, the text as looked up, and the component or None.
+    """
     item, kind, what = use.holder, use.reference, _get_kind(use.reference)
     if kind.rule == "socket" and kind.target == "Actuator" and setup.upgraded:
         # A name, that OpenSim looks for everywhere.
@@ -164,7 +168,7 @@ def _look_up_text(
 def _look_up_controls(
     setup: Setup, tool: Object, plain: set[str], report: FindingCollector
 ) -> None:
-    """Tell controls, and columns of controls, that are those of no actuator."""
+    """Report controls, and columns of controls, without an actuator."""
     if not plain:
         return
     # Of tools that follow a motion these are bounds, and go by the whole name.
@@ -205,7 +209,7 @@ def _look_up_controls(
 
 
 def _is_made_by_operators(setup: Setup, text: str) -> bool:
-    """Whether the operators that a study lets loose on its model may make what has this path."""
+    """Return whether the model operators of a study may create the component with this path."""
     makes = {type(operator).__name__ for operator in setup.find_by_class("ModelOperator")}
     return ("ModOpAddReserves" in makes and "/reserve_" in text) or (
         "ModOpReplaceMusclesWithDeGrooteFregly2016" in makes

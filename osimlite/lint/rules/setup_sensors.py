@@ -13,7 +13,7 @@ from osimlite.lint.words import describe_object, find_nearest_name, suggest_name
 
 
 def _find_orientations(setup: Setup) -> Iterator[tuple[Any, str, str, Table]]:
-    """Every tool that reads orientations: the property, what the names of sensors add to those of frames, the table."""
+    """Yield every tool that reads orientations: property, suffix of sensor names, table."""
     for kind, tag, ending in (
         ("IMUInverseKinematicsTool", "orientations_file", ""),
         ("IMUPlacer", "orientation_file_for_calibration", "_imu"),

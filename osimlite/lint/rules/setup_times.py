@@ -214,7 +214,7 @@ def _find_time_ranges(setup: Setup) -> Iterator[tuple[Object, tuple[str, ...], f
 
 
 def _list_tables(item: Any) -> Iterator[tuple[str, str]]:
-    """The tables that a tool reads over its times, with what happens where they end."""
+    """Yield the tables that a tool reads over its time range, with the consequence where they end."""
     for tag in (
         "marker_file",
         "coordinates_file",
@@ -382,7 +382,7 @@ def report_motion_in_degrees(setup: Setup, report: FindingCollector) -> None:
 
 
 def _find_largest(table: Table, places: list[int]) -> tuple[float, int]:
-    """The largest number in some columns, and in which it is; zeros if there is none."""
+    """Return the largest absolute number in some columns, and its column; zeros without numbers."""
     numbers = (
         (abs(sample[place]), place)
         for place in places

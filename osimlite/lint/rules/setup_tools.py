@@ -349,7 +349,7 @@ def report_tool_setting(setup: Setup, report: FindingCollector) -> None:
 
 
 def _find_unactuated_coordinates(setup: Setup) -> list[str]:
-    """The free coordinates of joints to ground, if nothing but paths between bodies acts in the model."""
+    """Return the free coordinates of joints to ground, if only paths between bodies act in the model."""
     if setup.tree is None or not setup.tree.of_class("Actuator"):
         return []
     files = setup.find_having("force_set_files")

@@ -89,7 +89,7 @@ def report_marker_size(setup: Setup, report: FindingCollector) -> None:
 
 
 def _measure_size(points: Sequence[Sequence[float]]) -> float:
-    """The diagonal of the box around points."""
+    """Return the diagonal of the box around points."""
     return math.hypot(*(max(axis) - min(axis) for axis in zip(*points, strict=True)))
 
 
@@ -138,7 +138,7 @@ def report_load_units(setup: Setup, report: FindingCollector) -> None:
 
 
 def _find_largest_load(forces: Sequence[Any], table: Table) -> float:
-    """The largest sum, N, of the sizes of some forces in a row of their table."""
+    """Return the largest sum, N, of the sizes of some forces in a row of their table."""
     prefixes = [str(force.force_identifier) for force in forces if force.force_identifier]
     places = [
         [place for place, label in enumerate(table.columns, 1) if label.startswith(prefix)]
@@ -209,7 +209,7 @@ def report_ground_twice(setup: Setup, report: FindingCollector) -> None:
 
 
 def _find_ground_contacts(setup: Setup) -> Iterator[tuple[Any, set[str]]]:
-    """Every force of the model that acts between surfaces on ground and on bodies, with the names of these bodies."""
+    """Yield every force between surfaces on ground and on bodies, with the names of these bodies."""
     subject = make_model_subject(setup)
     for force in subject.find_by_class("Force"):
         if not force.appliesForce:
@@ -227,7 +227,7 @@ def _find_ground_contacts(setup: Setup) -> Iterator[tuple[Any, set[str]]]:
 
 
 def _find_surfaces(setup: Setup, force: Any) -> Iterator[Any]:
-    """The contact surfaces that a force names."""
+    """Yield the contact surfaces that a force names."""
     subject = make_model_subject(setup)
     for use in subject.uses:
         if use.owner is force:

@@ -238,7 +238,7 @@ def report_lengths_in_millimetres(subject: Subject, report: FindingCollector) ->
 
 @cache
 def _list_lengths(cls: type[Object]) -> tuple[FieldSpec, ...]:
-    """The properties of a class that are lengths or places, in metres."""
+    """Return the properties of a class that are lengths or positions in metres."""
     return tuple(
         spec
         for spec in get_value_specs(cls)
@@ -284,7 +284,7 @@ def report_no_direction(subject: Subject, report: FindingCollector) -> None:
 
 
 def _find_circles(subject: Subject, frames: Sequence[Component]) -> set[int]:
-    """Ids of what one comes back to from itself, by the points of frames and the frames that these are on.
+    """Return the identities of frames and stations that depend on themselves.
 
     R. Tarjan's strongly connected components (1972), each looked at once.
     """
@@ -326,7 +326,7 @@ def _find_circles(subject: Subject, frames: Sequence[Component]) -> set[int]:
 
 
 def _list_supports(subject: Subject, item: Component) -> Iterator[Component]:
-    """What a frame or a station rests on."""
+    """Yield the components that a frame or a station is fixed to."""
     for tag in (*POINTS, "socket_parent_frame", "socket_parent"):
         target = subject.target_of(item, tag)
         if target is not None:
@@ -334,7 +334,7 @@ def _list_supports(subject: Subject, item: Component) -> Iterator[Component]:
 
 
 def _is_on_body(subject: Subject, item: Object) -> bool:
-    """Whether an object is fixed to bodies, so that nothing about it can be ten metres long."""
+    """Return whether an object is fixed to a body, so that no length of it can reach ten metres."""
     owner: Component | None = subject.owner(item)
     if isinstance(owner, Body):
         return True
@@ -352,7 +352,7 @@ def _is_on_body(subject: Subject, item: Object) -> bool:
 
 
 def _find_contact_groups(subject: Subject) -> Iterator[tuple[Component, list[ContactGeometry]]]:
-    """The surfaces that each contact force sets against each other."""
+    """Yield the surfaces of each contact force."""
     forces = {
         id(force)
         for kind in ("HuntCrossleyForce", "SmoothSphereHalfSpaceForce")
@@ -370,7 +370,7 @@ def _find_contact_groups(subject: Subject) -> Iterator[tuple[Component, list[Con
 
 
 def _compute_depth(subject: Subject, ball: ContactSphere, other: ContactGeometry) -> float | None:
-    """How deep a ball is in another surface (m), negative if they are apart; None if nobody can tell."""
+    """Return the depth of a sphere in another surface (m), negative if apart; None if unknown."""
     inner, outer = _locate_surface(subject, ball), _locate_surface(subject, other)
     if inner is None or outer is None or inner[0] is outer[0]:
         return None
@@ -386,7 +386,7 @@ def _compute_depth(subject: Subject, ball: ContactSphere, other: ContactGeometry
 def _locate_surface(
     subject: Subject, surface: ContactGeometry
 ) -> tuple[Component, FramePose] | None:
-    """The body a surface is fixed to, and where the surface is in ground."""
+    """Return the body of a surface, and the pose of the surface in ground; None if unknown."""
     place = locate_frame(subject, subject.target_of(surface, "socket_frame"))
     pose = compute_default_poses(subject).get(id(place[0])) if place is not None else None
     if place is None or pose is None:

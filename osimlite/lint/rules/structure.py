@@ -154,12 +154,12 @@ def _get_inner_text(subject: Subject, number: int) -> str:
 
 
 def _is_switched_off(subject: Subject, number: int) -> bool:
-    """Whether an element is empty, or says no more than that something is off."""
+    """Return whether an element is empty, or only disables something."""
     return _OFF.fullmatch(_get_inner_text(subject, number)) is not None
 
 
 def _is_default(subject: Subject, number: int, spec: FieldSpec) -> bool:
-    """Whether an element says what its property is anyway, so that it does not matter that OpenSim ignores it."""
+    """Return whether an element has the default value of the property, so ignoring it does not matter."""
     text = _get_inner_text(subject, number)
     if isinstance(spec.kind, Held):
         return spec.kind.form == "list" and not text.strip()
@@ -167,7 +167,7 @@ def _is_default(subject: Subject, number: int, spec: FieldSpec) -> bool:
 
 
 def _repeats_first(subject: Subject, owner: Object, number: int) -> bool:
-    """Whether an element holds the same as the first of its tag in the same object."""
+    """Return whether an element has the same content as the first of its tag in the same object."""
     assert subject.source is not None and owner._index is not None
     spans, end = subject.source.spans, 0
     for first in range(owner._index + 1, number):
@@ -184,7 +184,7 @@ def _repeats_first(subject: Subject, owner: Object, number: int) -> bool:
 def _report_old(
     subject: Subject, report: FindingCollector, note: Note, owner: Object, old: Successor
 ) -> None:
-    """Say that a tag is one of an older format."""
+    """Report a tag of an older format."""
     instead = f"write <{old.tag}>" if old.tag is not None else ""
     words = "; " + ", ".join(part for part in (instead, old.hint) if part)
     version = subject.version or CURRENT_VERSION
@@ -368,7 +368,7 @@ def _format_default(spec: FieldSpec) -> str:
 
 
 def list_homes(tag: str, owner: type[Object]) -> list[str]:
-    """Classes that have a property `tag`; a class is left out where one it derives from has it.
+    """Return the classes that have a property `tag`, without classes that inherit it from a listed one.
 
     In a model those of tools are left out, and the other way round.
     """

@@ -107,7 +107,7 @@ _BLANK_LINES = re.compile(rb"^[ \t\r]*\n(?:[ \t\r\n]*\n)?(?=[^\n]*\S)", re.MULTI
 
 
 def _remove_last_tabs(table: Table, width: int) -> Fix | None:
-    """The fix that takes out what ends rows of markers beyond their cells; None if that is more than tabs."""
+    """Return the fix that deletes tabs beyond the cells of rows of markers; None if there are none."""
     edits = []
     for match in _LAST_TABS.finditer(table.data, table.line_start(table.header.label_line + 2)):
         start = table.data.rfind(b"\n", 0, match.start()) + 1
@@ -118,7 +118,7 @@ def _remove_last_tabs(table: Table, width: int) -> Fix | None:
 
 
 def _remove_blank_lines(table: Table, first: int) -> Fix:
-    """The fix that takes out blank lines between rows, from a line on."""
+    """Return the fix that deletes blank lines between rows, from a line on."""
     result = _BLANK_LINES.finditer(table.data, table.line_start(first))
     return Fix(tuple(Edit(*match.span(), "") for match in result))
 

@@ -95,7 +95,7 @@ def report_table_header(table: Table, report: FindingCollector) -> None:
 
 
 def _set_count(table: Table, entry: Entry, key: str, count: int) -> Fix | None:
-    """The fix that makes a line of a header say a count: the key alone if a value is there."""
+    """Return the fix that sets a count in a line of a header: the key alone if a value is there."""
     if entry.value.text:
         return table.make_replacement(entry.key.at, None, key, certain=True)
     return table.make_replacement(
@@ -338,7 +338,7 @@ def report_table_setting(table: Table, report: FindingCollector) -> None:
 
 
 def _check_cell_type(table: Table, report: FindingCollector) -> None:
-    """What the newer reader of storage files makes of the type of the cells, and of blanks around keys."""
+    """Report the type of the cells, and blanks around keys, that the newer reader of storage files misreads."""
     kind = table.entries.get("DataType")
     if kind is not None and kind.value.text and kind.value.text not in SUFFIXES:
         report(

@@ -63,7 +63,7 @@ def report_syntax_error(subject: Subject, report: FindingCollector) -> None:
 
 
 def _describe_extent(subject: Subject) -> str:
-    """How far a text with a syntax error was checked."""
+    """Return how much of a text with a syntax error was checked."""
     if subject.model is None or subject.sure_until is None or subject.sure_until < 2:
         return "nothing else is checked until this is fixed"
     return f"until this is fixed, only tags and values above line {subject.sure_until} are checked"
@@ -235,7 +235,7 @@ def report_document_version(subject: Subject, report: FindingCollector) -> None:
 
 
 def _find_late_socket(source: Source) -> str:
-    """The first socket that is not read in an old document, as ``<socket> in <Class>``; empty if there is none."""
+    """Return the first socket that is not read in an old document, as ``<socket> in <Class>``; empty without one."""
     if not _SOCKET.search(source.text):
         return ""
     for number, span in enumerate(source.spans):
@@ -335,7 +335,7 @@ def _report_at(
 
 
 def _compute_offset(source: Source, line: int | None, column: int | None) -> int:
-    """The character at a line and column, no further than the end of that line."""
+    """Return the offset of the character at a line and column, at most the end of that line."""
     line = line or 1
     lines = source.lines
     if line > len(lines):

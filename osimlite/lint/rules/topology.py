@@ -198,7 +198,7 @@ def _make_pair(link: JointLink) -> frozenset[int]:
 
 
 def _describe_loop(bones: Skeleton, link: JointLink) -> str:
-    """What OpenSim makes of a joint between bodies that other joints connect already."""
+    """Return what OpenSim does with a joint between bodies that other joints already connect."""
     kind = type(link.joint)
     to_ground = link.parent_base is bones.ground and issubclass(kind, WeldJoint | FreeJoint)
     if to_ground or link.child_base is bones.ground or issubclass(kind, CustomJoint):
@@ -231,7 +231,7 @@ class _Groups:
 
 
 def _find_massless_leaves(bones: Skeleton) -> Iterator[tuple[Body, list[Body], Joint]]:
-    """Each rigid group of bodies that has no mass and hangs on one moving joint: its bodies, and the joint."""
+    """Yield each rigid group of massless bodies on one moving joint: first body, other bodies, joint."""
     groups = _Groups()
     for link in bones.links:
         if isinstance(link.joint, WeldJoint):

@@ -193,7 +193,7 @@ def _read_beginning(word: str) -> object:
 
 
 def _are_readable(text: str, kind: Value) -> bool:
-    """Whether every word is one of its kind, so that only their count is wrong."""
+    """Return whether every word is readable, so that only their number is wrong."""
     readers: dict[str, Callable[[str], object]] = {
         "double": parse_real,
         "int": parse_integer,
@@ -222,7 +222,7 @@ def _is_refused(note: Note, spec: FieldSpec, kind: Value) -> bool:
 
 
 def _describe_kept_value(note: Note, owner: Object, spec: FieldSpec, kind: Value) -> str:
-    """What OpenSim continues with."""
+    """Return which value OpenSim uses instead."""
     if note.value is not None:
         return f"OpenSim takes {format_value(note.value)}"
     if kind.legacy:
@@ -233,7 +233,7 @@ def _describe_kept_value(note: Note, owner: Object, spec: FieldSpec, kind: Value
 
 
 def _describe_foreign_characters(text: str) -> str:
-    """Which characters of a number cannot be told from others by looking at them."""
+    """Return which characters of a number only look like ASCII; empty if there are none."""
     odd = [character for character in dict.fromkeys(text) if not character.isascii()]
     if not odd:
         return ""
@@ -244,7 +244,7 @@ def _describe_foreign_characters(text: str) -> str:
 
 
 def _make_readable(text: str, kind: Value) -> str | None:
-    """The same value as OpenSim would read it, if that is plain."""
+    """Return the value as OpenSim would read it, if it is obvious; otherwise None."""
     if kind.scalar == "bool":
         known = {"yes": "true", "on": "true", "1": "true", "no": "false", "off": "false"}
         return known.get(text.lower()) or find_nearest(text.lower(), ("true", "false"))
@@ -262,7 +262,7 @@ def _make_readable(text: str, kind: Value) -> str | None:
 
 
 def _replace_digits(text: str) -> str:
-    """The text with minus signs and digits of word processors and other scripts as ASCII has them."""
+    """Return the text with minus signs and digits of other scripts replaced by ASCII."""
     import unicodedata
 
     return unicodedata.normalize("NFKC", text).translate(
@@ -271,7 +271,7 @@ def _replace_digits(text: str) -> str:
 
 
 def _complete_number(word: str) -> str | None:
-    """The number that was meant, if that is plain."""
+    """Return the intended number, if it is obvious; otherwise None."""
     comma = re.fullmatch(r"([+-]?\d+),(\d+)", word)
     if comma:
         return f"{comma[1]}.{comma[2]}"

@@ -73,7 +73,7 @@ def report_newer_class(subject: Subject, report: FindingCollector) -> None:
 
 
 def _is_given(subject: Subject, item: Object, spec: FieldSpec) -> bool:
-    """Whether the text gives a property under its very tag; an older text may have it under another."""
+    """Return whether the text gives a property under its current tag; older texts may use another."""
     if subject.source is None:
         return spec.name in item.model_fields_set
     number = subject.element_of(item, spec.tag)

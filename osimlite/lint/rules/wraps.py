@@ -129,7 +129,7 @@ def report_wrap_range(subject: Subject, report: FindingCollector) -> None:
 
 
 def _locate_wrap(subject: Subject, surface: WrapObject) -> tuple[Component, FramePose] | None:
-    """The body that a surface is fixed to, and where it is on it."""
+    """Return the body that a surface is fixed to, and its pose there; None if unknown."""
     holder = subject.tree.parent_of(surface)
     placed = locate_frame(subject, subject.tree.parent_of(holder) if holder is not None else None)
     return placed and (
@@ -139,7 +139,7 @@ def _locate_wrap(subject: Subject, surface: WrapObject) -> tuple[Component, Fram
 
 
 def _compute_depth(surface: WrapObject, place: Vector) -> float:
-    """How deep a place in the frame of a surface is inside it, m; 0 where OpenSim would let a path wrap."""
+    """Return the depth of a point inside a surface in its frame, m; 0 where OpenSim would wrap."""
     x, y, z = place
     match surface:
         case WrapCylinder():
