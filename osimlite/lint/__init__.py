@@ -1,4 +1,4 @@
-"""What is wrong with a model: rules over the text, the typed model and its component tree; nothing is simulated."""
+"""The linter: rules on texts, typed models and their component trees, without simulating anything."""
 
 from __future__ import annotations
 
@@ -40,15 +40,20 @@ def validate(
 ) -> Report:
     """Check a model, a setup, a table, or all that is in a folder against every rule.
 
-    Args: model: a Model, the path of a file or of a folder, or a Source. Only of a text do findings
-        know line and column. select: codes, beginnings of codes, or names of rules to run; all if
-        not given. ignore: the same, of rules to leave out. classes: files that declare the classes
-        of plug-ins. config: everything that can be set; `select`, `ignore` and `classes` take its
-        place.
+    Args:
+        model: a Model, the path of a file or a folder, or a Source. Findings have a line and a column
+            only if there is a text.
+        select: codes, prefixes of codes, or names of the rules to run; all by default.
+        ignore: codes, prefixes of codes, or names of the rules to leave out.
+        classes: files that declare the classes of plug-ins.
+        config: complete configuration, instead of `select`, `ignore` and `classes`.
 
-    Raises: MissingFileError: the file is missing or cannot be read. What is wrong inside a file is
-        a finding. OsimliteError: no rule has a code in `select` or `ignore`, or a class is declared
-        wrongly.
+    Returns:
+        The findings.
+
+    Raises:
+        MissingFileError: the file is missing or cannot be read. Errors inside a file are findings.
+        OsimliteError: no rule has a code in `select` or `ignore`, or a class is declared wrongly.
     """
     from osimlite.io.document.plugins import classes_in_use
     from osimlite.io.document.reader import pause_collector
@@ -68,7 +73,7 @@ def validate(
         if not isinstance(model, Source) and os.path.isdir(model):
             from osimlite.lint.many import check_files
 
-            # Processes that are not forked would run the caller's script anew.
+            # Spawned processes would run the caller's script again.
             passed: list[str] = []
             report = check_files(
                 find_project_files([model], passed=passed), config, cached=False, processes=1
@@ -91,8 +96,7 @@ def assert_valid(
 
 
 def __getattr__(name: str) -> Any:
-    # The rules and all that they need are imported when they are wanted, not for what was found
-    # before.
+    # The rules are imported on demand: cached reports do not need them.
     if name == "all_rules":
         from osimlite.lint.registry import all_rules
 

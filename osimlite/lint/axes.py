@@ -1,4 +1,4 @@
-"""How the axes of a CustomJoint name its coordinates, and what OpenSim 4.6 makes of names that do not fit."""
+"""Coordinates on the axes of a CustomJoint, and what OpenSim 4.6 does with names that do not match."""
 
 from __future__ import annotations
 

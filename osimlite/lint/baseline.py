@@ -1,4 +1,4 @@
-"""A baseline: the findings an old repository has and does not want to hear of again."""
+"""Baselines: known findings of a project that are not reported again."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def subtract_baseline(path: str | Path, report: Report) -> Report:
     kept = []
     for finding in report.findings:
         key = _make_key(finding)
-        # An older baseline has the code of the group.
+        # Older baselines contain the code of the group.
         known = next((code for code in (key[0], key[0][:7]) if counts[(code, *key[1:])] > 0), None)
         if known is not None:
             counts[(known, *key[1:])] -= 1
@@ -51,7 +51,7 @@ def subtract_baseline(path: str | Path, report: Report) -> Report:
 
 def _make_key(finding: Finding) -> tuple[str, str, str, str]:
     file = Path(finding.file).as_posix() if finding.file is not None else ""
-    # Where the project lies on this machine is not what another is to know it by.
+    # A baseline must not depend on where the project is on a machine.
     return (
         finding.code,
         file,

@@ -1,4 +1,4 @@
-"""What lies beside a file: documents, tables and folders, read once and again when they change."""
+"""Documents, tables and folders beside a file, cached until they change."""
 
 from __future__ import annotations
 

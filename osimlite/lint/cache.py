@@ -1,9 +1,9 @@
-"""What was found in files before, so that a file that has not changed need not be checked again.
+"""Cache of the reports of files, so that unchanged files need not be checked again.
 
-An entry holds for one text, under one path, by one configuration, with this very osimlite. A file
-whose times, size and place on the disk are those noted has not changed; of another its text tells.
-Files that the model names may change as
-well: an entry notes when each of them was last written, or that it was not there.
+An entry is valid for one text under one path, one configuration, and one version of osimlite. A
+file with the recorded times, size and inode is unchanged; otherwise its checksum decides. A report
+may depend on other files that the model names: an entry records when each of them was last written,
+or that it was missing.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ Stamp = tuple[int, int] | None
 
 
 class Cache:
-    """One folder of entries, a file each; whatever goes wrong with it, models are checked as if it were not there."""
+    """Folder with a file for each entry; any error means that the entry is missing."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder / __version__
@@ -106,7 +106,7 @@ class Cache:
         write_cached(place, json.dumps(entry, separators=(",", ":")))
 
     def _entry(self, file: str) -> Path:
-        # The key has the path too: of two files with the same sum, the one checked last is known.
+        # The key contains the path too: of two files with the same checksum, the last one is cached.
         digest = f"{crc32(os.path.abspath(file).encode(errors='surrogateescape')):08x}"
         return self.folder / digest[:2] / f"{digest[2:]}.json"
 

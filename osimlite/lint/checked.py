@@ -1,4 +1,4 @@
-"""What every subject of a check has, whatever it is: a model, a table, a document that runs a tool."""
+"""Base of everything that rules check: models, tables, setups, trials."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class Where(TypedDict, total=False):
-    """What more tells the place of a finding; :meth:`Subject.position` says how."""
+    """Arguments that locate a finding; see :meth:`Subject.position`."""
 
     tag: str | None
     word: str | None
@@ -26,7 +26,7 @@ class Where(TypedDict, total=False):
 
 
 class CheckTarget:
-    """Something under check, its file and its bytes. `about` says which rules speak of it (:attr:`Rule.about`)."""
+    """Target of a check with its file and bytes; rules with the same `about` apply to it (:attr:`Rule.about`)."""
 
     about: ClassVar[str] = "model"
     source: Source | None = None
@@ -41,7 +41,7 @@ class CheckTarget:
 
     @property
     def text(self) -> str:
-        """Its text, for those who show lines of it."""
+        """The text, for reports that show lines of it."""
         return self.source.text if self.source is not None else self.data.decode("utf-8", "replace")
 
     def is_for(self, rule: Rule) -> bool:
@@ -49,7 +49,7 @@ class CheckTarget:
         return rule.about == self.about
 
     def measure(self, *, anew: bool = True) -> str:
-        """Measure paths and muscles for the rules that need them, or recall the results; return why not, if that fails."""
+        """Measure paths and muscles or recall the results; return why not, if that fails."""
         return ""
 
     def find_obstacles(self, *, anew: bool = True) -> str:

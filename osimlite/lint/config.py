@@ -1,4 +1,4 @@
-"""What a check is asked to look for."""
+"""Configuration of a check: which rules run, with which severities and thresholds."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Config:
-    """Which rules run, how bad their findings are, and from which numbers on they speak.
+    """Which rules run, their severities, and their thresholds.
 
     `select` and `ignore` hold codes (``OSIM301``), the beginning of codes (``OSIM3``) or names of
     rules (``unresolved-reference``); an empty `select` means all. `severity` overrides that of a

@@ -21,14 +21,14 @@ if TYPE_CHECKING:
     from osimlite.lint.subject import Subject
 
 CONSTRUCTION = "construction"
-"""What the rules are about that report obstacles to a computation."""
+"""Value of `Rule.about` for rules that report obstacles to a computation."""
 
 REMEMBERED_MODELS = 16
 """Number of texts whose obstacles stay in memory."""
 
 
 class Stage(StrEnum):
-    """Where a computation stops, or what it finds."""
+    """Stage at which a computation stops, or kind of problem that it finds."""
 
     MECHANISM = "mechanism"
     FORCE = "force"
@@ -42,7 +42,7 @@ class Stage(StrEnum):
 
 
 class Obstacle(NamedTuple):
-    """A reason why a model cannot be computed, or is computed otherwise than it says."""
+    """A reason why a model cannot be computed, or is computed differently from the file."""
 
     stage: Stage
     path: str  # absolute path of the component at fault, empty if it is not known

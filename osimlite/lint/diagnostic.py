@@ -1,4 +1,4 @@
-"""Findings: what a rule has to say about one place of a model."""
+"""Findings of rules, their fixes, and reports."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from osimlite.base.text import escape_unprintable
 
 
 class Severity(StrEnum):
-    """How bad a finding is.
+    """Severity of a finding.
 
-    ERROR: OpenSim rejects the model, crashes, computes NaN, or does something other than what the
+    ERROR: OpenSim rejects the model, crashes, computes NaN, or does something other than the
         text says.
     WARNING: physically or numerically doubtful. INFO: tidiness, or something worth knowing.
     """
@@ -35,7 +35,7 @@ _RANKS = {Severity.ERROR: 0, Severity.WARNING: 1, Severity.INFO: 2}
 
 @dataclass(frozen=True, slots=True)
 class Edit:
-    """Replace the characters from `start` to `end` of the text, of a table the bytes, by `text`."""
+    """Replacement of the characters from `start` to `end` by `text`; in a table offsets count bytes."""
 
     start: int
     end: int
@@ -44,7 +44,7 @@ class Edit:
 
 @dataclass(frozen=True, slots=True)
 class Fix:
-    """A fix as text edits; `safe` if OpenSim then reads the same model, or certainly the one that was meant."""
+    """Fix as text edits; `safe` if OpenSim then reads the same model, or certainly the intended one."""
 
     edits: tuple[Edit, ...]
     safe: bool = True
@@ -52,7 +52,7 @@ class Fix:
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One finding.
+    """Something that a rule reports about one place.
 
     `line` and `column` are 1-based and None for a model made in Python; `length` characters are
     concerned. `component` is the absolute path of the component, empty where there is none.
@@ -73,7 +73,7 @@ class Finding:
 
     @property
     def fixable(self) -> bool:
-        """Whether the finding comes with a fix that is certainly right."""
+        """True if the finding has a safe fix."""
         return self.fix is not None and self.fix.safe
 
     @property
@@ -108,7 +108,7 @@ class Finding:
 
 
 NOT_MEASURED = " not measured: "
-"""Stands between file and rules, and the reason, in `Report.unmeasured`."""
+"""Separator between the file with its rules and the reason in `Report.unmeasured`."""
 
 
 class MissingPackageNote(NamedTuple):
@@ -121,10 +121,10 @@ class MissingPackageNote(NamedTuple):
 
 @dataclass(slots=True)
 class Report:
-    """Everything found in one or several models, sorted by file and place.
+    """All findings of one or several files, sorted by file and position.
 
     `texts` holds the text of each file with findings, for the snippets of a reporter; `checked`
-    counts the files, `known` what a baseline has left out. `unmeasured` has a sentence for each
+    counts the files, `known` the findings that a baseline left out. `unmeasured` has a sentence for each
     file of which some rules were not
     measured: its name, which rules, and why. `passed` names the files of a folder that are none of
         OpenSim's.
@@ -156,12 +156,12 @@ class Report:
 
     @property
     def ok(self) -> bool:
-        """Whether there is no error."""
+        """True if there is no error."""
         return not self.errors
 
     @property
     def codes(self) -> Counter[str]:
-        """How often each code was found."""
+        """Number of findings by code."""
         return Counter(finding.code for finding in self.findings)
 
     def missing_package_notes(self) -> list[MissingPackageNote]:

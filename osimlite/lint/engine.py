@@ -77,9 +77,14 @@ def _make_document_subject(found: Survey, config: Config | None) -> Subject:
 def run_rules(subject: CheckTarget, *, measure: bool = True, recall: bool = False) -> Report:
     """Run every selected rule, and return all findings sorted by position.
 
-    Args: subject: what is checked. measure: whether rules run that are about what is measured of
-        paths and muscles, which takes longer. recall: whether they run too where it was measured
-        before.
+    Args:
+        subject: what is checked.
+        measure: whether to run rules that need measurements of paths and muscles, or a construction
+            of the model, which takes longer.
+        recall: whether to run these rules where cached results exist, even without `measure`.
+
+    Returns:
+        The report.
     """
     findings: list[Finding] = []
     wanted = [
@@ -122,7 +127,7 @@ def run_rules(subject: CheckTarget, *, measure: bool = True, recall: bool = Fals
 
 
 MAX_SHORT_LINES = 3
-"""Lines of an ignoring comment that is found by its lines; others are asked for each finding."""
+"""Largest number of lines of an ignoring comment that is indexed by line; longer ones are tested for each finding."""
 
 
 def _make_ignore_test(comments: list[Suppression]) -> Callable[[Finding], bool]:
@@ -157,7 +162,7 @@ def _apply_suppressions(
         for comment in comments:
             for code in comment.codes:
                 named = [known for known in all_rules() if known.matches(code)]
-                # Of a rule that did not run nobody can say that nothing was found.
+                # A comment for a rule that did not run may be useful.
                 is_silent = any(known in left_out for known in named)
                 ran = not named or (any(map(subject.config.includes, named)) and not is_silent)
                 if code not in comment.used and ran:

@@ -1,6 +1,6 @@
-"""The faults that one rule tells apart: each has a code, a name and a page of its own, so that it can be ignored alone.
+"""Faults of a group rule: each has a separate code, name and page, so that it can be ignored alone.
 
-They are listed beside the rule::
+They are listed in the module of the rule::
 
     01 loose-accuracy, warning, in ik: Inverse kinematics hardly fits poses. It stops where the error is still large.
     - <accuracy>0.5</accuracy>
@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 
 class RuleFault(NamedTuple):
-    """One fault as its rule lists it: the end of its code, name, severity, fixes, example.
+    """Fault of a group rule: suffix of its code, name, severity, fixes, example.
 
     In the `frame` a line with {} stands for the `lines` of the example.
     """
@@ -33,7 +33,7 @@ class RuleFault(NamedTuple):
 
     @property
     def summary(self) -> str:
-        """What it finds."""
+        """The first sentence of the page."""
         return self.text.partition(". ")[0].rstrip(".") + "."
 
     def page(self, group: str) -> str:

@@ -1,4 +1,4 @@
-"""Mends as text edits: everything around them, comments and layout, stays as it is."""
+"""Fixes as text edits, which keep comments and layout."""
 
 from __future__ import annotations
 
@@ -133,8 +133,11 @@ def apply_fixes_in_pieces(
 ) -> tuple[list[bytes | memoryview], int]:
     """Return the bytes of a file after its fixes in pieces, which are views for a table; a document keeps its encoding.
 
-    Raises: OsimliteError: the bytes are in no single encoding, so that they cannot be written back
-        as they were.
+    Returns:
+        The pieces, and the number of fixes.
+
+    Raises:
+        OsimliteError: the file mixes encodings, so it cannot be written back unchanged.
     """
     edits, count = select_edits(report.findings, unsafe=unsafe)
     ends = [0, *(edit.end for edit in edits)]

@@ -1,4 +1,4 @@
-"""What releases of OpenSim have added: ``schemas/history.py`` reads it from their sources."""
+"""Classes and properties that each release of OpenSim added; ``schemas/history.py`` extracts them."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from osimlite.schema.model import CURRENT_VERSION
 from osimlite.schema.specs import FieldSpec, get_field_specs
 
 NEWEST = "4.6"
-"""The release whose classes osimlite has."""
+"""The release of OpenSim whose classes osimlite declares."""
 
 
 class LaterChanges(NamedTuple):
-    """What came after a release.
+    """What later releases added to a release.
 
     `format` is the newest version of documents that the release writes. `classes` has the first
     release of each class by its tag; `properties`, by class and tag, that of each property and the

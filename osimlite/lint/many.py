@@ -1,4 +1,4 @@
-"""Checking many files: those that have changed, on all processors if there is enough to do."""
+"""Check many files: only changed ones, in several processes if that is worth it."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ Progress = Callable[[int, int], None]
 
 
 class CheckJob(NamedTuple):
-    """One file to check, by which configuration, and the folder its findings are kept in (None: nowhere)."""
+    """File to check with its configuration, and the folder for its cached report (None: no cache)."""
 
     file: str
     config: Config
@@ -44,10 +44,15 @@ def check_files(
 ) -> Report:
     """Check files, each with the settings of its folder and the options in `given`.
 
-    Args: files: paths, ``-`` for standard input. given: what comes before the settings of the
-        project. cached: whether findings of files that have not changed are taken from the cache,
-        and new ones kept there. processes: how many processes to use; if not given, as many as
-        there is work for. progress: called with the number of files done and that of all.
+    Args:
+        files: paths, ``-`` for standard input.
+        given: configuration with precedence over the settings of the project.
+        cached: whether to take findings of unchanged files from the cache, and to cache new ones.
+        processes: number of processes; as many as are worth starting by default.
+        progress: called with the numbers of files that are done and of all files.
+
+    Returns:
+        The reports of all files together.
 
     Raises:
         MissingFileError: a file is missing or cannot be read.
@@ -81,7 +86,7 @@ def check_files(
 
 
 class SourceTexts(dict[str, str]):
-    """The text of each file, read again when it is asked for: a thousand models are not kept in memory."""
+    """Texts by file, read again on access, so that a thousand models do not fill the memory."""
 
     def __missing__(self, file: str) -> str:
         from osimlite.io.document.source import Source
@@ -119,7 +124,7 @@ def _check_jobs(jobs: list[CheckJob], processes: int | None) -> Iterator[tuple[C
 
     from osimlite.lint.registry import all_rules
 
-    # On Linux the processes begin with all that is loaded here.
+    # On Linux forked processes share what is loaded here.
     all_rules()
     gc.freeze()
     context = multiprocessing.get_context("fork" if sys.platform == "linux" else "spawn")
@@ -153,7 +158,7 @@ def check_job(job: CheckJob) -> Report:
     report = run_rules(subject)
     outside = subject.list_outside_paths() if job.cache_folder is not None else None
     if job.cache_folder is not None and outside is not None:
-        # A file that changes while it is checked must not be taken for one that was checked after.
+        # A file that changes during the check must not count as checked.
         key, text = make_key(job.file, job.config), fingerprint_text(subject.data)
         Cache(job.cache_folder).store(job.file, key, text, report, outside, began)
     return report

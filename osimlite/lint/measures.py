@@ -42,7 +42,7 @@ NEEDS_SIM = "needs osimlite[sim]"
 """Begins the reason why nothing is measured where the numeric packages are not installed."""
 
 MAX_WRAPS_UNCOMPILED = 12
-"""Wraps of a model; with more it is worth to compile."""
+"""Number of wraps up to which kernels are not compiled for a model."""
 
 _MEASURED = ("Muscle", "PathWrap", "ConditionalPathPoint", "MovingPathPoint")
 
@@ -64,7 +64,7 @@ class Value(NamedTuple):
 
 
 class Pose(NamedTuple):
-    """The default pose, but for some coordinates."""
+    """Default pose except for some coordinates."""
 
     values: tuple[Value, ...] = ()
 
@@ -73,7 +73,7 @@ class Pose(NamedTuple):
 
 
 class WrappingError(NamedTuple):
-    """A path around surfaces in OpenSim's way, beside the same along geodesics."""
+    """Path length around surfaces in OpenSim compared with geodesics."""
 
     owner: str  # path of what has it
     surfaces: tuple[str, ...]  # names of the surfaces
@@ -83,7 +83,7 @@ class WrappingError(NamedTuple):
 
 
 class PathJump(NamedTuple):
-    """A length of a path that jumps: by how much (m), where, and which points or surfaces come or go there."""
+    """Jump of a path length (m), where it is, and which points or surfaces appear or disappear there."""
 
     owner: str
     size: float
@@ -92,7 +92,7 @@ class PathJump(NamedTuple):
 
 
 class LengthOnSurface(NamedTuple):
-    """A length of a path on one of its surfaces (m) that is negative, or NaN where OpenSim finds no way around it."""
+    """Length of a path on a surface (m) that is negative, or NaN where OpenSim finds no path around it."""
 
     owner: str
     surface: str
@@ -106,7 +106,7 @@ class MovingPoint(NamedTuple):
     owner: str  # path of what has the point
     point: str  # its name
     end: Value  # of the range
-    # by how much the coordinate is outside what the functions are given for there (rad or m), 0 if
+    # distance of the coordinate from the range in which the functions are defined (rad or m), 0 if
     # inside
     beyond: float
     moved: float  # how far they let the point move on that way, m
@@ -115,16 +115,16 @@ class MovingPoint(NamedTuple):
 
 
 class MuscleStart(NamedTuple):
-    """A muscle in the state that it starts with, and in equilibrium at the same activation, in the default pose."""
+    """Initial state and equilibrium of a muscle at the same activation in the default pose."""
 
     owner: str  # its path
-    # of the fibers, in optimal fiber lengths; in equilibrium NaN if there is none
+    # fiber lengths in optimal fiber lengths; NaN without an equilibrium
     lengths: tuple[float, float]
     tensions: tuple[float, float]  # of the tendon, in max_isometric_force
 
 
 class FiberReach(NamedTuple):
-    """The fibers of a muscle in equilibrium, fully active where its path is shortest, at rest where it is longest."""
+    """Equilibrium of muscle fibers: fully active at the shortest path, or at rest at the longest path."""
 
     owner: str  # path of the muscle
     is_active: bool  # whether they are
@@ -134,7 +134,7 @@ class FiberReach(NamedTuple):
 
 
 class Measures(NamedTuple):
-    """What is measured of a model."""
+    """Measurements of a model."""
 
     # for each path the places in the mechanism of the coordinates that change its length; in what
     # poses a path is looked at, those of all paths say
@@ -234,10 +234,10 @@ def get_measures(subject: Subject) -> Measures:
 
 
 MAX_REMEMBERED_MODELS = 16
-"""So many models are remembered."""
+"""Number of models whose measurements stay in memory."""
 
 _INDEPENDENT_CLASSES = {"Geometry", "Marker", "Controller", "Probe", "ContactGeometry"}
-"""Classes of what no path depends on."""
+"""Classes of objects that no path depends on."""
 
 
 class TextParts(NamedTuple):
@@ -248,7 +248,7 @@ class TextParts(NamedTuple):
 
 
 class RememberedMeasures(NamedTuple):
-    """What was measured, and of which elements by the paths of their owners."""
+    """Measurements with the digests of the elements that they belong to, by path of the owner."""
 
     paths: dict[str, str]
     measures: Measures

@@ -10,7 +10,7 @@ from osimlite.schema.specs import get_field_specs
 
 
 class Successor(NamedTuple):
-    """The version that did away with a tag, the tag that says the same now (if one does), and what else is to do."""
+    """Version that removed a tag, the tag that replaces it (if any), and a hint."""
 
     since: int
     tag: str | None

@@ -1,4 +1,4 @@
-"""What there is to read about a rule: its page, and the index of all."""
+"""Pages of rules and the index of all rules, as Markdown."""
 
 from __future__ import annotations
 

@@ -52,7 +52,7 @@ if TYPE_CHECKING:
 
 
 class FramePose(NamedTuple):
-    """A frame in another: its axes, and its origin (m)."""
+    """Pose of a frame in another: its axes, and its origin (m)."""
 
     axes: Axes = (X, Y, Z)
     position: Vector = ZERO
@@ -125,8 +125,13 @@ def compute_poses(
 ) -> dict[int, FramePose]:
     """Return the pose in ground of each body that can be located, by its identity.
 
-    Args: subject: the model. values: those of coordinates, rad or m; others have their default
-        values. Given, places may be off by some centimetres.
+    Args:
+        subject: the model.
+        values: values of coordinates, rad or m; the others have their defaults. With values,
+            positions may be off by some centimetres.
+
+    Returns:
+        The poses by the identity of the body.
     """
     bones, ends, motions = (
         build_skeleton(subject),
@@ -162,7 +167,7 @@ def compute_poses(
 
 
 class _JointMotion(NamedTuple):
-    """What a joint turns about or shifts along, and by which function of coordinates; None is the coordinate itself."""
+    """Rotation or translation of a joint by a function of coordinates; None is the coordinate itself."""
 
     turns: bool
     axis: Vector  # a unit vector, or zeros
@@ -249,9 +254,10 @@ def _compute_joint_pose(
 def find_rotation_axes(subject: Subject, joint: Joint) -> list[tuple[str, Vector]]:
     """Return the rotation axes of a gimbal or custom joint in the default pose.
 
-    Returns: The coordinate of each rotation and its axis, a unit vector in the parent frame.
-        Nothing for a joint of another class, and where a rotation does not follow one coordinate of
-        its own or cannot be computed.
+    Returns:
+        The coordinate of each rotation and its axis, a unit vector in the parent frame. Empty for a
+        joint of another class, and where a rotation does not follow exactly one coordinate or
+        cannot be computed.
     """
     values = {item.name: item.default_value for item in list_coordinates(joint)}
     result: dict[str, Vector] = {}

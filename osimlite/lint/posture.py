@@ -1,4 +1,4 @@
-"""The model of a tool in the poses that its tables tell, to some centimetres."""
+"""Poses of the model of a tool along its tables, accurate to some centimetres."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ from osimlite.base.files import make_missing_error, read_at_most, unsaved
 from osimlite.errors import OsimliteError
 
 BEGINNING = 1 << 16
-"""Bytes of a file that tell whose it is."""
+"""Number of bytes at the beginning of a file that decide whether it is OpenSim's."""
 
 _ROOT = re.compile(r"<(?:[\w.-]+:)?OpenSimDocument\b")
 _TAGS = re.compile(
@@ -128,8 +128,10 @@ def find_project_files(
     With `only_ours`, XML of other programs is passed over even where it is named. What is passed
     over is added to `passed`.
 
-    Raises: MissingFileError: a path is not there; MissingFolderError of one that ends as those of
-        folders do. OsimliteError: there is none in a folder.
+    Raises:
+        MissingFileError: a path does not exist.
+        MissingFolderError: a path without a suffix does not exist.
+        OsimliteError: a folder contains no OpenSim file.
     """
     result: list[str] = []
     others: list[str] = [] if passed is None else passed

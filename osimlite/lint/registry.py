@@ -53,7 +53,7 @@ class Threshold(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class FindingCollector:
-    """What a rule calls for each finding of a subject."""
+    """Callback of a rule: each call adds a finding."""
 
     rules: dict[str, Rule]
     subject: CheckTarget
@@ -72,13 +72,22 @@ class FindingCollector:
         fix: Fix | None = None,
         **where: Unpack[Where],
     ) -> None:
-        """Note one finding; where it is, is said as in :meth:`Subject.position`, or by `at`.
+        """Add a finding at a position, which is given by `at` or as in :meth:`Subject.position`.
 
-        A rule that tells faults apart says which it is, by its name; what nobody wants to hear of
-        is passed over.
+        A group rule names its `fault`; faults that are not selected are ignored. For rules on
+        tables and documents with fixes, a suggestion becomes a fix: a safe one if it is `certain` or
+        differs in letter case only.
 
-        Of a rule about tables or documents that fixes, a suggestion is a fix: safe if it is
-        `certain` or differs in letter case alone.
+        Args:
+            message: what is wrong, the consequence in OpenSim, and the next step.
+            item: the object concerned.
+            fault: name of the fault, in a group rule.
+            at: position in the text.
+            severity: severity, if it is not that of the rule.
+            suggestion: the text that would be right at this position.
+            certain: whether the suggestion is certainly right.
+            fix: the fix.
+            **where: more arguments of :meth:`Subject.position`.
         """
         rule, subject = self.rules.get(fault), self.subject
         if rule is None:
@@ -92,7 +101,7 @@ class FindingCollector:
             )
             fix = fix or subject.make_replacement(at, named, suggestion, certain=certain)
         elif subject.upgraded:
-            # What is said of an upgraded document need not be said of its text.
+            # Findings on an upgraded document may not match its text.
             fix = None
         self.findings.append(
             Finding(
@@ -106,7 +115,7 @@ class FindingCollector:
                 max(1, length),
                 subject.path(item),
                 suggestion,
-                # Nor need what is said of one that was guessed at.
+                # Nor may findings on a text that was repaired for reading.
                 None if subject.sure_until is not None else fix,
             )
         )
@@ -118,7 +127,7 @@ FixKinds = Literal["", "safe", "unsafe", "both"]
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """One registered rule.
+    """Registered rule.
 
     `severity` is that of its findings unless it says otherwise of one; `before` has another for
     documents older than a version, where OpenSim does something else with them. `fixes` says of

@@ -20,11 +20,11 @@ from osimlite.base.text import format_count
 from osimlite.lint.shapes import MARKERS, ROWS, VECTORS, Layout, compute_shapes
 
 _MAX_FAULTS = 50
-"""Faults of a kind that are told, one for each column."""
+"""Largest number of faults of a kind that are reported, one for each column."""
 
 
 class RowFault(NamedTuple):
-    """Something wrong in the rows: of what kind, in which column of the table, where it is met first, and how often.
+    """Fault in the rows of a table: its kind and column, its first position, and how often it occurs.
 
     `kind` is ``cell`` (no number), ``row`` (`number` says how many cells, `text` more),
     ``comment``, ``blank``, ``order``, ``time`` (no number), ``part`` (a part of a marker), ``zero``
@@ -54,7 +54,7 @@ class RowFault(NamedTuple):
 
 @dataclass(slots=True)
 class TableRows:
-    """What is known of the rows of a table.
+    """Rows of a table: their number, times and faults.
 
     `cells` is how many cells a row should have, `samples` are the numbers of a few rows (NaN for
     what is none), `unseen` the markers that no row has.
@@ -91,8 +91,10 @@ BLOCK = 16_000
 
 _LONGEST = 4_000_000
 """Bytes of a line whose look would take too much memory."""
-_SAMPLES, _SAMPLED = 64, 200_000
-"""Rows of which all are samples, and the numbers in them at most; of further ones fewer and fewer are."""
+_SAMPLES = 64
+"""Number of rows at the beginning that are all samples; later rows are sampled ever more sparsely."""
+_SAMPLED = 200_000
+"""Largest total of numbers in these rows."""
 _PLAIN = re.compile(rb"[-+]?(\d+(?:\.\d*)?|\.\d+)([eE][-+]?\d+)?")
 _WORD = re.compile(rb"\S+")
 _LETTER = re.compile(rb"[A-Za-z]")
@@ -102,12 +104,14 @@ _FRAME = re.compile(rb"^[^\t\r\n ]", re.MULTILINE)
 
 @dataclass(slots=True)
 class RowScanner:
-    """Goes once through the rows of a table.
+    """Scanner that reads the rows of a table once.
 
-    Args: cells: how many numbers a row has; of a marker table with the number of the frame. parts:
-        how many numbers, with commas between, make a cell. markers: whether these are markers
-        (.trc): a tab ends every cell, cells may be empty, and the time is the second. Else blanks
-        and tabs separate, and the time comes first.
+    Args:
+        cells: number of cells in a row; in a marker table with the frame number.
+        parts: number of values in a cell, separated by commas.
+        markers: whether this is a marker table (.trc): a tab ends every cell, cells may be empty, and
+            the time is the second cell. Otherwise blanks and tabs separate cells, and the time is
+            the first.
     """
 
     cells: int

@@ -24,7 +24,7 @@ _SETTINGS = (
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """What a project asks for. `file` is where it says so; paths and patterns in it count from that folder."""
+    """Settings of a project. Paths and patterns are relative to the folder of `file`."""
 
     file: Path | None = None
     select: tuple[str, ...] = ()

@@ -1,7 +1,7 @@
-"""A setup under check: what a tool is told to do, or a set of tasks, loads, markers that a tool reads.
+"""Setups of tools, and the sets of tasks, loads or markers that tools read, as check targets.
 
-What a setup names is looked for where OpenSim looks for it; a set that a tool reads is checked with
-the model of the tool that names it.
+Files are searched where OpenSim searches them; a set is checked with the model of the tool that
+refers to it.
 """
 
 from __future__ import annotations
@@ -34,15 +34,15 @@ from osimlite.schema.specs import (
 from osimlite.schema.tree import Tree, Use, is_a
 
 NO_FILE_CONSEQUENCE = "OpenSim rejects it unless a program or the GUI supplies one"
-"""What becomes of a tool that names no file where it needs one."""
+"""Consequence for a tool that lacks the name of a required file."""
 _NAMES_MODEL = re.compile(rb"Tool|Moco|ModelProcessor")
 _MAX_NEIGHBOURS = 200
 _MODEL_RULES = frozenset(("OSIM110", "OSIM111", "OSIM209"))
-"""Rules of tags and values that hold of models only."""
+"""Codes of rules on tags and values that apply to models only."""
 
 
 class FileReference(NamedTuple):
-    """A file that an object names, and where it would be."""
+    """Reference to a file: the object, its property, the name and the path."""
 
     item: Object
     spec: FieldSpec
@@ -51,7 +51,7 @@ class FileReference(NamedTuple):
 
 
 class Setup(Subject):
-    """A document whose top is no model. `top` is None if it cannot be read."""
+    """Document whose top object is not a model. `top` is None if it cannot be read."""
 
     about: ClassVar[str] = "document"
 
@@ -87,7 +87,7 @@ class Setup(Subject):
 
     @cached_property
     def setup_items(self) -> list[Object]:
-        """The objects that are no part of a model that the document holds, in the order of the document."""
+        """Objects outside of any model in the document, in document order."""
         inside = {id(part) for model in self.by_class.get(Model, ()) for part in model.walk()}
         return [item for item in self.items if id(item) not in inside]
 
@@ -153,7 +153,7 @@ class Setup(Subject):
 
     @cached_property
     def neighbours(self) -> list[tuple[str, Object]]:
-        """Every tool that is set up in this folder or in one beside it, above or below, with the path of its setup."""
+        """Tools in this folder, its parent, and folders beside and below, with the paths of their setups."""
         if self.folder is None:
             return []
         here = self.folder.resolve()
@@ -195,7 +195,7 @@ class Setup(Subject):
 
     @cached_property
     def model_file(self) -> str | None:
-        """Where the model is that the tool works on; None if there is no tool, or it names none."""
+        """Path of the model of the tool; None without a tool or a model file."""
         return (
             None
             if self.tool is None
@@ -204,7 +204,7 @@ class Setup(Subject):
 
     @cached_property
     def tree(self) -> Tree | None:  # type: ignore[override]
-        """The component tree of the model that the tool works on; None if there is none to be read."""
+        """Component tree of the model of the tool; None if no model can be read."""
         if self.model_file is not None:
             return read_tree(self.model_file)
         # A study may hold its model itself.

@@ -1,4 +1,4 @@
-"""Which lines are rows of numbers, told for many lines at once.
+"""Recognise lines that are rows of numbers, many lines at a time.
 
 A block of lines becomes one large integer, a byte for each character: a shift by eight bits continues
 to the next character, and an addition carries a mark over a run of characters to what follows on
@@ -30,7 +30,7 @@ _CHARACTERS = (
 
 
 class Layout(NamedTuple):
-    """What stands between numbers: a byte for each character, and the characters that show what was found."""
+    """Layout of rows: a code byte for each character, and the characters of the resulting shapes."""
 
     codes: bytes
     shown: bytes

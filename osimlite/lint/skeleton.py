@@ -1,4 +1,4 @@
-"""The bodies and joints of a model as a graph, as far as the references between them lead anywhere."""
+"""Bodies and joints of a model as a graph, as far as their references resolve."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Skeleton:
 
     @property
     def complete(self) -> bool:
-        """Whether every joint's frames lead to a body."""
+        """True if the frames of every joint lead to a body."""
         return all(
             link.parent_base is not None and link.child_base is not None for link in self.links
         )
@@ -67,7 +67,7 @@ class Skeleton:
 
 
 class _Edge(NamedTuple):
-    """A joint as the tree of bodies is grown from it, or one to ground that OpenSim adds; bodies by their paths."""
+    """Edge of the tree of bodies: a joint, or a joint to ground that OpenSim adds; bodies by path."""
 
     parent: str
     child: str
@@ -76,7 +76,7 @@ class _Edge(NamedTuple):
 
 
 class TreeGrowth(NamedTuple):
-    """How OpenSim makes a tree of the bodies of a skeleton."""
+    """Tree of bodies that OpenSim builds from a skeleton."""
 
     loops: list[JointLink]  # the joints that close loops, in the order of the joints
     # whether it rejects the model, or crashes, for the bodies that no joint connects to ground. It

@@ -1,4 +1,4 @@
-"""What is checked: a model with, where there is one, the text it came from; and the answers rules ask for."""
+"""Model as a check target, with its text if there is one, and queries for rules."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def cached_per_subject(
 
 
 class Subject(CheckTarget):
-    """One model under check. `source` is None for a model made in Python, `model` for a text that cannot be read.
+    """Model under check. `source` is None for a model made in Python, `model` for an unreadable text.
 
     `top` is the object at the top of the document, whatever it is; `kept_in` the folder for what is
     measured of it. If there was no machine code to measure it with, it `needs_remeasuring`: the next
@@ -174,7 +174,7 @@ class Subject(CheckTarget):
 
     @cached_property
     def has_unknown(self) -> bool:
-        """Whether parts of the model are of classes that are not known, so that its tree has gaps."""
+        """True if parts of the model have unknown classes, so its tree has gaps."""
         return Unknown in self.by_class
 
     def owner(self, item: Object) -> Component:
@@ -267,10 +267,14 @@ class Subject(CheckTarget):
     ) -> Position | None:
         """Return the position of something in the text.
 
-        Args: item: the object concerned; alone, its start tag. tag: a property of it: its text, or
-            the object's start tag where the property is not given. word: the `nth` occurrence of
-            this word in that text. attribute: the value of an attribute instead. number: the number
-            of an element, in place of `item`.
+        Args:
+            item: the object; without other arguments the position is that of its start tag.
+            tag: a property of it: its text, or the start tag of the object if the property is not
+                given.
+            word: the `nth` occurrence of this word in that text.
+            nth: how many equal words precede it.
+            attribute: an attribute, for the position of its value.
+            number: index of an element, instead of `item`.
         """
         if self.source is None:
             return None

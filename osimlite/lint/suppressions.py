@@ -1,4 +1,4 @@
-"""``<!-- osimlite: ignore OSIM203 -->``: findings that the author of a file has looked at."""
+"""Comments that ignore findings: ``<!-- osimlite: ignore OSIM203 -->``."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ LAST_LINE = sys.maxsize
 
 @dataclass(slots=True)
 class Suppression:
-    """One comment: the codes it names, the lines it speaks of, and the codes that were found there."""
+    """Ignoring comment: its codes, the lines it applies to, and the codes that were used."""
 
     place: Position
     codes: tuple[str, ...]

@@ -1,4 +1,4 @@
-"""A table under check (.sto, .mot, .trc): its header, its labels, and its rows."""
+"""Tables (.sto, .mot, .trc) as check targets: header, labels and rows."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _ROW = re.compile(rb"[^ \t\r\n][^\n]*")
 
 
 class Table(CheckTarget):
-    """A table. Whatever is wrong with its text, all that can be read of it is there.
+    """Table under check; everything readable is available, whatever is wrong with the text.
 
     Args:
         data: the bytes.
@@ -39,17 +39,17 @@ class Table(CheckTarget):
 
     @cached_property
     def header(self) -> StorageHeader | MarkerHeader:
-        """What stands before its rows."""
+        """The part before the rows."""
         return MarkerHeader(self.data) if self.is_markers else StorageHeader(self.data, self.file)
 
     @property
     def entries(self) -> dict[str, Entry]:
-        """What the header says, by its keys."""
+        """Entries of the header by key."""
         return self.header.entries
 
     @property
     def is_strict(self) -> bool:
-        """Whether OpenSim's newer reader of storage files takes it: every row is a line, and NaN is a value."""
+        """True if OpenSim's newer reader reads this storage file: every row is a line, and NaN is a value."""
         return isinstance(self.header, StorageHeader) and self.header.is_strict
 
     @property

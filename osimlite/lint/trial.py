@@ -1,4 +1,4 @@
-"""A file of a finished trial under check: what was measured of it, for rules that compare this with limits.
+"""File of a finished trial as check target: its measurements, for rules that compare them with limits.
 
 The linter computes without a numeric library: the numbers come from :mod:`osimlite.tools.trials`,
 which stands above.
@@ -30,8 +30,14 @@ CHECKLIST = "OpenSim's checklist"
 OSIMLITE = "osimlite"
 """Where nobody has published a limit."""
 
-GOOD, OKAY, BAD = VERDICTS = ("good", "okay", "bad")
-"""What a number is: within every limit, beyond the stricter of two, beyond all."""
+GOOD = "good"
+"""Verdict on a measurement within every limit."""
+OKAY = "okay"
+"""Verdict on a measurement between the stricter and the looser of two limits."""
+BAD = "bad"
+"""Verdict on a measurement beyond every limit."""
+VERDICTS = (GOOD, OKAY, BAD)
+"""The verdicts from best to worst."""
 
 SMALLEST_SHOWN = 0.001
 """What is less is not shown with its digits."""
@@ -43,7 +49,7 @@ STATISTICS = {"peak": "the peak of "} | dict.fromkeys(
 
 
 class Measurement(NamedTuple):
-    """Something that was measured of a trial."""
+    """Measurement of a trial."""
 
     rule: str  # name of the rule that judges it
     kind: str  # what it is of a column of numbers: one of `KINDS`, or ""
@@ -59,7 +65,7 @@ class Measurement(NamedTuple):
 
 
 class TrialVerdict(NamedTuple):
-    """A number with its limits."""
+    """Measurement with its limits and the verdict."""
 
     code: str  # of the rule
     name: str  # of the rule
@@ -86,7 +92,7 @@ class TrialVerdict(NamedTuple):
 
     @property
     def words(self) -> str:
-        """What was measured, and where."""
+        """The measured quantity and its location."""
         return f"{self.of} ({self.where})" if self.where else self.of
 
 
@@ -97,7 +103,7 @@ def _format_number(value: float) -> str:
 
 
 class Trial(CheckTarget):
-    """A file of a trial.
+    """File of a trial under check.
 
     Args:
         file: its path.
@@ -148,7 +154,7 @@ class Trial(CheckTarget):
             if not known:
                 continue
             good, bad = min(known), max(known)
-            # What is not a number is within no limit.
+            # NaN is within no limit.
             verdict = GOOD if number.value <= good else OKAY if number.value <= bad else BAD
             self.verdicts.append(
                 TrialVerdict(

@@ -1,4 +1,4 @@
-"""How findings speak of things."""
+"""Names of objects, quantities and suggestions in messages."""
 
 from __future__ import annotations
 

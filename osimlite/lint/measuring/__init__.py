@@ -1,4 +1,4 @@
-"""Paths and muscles measured over the ranges of the coordinates, for the rules of the linter that are about that."""
+"""Measurements of paths and muscles over the ranges of the coordinates, for rules of the linter."""
 
 from osimlite.lint.measuring.model import measure_model
 

@@ -50,8 +50,9 @@ def try_construction(
         model: the model to build.
         folder: where its file is, and the files that it names; None for a model that is in no file.
 
-    Returns: The obstacles in the order of the steps, and the mechanism for those who compute more
-        of the model; None if it has none.
+    Returns:
+        The obstacles in the order of the steps, and the mechanism for further computations; None if
+        the model has none.
     """
     with warnings.catch_warnings():
         # Rules report what a simulation only warns of.

@@ -1,4 +1,4 @@
-"""Where the length of a path jumps: points that come and go, ways around a surface that change."""
+"""Find jumps of path lengths: conditional points, and routes around surfaces that change."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""All that is measured of a model."""
+"""Measure the paths and muscles of a model."""
 
 from __future__ import annotations
 
@@ -53,10 +53,13 @@ def measure_model(
 ) -> Measures:
     """Measure the paths and muscles of a model.
 
-    Args: model: what is measured. compiles: whether kernels that are in no library or file yet are
-        compiled, which takes longer than to do without for a model that has few surfaces. known:
-        what was measured when some paths were others, or not there, and all else as it is; and what
-        still holds. mechanism: of the model; made if left out.
+    Args:
+        model: the model.
+        compiles: whether to compile kernels that are in no library or cache yet; for a model with
+            few surfaces that takes longer than running them as Python.
+        known: earlier measurements when some paths differed or were missing, and those of them that
+            are still valid.
+        mechanism: mechanism of the model; built by default.
 
     Raises:
         UnsupportedError: a path, a joint or a constraint cannot be computed.

@@ -1,4 +1,4 @@
-"""Muscles where they start, and where their paths are shortest and longest, in equilibrium at rest."""
+"""Muscles in their initial state, and in equilibrium at the shortest and longest path."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ REST_ACTIVATION = 0.01
 
 
 class MuscleFibers(NamedTuple):
-    """A muscle with its law, which is called as Python: some hundred times, where compiling it would take longer."""
+    """Muscle with its law as a Python function: compiling would take longer than some hundred calls."""
 
     path: str  # of the muscle
     kind: ForceType  # of the muscle
@@ -114,7 +114,7 @@ def find_fibers(
         )
         if not all(isinstance(part, Fields | Number | Numbers) for part in parts):
             continue
-        # What OpenSim rejects, other rules have told.
+        # Other rules report what OpenSim rejects.
         with suppress(ModelError):
             if kind.check is not None:
                 kind.check(builder, muscle)

@@ -1,4 +1,7 @@
-"""Moving points at the ends of their coordinates' ranges, outside which OpenSim lets them rest and says they move."""
+"""Moving path points at the ends of the ranges of their coordinates.
+
+Outside the range OpenSim keeps the position of a point but computes with a speed of it.
+"""
 
 from __future__ import annotations
 

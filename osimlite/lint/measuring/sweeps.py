@@ -1,4 +1,4 @@
-"""The poses that are looked at: the default one, and each coordinate alone over its range."""
+"""Poses for measurements: the default pose, and each coordinate alone over its range."""
 
 from __future__ import annotations
 
@@ -16,10 +16,12 @@ from osimlite.mechanics.multibody.parts import CoordinateInfo
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.simulation.paths import Paths
 
-VALUES, TIED_VALUES, TIED_POSES = 9, 5, 40
-"""Of each coordinate; of each that constraints tie to others, whose poses take long to find; and
-how many of these poses are found at most.
-"""
+VALUES = 9
+"""Number of values of each free coordinate."""
+TIED_VALUES = 5
+"""Number of values of a coordinate that constraints tie to others: each pose must be assembled."""
+TIED_POSES = 40
+"""Largest number of assembled poses of a model."""
 MAX_RANGE = 4.0 * pi
 """A wider range (rad or m) stands for none."""
 MIN_CHANGE_M = 1e-9
@@ -28,7 +30,7 @@ MIN_CHANGE_M = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Sweep:
-    """A coordinate over its range, the others as in the default pose, or as near to it as constraints let them be."""
+    """Sweep of a coordinate over its range, the others at their defaults or as near as constraints allow."""
 
     paths: Paths  # whose lengths change
     place: int  # of the coordinate in the mechanism
@@ -44,7 +46,7 @@ class Sweep:
 
     @property
     def moved(self) -> NDArray[np.bool_]:
-        """Whether the length of each path (p,) changes."""
+        """Flags (p,) of the paths whose length changes."""
         return np.nan_to_num(np.ptp(self.lengths, axis=0)) > MIN_CHANGE_M
 
     @property

@@ -1,4 +1,4 @@
-"""Paths around surfaces in OpenSim's way beside the same along geodesics."""
+"""Compare OpenSim's path lengths around surfaces with geodesics."""
 
 from __future__ import annotations
 
@@ -16,8 +16,10 @@ RANDOM_POSES = 64
 """Poses with values of all coordinates within their ranges, at random but always the same."""
 
 
-ASIDE, NEAR = 1e-7, 1e-4
-"""How far (rad or m) beside a pose a length is computed again, and by how much (m) it may differ there."""
+ASIDE = 1e-7
+"""Distance (rad or m) from a pose at which a length is computed again."""
+NEAR = 1e-4
+"""Largest difference (m) of the excess length at that distance."""
 
 
 def compare_wrappings(
@@ -47,8 +49,8 @@ def compare_wrappings(
             continue
         moved = [sweep for sweep in free if sweep.moved[path]]
 
-        def told(k: int, moved: Sequence[Sweep] = moved) -> tuple[Pose, Array]:
-            """A pose as it is told, where coordinates that do not matter are as by default."""
+        def describe_pose(k: int, moved: Sequence[Sweep] = moved) -> tuple[Pose, Array]:
+            """Return pose k for the message, with irrelevant coordinates at their defaults."""
             if k == 0:
                 return Pose(), start
             for sweep in looked_at:
@@ -61,10 +63,14 @@ def compare_wrappings(
 
         order = np.argsort(-np.nan_to_num(np.abs(excess)), kind="stable").tolist()
         certain = (
-            k for k in order if _is_certain(geodesic, paths, own, path, excess[k], told(k)[1])
+            k
+            for k in order
+            if _is_certain(geodesic, paths, own, path, excess[k], describe_pose(k)[1])
         )
         worst = next(certain, order[-1])
-        yield WrappingError(name, around, float(excess[0]), float(excess[worst]), told(worst)[0])
+        yield WrappingError(
+            name, around, float(excess[0]), float(excess[worst]), describe_pose(worst)[0]
+        )
 
 
 def _sample_poses(start: Array, free: Sequence[Sweep]) -> Array:

@@ -1,6 +1,6 @@
 """Reports for people: one line per finding (concise), or the source line with a caret (full).
 
-Findings that say the same are fold_findings: one stands for all, and the others are only counted.
+Findings that say the same are folded: one stands for all, and the others are only counted.
 """
 
 from __future__ import annotations
@@ -87,10 +87,10 @@ def _pluralize(noun: str, count: int) -> str:
 T = TypeVar("T")
 
 MIN_FOLD_SIZE = 4
-"""Number of similar findings, or of files with the same finding, from which they are fold_findings."""
+"""Number of similar findings, or of files with the same finding, from which they are folded."""
 
 _ONE_CAUSE_RULES = {"OSIM701"}
-"""Rules whose findings are fixed together: two of them are fold_findings already."""
+"""Rules whose findings are fixed together: two of them are folded already."""
 
 # Names are in quotes or are tags. A number includes its unit; paths count as numbers.
 _NAME_PATTERN = re.compile(r"'[^']*'|<\w+>")
@@ -106,7 +106,7 @@ class Fold(NamedTuple):
 
     @property
     def remarks(self) -> list[str]:
-        """Notes on the fold_findings findings, such as ``91 more like this, on lines 12, 40 and 88 more``."""
+        """Notes on the folded findings, such as ``91 more like this, on lines 12, 40 and 88 more``."""
         result = []
         if self.more:
             lines = list(
@@ -183,7 +183,7 @@ def _group_by(items: Iterable[T], key: Callable[[T], Hashable]) -> list[list[T]]
 
 
 def hint_at_folds(folds: Iterable[Fold]) -> str:
-    """Return the hint how to print fold_findings findings; empty if there are none."""
+    """Return the hint how to print every finding; empty if there are none."""
     return "--all prints every finding." if any(fold.remarks for fold in folds) else ""
 
 

@@ -1,1 +1,1 @@
-"""The rules, one module per family; :mod:`osimlite.lint.registry` lists them."""
+"""The rules, a module for each subject; :mod:`osimlite.lint.registry` lists them."""

@@ -292,7 +292,7 @@ def _describe_unreadable(source: Source, number: int, kind: str) -> str:
     except UncleanText as unclean:
         if kind == "numbers":
             return "a list of finite numbers"
-        # Of several numbers OpenSim takes the first, unless it is none, and of a word the
+        # OpenSim reads the first of several numbers, if it is a number, and of a word the
         # beginning.
         return "" if unclean.value is not ABSENT and isfinite(unclean.value) else "a number"
     return ""

@@ -10,7 +10,7 @@ from osimlite.lint.registry import INFO, WARNING, FindingCollector, rule
 from osimlite.lint.table import Table
 
 _LARGEST, _SMALLEST = 8.0, 0.02
-"""Between these, m, is how far the markers of one frame are spread."""
+"""Plausible range of the spread of the markers in a frame, m."""
 
 
 @rule("OSIM811", "marker-units", severity=WARNING, fixes="unsafe", about="table")

@@ -41,7 +41,7 @@ def report_duplicate_name(subject: Subject, report: FindingCollector) -> None:
     tree = subject.tree
     for renamed in tree.renamed:
         item = renamed.component
-        # Of what has no name in the file nobody expects one.
+        # A component without a name in the file has no expected name.
         if not item.name or not subject.has_explicit_name(item) or isinstance(item, Unknown):
             continue
         users = list(_find_holders(subject).get(id(renamed.first), ()))
@@ -138,7 +138,7 @@ def report_missing_name(subject: Subject, report: FindingCollector) -> None:
     """
     tree = subject.tree
     # What the file does not name has got a name while it was upgraded, as OpenSim does. It is
-    # looked at if others name what is not there.
+    # checked if references are unresolved.
     renamed = subject.upgraded and any(
         broken.why in ("missing", "form") for broken in find_broken_references(subject)
     )

@@ -249,7 +249,7 @@ def _iterate_broken_references(subject: Subject) -> Iterator[BrokenReference]:
             if use.reference.required and use.position is None:
                 yield BrokenReference(use, text, "empty")
         elif use.reference.rule == "own-joint-coordinate" and is_a(use.owner, "CustomJoint"):
-            # Often OpenSim makes such a coordinate up, of which another rule speaks.
+            # Often OpenSim creates such a coordinate, which another rule reports.
             if refuses_axes(cast("CustomJoint", use.owner)):
                 yield _explain_reference(subject, use, text, resolution)
         elif not _is_undecided(subject, use, text) and not (

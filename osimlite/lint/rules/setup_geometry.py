@@ -21,7 +21,7 @@ from osimlite.lint.table import Table
 from osimlite.lint.words import describe_object
 
 _MIN_FACTOR, _MAX_FACTOR = 0.5, 2.0
-"""Between these a factor that scales a body can be believed."""
+"""Plausible range of the factor that scales a body."""
 _MIN_ROWS = 3
 """Sampled rows within the time range of the tool that suffice; with fewer, the table is read."""
 _MAX_ROWS = 100

@@ -129,7 +129,7 @@ def report_time_outside_data(setup: Setup, report: FindingCollector) -> None:
         if first > last or (
             first == last and is_a(item, "AbstractTool") and not is_a(item, "AnalyzeTool")
         ):
-            # Nobody knows which of the two is wrong.
+            # Either of the two may be wrong.
             fate, severity = (
                 ("uses the times of the tool", WARNING)
                 if is_a(item, "Analysis")

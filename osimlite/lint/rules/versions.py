@@ -36,7 +36,7 @@ def report_newer_class(subject: Subject, report: FindingCollector) -> None:
     """
     target = subject.config.target_version or NEWEST
     later = load_later_changes(target)
-    # What is newer than all is told by OSIM004.
+    # OSIM004 reports versions newer than all releases.
     if subject.source is not None and later.format < (subject.version or 0) <= CURRENT_VERSION:
         report(
             f"the file has the format {subject.version}, OpenSim {target} writes {later.format} "

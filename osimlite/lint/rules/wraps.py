@@ -107,7 +107,7 @@ def report_wrap_range(subject: Subject, report: FindingCollector) -> None:
                     f"{tells} ends beyond the {format_count(count, 'point')} of the path: {fate}",
                     wrap,
                     tag="range",
-                    # Nobody asks for the length of a force that is off.
+                    # OpenSim does not compute the length for a disabled force.
                     severity=WARNING
                     if may_leave or getattr(owner, "appliesForce", True) is False
                     else ERROR,
