@@ -61,7 +61,7 @@ def commands() -> str:
     """What every command says of itself."""
     parts = [
         "# Commands",
-        "Exit codes everywhere: 0 done, 1 the answer is no, 2 it could not be carried out.",
+        "Exit codes of all commands: 0 done, 1 problems found, 2 the command could not run.",
     ]
     for command in COMMANDS:
         parts.append(f"## {command}\n\n```text\n{_help(command)}\n```")
