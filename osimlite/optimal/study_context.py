@@ -12,7 +12,7 @@ from typing import Any
 from osimlite.base.files import read_file
 from osimlite.base.text import join_words, suggest_name
 from osimlite.errors import DocumentError, OsimliteError, UnsupportedError
-from osimlite.io.tables.storage import merge_tables
+from osimlite.io.tables.storage import find_named_file
 from osimlite.schema.base import Component, Object, Unknown
 from osimlite.schema.fields import Value, make_domain_test
 from osimlite.schema.patterns import Pattern, PatternError, UnsupportedPatternError
@@ -52,7 +52,7 @@ class StudyContext:
 
     def locate_file(self, name: str) -> Path:
         """Return the path of a file that the study names, looked for in its folder, then in the current one."""
-        return merge_tables(self.folder, name.strip())
+        return find_named_file(self.folder, name.strip())
 
     def _locate_part(self, part: Object) -> dict[str, Any]:
         """Return file and line of a part of the study: objects know no lines, but their tags and names are in the text."""

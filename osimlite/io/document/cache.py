@@ -22,51 +22,56 @@ Top = TypeVar("Top", bound=Object)
 
 
 class FileCache(Generic[T]):
-    """What was made of the last `size` files, as long as these do not change; None of one that is not there."""
+    """Cache of the results of a function of a file, for the last `size` files.
+
+    A result is valid until the file changes or other plug-in classes count.
+    """
 
     def __init__(self, make: Callable[[str], T], size: int) -> None:
         self._make, self._size = make, size
-        self._kept: dict[str, tuple[int, T]] = {}
-        on_class_change(self._kept.clear)
+        self._cached: dict[str, tuple[int, T]] = {}
+        on_class_change(self._cached.clear)
 
     def __call__(self, path: str) -> T | None:
-        """What the file at a path makes."""
-        # A file is the same by a relative and by an absolute path.
-        stamp, place = get_file_stamp(path), os.path.abspath(path)
+        """Return the result for a file; None if the file does not exist."""
+        stamp = get_file_stamp(path)
+        # Relative and absolute paths of a file share one entry.
+        key = os.path.abspath(path)
         if stamp is None:
             return None
-        known = self._kept.pop(place, None)
+        known = self._cached.pop(key, None)
         if known is None or known[0] != stamp:
             known = stamp, self._make(path)
-        self._kept[place] = known
-        if len(self._kept) > self._size:
-            del self._kept[next(iter(self._kept))]
+        self._cached[key] = known
+        if len(self._cached) > self._size:
+            del self._cached[next(iter(self._cached))]
         return known[1]
 
     def has(self, path: str) -> bool:
-        """Whether it is known of a file as it is now."""
-        known = self._kept.get(os.path.abspath(path))
+        """Return whether the cache has a valid result for a file."""
+        known = self._cached.get(os.path.abspath(path))
         return known is not None and known[0] == get_file_stamp(path)
 
-    def keep(self, path: str, made: T) -> None:
-        """Keep what somebody else has made of the file at a path, as it is now."""
-        stamp, place = get_file_stamp(path), os.path.abspath(path)
+    def keep(self, path: str, result: T) -> None:
+        """Store a result that was computed elsewhere for the present file."""
+        stamp = get_file_stamp(path)
+        key = os.path.abspath(path)
         if stamp is None:
             return
-        self._kept.pop(place, None)
-        self._kept[place] = stamp, made
-        if len(self._kept) > self._size:
-            del self._kept[next(iter(self._kept))]
+        self._cached.pop(key, None)
+        self._cached[key] = stamp, result
+        if len(self._cached) > self._size:
+            del self._cached[next(iter(self._cached))]
 
 
 def cache_by_file(size: int) -> Callable[[Callable[[str], T]], FileCache[T]]:
-    """Keep what a function makes of the last `size` files."""
+    """Return a decorator that caches a function of a path for the last `size` files."""
     return lambda make: FileCache(make, size)
 
 
 @cache_by_file(256)
 def get_object(path: str) -> Object | None:
-    """The top of a document; None if it cannot be read."""
+    """Return the object of a document; None if it cannot be read."""
     try:
         return read_document(Source.of_file(path), of=Object).top
     except (OsimliteError, ValueError, RecursionError):
@@ -75,7 +80,7 @@ def get_object(path: str) -> Object | None:
 
 @cache_by_file(256)
 def _has_no_include(path: str) -> bool:
-    """Whether no part of a document is in another file, which nobody would see change."""
+    """Return whether all parts of a document are in its file; changes of other files go unnoticed."""
     top = get_object(path)
     return top is not None and not any(
         item.layout is not None and item.layout.include for item in top.walk()
@@ -83,10 +88,14 @@ def _has_no_include(path: str) -> bool:
 
 
 def read_copy(path: str | Path, of: type[Top]) -> Top:
-    """The top of a document, of a class, for whoever changes it: a copy, if it is known from before.
+    """Return the object of a document as a copy that the caller may change.
+
+    Args:
+        path: the file.
+        of: class of the object.
 
     Raises:
-        DocumentError: the file is missing or holds something else; with line and column.
+        DocumentError: the file is missing or has an object of another class; with line and column.
     """
     from osimlite.io.document.plugins import classes_in_use
 
@@ -106,21 +115,28 @@ AnyObject = TypeVar("AnyObject", bound=Object)
 
 
 def read_object(path: str | Path, cls: type[AnyObject]) -> AnyObject:
-    """Read a document that holds one object of a class; what is like nothing of that class is ignored, as in OpenSim.
+    """Read a document with one object of a class.
+
+    Unknown elements are ignored as in OpenSim, unless their names are similar to a property.
+
+    Args:
+        path: the file.
+        cls: class of the object.
 
     Raises:
-        DocumentError: the file is missing or holds something else; with line and column.
+        DocumentError: the file is missing, has an object of another class, or has a misspelt
+            property; with line and column.
     """
     document = read_document(Source.of_file(path), of=cls)
     for note in document.notes:
-        # Properties of older versions are still in many files; what is like one of today is
-        # misspelt.
+        # Many files have properties of old versions; a name similar to a present one is a
+        # spelling mistake.
         if (
             note.kind == "unknown-tag"
             and note.owner
             and (near := find_nearest(note.word, get_field_specs(type(note.owner))))
         ):
-            message = f"<{note.word}> means nothing in this document; did you mean <{near}>?"
+            message = f"<{note.word}> is unknown in this document; did you mean <{near}>?"
             raise document.source.fault(DocumentError, message, document.source.of_tag(note.number))
     assert isinstance(document.top, cls)
     return document.top

@@ -1,4 +1,4 @@
-"""What the reader noticed: facts about a text that OpenSim would pass over. The linter turns them into findings."""
+"""Notes of the reader about content that OpenSim ignores; the linter turns them into findings."""
 
 from __future__ import annotations
 
@@ -37,11 +37,17 @@ NoteKind = Literal[
 
 
 class Note(NamedTuple):
-    """One fact. `number` is the element concerned, in document order.
+    """Note of the reader about one element.
 
-    `word` is the tag, attribute or part of the text in question; `owner` the object around it and
-    `spec` the property, where there is one; `value` is what was read instead (None where the
-    default stays). `why` says of a file that is named and not read, as in "which is not there".
+    Attributes:
+        kind: type of the note.
+        number: index of the element in document order.
+        word: tag, attribute or part of the text.
+        owner: object that contains the element.
+        spec: property that the element sets, if any.
+        value: value that was read instead; None if the default stays.
+        line: line of the element, if it is known.
+        why: reason why a named file was not read, as "which is not there".
     """
 
     kind: NoteKind

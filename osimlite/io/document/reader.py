@@ -77,7 +77,7 @@ _NOT_KNOWN = frozenset(("unknown-tag", "unknown-class", "wrong-class"))
 class Document:
     """The object at the top of a document, with the text it came from and what the reader noticed in it.
 
-    `fault` is what the XML parser says against a text that could be read all the same.
+    `fault` is the syntax error of a text that was repaired for reading.
     """
 
     top: Object
@@ -89,13 +89,13 @@ class Document:
 
     @property
     def model(self) -> Model:
-        """The model of a document that was read as one of a model."""
+        """The model, for a document that was read as a model."""
         assert isinstance(self.top, Model)
         return self.top
 
     @property
     def refusals(self) -> list[Refusal]:
-        """Over what OpenSim fails when it brings a document of an older version up to date."""
+        """Elements over which OpenSim fails when it upgrades the document."""
         result = [] if self.upgraded is None else self.upgraded.refusals
         if not result:
             return []
@@ -105,18 +105,21 @@ class Document:
 
     @property
     def changes(self) -> list[Change]:
-        """What was done to a document of an older version, in its order."""
+        """Changes of the upgrade, in the order of the document."""
         return [] if self.upgraded is None else self.upgraded.changes
 
 
 def read(path: str | Path, *, classes: Paths = ()) -> Model:
     """Read a model file.
 
-    Args: path: the file. classes: files that declare the classes of plug-ins; without them objects
-        of such classes are kept as text.
+    Args:
+        path: the file.
+        classes: files that declare the classes of plug-ins; without them, objects of such classes
+            stay text.
 
-    Raises: DocumentError: the file is missing or is not an OpenSim model document; with line and
-        column. OsimliteError: a class is declared wrongly; with file and line.
+    Raises:
+        DocumentError: the file is missing or is not an OpenSim model; with line and column.
+        OsimliteError: a declaration of a class is wrong; with file and line.
     """
     from osimlite.io.document.plugins import classes_in_use
 

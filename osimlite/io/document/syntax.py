@@ -1,4 +1,4 @@
-"""What the XML parser says against a text, in plain words and in the right place."""
+"""Readable messages and positions for XML syntax errors."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def expect_plain_doctype(source: Source) -> None:
 
 
 def rephrase_message(message: str) -> str:
-    """The parser's message without its place, and readable."""
+    """Return the parser's message in plain words, without its position."""
     message = " ".join(as_written(re.sub(r", line \d+, column \d+$", "", message)).split())
     for pattern, words in _PLAIN:
         match = re.fullmatch(pattern, message)
@@ -73,9 +73,13 @@ def rephrase_message(message: str) -> str:
 
 
 def locate_error(source: Source, line: int, column: int, message: str) -> Position:
-    """Where in the text the parser gave up, when it says `line` and `column` of what it was given.
+    """Return the position in the text at which the parser stopped.
 
-    After a wrong closing tag it stands behind it.
+    Args:
+        source: the text.
+        line: line of the parser's message.
+        column: column of the parser's message, which is behind a wrong closing tag.
+        message: the parser's message.
     """
     lines = source.lines
     line = min(max(line, 1), len(lines))

@@ -28,19 +28,21 @@ if TYPE_CHECKING:
 ENDING = ".c3d"
 
 SECONDS = 2
-"""Processor time of reading a small file, with loading numpy; large ones get more by their size."""
+"""Processor time for a small file and for loading numpy; large files get more by their size."""
 
 BYTES_PER_SECOND = 2_000_000
-"""Of a file, at least so much is read in a second; it is about 50 times as much where nothing is wrong."""
+"""Smallest accepted rate of reading a file per second; a sound file is read about 50 times faster."""
 
 PATIENCE = 30
-"""The process may wait so many times its processor time for a processor."""
+"""Factor from the limit of processor time to the limit of elapsed time."""
 
-PROGRAM = "import sys; sys.path[:0] = sys.argv[3:]; from osimlite.io.tables.c3d_process import serve; serve()"
+PROGRAM = "import sys; sys.path[:0] = sys.argv[3:]; from osimlite.io.tables.c3d_process import run_process; run_process()"
 
 
 def read_c3d_markers(path: str | Path) -> tuple[tuple[str, ...], Array, Array]:
-    """Names of the markers (m,), times (t,), s, and places (t, m, 3), m; NaN where a marker was not seen.
+    """Read names of the markers (m,), times (t,) in s and positions (t, m, 3) in m.
+
+    Positions are NaN where a marker was not seen.
 
     Raises:
         MissingFileError: there is no such file.
@@ -71,7 +73,7 @@ def read_c3d_forces(path: str | Path) -> StoTable:
 
 
 def _run_reader(path: str | Path, what: str) -> dict[str, Array]:
-    """Return the arrays that a process of its own reads from a file.
+    """Return the arrays that a separate process reads from a file.
 
     Damaged files make ezc3d 1.6 write beyond its memory (a process ends by SIGSEGV), or loop
     without
@@ -129,7 +131,7 @@ def _run_reader(path: str | Path, what: str) -> dict[str, Array]:
 
 
 def _find_reason(done: subprocess.CompletedProcess[bytes]) -> str:
-    """Return why a process has read nothing, by what it has left."""
+    """Return the reason why the process failed, from its output and exit code."""
     try:
         return str(json.loads(done.stdout)["error"])
     except (ValueError, KeyError, TypeError):

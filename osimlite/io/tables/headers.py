@@ -16,9 +16,9 @@ from osimlite.io.document.source import Position
 MARKER_KEYS = (
     "DataRate", "CameraRate", "NumFrames", "NumMarkers", "Units", "OrigDataRate", "OrigDataStartFrame", "OrigNumFrames",
 )  # fmt: skip
-"""The keys in the second line of a marker file, all of which OpenSim asks for, in this order."""
+"""Keys in the second line of a marker file, all of which OpenSim requires in this order."""
 METRES = {"m": 1.0, "mm": 0.001, "cm": 0.01, "km": 1000.0}
-"""The units of markers that OpenSim knows, in metres."""
+"""Units of markers that OpenSim knows, in metres."""
 COUNTS = {"nRows": "nRows", "nr": "nRows", "datarows": "nRows"} | dict.fromkeys(
     ("nColumns", "nc", "datacolumns"), "nColumns"
 )
@@ -63,14 +63,14 @@ def list_suffixes(kind: str, file: str | None = None) -> tuple[str, ...]:
 
 
 class Word(NamedTuple):
-    """A word of a header, and where it is."""
+    """Word of a header with its position."""
 
     text: str
     at: Position
 
 
 class Entry(NamedTuple):
-    """A key of a header with its value."""
+    """Key of a header with its value."""
 
     key: Word
     value: Word
@@ -112,7 +112,7 @@ class MarkerHeader:
         self.labels = self.words(4)[2:]
 
     def words(self, number: int) -> list[Word]:
-        """The words of a line, those without a letter left out; none if there is no such line."""
+        """Return the words of a line that have a letter; none if the line does not exist."""
         return (
             split_header(self.lines[number - 1], number, _BETWEEN_TABS)
             if len(self.lines) >= number
@@ -162,12 +162,12 @@ class StorageHeader:
         )
 
     def value(self, key: str) -> str:
-        """What it says under a key, or nothing."""
+        """Return the value of a key, or an empty text."""
         return self.entries[key].value.text if key in self.entries else ""
 
     @property
     def name(self) -> str:
-        """What the table is called: the first line, unless it says so under a key."""
+        """Name of the table: the first line, or the value of the key `name`."""
         plain = (line.strip() for line in self.lines if line.strip() and "=" not in line)
         return self.value("name") or next(
             (line for line in plain if line.split()[0] not in _KEYS), ""
@@ -175,28 +175,28 @@ class StorageHeader:
 
     @property
     def form(self) -> int:
-        """The version: up to 1 the older of OpenSim's readers takes the file."""
+        """Version of the format; up to 1, the older of OpenSim's readers reads the file."""
         match = re.match(r"[0-9]{1,9}", self.value("version"))
         return int(match[0]) if match else 0
 
     @property
     def is_strict(self) -> bool:
-        """Whether OpenSim's newer reader takes it: every row is a line, and NaN is a value."""
+        """True if OpenSim's newer reader reads the file: every row is a line, and NaN is a value."""
         return self.form > 1
 
     @property
     def kind(self) -> str:
-        """What a cell holds: ``double`` where it does not say otherwise."""
+        """Type of a cell (``DataType``); default ``double``."""
         return self.value("DataType") or "double"
 
     @property
     def parts(self) -> int:
-        """How many numbers a cell has; 1 if OpenSim does not know what it holds."""
+        """Number of values of a cell; 1 for a type that OpenSim does not know."""
         return len(SUFFIXES.get(self.kind, ("",)))
 
     @property
     def in_degrees(self) -> bool:
-        """Whether angles are in degrees, as OpenSim reads it."""
+        """True if angles are in degrees, as OpenSim reads the header."""
         said = self.value("inDegrees").lower() in ("yes", "y")
         if self.form or said:
             return said
@@ -205,7 +205,7 @@ class StorageHeader:
 
 
 def split_header(line: str, number: int, pattern: re.Pattern[str] = _WORD) -> list[Word]:
-    """The words of a line with this number."""
+    """Return the words of a line with its number."""
     return [_word(match, 0, number) for match in pattern.finditer(line)]
 
 

@@ -1,4 +1,4 @@
-"""OpenSim's storage files (.sto, .mot): tables over time."""
+"""Reading and writing of OpenSim's storage files (.sto, .mot), which are tables over time."""
 
 from __future__ import annotations
 
@@ -24,11 +24,15 @@ from osimlite.mechanics.multibody.spatial import Array
 class StoTable(Tabular):
     """A table over time.
 
-    Attributes: name: first line of the file. times: (n,), s. columns: labels of the m columns
-        besides the time, in order; OpenSim itself writes some labels twice. rows: (n, m).
-        in_degrees: whether rotational values are in degrees. header: the first word of every line
-        of the header, with the rest of the line. kind: what the file holds; where it is not
-        ``double``, a value has several columns. file: where it was read from.
+    Attributes:
+        name: first line of the file.
+        times: times (n,), s.
+        columns: labels of the m columns besides the time; OpenSim writes some labels twice.
+        rows: values (n, m).
+        in_degrees: whether rotational values are in degrees.
+        header: rest of every line of the header by its first word.
+        kind: type of a value (``DataType``); a value other than ``double`` has several columns.
+        file: path of the file.
     """
 
     name: str
@@ -41,14 +45,18 @@ class StoTable(Tabular):
     file: str | None = None
 
     def __getitem__(self, column: str) -> Array:
-        """The first column (n,) of a label; KeyError if there is none."""
+        """Return the first column (n,) with a label; raise KeyError if there is none."""
         if column not in self.columns:
             raise KeyError(column)
         return self.rows[:, self.columns.index(column)]
 
     @property
     def table(self) -> tuple[Mapping[str, Array], Mapping[str, Array]]:
-        """The columns over ``time`` (s); of a label that is there again the second is called ``label.1``."""
+        """The times and the columns; the second column of a label is called ``label.1``.
+
+        Returns:
+            The index, which is ``time`` (s), and the columns by label, each (n,).
+        """
         columns, again = dict[str, Array](), Counter[str]()
         for label, column in zip(self.columns, self.rows.T, strict=True):
             columns[f"{label}.{again[label]}" if again[label] else label] = column
@@ -114,7 +122,7 @@ def write_sto(
 
 
 def read_sto(path: str | Path) -> StoTable:
-    """Read a table, as OpenSim 4 or an older version wrote it; errors as those of :class:`TableStream`."""
+    """Read a table that OpenSim 4 or an older version wrote; for errors see :class:`TableStream`."""
     times, rows = array("d"), array("d")
     with TableStream(path) as stream:
         for time, row in stream:
@@ -134,8 +142,11 @@ def read_sto(path: str | Path) -> StoTable:
         )
 
 
-def merge_tables(folder: Path, name: str) -> Path:
-    """Where a file is that a document names: looked for in the document's folder, then from where the program runs."""
+def find_named_file(folder: Path, name: str) -> Path:
+    """Return the path of a file that a document names.
+
+    It is searched in the folder of the document, then in the current folder.
+    """
     there, here = folder / name, Path(name)
     return there if there.is_file() or not here.is_file() else here
 
@@ -201,7 +212,7 @@ def _format_lines(
 
 
 def format_adapter_table(table: StoTable) -> Iterator[str]:
-    """The lines of a table as OpenSim's ``STOFileAdapter`` writes it, without the version of OpenSim."""
+    """Yield the lines of a table as OpenSim's ``STOFileAdapter`` writes it, without OpenSim's version."""
     expect_plain_labels("", (*table.columns, *table.header, *map(str, table.header.values())))
     yield "".join(f"{key}={value}\n" for key, value in table.header.items())
     yield f"DataType={table.kind}\nversion=3\nendheader\n"
@@ -214,14 +225,21 @@ def format_adapter_table(table: StoTable) -> Iterator[str]:
 
 
 def format_number(value: float) -> str:
-    """All digits of a number, without a needless point."""
+    """Return a number with all digits, an integer without a decimal point."""
     text = repr(float(value))
     return text[:-2] if text.endswith(".0") else text
 
 
 def expect_time_range(time_range: Sequence[float]) -> tuple[float, float]:
-    """The first and the last time (s) of a setup; SettingError if it does not give two."""
+    """Check that a `time_range` has two times.
+
+    Returns:
+        The first and the last time (s).
+
+    Raises:
+        SettingError: the range does not have two numbers.
+    """
     if len(time_range) != 2:
         count = format_count(len(time_range), "number")
-        raise SettingError(f"time_range has {count}; give it two, the first and the last time")
+        raise SettingError(f"time_range has {count}; it needs two, the first and the last time")
     return time_range[0], time_range[1]

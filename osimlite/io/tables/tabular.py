@@ -1,4 +1,4 @@
-"""Results as tables of other libraries."""
+"""Conversion of results to tables of pandas, Arrow and xarray."""
 
 from __future__ import annotations
 
@@ -10,15 +10,19 @@ from osimlite.base.require import require
 
 
 class Tabular(ABC):
-    """Results that are a table."""
+    """Result that can be converted to tables of other libraries."""
 
     @property
     @abstractmethod
     def table(self) -> tuple[Mapping[str, Any], Mapping[str, Any]]:
-        """What tells the rows apart, and the columns, each (n,) by its name."""
+        """The table of the result.
+
+        Returns:
+            Index columns, which identify the rows, and value columns; each (n,) by name.
+        """
 
     def to_frame(self) -> Any:
-        """The `table` as a pandas DataFrame, with what tells the rows apart as its index.
+        """Return the `table` as a pandas DataFrame with its index columns as index.
 
         Raises:
             MissingDependency: pandas is not installed.
@@ -28,7 +32,7 @@ class Tabular(ABC):
         return pandas.DataFrame(columns, index=pandas.DataFrame(rows).set_index(list(rows)).index)
 
     def to_arrow(self) -> Any:
-        """The `table` as a pyarrow Table, which Polars, DuckDB and Parquet take as it is.
+        """Return the `table` as a pyarrow Table, which Polars, DuckDB and Parquet read directly.
 
         Raises:
             MissingDependency: pyarrow is not installed.
@@ -39,7 +43,7 @@ class Tabular(ABC):
         )
 
     def to_xarray(self) -> Any:
-        """The `table` as an xarray Dataset over what tells the rows apart.
+        """Return the `table` as an xarray Dataset over its index columns.
 
         Raises:
             MissingDependency: xarray or pandas is not installed.

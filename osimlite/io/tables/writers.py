@@ -20,16 +20,16 @@ def write_trc(
     *,
     units: str = "m",
 ) -> None:
-    """Write marker positions to a file, whole or not at all; the rows are taken one by one.
+    """Write marker positions to a file atomically, one row at a time.
 
-    A position that is not a number is left empty: the marker was not seen.
+    A position that is NaN is left empty, because the marker was not seen.
 
     Args:
-        path: of the file.
-        times: n moments, s.
-        markers: their m names.
-        rows: 3 m numbers each, X, Y and Z of one marker after the other.
-        units: of the positions.
+        path: the file.
+        times: n times (s).
+        markers: names of the m markers.
+        rows: n rows of 3 m numbers, X, Y and Z of each marker.
+        units: unit of the positions.
 
     Raises:
         OsimliteError: the file cannot be written.
@@ -97,7 +97,7 @@ _END = """		</objects>
 
 
 def format_control_set(table: StoTable) -> Iterator[str]:
-    """The text of a ControlSet, in parts: a ControlLinear for each column; what is no number has no node."""
+    """Yield the text of a ControlSet in parts, with a ControlLinear for each column and no node for NaN."""
     # Imported here, because it imports the network code of the standard library.
     from xml.sax.saxutils import quoteattr
 

@@ -12,7 +12,7 @@ from osimlite.base.records import dataclass
 from osimlite.base.text import suggest_name
 from osimlite.errors import ModelError
 from osimlite.io.document.cache import read_object
-from osimlite.io.tables.storage import merge_tables
+from osimlite.io.tables.storage import find_named_file
 from osimlite.mechanics.multibody.functions import Constant, Function, PiecewiseConstant
 from osimlite.mechanics.multibody.smoothing_spline import PiecewisePolynomial
 from osimlite.schema.control_sets import (
@@ -143,7 +143,7 @@ def drive_by_control_set(
     """
     if controller.controls_file in ("", "Unassigned"):
         return
-    path = merge_tables(builder.folder, str(controller.controls_file))
+    path = find_named_file(builder.folder, str(controller.controls_file))
     result = ControlCurves.read(path)
     driven = find_actuators(builder, controller)
     actuators = map_actuators(builder)

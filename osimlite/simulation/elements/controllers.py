@@ -7,7 +7,7 @@ from typing import Any
 
 from osimlite.base.text import suggest_name
 from osimlite.errors import ModelError, UnsupportedError
-from osimlite.io.tables.storage import merge_tables
+from osimlite.io.tables.storage import find_named_file
 from osimlite.schema.actuators import Actuator
 from osimlite.schema.controller_types import PrescribedController
 from osimlite.schema.examples import ToyPropMyoController, ToyReflexController
@@ -57,7 +57,7 @@ def _from_file(
     path = builder.path(controller)
     actuators = map_actuators(builder)
     actuators |= {builder.path(item): item for item in builder.find_components(Actuator)}
-    table = read_controls(merge_tables(builder.folder, str(controller.controls_file)))
+    table = read_controls(find_named_file(builder.folder, str(controller.controls_file)))
     known = {
         word if isinstance(word, str) else builder.path(word)
         for word in controller.socket_actuators

@@ -17,7 +17,7 @@ from osimlite.base.text import find_nearest, join_words
 from osimlite.errors import DocumentError, ModelError, SettingError
 from osimlite.io.document.cache import cache_by_file, read_object
 from osimlite.io.tables.c3d import ENDING, read_c3d_forces
-from osimlite.io.tables.storage import StoTable, merge_tables, read_sto
+from osimlite.io.tables.storage import StoTable, find_named_file, read_sto
 from osimlite.mechanics.multibody.functions import Constant, Function, PiecewiseLinear
 from osimlite.mechanics.multibody.mechanism import FramePlacement, Mechanism
 from osimlite.mechanics.multibody.smoothing_spline import natural_splines
@@ -157,7 +157,7 @@ def read_loads_table(loads: ExternalLoads, folder: Path, file: str | None) -> St
     name = loads.datafile.strip()
     if name in ("", "Unassigned"):
         raise DocumentError("it names no data file; give it a <datafile>", file=file)
-    path = merge_tables(folder, name)
+    path = find_named_file(folder, name)
     return (
         read_c3d_forces(path)
         if path.suffix.lower() == ENDING

@@ -8,7 +8,7 @@ from typing import Any
 from osimlite.base.records import dataclass
 from osimlite.base.text import suggest_name
 from osimlite.errors import ModelError, UnsupportedError
-from osimlite.io.tables.storage import merge_tables
+from osimlite.io.tables.storage import find_named_file
 from osimlite.mechanics.multibody.functions import Function, PiecewiseLinear, Scaled
 from osimlite.schema.controller_types import SynergyController
 from osimlite.schema.reporters import SignalGenerator, TableSource__double_
@@ -47,7 +47,7 @@ def read_signal(builder: ElementBuilder, controller: Any, text: str) -> Function
     if isinstance(source, SignalGenerator) and name == "signal":
         return builder.read_function(source, source.function, "function")
     if isinstance(source, TableSource__double_) and name == "column":
-        table = read_controls(merge_tables(builder.folder, source.filename))
+        table = read_controls(find_named_file(builder.folder, source.filename))
         if channel not in table.columns:
             raise ModelError(
                 f"'{builder.path(source)}' has no column '{channel}'{suggest_name(channel, table.columns)}",
