@@ -68,7 +68,9 @@ def run_until_mergeable(function: Callable[[], Any]) -> Any:
         NoFormula: a part depends on the state in a way that has no formula.
     """
     while True:
-        run.frame, run.failures, where.condition = None, [], None
+        run.frame = None
+        run.failures = []
+        where.condition = None
         Vector.journals.clear()
         try:
             return function()
@@ -194,7 +196,8 @@ def run_all_branches(part: str, function: Callable[..., Any], *given: Any) -> An
     Raises:
         NoFormula: there are more than `MAX_BRANCH_COMBINATIONS` combinations.
     """
-    outer, condition = run.frame, where.condition
+    outer = run.frame
+    condition = where.condition
     if part in run.widened and outer is not None:
         return function(*given)
     frame = run.frame = _FunctionFrame()
@@ -206,14 +209,19 @@ def run_all_branches(part: str, function: Callable[..., Any], *given: Any) -> An
             Vector.journals[-1].update(
                 {key: writes[key] for key in writes if key not in Vector.journals[-1]}
             )
-        run.frame, where.condition = outer, condition
+        run.frame = outer
+        where.condition = condition
         return result
 
     def run_others(first: int, result: Any) -> tuple[Any, Writes]:
         """Return result and writes, merged with those of the combinations that differ after `first` branches."""
-        written, sides, tests = _undo_writes(), frame.sides, frame.tests
+        written = _undo_writes()
+        sides = frame.sides
+        tests = frame.tests
         for k in range(len(sides) - 1, first - 1, -1):
-            frame.sides, frame.tests, frame.at = [*sides[:k], False], tests[: k + 1], 0
+            frame.sides = [*sides[:k], False]
+            frame.tests = tests[: k + 1]
+            frame.at = 0
             frame.count += 1
             if frame.count > MAX_BRANCH_COMBINATIONS:
                 raise NoFormula(
@@ -227,7 +235,8 @@ def run_all_branches(part: str, function: Callable[..., Any], *given: Any) -> An
         return result, written
 
     result, written = run_others(0, result)
-    run.frame, where.condition = outer, condition
+    run.frame = outer
+    where.condition = condition
     _apply_writes(written)
     return result
 

@@ -52,7 +52,8 @@ def find_independent_equations(
     Raises:
         SimulationError: no pose fulfils the constraints.
     """
-    ints, size = Program(packed, PYTHON).ints, len(packed.order)
+    ints = Program(packed, PYTHON).ints
+    size = len(packed.order)
     ints[MODEL.CONTROLS] = 0
     count = int(ints[ints[MODEL.CONSTRAINED] + CONSTRAINED.EQUATIONS])
     at_rows = int(ints[ints[MODEL.CONSTRAINED] + CONSTRAINED.WORK_ROWS])
@@ -64,7 +65,8 @@ def find_independent_equations(
         q = start + (0.05 * rng.normal(size=len(start)) if number else 0.0)
         values, speeds = kept_state(mechanism, q.tolist(), [0.0] * len(infos), (), ())
         y = np.array(state.pack(values.tolist(), speeds.tolist()))
-        w, f = np.zeros(int(ints[MODEL.WORK_SIZE])), np.zeros(len(y))
+        w = np.zeros(int(ints[MODEL.WORK_SIZE]))
+        f = np.zeros(len(y))
         evaluate(ints, packed.numbers, w, y, f, STAGE.VELOCITY)
         evaluate_constraints(ints, packed.numbers, w, y, f)
         rows = _select_independent_rows(w[at_rows : at_rows + count * size].reshape(count, size))
@@ -101,12 +103,15 @@ def make_constrained_dynamics(equations: Sequence[int]) -> Law:
     """
 
     def law(model: Vector, reals: Vector, data: Vector, y: Vector, f: Vector, unused: int) -> int:
-        h, size = model.rest(model[MODEL.CONSTRAINED]), model[MODEL.DOFS]
-        right, freedoms = f.rest(size), model.rest(model[MODEL.DOF_AT])
+        h = model.rest(model[MODEL.CONSTRAINED])
+        size = model[MODEL.DOFS]
+        right = f.rest(size)
+        freedoms = model.rest(model[MODEL.DOF_AT])
         make_symbolic(evaluate_constraints)(model, reals, data, y, f)
         make_symbolic(solve_accelerations)(model, data, right)
         inverse = [1.0 / data[freedoms[DOF.SIZE * k + DOF.ROW]] for k in range(size)]
-        rows, missing = [], []
+        rows = []
+        missing = []
         for number in equations:
             row = [data[h[CONSTRAINED.WORK_ROWS] + size * number + k] for k in range(size)]
             missing.append(

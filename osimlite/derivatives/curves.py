@@ -51,7 +51,8 @@ def evaluate_pieces(table: Any, z: Any, kind: int) -> tuple[Any, Any, Any]:
         Value, first and second derivative; for PIECES_OF_OPENSIM the second one is the first, as in
         OpenSim 4.6.
     """
-    knots, width = int(simplify_number(table[2])), int(simplify_number(table[3]))
+    knots = int(simplify_number(table[2]))
+    width = int(simplify_number(table[3]))
     if not is_symbol(z):
         numbers: Any = [simplify_number(number) for number in table[: 4 + knots * (1 + width)]]
         return evaluate_piecewise(numbers, float(simplify_number(z)), kind)
@@ -67,7 +68,10 @@ def evaluate_pieces(table: Any, z: Any, kind: int) -> tuple[Any, Any, Any]:
         ]
         return reduce(plus, parts)
 
-    t, value, slope, curvature = minus(z, chosen(4, 1)), 0.0, 0.0, 0.0
+    t = minus(z, chosen(4, 1))
+    value = 0.0
+    slope = 0.0
+    curvature = 0.0
     for k in range(width - 1, -1, -1):
         curvature = plus(times(curvature, t), slope)
         slope = plus(times(slope, t), value)
@@ -90,13 +94,12 @@ def evaluate_curve(c: Any, x: Any) -> tuple[Any, Any]:
         numbers = [float(simplify_number(c[k])) for k in range(HEAD + (1 + SECTION) * count)]
         return curve_value(numbers, float(simplify_number(x)))
     start, scale, *rest = _select_section(c, [x >= c[HEAD + number] for number in range(count - 1)])
-    of_x, of_y = rest[:5], rest[5:]
+    of_x = rest[:5]
+    of_y = rest[5:]
     off = _clamp_value(x, c[FIRST], c[LAST]) - start
     u = _find_root([-off, *of_x], off * scale / NODES)
-    y, slope = (
-        _evaluate_polynomial(of_y, u),
-        divide(_evaluate_slope(of_y, u), _evaluate_slope([0.0, *of_x], u)),
-    )
+    y = _evaluate_polynomial(of_y, u)
+    slope = divide(_evaluate_slope(of_y, u), _evaluate_slope([0.0, *of_x], u))
     for test, end in ((x < c[FIRST], FIRST), (x > c[LAST], LAST)):
         y = casadi.if_else(test, c[end + 1] + c[end + 2] * (x - c[end]), y)
         slope = casadi.if_else(test, c[end + 2], slope)
@@ -114,7 +117,9 @@ def solve_damped_velocity(
     Returns:
         Whether it was solved, the velocity, and the force-velocity factor.
     """
-    c, share, wanted = curves.velocity, active * by_length, divide(tendon, cos) - elastic
+    c = curves.velocity
+    share = active * by_length
+    wanted = divide(tendon, cos) - elastic
 
     def borne(velocity: Any, factor: Any) -> Any:
         return share * factor + m.damping * velocity
@@ -123,13 +128,15 @@ def solve_damped_velocity(
     first = HEAD + count
     knots = [borne(c[HEAD + k], c[first + SECTION * (k + 1) + Y]) for k in range(count - 1)]
     start, _, *rest = _select_section(c, [wanted >= knot for knot in knots])
-    of_x, of_y = [start, *rest[:5]], rest[5:]
+    of_x = [start, *rest[:5]]
+    of_y = rest[5:]
     low, high = (borne(c[end], c[end + 1]) for end in (FIRST, LAST))
     off = _clamp_value(wanted, low, high)
     both = [borne(*pair) for pair in zip(of_x, of_y, strict=True)]
     both[0] -= off
     u = _find_root(both, divide(-both[0], sum(both[1:])))
-    velocity, factor = _evaluate_polynomial(of_x, u), _evaluate_polynomial(of_y, u)
+    velocity = _evaluate_polynomial(of_x, u)
+    factor = _evaluate_polynomial(of_y, u)
     for test, end, edge in ((wanted < low, FIRST, low), (wanted > high, LAST, high)):
         beyond = divide(wanted - edge, borne(1.0, c[end + 2]))
         velocity = casadi.if_else(test, c[end] + beyond, velocity)
@@ -165,7 +172,8 @@ def _find_root(c: Sequence[Any], u: Any) -> Any:
 def _make_root_function() -> Any:
     """Return `_find_root` as a CasADi function, which CasADi inserts into expressions faster than Python."""
     given = casadi.SX.sym("c", 6), casadi.SX.sym("u")
-    c, u = casadi.vertsplit(given[0]), given[1]
+    c = casadi.vertsplit(given[0])
+    u = given[1]
     for _ in range(HALLEY_STEPS):
         u = _clamp_value(_apply_halley_step(c, u), 0.0, 1.0)
     return casadi.Function(
@@ -175,7 +183,8 @@ def _make_root_function() -> Any:
 
 def _apply_halley_step(c: Sequence[Any], u: Any) -> Any:
     """Return the next iterate of Halley's method."""
-    value, slope = _evaluate_polynomial(c, u), _evaluate_slope(c, u)
+    value = _evaluate_polynomial(c, u)
+    slope = _evaluate_slope(c, u)
     divisor = slope * slope - value * _evaluate_slope(_differentiate_polynomial(c), u) / 2.0
     return u - casadi.if_else(
         divisor > 0.0, value * slope / casadi.if_else(divisor > 0.0, divisor, 1.0), 0.0

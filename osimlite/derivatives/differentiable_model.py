@@ -49,7 +49,8 @@ class DifferentiableModel:
     def __init__(
         self, model: Model, parameters: Sequence[str], folder: Path, *, apart: bool = False
     ) -> None:
-        self._folder, self._model = folder, model
+        self._folder = folder
+        self._model = model
         # Numbers of merged bodies are no linear functions of masses and positions, those of separate
         # ones are.
         self._apart = apart or bool(parameters)
@@ -65,7 +66,8 @@ class DifferentiableModel:
             for what in ("value", "speed")
             for place in self._packed.order
         ]
-        moving, paths = len(own), self._state.paths
+        moving = len(own)
+        paths = self._state.paths
         self.coordinates = tuple(
             path.rpartition("/")[0] for path in in_model_order(model, own[: moving // 2])
         )

@@ -255,7 +255,8 @@ class CasadiModel(DifferentiableModel):
         of auxiliary states less those of the force laws. The multipliers (N, N m) belong to the
         rows of G in `constraints`; there are none without constraints.
         """
-        size, xdot = len(self.coordinates), self._sort_by_engine("xdot")
+        size = len(self.coordinates)
+        xdot = self._sort_by_engine("xdot")
         found = self._evaluator.compute_missing_forces(xdot[size : 2 * size])
         f = found.f.cells
         rows = [given - own for given, own in zip(xdot, f, strict=True)]
@@ -284,7 +285,8 @@ class CasadiModel(DifferentiableModel):
             ``casadi.Function`` whose result (k, 1), N and N m, is in the order of `coordinates`;
             constraint forces are not included.
         """
-        size, xdot = len(self.coordinates), self._sort_by_engine("xdot")
+        size = len(self.coordinates)
+        xdot = self._sort_by_engine("xdot")
         found = self._evaluator.compute_missing_forces(xdot[size : 2 * size], pushing)
         forces = self._sort_by_model(found.f.cells)[size : 2 * size]
         return self._make_function(
@@ -309,7 +311,8 @@ class CasadiModel(DifferentiableModel):
         """
         from osimlite.derivatives.outputs import compute_joint_load_columns, locate_frames
 
-        bodies, placements = self.mechanism.bodies, self._packed.placements
+        bodies = self.mechanism.bodies
+        placements = self._packed.placements
         body = next(body for body in bodies if body.mobilizer.joint == path)
         link = placements[bodies.index(body)].link
         if link == (GROUND if body.parent == GROUND else placements[body.parent].link):
@@ -320,7 +323,8 @@ class CasadiModel(DifferentiableModel):
         # The missing wrench acts on the body that the joint carries in the tree, and its opposite on
         # the other one.
         sign = 1.0 if (side == "child") != body.mobilizer.reversed else -1.0
-        size, xdot = len(self.coordinates), self._sort_by_engine("xdot")
+        size = len(self.coordinates)
+        xdot = self._sort_by_engine("xdot")
         found = self._evaluator.compute_missing_forces(xdot[size : 2 * size])
         pushes = []
         if self.constraint_count:
@@ -358,7 +362,9 @@ class CasadiModel(DifferentiableModel):
         """Results of `constraints` by name."""
         from osimlite.derivatives.constraints import list_position_equations
 
-        size, count, column = len(self.coordinates), self.constraint_count, self._library.vertcat
+        size = len(self.coordinates)
+        count = self.constraint_count
+        column = self._library.vertcat
         if not count:
             nothing = self._library.SX(0, 1)
             empty = self._library.SX(0, size)
@@ -368,8 +374,10 @@ class CasadiModel(DifferentiableModel):
                 "acceleration": nothing,
                 "jacobian": empty,
             }
-        found, structure = self._evaluator.evaluate_constraints(), self._evaluator.structure
-        h, data = structure[structure[MODEL.CONSTRAINED] :], found.data
+        found = self._evaluator.evaluate_constraints()
+        structure = self._evaluator.structure
+        h = structure[structure[MODEL.CONSTRAINED] :]
+        data = found.data
         order = [self.state_indices.index(k) for k in range(size)]
         rows = []
         for number in range(count):
@@ -379,7 +387,8 @@ class CasadiModel(DifferentiableModel):
                 row[place] = data[first + k]
             rows.append(self._library.horzcat(*row))
         jacobian = self._library.sparsify(self._library.SX(column(*rows)))
-        u, udot = self._symbols["x"][size : 2 * size], self._symbols["xdot"][size : 2 * size]
+        u = self._symbols["x"][size : 2 * size]
+        udot = self._symbols["xdot"][size : 2 * size]
 
         def get_rows(place: int) -> Any:
             return column(*data[h[place] : h[place] + count])
@@ -440,7 +449,8 @@ class CasadiModel(DifferentiableModel):
             first = len(self._packed.numbers)
             second = first + len(stations)
             numbers = [*self._evaluator.numbers]
-            stations, frames = numbers[first:second], numbers[second : second + len(frames)]
+            stations = numbers[first:second]
+            frames = numbers[second : second + len(frames)]
         return stations, frames
 
     def frames(self, paths: Iterable[str]) -> Any:
@@ -458,7 +468,8 @@ class CasadiModel(DifferentiableModel):
         """
         from osimlite.derivatives.outputs import compute_frame_columns, locate_frames
 
-        places, chosen = locate_frames(self.mechanism, self._packed), []
+        places = locate_frames(self.mechanism, self._packed)
+        chosen = []
         numbers = {
             path: self._fixed_numbers[1][12 * number : 12 * number + 12]
             for number, path in enumerate(places)
@@ -522,7 +533,8 @@ class CasadiModel(DifferentiableModel):
             SettingError: a function does not exist.
             UnsupportedError: the model has paths around surfaces.
         """
-        names, folder = [*functions], Path(folder)
+        names = [*functions]
+        folder = Path(folder)
         if unknown := [name for name in names if name not in FUNCTIONS]:
             raise SettingError(
                 f"there is no function '{unknown[0]}'; there are {', '.join(FUNCTIONS)}"

@@ -139,7 +139,8 @@ def _find_outputs(
         for group, labels in output_names.items()
         for k, label in enumerate(labels)
     }
-    known, result = {**groups, **single}, list[tuple[str, int]]()
+    known = {**groups, **single}
+    result = list[tuple[str, int]]()
     for name in names:
         if name not in known:
             raise SettingError(f"the model has no output '{name}'{suggest_name(name, known)}")

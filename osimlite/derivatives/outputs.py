@@ -121,7 +121,8 @@ def compute_output_columns(
     Returns:
         Labels and column of each result by its name.
     """
-    at_station, speed_of = workspace.wrap(station), workspace.wrap(velocity)
+    at_station = workspace.wrap(station)
+    speed_of = workspace.wrap(velocity)
     labels: list[str] = []
     places: list[Any] = []
     speeds: list[Any] = []
@@ -186,11 +187,14 @@ def _compute_mass_center(
         )
     for placement, body in zip(packed.placements, mechanism.bodies, strict=True):
         if placement.link == GROUND:
-            own, frame = body.mass_properties, placement.frame
+            own = body.mass_properties
+            frame = placement.frame
             parts.append(
                 (own.mass, GROUND, tuple((frame[:3, :3] @ own.center + frame[:3, 3]).tolist()))
             )
-    total, center, rate = 0.0, [0.0] * 3, [0.0] * 3
+    total = 0.0
+    center = [0.0] * 3
+    rate = [0.0] * 3
     for mass, link, point in parts:
         place = workspace.wrap(station)(workspace.model, workspace.data, link, point)
         moves = workspace.wrap(velocity)(workspace.model, workspace.data, link, place)
@@ -237,7 +241,9 @@ def compute_path_columns(
     Returns:
         Names, lengths and lengthening speeds.
     """
-    names, lengths, speeds = list[str](), list[Any](), list[Any]()
+    names = list[str]()
+    lengths = list[Any]()
+    speeds = list[Any]()
     for element, items in zip(forces.elements, packed.items, strict=True):
         if (
             isinstance(element, DeclaredForce)

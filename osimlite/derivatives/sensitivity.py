@@ -199,15 +199,14 @@ class _SensitivityRun:
         initial: Sequence[int],
         held: Sequence[Sequence[int]],
     ) -> None:
-        self._tangent_model, self._simulation, self._initial, self._prescribed = (
-            tangent_model,
-            simulation,
-            initial,
-            held,
-        )
+        self._tangent_model = tangent_model
+        self._simulation = simulation
+        self._initial = initial
+        self._prescribed = held
         engine: Any = simulation.engine
         self._engine = engine
-        infos, order = simulation.mechanism.coordinates, self._engine.order
+        infos = simulation.mechanism.coordinates
+        order = self._engine.order
         moving = [f"{infos[place].path}/{what}" for what in ("value", "speed") for place in order]
         known = [
             *moving,
@@ -242,7 +241,8 @@ class _SensitivityRun:
             raise ended
         for place in (0, len(times) // 2, -1):
             self._check_same_rates(times[place], states[place])
-        count, initial = len(self._tangent_model.parameters), self._initial
+        count = len(self._tangent_model.parameters)
+        initial = self._initial
         slopes = np.zeros((len(self._places), count + len(initial)))
         slopes[initial, range(count, count + len(initial))] = 1.0
         rows = np.array(states)[:, self._places]
@@ -258,7 +258,8 @@ class _SensitivityRun:
         The projection repeats that of the initial state: of free values, yielding coordinates
         change first, then all as little as possible; speeds above 1 change relative to their size.
         """
-        tangent_model, size = self._tangent_model, len(self._tangent_model.coordinates)
+        tangent_model = self._tangent_model
+        size = len(self._tangent_model.coordinates)
         infos = {info.path: info for info in tangent_model.mechanism.coordinates}
         eases = np.ones(size), np.maximum(np.abs(x[size : 2 * size]), 1.0)
         eases[0][[infos[path].yielding for path in tangent_model.coordinates]] = YIELDING_FACTOR
@@ -346,7 +347,8 @@ def integrate_sensitivities(
             return integrate_step(middle, t1, integrate_step(t0, middle, y0))
         return y
 
-    result, row = np.empty((len(wanted), *slopes.shape)), 1
+    result = np.empty((len(wanted), *slopes.shape))
+    row = 1
     result[0] = slopes
     y = steps.blocks(states[0], slopes)
     # Each step starts from the state of the motion, as the steps are those of the motion.
@@ -354,8 +356,10 @@ def integrate_sensitivities(
     for (t, state), (end, _) in pairwise(zip(times, values, strict=True)):
         y[:, :, 0] = state
         while row < len(wanted) and wanted[row] <= end:
-            y, t = integrate_step(t, wanted[row], y), wanted[row]
-            result[row], row = steps.slopes(y), row + 1
+            y = integrate_step(t, wanted[row], y)
+            t = wanted[row]
+            result[row] = steps.slopes(y)
+            row = row + 1
         if t < end:
             y = integrate_step(t, end, y)
     return result

@@ -163,7 +163,9 @@ class _KernelRewriter(Kernel, ast.NodeTransformer):
             ast.Assign([_store_name(name)], _load_name("unset_"))
             for name in sorted(self.branch_variables - set(self.given))
         ]
-        tree.body, tree.returns, tree.decorator_list = [*clear, *body], None, []
+        tree.body = [*clear, *body]
+        tree.returns = None
+        tree.decorator_list = []
         for argument in tree.args.args:
             argument.annotation = None
         code = compile(
@@ -246,7 +248,8 @@ class _KernelRewriter(Kernel, ast.NodeTransformer):
         return node
 
     def visit_If(self, node: ast.If) -> Any:
-        part, is_failure = self._number_part(node), self._is_failure(node)
+        part = self._number_part(node)
+        is_failure = self._is_failure(node)
         leaves = any(map(_exits_block, (*node.body, *node.orelse)))
         names = stored(*node.body, *node.orelse)
         self.generic_visit(node)
@@ -263,7 +266,8 @@ class _KernelRewriter(Kernel, ast.NodeTransformer):
         self.branch_variables.update(names)
         branch, side, before = (f"{name}{self.number}_" for name in ("branch", "side", "before"))
         self.number += 1
-        test, node.test = node.test, _load_name(side)
+        test = node.test
+        node.test = _load_name(side)
         append = ast.Attribute(
             ast.Attribute(_load_name(branch), "ends", ast.Load()), "append", ast.Load()
         )

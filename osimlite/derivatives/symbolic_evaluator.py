@@ -74,8 +74,13 @@ class SymbolicEvaluator:
         equations: Sequence[int] = (),
         loads: Sequence[Any] = (),
     ) -> None:
-        self._packed, self._elements, self._loads = packed, forces.elements, loads
-        self.numbers, self._t, self._y, self._controls = numbers, t, y, controls
+        self._packed = packed
+        self._elements = forces.elements
+        self._loads = loads
+        self.numbers = numbers
+        self._t = t
+        self._y = y
+        self._controls = controls
         given: dict[int, int] = {}
         for place, kernel in packed.kernels.items():
             if not isinstance(kernel, str) and hasattr(kernel, "takes_symbols"):
@@ -133,16 +138,20 @@ class SymbolicEvaluator:
             udot: accelerations (n,).
             pushing: paths of the forces that act; all if None.
         """
-        size, structure = self.structure[MODEL.DOFS], [*self.structure]
+        size = self.structure[MODEL.DOFS]
+        structure = [*self.structure]
         if pushing is not None:
-            first, count = structure[MODEL.ITEM_AT], structure[MODEL.ITEMS]
+            first = structure[MODEL.ITEM_AT]
+            count = structure[MODEL.ITEMS]
             items = [
                 item for item in structure[first : first + count] if self._path(item) in pushing
             ]
-            structure[MODEL.ITEMS], structure[first : first + len(items)] = len(items), items
+            structure[MODEL.ITEMS] = len(items)
+            structure[first : first + len(items)] = items
             run = structure[MODEL.RUN_AT]
             structure[MODEL.RUNS], structure[run + RUN.LAW] = 1, 0
-            structure[run + RUN.FIRST], structure[run + RUN.END] = 0, len(items)
+            structure[run + RUN.FIRST] = 0
+            structure[run + RUN.END] = len(items)
 
         def law(model: Vector, reals: Vector, data: Vector, y: Vector, f: Vector) -> None:
             for k in range(size):
@@ -195,11 +204,10 @@ class SymbolicEvaluator:
         """
 
         def run() -> SymbolicWorkspace:
-            model, reals = (
-                Vector(self.structure if structure is None else structure),
-                Vector(list(self.numbers)),
-            )
-            data, y = Vector([0.0] * self.structure[MODEL.WORK_SIZE]), Vector(list(self._y))
+            model = Vector(self.structure if structure is None else structure)
+            reals = Vector(list(self.numbers))
+            data = Vector([0.0] * self.structure[MODEL.WORK_SIZE])
+            y = Vector(list(self._y))
             f = Vector([0.0] * len(self._y))
             data[WORK.TIME] = self._t
             for k, control in enumerate(self._controls):
@@ -261,11 +269,13 @@ class SymbolicWorkspace:
         result: Any,
         failures: Sequence[Any],
     ) -> None:
-        self.model, self.reals, self.data, self.f, self.result = model, reals, data, f, result
-        self.wrap, self._failure = (
-            make_symbolic,
-            reduce(casadi.logic_or, failures) if failures else None,
-        )
+        self.model = model
+        self.reals = reals
+        self.data = data
+        self.f = f
+        self.result = result
+        self.wrap = make_symbolic
+        self._failure = reduce(casadi.logic_or, failures) if failures else None
 
     def mask_failures(self, numbers: Sequence[Any]) -> Any:
         """Return numbers as one column that is NaN where the evaluation fails."""

@@ -89,7 +89,8 @@ class Vector:
     """For each open branch, the cells that were written with their previous values."""
 
     def __init__(self, cells: list[Any], first: int = 0) -> None:
-        self.cells, self.first = cells, first
+        self.cells = cells
+        self.first = first
 
     def __getitem__(self, place: Any) -> Number:
         if type(place) is slice:
@@ -180,7 +181,8 @@ def merge_values(test: Any, a: Any, b: Any, part: Any) -> Any:
     if isinstance(a, tuple) and isinstance(b, tuple) and len(a) == len(b):
         parts = [merge_values(test, x, y, part) for x, y in zip(a, b, strict=True)]
         return type(a)(*parts) if hasattr(a, "_fields") else tuple(parts)
-    a, b = simplify_number(a), simplify_number(b)
+    a = simplify_number(a)
+    b = simplify_number(b)
     if isinstance(a, bool) and isinstance(b, bool):
         return a if a == b else (test if a else casadi.logic_not(test))
     if isinstance(a, UnmergeableValue) or isinstance(b, UnmergeableValue):
@@ -218,7 +220,8 @@ def divide(a: Any, b: Any) -> Any:
     """Return a / b with the rules of IEEE arithmetic for division by zero."""
     if is_symbol(b):
         return a / guard_value(b)
-    a, b = simplify_number(a), simplify_number(b)
+    a = simplify_number(a)
+    b = simplify_number(b)
     if b == 0.0 and not isinstance(a, SX):
         return (
             math.nan
@@ -230,7 +233,8 @@ def divide(a: Any, b: Any) -> Any:
 
 def power(a: Any, b: Any) -> Any:
     """Return a to the power of b."""
-    a, b = simplify_number(a), simplify_number(b)
+    a = simplify_number(a)
+    b = simplify_number(b)
     if not (isinstance(a, SX) or isinstance(b, SX)):
         return a**b
     if not isinstance(b, SX) and b == int(b) and b >= 0:
@@ -356,7 +360,8 @@ def _make_counterpart(name: str, instead: float | None = None) -> Callable[..., 
         name: name of the function.
         instead: argument that replaces inactive ones; None if the function is defined everywhere.
     """
-    numeric, symbolic = getattr(math, name), getattr(casadi, name)
+    numeric = getattr(math, name)
+    symbolic = getattr(casadi, name)
 
     def function(*values: Any) -> Any:
         if not any(map(is_symbol, values)):

@@ -122,10 +122,8 @@ class TangentModel(DifferentiableModel):
         super().__init__(model, parameters, folder)
         packed = self._packed
         slopes = self._parameters.slopes if self._parameters else {}
-        self._parameter_rows, self._slopes = (
-            [*slopes],
-            np.zeros((len(slopes), len(self.parameters))),
-        )
+        self._parameter_rows = [*slopes]
+        self._slopes = np.zeros((len(slopes), len(self.parameters)))
         for row, parts in zip(self._slopes, slopes.values(), strict=True):
             for number, factor in parts:
                 row[number] = factor
@@ -178,9 +176,13 @@ class TangentModel(DifferentiableModel):
         Returns:
             Rates (x,), and their derivatives (x, m).
         """
-        machine, y, f = self._machine, self._y, self._f
-        y[self.state_indices, 0], self._control_rows[:, 0] = x, u
-        rates, result = np.full(len(x), np.nan), np.full(dx.shape, np.nan)
+        machine = self._machine
+        y = self._y
+        f = self._f
+        y[self.state_indices, 0] = x
+        self._control_rows[:, 0] = u
+        rates = np.full(len(x), np.nan)
+        result = np.full(dx.shape, np.nan)
         for part, own in split_directions(dx.shape[1]):
             machine.begin(t)
             y[self.state_indices, own] = dx[:, part]
@@ -189,7 +191,8 @@ class TangentModel(DifferentiableModel):
             if dp is not None:
                 self.fill_derivatives(dp[:, part], machine.x[:, own])
             if self._evaluate(STAGE.ACCELERATION) == OUTCOME.OK:
-                rates, result[:, part] = f[self.state_indices, 0], f[self.state_indices, own]
+                rates = f[self.state_indices, 0]
+                result[:, part] = f[self.state_indices, own]
                 if look is not None:
                     look(part, own)
         if dp is not None:
@@ -217,7 +220,8 @@ class TangentModel(DifferentiableModel):
         """
         size = len(x)
         both = np.eye(size + len(u))
-        y, slopes = np.full(len(chosen), np.nan), np.full((len(chosen), size + len(u)), np.nan)
+        y = np.full(len(chosen), np.nan)
+        slopes = np.full((len(chosen), size + len(u)), np.nan)
 
         def look(part: slice, own: slice) -> None:
             for place, probe in self._probe_kernels:
@@ -245,7 +249,8 @@ class TangentModel(DifferentiableModel):
     @cached_property
     def _probe_kernels(self) -> list[tuple[int, Callable[[int], int]]]:
         """Items of the probes with their kernels."""
-        places, kernels = list_probe_items(self._packed, self.forces.elements), self._packed.kernels
+        places = list_probe_items(self._packed, self.forces.elements)
+        kernels = self._packed.kernels
         return [
             (place, self._machine.bind_kernel(str(kernels[place + ITEM.LAW]), self._y, self._f))
             for place in places
@@ -262,11 +267,16 @@ class TangentModel(DifferentiableModel):
             Derivatives of the position errors (m, x + p), in m and rad, and of the speed errors (k,
             x + p), in m/s and rad/s.
         """
-        s, w, y, size = self._machine.program.ints, self._machine.w, self._y, len(x)
-        h, freedoms = s[s[MODEL.CONSTRAINED] :], int(s[MODEL.DOFS])
+        s = self._machine.program.ints
+        w = self._machine.w
+        y = self._y
+        size = len(x)
+        h = s[s[MODEL.CONSTRAINED] :]
+        freedoms = int(s[MODEL.DOFS])
         count = int(h[CONSTRAINED.EQUATIONS])
         both = np.eye(size + len(self.p))
-        positions, speeds = np.zeros((count, len(both))), np.zeros((count, len(both)))
+        positions = np.zeros((count, len(both)))
+        speeds = np.zeros((count, len(both)))
 
         def look(part: slice, own: slice) -> None:
             rows, errors, rates = (
@@ -277,7 +287,8 @@ class TangentModel(DifferentiableModel):
                     (CONSTRAINED.WORK_RATES, 1),
                 )
             )
-            rows, u = rows.reshape(count, freedoms, -1), y[freedoms : 2 * freedoms]
+            rows = rows.reshape(count, freedoms, -1)
+            u = y[freedoms : 2 * freedoms]
             positions[:, part] = errors[:, own]
             moved = np.einsum("ijk,j->ik", rows[:, :, own], u[:, 0]) + rows[:, :, 0] @ u[:, own]
             speeds[:, part] = moved - rates[:, own]
@@ -319,10 +330,8 @@ class TangentModel(DifferentiableModel):
             dp: directions of the parameters (p, m).
         """
         packed = pack(self.mechanism, replace(self.forces, controls=controls), apart=self._apart)
-        result, numbers = (
-            TangentSteps(packed, self.forces, self.state_indices),
-            packed.numbers.copy(),
-        )
+        result = TangentSteps(packed, self.forces, self.state_indices)
+        numbers = packed.numbers.copy()
         changes = np.zeros((len(numbers), dp.shape[1]))
         self.fill_numbers(numbers)
         self.fill_derivatives(dp, changes)
@@ -342,7 +351,9 @@ class DualWorkspace:
     wrap = staticmethod(carried_by)
 
     def __init__(self, model: Any, reals: Array, data: Array) -> None:
-        self.model, self.reals, self.data = model, DualVector(reals), DualVector(data)
+        self.model = model
+        self.reals = DualVector(reals)
+        self.data = DualVector(data)
 
     def mask_failures(self, numbers: Sequence[Any]) -> list[Any]:
         """Return numbers unchanged: after a failed evaluation they are not read."""
@@ -362,18 +373,18 @@ class TangentSteps:
     """
 
     def __init__(self, packed: Packed, forces: Forces, places: Sequence[int]) -> None:
-        size, self.state_indices = len(places), places
-        method, first = (
-            int(packed.structure[MODEL.WORK_SIZE]),
-            int(packed.structure[MODEL.WORK_STATE]),
-        )
+        size = len(places)
+        self.state_indices = places
+        method = int(packed.structure[MODEL.WORK_SIZE])
+        first = int(packed.structure[MODEL.WORK_STATE])
         # With constraints no error is small enough, so that the kernel never projects the end of a step.
         self._accepted = -1.0 if packed.structure[MODEL.CONSTRAINED] else np.inf
         self._machine = machine = DualMachine(
             packed, forces, ("evaluate", MERSON), merson.HEAD + merson.STATES * size
         )
         self._start, self._end = (np.zeros((2 * size, 1 + DIRECTIONS)) for _ in range(2))
-        self._errors, self._h = machine.w[first + ERRORS * size :][:size], machine.w[method:, 0]
+        self._errors = machine.w[first + ERRORS * size :][:size]
+        self._h = machine.w[method:, 0]
         self._evaluate = machine.bind_kernel("evaluate", self._start, self._start[size:])
         self._step: Callable[[], int] = partial(
             machine.bind_kernel(MERSON, self._start, self._end), method
@@ -381,10 +392,12 @@ class TangentSteps:
 
     def take(self, numbers: Array, changes: Array) -> None:
         """Set the numbers of the model (k,) and their derivatives along all directions (k, m)."""
-        self._count, self._number = changes.shape[1], -1
+        self._count = changes.shape[1]
+        self._number = -1
         self._numbers = [np.zeros(self._machine.x.shape) for _ in split_directions(self._count)]
         for (part, own), block in zip(split_directions(self._count), self._numbers, strict=True):
-            block[:, 0], block[:, own] = numbers, changes[:, part]
+            block[:, 0] = numbers
+            block[:, own] = changes[:, part]
 
     def blocks(self, y: Array, slopes: Array) -> Array:
         """Return the blocks of a state (x,) with its derivatives (x, m), in the order of the model."""
@@ -413,23 +426,26 @@ class TangentSteps:
         Returns:
             Blocks at the end, and blocks of the error estimate.
         """
-        end, error, machine, size = (
-            np.empty(start.shape),
-            np.empty(start.shape),
-            self._machine,
-            start.shape[1],
-        )
+        end = np.empty(start.shape)
+        error = np.empty(start.shape)
+        machine = self._machine
+        size = start.shape[1]
         for number, block in enumerate(start):
             if self._number != number:
-                self._number, machine.x[:] = number, self._numbers[number]
+                self._number = number
+                machine.x[:] = self._numbers[number]
             machine.begin(t0)
             h = self._h
-            h[REACHED], h[LAST_TIME], h[NEXT_STEP], h[ACCEPTED] = t0, t1, t1 - t0, self._accepted
+            h[REACHED] = t0
+            h[LAST_TIME] = t1
+            h[NEXT_STEP] = t1 - t0
+            h[ACCEPTED] = self._accepted
             self._start[:size] = block
             self._end[0] = np.nan
             if self._evaluate(STAGE.ACCELERATION) == OUTCOME.OK:
                 self._step()
-            end[number], error[number] = self._end[:size], self._errors
+            end[number] = self._end[:size]
+            error[number] = self._errors
         if machine.program.failures:
             raise machine.program.failures.pop()
         return end, error

@@ -51,7 +51,8 @@ class SymbolicPath:
     coupled: ClassVar[bool] = False
 
     def __init__(self, coordinates: Sequence[int]) -> None:
-        self.coordinates, self.symbols = tuple(coordinates), list[Any]()
+        self.coordinates = tuple(coordinates)
+        self.symbols = list[Any]()
 
     @property
     def size(self) -> int:
@@ -106,12 +107,10 @@ class WrappedPaths:
 
     def __init__(self, mechanism: Mechanism, forces: Forces, order: Sequence[int]) -> None:
         owners: list[Any] = [item for item in forces.elements if _is_wrapped(item)]
-        self.forces, self.symbolic_paths, self.names, self.size = (
-            forces,
-            list[SymbolicPath](),
-            tuple[str, ...](),
-            0,
-        )
+        self.forces = forces
+        self.symbolic_paths = list[SymbolicPath]()
+        self.names = tuple[str, ...]()
+        self.size = 0
         if not owners:
             return
         self._order = list(order)
@@ -200,7 +199,9 @@ class WrappedPaths:
     def pattern(self) -> Any:
         """Sparsity pattern of `compute_slopes`."""
         places = {place: k for k, place in enumerate(self._order)}
-        rows, columns, first = list[int](), list[int](), 0
+        rows = list[int]()
+        columns = list[int]()
+        first = 0
         for item in self.symbolic_paths:
             count = item.size
             for row in range(first, first + count):
@@ -274,7 +275,10 @@ class _NumericCallback(casadi.Callback):  # type: ignore[misc]
         slopes: Any = None,
     ) -> None:
         casadi.Callback.__init__(self)
-        self._sizes, self._out, self._call, self._slopes = sizes, out, function, slopes
+        self._sizes = sizes
+        self._out = out
+        self._call = function
+        self._slopes = slopes
         self.construct(name, {"enable_fd": slopes is None, "fd_method": "central"})
 
     def get_n_in(self) -> int:

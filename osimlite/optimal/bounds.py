@@ -182,6 +182,7 @@ def compute_scaling(low: float, high: float) -> tuple[float, float]:
 
 def compute_midpoint(low: Array, high: Array) -> Array:
     """Return the middle between bounds, the only bound, or zero: where a search starts."""
-    has_low, has_high = np.isfinite(low), np.isfinite(high)
+    has_low = np.isfinite(low)
+    has_high = np.isfinite(high)
     ends = np.where(has_low, low, 0.0), np.where(has_high, high, 0.0)
     return (ends[0] + ends[1]) * np.where(has_low & has_high, 0.5, 1.0)

@@ -26,7 +26,8 @@ class Dynamics:
     """
 
     def __init__(self, problem: Problem) -> None:
-        self.problem, self.functions = problem, problem.functions
+        self.problem = problem
+        self.functions = problem.functions
         self.is_implicit = problem.solver.multibody_dynamics_mode == "implicit"
         self.size = len(self.functions.coordinates)
         self.tendons = TendonEquations(problem, self.list_forces())
@@ -43,14 +44,16 @@ class Dynamics:
 
     def compute_rates(self, point: Point) -> Formula:
         """Compute the time derivative of the complete state."""
-        size, f = self.size, self.functions
+        size = self.size
+        f = self.functions
         speeds = point.x[size : 2 * size]
         if self.is_implicit:
             accelerations = point.derivatives[:size]
         else:
             # The accelerations remain symbols: M udot = f is solved with the factors of M (see PointFormula).
             accelerations = casadi.SX.sym("udot", size)
-            none, others = casadi.SX.zeros(size), casadi.SX.zeros(len(f.states) - 2 * size)
+            none = casadi.SX.zeros(size)
+            others = casadi.SX.zeros(len(f.states) - 2 * size)
             udot = casadi.vertcat(none, accelerations, others)
             rows = f.residual(point.t, point.x, udot, point.u, point.p, point.multipliers)[
                 size : 2 * size
@@ -69,7 +72,8 @@ class Dynamics:
 
     def _compute_auxiliary_rates(self, point: Point) -> Formula:
         """Compute the rates of the auxiliary states by the force laws."""
-        none, f = casadi.SX.zeros(len(self.functions.states)), self.functions
+        none = casadi.SX.zeros(len(self.functions.states))
+        f = self.functions
         return -f.residual(point.t, point.x, none, point.u, point.p, point.multipliers)[
             2 * self.size :
         ]
@@ -91,7 +95,9 @@ class Dynamics:
         names, errors = self.tendons.compute_residuals(point, point.derivatives[self._first_rate :])
         if not self.is_implicit:
             return names, errors
-        f, size, point = self.functions, self.size, point.before_projection
+        f = self.functions
+        size = self.size
+        point = point.before_projection
         rows = f.residual(point.t, point.x, point.rates, point.u, point.p, point.multipliers)[
             size : 2 * size
         ]
@@ -109,7 +115,8 @@ class Dynamics:
         Returns:
             Names of the errors, and the errors (k, 1).
         """
-        problem, labels = self.problem, self.problem.constraint_names
+        problem = self.problem
+        labels = self.problem.constraint_names
         if not problem.has_constraints or not (is_mesh or problem.uses_projection):
             return [], casadi.SX(0, 1)
         position, velocity, _, _ = self._evaluate_constraints(point)
@@ -153,10 +160,8 @@ class Dynamics:
         Returns:
             Function that returns the generalized forces still missing, N and N m.
         """
-        missing, rows = (
-            self.functions.generalized_forces(pushing),
-            [*map(self.functions.coordinates.index, coordinates)],
-        )
+        missing = self.functions.generalized_forces(pushing)
+        rows = [*map(self.functions.coordinates.index, coordinates)]
         return lambda point: missing(point.t, point.x, point.rates, point.u, point.p)[rows]
 
     def _evaluate_constraints(self, point: Point) -> Sequence[Formula]:
@@ -174,6 +179,7 @@ class Dynamics:
         Returns:
             Names of the errors, and the errors (k, 1).
         """
-        names, g = self.problem.projected_names, self._evaluate_constraints(point)[3]
+        names = self.problem.projected_names
+        g = self._evaluate_constraints(point)[3]
         moved = casadi.vertcat(*(g.T @ part for part in casadi.vertsplit(point.slacks, g.size1())))
         return names, point.x[: len(names)] - point.projections - moved

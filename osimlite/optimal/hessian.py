@@ -23,7 +23,8 @@ class Hessian:
         for group in program.groups:
             group.make_hessian()
         rows, columns = program._entries("hessian_rows", "hessian_columns")
-        direct, pattern = len(program.end_columns), program._end_hessian_pattern
+        direct = len(program.end_columns)
+        pattern = program._end_hessian_pattern
         if pattern[direct:, direct:].any():
             raise program.problem.unsupported_error(
                 program.problem.solver,
@@ -61,13 +62,12 @@ class Hessian:
             factor: factor of the objective.
             multipliers: multipliers of the constraints (m,).
         """
-        program, direct = self.program, len(self.program.end_columns)
+        program = self.program
+        direct = len(self.program.end_columns)
         totals = program._compute_rows(w)[program._row_count :]
         end_arguments = program._end_arguments(w, totals)
-        multipliers_of_points, at_ends = (
-            multipliers[: program._row_count],
-            multipliers[program._row_count :],
-        )
+        multipliers_of_points = multipliers[: program._row_count]
+        at_ends = multipliers[program._row_count :]
         cost, end_slopes = (part.T for part in program._end_slope(*end_arguments))
         of_integrals = factor * cost.ravel()[direct:] + at_ends @ end_slopes[:, direct:]
         row_multipliers = program._b.multiply_transpose(

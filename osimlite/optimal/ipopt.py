@@ -160,7 +160,8 @@ def run_ipopt(
     before = time.perf_counter()
     _load_ipopt()
     solver = casadi.nlpsol("moco", "ipopt", search.objective, options)
-    lower, upper = program.layout.lower, program.layout.upper
+    lower = program.layout.lower
+    upper = program.layout.upper
     with search.stop_on_interrupt():
         solution = solver(
             x0=search.scale(np.clip(guess, lower, upper)),
@@ -169,7 +170,8 @@ def run_ipopt(
             lbg=program.lower,
             ubg=program.upper,
         )
-    took, stats = time.perf_counter() - before, solver.stats()
+    took = time.perf_counter() - before
+    stats = solver.stats()
     status = stats["return_status"]
     if not np.isfinite(np.array(solution["f"])).all() or status == "Invalid_Number_Detected":
         raise SimulationError(_describe_invalid_number(program, guess))
@@ -204,7 +206,8 @@ def _uses_exact_hessian(program: Program) -> bool:
 
 def _make_options(program: Program) -> dict[str, Any]:
     """Return Ipopt's options, set as Moco sets them."""
-    settings, options = program.problem.solver, dict[str, Any]()
+    settings = program.problem.solver
+    options = dict[str, Any]()
     is_exact = _uses_exact_hessian(program)
     options["hessian_approximation"] = "exact" if is_exact else "limited-memory"
     # "extended" takes the same steps, but puts the quasi-Newton update into one larger matrix, instead
@@ -252,7 +255,9 @@ class _ArrayCallback(casadi.Callback):  # type: ignore[misc]
         self, name: str, inputs: dict[str, Any], outputs: dict[str, Any], law: Callable[..., Any]
     ) -> None:
         casadi.Callback.__init__(self)
-        self._inputs, self._outputs, self._law = inputs, outputs, law
+        self._inputs = inputs
+        self._outputs = outputs
+        self._law = law
         self.construct(name, {})
 
     def get_n_in(self) -> int:
@@ -309,10 +314,12 @@ class _SearchCallbacks:
         self.factors, self.offsets = program.layout.scaling
         columns = np.array(program.jacobian_sparsity.get_triplet()[1], dtype=int)
         self._column_factors = self.factors[columns]
-        width, rows = len(program.layout.lower), len(program.labels)
+        width = len(program.layout.lower)
+        rows = len(program.labels)
         inputs = {"x": _make_dense_column(width), "p": casadi.Sparsity(0, 0)}
         sizes = {"f": 1, "x": width, "lam_x": width, "g": rows, "lam_g": rows}
-        scalar, across = casadi.Sparsity.scalar(), casadi.Sparsity.dense(width, 1)
+        scalar = casadi.Sparsity.scalar()
+        across = casadi.Sparsity.dense(width, 1)
         # Ipopt evaluates objective and constraints at one x by separate calls.
         self._values_at = cache_last(lambda x: program.compute_values(self.unscale(x)))
         self._slopes_at = cache_last(lambda x: program.compute_slopes(self.unscale(x)))
@@ -361,7 +368,8 @@ class _SearchCallbacks:
         # Among feasible iterates the objective decides, among others the violation.
         rank = (size, np.inf) if size > FEASIBILITY_TOLERANCE else (0.0, objective)
         if rank < self._best:
-            self.best, self._best = self.unscale(x), rank
+            self.best = self.unscale(x)
+            self._best = rank
         if self.report is not None:
             self.report(Progress(self.count, objective, worst[0] if worst else None))
         self.count += 1

@@ -35,7 +35,9 @@ class Layout:
     """
 
     def __init__(self, problem: Problem) -> None:
-        functions, grid, solver = problem.functions, problem.grid, problem.solver
+        functions = problem.functions
+        grid = problem.grid
+        solver = problem.solver
         self.problem = problem
         multipliers = [f"lambda_{name}" for name in problem.constraint_names]
         accelerations = (
@@ -135,7 +137,8 @@ class Layout:
         Each variable is scaled by its own bounds; Moco 4.6 takes those of the last variable of a
         kind for all of that kind.
         """
-        scale, shift = np.ones(len(self.lower)), np.zeros(len(self.lower))
+        scale = np.ones(len(self.lower))
+        shift = np.zeros(len(self.lower))
         if not self.problem.solver.scale_variables_using_bounds:
             return scale, shift
         pairs: list[Any] = [*enumerate([*self.problem.times, *self.problem.parameters.values()])]
@@ -155,7 +158,8 @@ class Layout:
 
         Variables that the trajectory lacks are in the middle between their bounds.
         """
-        result, times = self.make_guess(), trajectory.times
+        result = self.make_guess()
+        times = trajectory.times
         result[:2] = times[0], times[-1]
         at = times[0] + self.problem.grid.fractions * (times[-1] - times[0])
         for kind in VARIABLE_KINDS:

@@ -64,7 +64,8 @@ def build_frame_distance_rows(
     constraint: MocoFrameDistanceConstraint, problem: Problem
 ) -> ConstraintRows:
     """Return the squared distances, m², of pairs of frame origins, as OpenSim bounds them."""
-    pairs, limits = [], []
+    pairs = []
+    limits = []
     for pair in constraint.frame_pairs:
         ends = str(pair.frame1_path), str(pair.frame2_path)
         for path in ends:

@@ -40,7 +40,8 @@ class TimeFunction:
 
         The expansion is renewed for each time, so that value and both derivatives are exact.
         """
-        first, since = 1 + 3 * self.number, t - known[0]
+        first = 1 + 3 * self.number
+        since = t - known[0]
         return known[first] + since * (known[first + 1] + 0.5 * since * known[first + 2])
 
 

@@ -66,18 +66,23 @@ class PointFormula:
     """
 
     def __init__(self, program: Program, number: int, size: int) -> None:
-        problem, layout = program.problem, program.layout
+        problem = program.problem
+        layout = program.layout
         is_mesh = bool(problem.grid.is_mesh[number])
         self.projected = (
             len(layout.names["projections"]) if layout.has_kind("projections", number) else 0
         )
-        s, z = SX.sym("s", layout.shared), SX.sym("z", size)
-        fraction, known = SX.sym("fraction"), SX.sym("known", program.known_size)
+        s = SX.sym("s", layout.shared)
+        z = SX.sym("z", size)
+        fraction = SX.sym("fraction")
+        known = SX.sym("known", program.known_size)
         point = program.point(s, z, fraction, known, number)
         # Rates are per fraction of the motion, as the duration may vary.
         duration = s[1] - s[0]
         names, residuals = problem.dynamics.compute_residuals(point)
-        rows, labels, limits = [residuals], [*names], [(0.0, 0.0)] * len(names)
+        rows = [residuals]
+        labels = [*names]
+        limits = [(0.0, 0.0)] * len(names)
         if is_mesh or problem.solver.enforce_path_constraint_mesh_interior_points:
             for constraint in problem.path_rows:
                 rows.append(constraint.formula(point))
@@ -105,20 +110,21 @@ class PointFormula:
         implicit, equations = (
             casadi.vertcat(SX(0, 1), *(pair[k] for pair in point.linear_systems)) for k in range(2)
         )
-        self.labels, self.limits, self.rows = labels, limits, column.numel()
+        self.labels = labels
+        self.limits = limits
+        self.rows = column.numel()
         parts = casadi.cse(casadi.densify(casadi.vertcat(column, equations)))
-        self._inputs, self._variables, self._implicit = (
-            [s, z, fraction, known],
-            casadi.vertcat(s, z),
-            implicit,
-        )
-        self._column, self._equations = parts[: self.rows], parts[self.rows :]
-        slopes, width = (
-            casadi.jacobian(parts, casadi.vertcat(self._variables, implicit)),
-            self._variables.numel(),
-        )
-        jacobian, self._slope_by_implicit = slopes[: self.rows, :width], slopes[: self.rows, width:]
-        self._implicit_value, self._implicit_slope = SX(0, 1), SX(0, width)
+        self._inputs = [s, z, fraction, known]
+        self._variables = casadi.vertcat(s, z)
+        self._implicit = implicit
+        self._column = parts[: self.rows]
+        self._equations = parts[self.rows :]
+        slopes = casadi.jacobian(parts, casadi.vertcat(self._variables, implicit))
+        width = self._variables.numel()
+        jacobian = slopes[: self.rows, :width]
+        self._slope_by_implicit = slopes[: self.rows, width:]
+        self._implicit_value = SX(0, 1)
+        self._implicit_slope = SX(0, width)
         if implicit.numel():
             # The solution of the equations is not differentiated: its derivatives follow from the
             # implicit function theorem, with the factors of the same symmetric matrix.
@@ -146,10 +152,8 @@ class PointFormula:
 
         It is only made when it is used, as it takes longest.
         """
-        multipliers, adjoints = (
-            SX.sym("multipliers", self.rows),
-            SX.sym("adjoints", self._implicit.numel()),
-        )
+        multipliers = SX.sym("multipliers", self.rows)
+        adjoints = SX.sym("adjoints", self._implicit.numel())
         combined = casadi.dot(multipliers, self._column) + casadi.dot(adjoints, self._equations)
         hessian = casadi.hessian(combined, casadi.vertcat(self._variables, self._implicit))[0]
         if self._implicit.numel():
@@ -179,7 +183,8 @@ class PointGroup:
     """
 
     def __init__(self, program: Program, numbers: list[int]) -> None:
-        problem, layout = program.problem, program.layout
+        problem = program.problem
+        layout = program.layout
         self.numbers = np.array(numbers, dtype=int)
         self.columns = np.array([layout.point_indices[number] for number in numbers])
         key = bool(problem.grid.is_mesh[numbers[0]]), layout.has_kind("projections", numbers[0])
@@ -187,7 +192,9 @@ class PointGroup:
             problem.formulas[key] = PointFormula(program, numbers[0], self.columns.shape[1])
         self.formula = formula = problem.formulas[key]
         self.projected = formula.projected
-        self.labels, self.limits, self.rows = formula.labels, formula.limits, formula.rows
+        self.labels = formula.labels
+        self.limits = formula.limits
+        self.rows = formula.rows
         self.jacobian_rows, self.jacobian_columns = formula.jacobian_entries
         self.value, self.slope = (
             BufferedFunction(each.map(len(numbers))) for each in (formula.value, formula.slope)

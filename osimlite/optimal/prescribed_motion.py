@@ -116,7 +116,9 @@ class PrescribedMotion:
         self.moving = self._force_balance.moving
         self.constraint_count = self._force_balance.equation_count
         self.numbers = cache_last(self._tabulate_numbers)
-        self._model_paths, self._model, self._folder = known, model, folder
+        self._model_paths = known
+        self._model = model
+        self._folder = folder
 
     def list_forces(self) -> list[tuple[str, Any]]:
         """Return the forces on the bench with their paths in the model."""
@@ -173,17 +175,16 @@ class PrescribedMotion:
             One row per time (t, (1 + a + c) k): the value without forces, and the change by 1 N of
             each of a actuators and by 1 of each of c multipliers.
         """
-        force_model, infos = self.force_model, [info.path for info in self.mechanism.coordinates]
+        force_model = self.force_model
+        infos = [info.path for info in self.mechanism.coordinates]
         order = [infos.index(path) for path in force_model.coordinates]
         values, speeds, accelerations = (part[:, order].T for part in self._motion(times))
         x = np.tile(force_model.x[:, None], len(times))
         x[: 2 * len(order)] = np.vstack([values, speeds])
         xdot = np.zeros_like(x)
         xdot[: 2 * len(order)] = np.vstack([speeds, accelerations])
-        indices, count = (
-            [force_model.controls.index(path) for path in self._paths],
-            len(self._paths),
-        )
+        indices = [force_model.controls.index(path) for path in self._paths]
+        count = len(self._paths)
         found = []
         for unit in np.eye(1 + count + self.constraint_count):
             u = np.zeros(len(force_model.controls))
@@ -217,7 +218,8 @@ class PrescribedDynamics(Dynamics):
                 problem.phase, "initial and final time must be fixed with a prescribed motion"
             )
         given: PrescribedMotion = self.functions
-        start, end = problem.times[0][0], problem.times[1][0]
+        start = problem.times[0][0]
+        end = problem.times[1][0]
         self._times = start + problem.grid.fractions * (end - start)
         self._entries = self._add_series(given.numbers)
 
@@ -273,8 +275,10 @@ class PrescribedDynamics(Dynamics):
             Names of the residuals, and the residuals (k, 1).
         """
         names, errors = self.tendons.compute_residuals(point, point.derivatives)
-        count, moving = len(self.functions.path_names), self.functions.moving
-        first, size = 2 * count + len(moving), count * len(moving)
+        count = len(self.functions.path_names)
+        moving = self.functions.moving
+        first = 2 * count + len(moving)
+        size = count * len(moving)
         needed = self._select_entries(point, 2 * count, len(moving))
         pushes = casadi.reshape(self._select_entries(point, first, size), count, -1).T
         bound = casadi.reshape(
@@ -368,7 +372,8 @@ def build_test_bench(actuators: Sequence[Any], names: Sequence[str]) -> Model:
         slider = SliderJoint(
             name=f"{name}_slider", socket_parent_frame=model.ground, socket_child_frame=body
         )
-        slider.coordinates[0].name, slider.coordinates[0].default_value = name, 1.0
+        slider.coordinates[0].name = name
+        slider.coordinates[0].default_value = 1.0
         model.add(slider)
         if isinstance(item, Muscle):
             own: Any = item.copy_deep()

@@ -101,7 +101,8 @@ class Problem(StudyContext):
         scaled: Mapping[str, str] | None = None,
     ) -> None:
         super().__init__(file, folder)
-        self.tables, self._scaled = tables or {}, scaled or {}
+        self.tables = tables or {}
+        self._scaled = scaled or {}
         self._factors: dict[str, str] = {}
         self.study = study
         # Invalid values are reported with their line, before a conversion could fail on them.
@@ -304,10 +305,8 @@ class Problem(StudyContext):
 
     def _make_solver_costs(self) -> Iterator[tuple[MocoGoal, GoalTerms]]:
         """Yield the costs that settings of the solver add, named as in Moco."""
-        solver, acceleration_count = (
-            self.solver,
-            len(self.functions.coordinates) if self.dynamics.is_implicit else 0,
-        )
+        solver = self.solver
+        acceleration_count = len(self.functions.coordinates) if self.dynamics.is_implicit else 0
         if solver.minimize_lagrange_multipliers and not self.constraint_names:
             raise self.invalid_error(
                 solver, "minimize_lagrange_multipliers requires a model with constraints"

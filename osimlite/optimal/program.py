@@ -44,7 +44,8 @@ class Program:
     """
 
     def __init__(self, problem: Problem) -> None:
-        self.problem, self.layout = problem, Layout(problem)
+        self.problem = problem
+        self.layout = Layout(problem)
         self._time_data: dict[bytes, Array] = {}
         self._compute_rows = cache_last(
             lambda w: self._a @ w + self._b @ self._evaluate_groups("value", w)
@@ -57,7 +58,8 @@ class Program:
         self.integrals: list[Any] = [
             (goal, terms) for goal, terms in problem.goals if terms.integrand is not None
         ]
-        points, is_mesh = range(len(problem.grid.fractions)), problem.grid.is_mesh
+        points = range(len(problem.grid.fractions))
+        is_mesh = problem.grid.is_mesh
         groups = [[k for k in points if is_mesh[k]], [k for k in points if not is_mesh[k]]]
         inside = (
             problem.solver.enforce_path_constraint_mesh_interior_points or not problem.path_rows
@@ -85,7 +87,8 @@ class Program:
             known: symbols of the data of the functions of time.
             number: index of the point.
         """
-        parts, first = {}, 0
+        parts = {}
+        first = 0
         for kind in VARIABLE_KINDS:
             count = len(self.layout.names[kind]) if self.layout.has_kind(kind, number) else 0
             parts[kind] = z[first : first + count]
@@ -110,18 +113,19 @@ class Program:
 
     def _make_ends(self) -> None:
         """Make E: the parts of the cost and the endpoint constraints, with their derivatives."""
-        problem, layout = self.problem, self.layout
-        size, last = layout.shared, len(layout.point_indices) - 1
+        problem = self.problem
+        layout = self.layout
+        size = layout.shared
+        last = len(layout.point_indices) - 1
         s = SX.sym("s", size)
-        z0, z1 = (
-            SX.sym("z0", len(layout.point_indices[0])),
-            SX.sym("z1", len(layout.point_indices[last])),
-        )
+        z0 = SX.sym("z0", len(layout.point_indices[0]))
+        z1 = SX.sym("z1", len(layout.point_indices[last]))
         totals = SX.sym("integrals", len(self.integrals))
         known = [SX.sym(f"known{k}", self.known_size) for k in range(2)]
         start = self.point(s, z0, SX(0.0), known[0], 0)
         end = self.point(s, z1, SX(1.0), known[1], last)
-        costs, rows = [], []
+        costs = []
+        rows = []
         self.costs: list[str] = []
         self.end_labels: list[str] = []
         limits: list[tuple[float, float]] = []
@@ -151,7 +155,8 @@ class Program:
             solution = casadi.ldl_solve(-casadi.substitute(equations, symbol, 0), *factors)
             cost, end_rows = casadi.substitute([cost, end_rows], [symbol], [solution])
         both = casadi.vertcat(s, z0, z1, totals)
-        total, multipliers = casadi.sum1(cost), SX.sym("multipliers", end_rows.numel())
+        total = casadi.sum1(cost)
+        multipliers = SX.sym("multipliers", end_rows.numel())
         factor = SX.sym("factor")
         self.end_columns = np.concatenate(
             [np.arange(size), layout.point_indices[0], layout.point_indices[last]]
@@ -325,9 +330,12 @@ class Program:
         Returns:
             Rows and columns in the program of each entry.
         """
-        first, second = [], []
+        first = []
+        second = []
         for group, start in zip(self.groups, self._offsets, strict=False):
-            r, c, count = getattr(group, rows), getattr(group, columns), len(group.numbers)
+            r = getattr(group, rows)
+            c = getattr(group, columns)
+            count = len(group.numbers)
             variables = np.hstack(
                 [np.tile(np.arange(self.layout.shared), (count, 1)), group.columns]
             )
@@ -344,7 +352,8 @@ class Program:
         """Make the sparse map from the Jacobians of the points to that of A w + B F."""
         width = len(self.layout.lower)
         rows, columns = self._entries("jacobian_rows", "jacobian_columns")
-        spread, constant = self._b.select_columns(rows.astype(np.int64)), self._a
+        spread = self._b.select_columns(rows.astype(np.int64))
+        constant = self._a
         keys = np.concatenate(
             [
                 spread.rows * np.int64(width) + columns[spread.columns],
@@ -359,12 +368,14 @@ class Program:
         self._jacobian_constant = np.bincount(
             inverse[count:], weights=constant.values, minlength=len(unique)
         )
-        self._jacobian_rows, self._jacobian_columns = unique // width, unique % width
+        self._jacobian_rows = unique // width
+        self._jacobian_columns = unique % width
         self._of_g = self._jacobian_rows < self._row_count
 
     def _map_ends(self) -> None:
         """Make the sparsity pattern of the endpoint constraints, whose rows follow the others."""
-        width, direct = len(self.layout.lower), len(self.end_columns)
+        width = len(self.layout.lower)
+        direct = len(self.end_columns)
         pattern = np.zeros((len(self.end_labels), width), dtype=bool)
         pattern[:, self.end_columns] |= self._end_pattern[:, :direct]
         for k in range(len(self.integrals)):
@@ -419,7 +430,8 @@ class Program:
     def _end_arguments(self, w: Array, totals: Array) -> list[Array]:
         """Return the arguments of E."""
         known = self._sample_time_functions(w[:2])
-        first, last = self.layout.point_indices[0], self.layout.point_indices[-1]
+        first = self.layout.point_indices[0]
+        last = self.layout.point_indices[-1]
         return [w[: self.layout.shared], w[first], w[last], totals, known[0], known[1]]
 
     def compute_values(self, w: Array) -> tuple[Array, Array]:
@@ -455,7 +467,8 @@ class Program:
             Gradient of f, rows of the endpoint constraints, entries of the Jacobian of A w + B F,
             and the gradients of the integrals.
         """
-        width, direct = len(w), len(self.end_columns)
+        width = len(w)
+        direct = len(self.end_columns)
         numbers = self._jacobian_constant + self._jacobian_map @ self._evaluate_groups("slope", w)
         integrals = np.zeros((len(self.integrals), width))
         is_integral = ~self._of_g

@@ -125,14 +125,13 @@ def solve_with_refinement(
             Round(len(error), float(error.max()), cost, result.iterations, result.duration)
         )
         mesh = split_intervals(program.problem.grid, error, refinement.tolerance)
-        is_good, is_enough = (
-            len(mesh) == len(error) + 1,
-            len(rounds) > MAX_ROUNDS or len(mesh) > MAX_INTERVALS,
-        )
+        is_good = len(mesh) == len(error) + 1
+        is_enough = len(rounds) > MAX_ROUNDS or len(mesh) > MAX_INTERVALS
         if not result.success or is_good or is_enough:
             return program, result, rounds
         finer = _rebuild_program(program.problem, mesh, refinement.hessian)
-        guess, program = interpolate_solution(program, result.w, finer), finer
+        guess = interpolate_solution(program, result.w, finer)
+        program = finer
         result = search(program, guess, tell, near=True)
 
 
@@ -158,11 +157,13 @@ def check_refinable(problem: Problem) -> None:
 
 def estimate_errors(program: Program, w: Array) -> Array:
     """Estimate the error of each interval (m,): that of the worst state, relative to 1 plus its largest absolute value."""
-    grid, layout = program.problem.grid, program.layout
+    grid = program.problem.grid
+    layout = program.layout
     polynomial = _SolutionPolynomials(program, w)
     count = len(layout.names["states"])
     group = program.groups[0]
-    rates, sizes = polynomial.rates, 1.0 + np.abs(w[layout.indices["states"]]).max(axis=0)
+    rates = polynomial.rates
+    sizes = 1.0 + np.abs(w[layout.indices["states"]]).max(axis=0)
     result = np.zeros(len(grid.lengths))
     of_rates = _evaluate_basis(polynomial.nodes, SAMPLE_FRACTIONS)
     starts = np.concatenate([[0.0], np.cumsum(grid.lengths)[:-1]])
@@ -205,7 +206,8 @@ def interpolate_solution(program: Program, w: Array, finer: Program) -> Array:
         w: variables of the solution.
         finer: program on the other mesh.
     """
-    grid, layout = program.problem.grid, finer.layout
+    grid = program.problem.grid
+    layout = finer.layout
     starts = np.concatenate([[0.0], np.cumsum(grid.lengths)[:-1]])
     fractions = finer.problem.grid.fractions
     interval = np.clip(np.searchsorted(starts, fractions, side="right") - 1, 0, len(starts) - 1)
@@ -240,8 +242,11 @@ class _SolutionPolynomials:
     """
 
     def __init__(self, program: Program, w: Array) -> None:
-        grid, layout, scheme = program.problem.grid, program.layout, program.problem.grid.scheme
-        self.grid, self.scheme = grid, scheme
+        grid = program.problem.grid
+        layout = program.layout
+        scheme = program.problem.grid.scheme
+        self.grid = grid
+        self.scheme = scheme
         used = np.flatnonzero(scheme.rates.any(axis=0))
         self.nodes = scheme.fractions[used]
         points = np.array([grid.get_points(k) for k in range(len(grid.lengths))])

@@ -64,19 +64,23 @@ def _make_legendre_scheme(name: str, degree: int, is_radau: bool) -> Scheme:
     slopes, end, weights = (np.array(part) for part in casadi.collocation_coeff(roots))
     count = degree + (1 if is_radau else 2)
     fractions = np.array([0.0, *roots] if is_radau else [0.0, *roots, 1.0])
-    states, rates = np.zeros((degree, count)), np.zeros((degree, count))
+    states = np.zeros((degree, count))
+    rates = np.zeros((degree, count))
     states[:, : degree + 1] = -slopes.T
     rates[:, 1 : degree + 1] = np.eye(degree)
     if not is_radau:
         last = np.zeros((1, count))
-        last[0, : degree + 1], last[0, -1] = -end.ravel(), 1.0
-        states, rates = np.vstack([states, last]), np.vstack([rates, np.zeros((1, count))])
+        last[0, : degree + 1] = -end.ravel()
+        last[0, -1] = 1.0
+        states = np.vstack([states, last])
+        rates = np.vstack([rates, np.zeros((1, count))])
     # The quadrature is over the collocation points; the start of the interval has no weight.
     mean = np.zeros(count)
     mean[1 : degree + 1] = weights.ravel()
     inner = fractions[1:-1]
     controls = np.zeros((len(inner), count))
-    controls[:, 0], controls[:, -1] = inner - 1.0, -inner
+    controls[:, 0] = inner - 1.0
+    controls[:, -1] = -inner
     controls[:, 1:-1] += np.eye(len(inner))
     return Scheme(name, fractions, mean, states, rates, controls)
 
@@ -107,7 +111,8 @@ class Grid:
             scheme: transcription scheme.
             mesh: ends of the intervals (m + 1,), from 0 to 1.
         """
-        lengths, steps = np.diff(mesh), len(scheme.fractions) - 1
+        lengths = np.diff(mesh)
+        steps = len(scheme.fractions) - 1
         fractions = np.append(
             (mesh[:-1, None] + lengths[:, None] * scheme.fractions[:-1]).ravel(), 1.0
         )

@@ -150,7 +150,8 @@ def solve_program(
         tell: as for :func:`solve`.
         refine: as for :func:`solve`.
     """
-    problem, rounds = program.problem, list[Round]()
+    problem = program.problem
+    rounds = list[Round]()
     if guess is None and problem.solver.guess_file.strip():
         guess = problem.locate_file(problem.solver.guess_file)
     if isinstance(guess, str | Path):
@@ -273,7 +274,8 @@ def append_next_period(problem: Problem, trajectory: MocoTrajectory) -> MocoTraj
     names = {kind: trajectory.names[kind] for kind in ("states", "controls")}
     columns = {}
     for name in (*names["states"], *names["controls"]):
-        column, pair = trajectory.columns[name], follows.get(name)
+        column = trajectory.columns[name]
+        pair = follows.get(name)
         if pair is None:
             more = column + (column[-1] - column[0])
         else:

@@ -113,7 +113,8 @@ def _filter_lowpass(table: StoTable, operator: TabOpLowPassFilter) -> StoTable:
     """Return the table after OpenSim's low-pass filter, resampled at equal steps first if need be."""
     if operator.cutoff_frequency < 0.0:
         return table
-    times, rows = table.times, table.rows
+    times = table.times
+    rows = table.rows
     step = float(np.diff(times).min())
     if float(times[-1] - times[0]) / (len(times) - 1) - step > np.finfo(float).eps:
         # Resample at equal steps before the table is padded at both ends, in the order of OpenSim's
@@ -125,7 +126,8 @@ def _filter_lowpass(table: StoTable, operator: TabOpLowPassFilter) -> StoTable:
     if operator.trim_to_original_time_range:
         slack = 1e-6 * (times[1] - times[0])
         is_within = (times >= table.times[0] - slack) & (times <= table.times[-1] + slack)
-        times, rows = times[is_within], rows[is_within]
+        times = times[is_within]
+        rows = rows[is_within]
     return replace(table, times=times, rows=rows)
 
 
@@ -186,8 +188,10 @@ def fit_splines(problem: Problem, table: StoTable, columns: list[str]) -> list[T
         DocumentError: a column is missing, has gaps, or does not cover the motion.
     """
     check_columns(table, columns)
-    first, last = float(table.times[0]), float(table.times[-1])
-    start, end = problem.times[0][1], problem.times[1][0]
+    first = float(table.times[0])
+    last = float(table.times[-1])
+    start = problem.times[0][1]
+    end = problem.times[1][0]
     if start < first - TIME_TOLERANCE_S or end > last + TIME_TOLERANCE_S:
         message = f"the table covers {first:g} s to {last:g} s, but the motion lasts at least from {start:g} s to {end:g} s"
         raise DocumentError(message, file=table.file)
@@ -241,8 +245,6 @@ class SplineCurves:
     def evaluate(self, times: Array) -> Array:
         """Return values, first and second derivatives (3, n, m) of m columns at times (n,)."""
         if self._times is None or not np.array_equal(self._times, times):
-            self._times, self._values = (
-                times.copy(),
-                np.array(self._curves.derivatives(times, (0, 1, 2))),
-            )
+            self._times = times.copy()
+            self._values = np.array(self._curves.derivatives(times, (0, 1, 2)))
         return self._values

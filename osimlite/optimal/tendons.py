@@ -76,7 +76,8 @@ class TendonEquations:
         """
         if not self.muscles:
             return [], casadi.SX(0, 1)
-        functions, rows = self.problem.functions, []
+        functions = self.problem.functions
+        rows = []
         lengths, speeds = self.problem.dynamics.compute_path_lengths(point)
         residual = make_symbolic(degroote_residual)
         for number, (path, muscle, tendon) in enumerate(self.muscles):
@@ -104,11 +105,14 @@ class TendonEquations:
         The fibers are springs here: neither the activation nor the force-velocity factor changes
         (M. Millard et al., Journal of Biomechanical Engineering 135, 2013, A6).
         """
-        functions, rows = self.problem.functions, [casadi.SX(0, 1)]
+        functions = self.problem.functions
+        rows = [casadi.SX(0, 1)]
         lengths, speeds = self.problem.dynamics.compute_path_lengths(point)
         for path, muscle, tendon in self.muscles:
-            place, state = functions.path_names.index(path), f"{path}/normalized_tendon_force"
-            force, rate = point.state(state), point.rates[functions.states.index(state)]
+            place = functions.path_names.index(path)
+            state = f"{path}/normalized_tendon_force"
+            force = point.state(state)
+            rate = point.rates[functions.states.index(state)]
             activation = (
                 point.state(f"{path}/activation") if muscle.follows else point.control(path)
             )

@@ -74,7 +74,8 @@ def set_time_range(
         raise context.invalid_error(tool, message)
     study.solver.num_mesh_intervals = math.ceil((end - start) / tool.mesh_interval)
     if tool.clip_time_range:
-        start, end = start + 1e-3, end - 1e-3
+        start = start + 1e-3
+        end = end - 1e-3
     phase = study.problem.phases
     phase.time_initial_bounds = MocoInitialBounds(name="time_initial_bounds", bounds=(start,))
     phase.time_final_bounds = MocoFinalBounds(name="time_final_bounds", bounds=(end,))

@@ -64,7 +64,8 @@ def build_track_problem(
     # A problem without goals gives the names of states, and errors with their line.
     bare = Problem(study, file, place)
     tables: dict[str, StoTable] = {}
-    states, mechanism = bare.functions.states, bare.functions.mechanism
+    states = bare.functions.states
+    mechanism = bare.functions.mechanism
     if tool.states_reference.filepath.strip():
         table = process_table(bare, tool.states_reference, tool.states_reference, states, mechanism)
         if tool.track_reference_position_derivatives:

@@ -112,7 +112,8 @@ class MocoTrajectory:
         if sum(counts) != len(table.columns):
             message = f"the header counts {sum(counts)} columns besides the time, but the file has {len(table.columns)}"
             raise DocumentError(message, file=str(path))
-        names, first = dict[str, tuple[str, ...]](), 0
+        names = dict[str, tuple[str, ...]]()
+        first = 0
         for kind, count in zip(COLUMN_KINDS, counts, strict=True):
             names[kind] = table.columns[first : first + count]
             first += count
@@ -134,10 +135,8 @@ class MocoTrajectory:
             # OpenSim writes the values of parameters into the first row only.
             first = np.full((len(self.times), len(self.parameters)), np.nan)
             first[0] = [*self.parameters.values()]
-            rows, counted = (
-                np.hstack([rows, first]),
-                self.names | {"parameters": tuple(self.parameters)},
-            )
+            rows = np.hstack([rows, first])
+            counted = self.names | {"parameters": tuple(self.parameters)}
             names += self.parameters
             said = self.header | {
                 f"num_{each}": str(len(counted.get(each, ()))) for each in COLUMN_KINDS

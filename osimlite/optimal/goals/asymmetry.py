@@ -35,7 +35,8 @@ def build_step_time_asymmetry_goal(goal: MocoStepTimeAsymmetryGoal, problem: Pro
 
     def integrand(point: Point) -> Formula:
         forces = point.output("contact_forces")
-        contacts, positions = [], []
+        contacts = []
+        positions = []
         for paths, foot in feet:
             load = sum(
                 get_component(
