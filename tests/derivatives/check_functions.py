@@ -136,7 +136,7 @@ def test_outputs_are_those_of_the_simulation(name):
     for label, value in zip(f.output_names["forces"], matrix(found["forces"]).ravel(), strict=True):
         path, _, what = label.partition("|")
         assert value == pytest.approx(
-            both.engine.recorded(path, both.engine.kind_at(path).recorded[what]),
+            both.engine.recorded(path, both.engine.kind_at(path).record_offsets[what]),
             rel=1e-11,
             abs=1e-11,
         )
