@@ -143,7 +143,11 @@ def assemble_poses(
 
 
 def assemble_pose(a: Assembly, target: Floats, q: Floats) -> bool:
-    """Fill q with the nearest pose in which clamped coordinates are in their ranges; return whether there is one."""
+    """Fill q with the nearest pose in which clamped coordinates are in their ranges.
+
+    Returns:
+        Whether there is one.
+    """
     size, status, ranges = a.model[MODEL.DOFS], at(a.p, ASSEMBLY_HEAD), at(a.c, RANGES)
     clamped, fixed = at(status, CLAMPED * size), a.w
     for k in range(size):
@@ -242,7 +246,11 @@ def measure_change(a: Assembly, target: Floats, q: Floats) -> float:
 
 
 def evaluate_equations(a: Assembly, q: Floats) -> float:
-    """Evaluate errors and rows of the equations of a pose; return the largest error, infinite if undefined."""
+    """Evaluate errors and rows of the equations of a pose.
+
+    Returns:
+        The largest error, infinite if undefined.
+    """
     model, size = a.model, a.model[MODEL.DOFS]
     copy_numbers(size, q, a.y)
     if a.p[MOVES_LINKS] > 0:
@@ -288,7 +296,11 @@ def follow_couplers(a: Assembly, q: Floats) -> None:
 
 
 def factorise_rows(a: Assembly, free: int, is_eased: bool) -> int:
-    """Factorise the equations of the free coordinates, each with a left side of unit length; return their rank."""
+    """Factorise the equations of the free coordinates, each with a left side of unit length.
+
+    Returns:
+        Their rank.
+    """
     size, count = a.model[MODEL.DOFS], count_equations(a)
     status, rows, factor = at(a.p, ASSEMBLY_HEAD), equation_rows(a), equation_factor(a)
     counted, free_list = at(status, COUNTED * size), at(status, FREE * size)
@@ -312,7 +324,11 @@ def factorise_rows(a: Assembly, free: int, is_eased: bool) -> int:
 
 
 def restore_pose(a: Assembly, q: Floats, is_assembled: bool) -> bool:
-    """Move q to where the equations hold, by Newton's method with the shortest steps; return whether they do."""
+    """Move q to where the equations hold, by Newton's method with the shortest steps.
+
+    Returns:
+        Whether they do.
+    """
     size, count, tolerance = a.model[MODEL.DOFS], count_equations(a), a.c[TOLERANCE]
     status, errors, factor = at(a.p, ASSEMBLY_HEAD), at(a.w, 7 * size), equation_factor(a)
     counted, free_list = at(status, COUNTED * size), at(status, FREE * size)

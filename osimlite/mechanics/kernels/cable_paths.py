@@ -296,7 +296,11 @@ def end_to_ground(pose: Floats, end: Floats, ground: Floats) -> None:
 
 
 def draw_lines(elements: Ints, record: Floats, first: int, last: int, lines: Floats) -> int:
-    """Compute direction and length of each straight part; return the number of touched obstacles."""
+    """Compute direction and length of each straight part.
+
+    Returns:
+        The number of touched obstacles.
+    """
     count = 0
     start = vector(record, elements[ELEMENT_INTS * first + KEPT])
     for k in range(first + 1, last + 1):
@@ -528,7 +532,10 @@ def shoot_again(
 def lengthening_speed(
     model: Ints, data: Floats, count: int, elements: Ints, record: Floats
 ) -> float:
-    """Return the lengthening speed of the straight parts (m/s); their ends on obstacles move with these."""
+    """Return the lengthening speed of the straight parts (m/s).
+
+    Their ends on obstacles move with these.
+    """
     total = 0.0
     here = vector(record, elements[KEPT])
     moves = velocity(model, data, elements[LINK], here)

@@ -343,7 +343,11 @@ def integrate_by_extrapolation(
 
 
 def extrapolate_step(p: Floats, step: float, work: Floats) -> bool:
-    """Take a step by midpoint rules of 2, 4, 6 ... parts, extrapolated; return whether it is exact."""
+    """Take a step by midpoint rules of 2, 4, 6 ... parts, extrapolated.
+
+    Returns:
+        Whether it is exact.
+    """
     y, f, old, columns = work, at(work, SIZE), at(work, 2 * SIZE), at(work, 3 * SIZE)
     for column in range(COLUMNS):
         new, parts = at(columns, column * SIZE), 2 * column + 2

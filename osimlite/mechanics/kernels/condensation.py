@@ -334,7 +334,11 @@ def add_outer_product(
 
 
 def condense_system(model: Ints, c: float, work: Floats) -> bool:
-    """Eliminate all but the speeds from 1 - c J and factorise the rest; return whether it is regular."""
+    """Eliminate all but the speeds from 1 - c J and factorise the rest.
+
+    Returns:
+        Whether it is regular.
+    """
     size = model[MODEL.DOFS]
     system, levers = at(work, SYSTEM * size * size), at(work, LEVERS * size * size)
     stiffness, damping = at(work, STIFFNESS * size * size), at(work, DAMPING * size * size)

@@ -113,7 +113,7 @@ def measure_spheres(
 def contact_response(
     model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int
 ) -> int:
-    """Apply 1 N along the normal of a contact or across it, and write the derivatives of the force to SCRATCH.
+    """Apply 1 N along or across the normal of a contact; write the derivatives of its force to SCRATCH.
 
     The integers of the item are the distance back to the contact's item, the axis (0 along the normal,
     1 and 2 across it), and whether surface 1 is a half space. Friction is proportional to the normal

@@ -290,7 +290,7 @@ def add_generalized_forces(model: Ints, data: Floats, right: Floats) -> None:
 
 
 def composite_rigid_body(model: Ints, data: Floats, right: Floats) -> None:
-    """Compute the mass matrix, and add the generalized forces of the wrenches, inwards from the leaves."""
+    """Compute the mass matrix and add generalized forces of wrenches, inwards from the leaves."""
     freedoms, columns = at(model, model[MODEL.DOF_AT]), at(data, model[MODEL.WORK_COLUMN])
     for link in range(model[MODEL.LINKS] - 1, -1, -1):
         j, here = link_ints(model, link), link_work(model, data, link)

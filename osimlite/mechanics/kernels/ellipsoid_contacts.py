@@ -35,7 +35,7 @@ def touch_ellipsoid(
 def touch_ellipsoids(
     model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int
 ) -> int:
-    """Apply the contact force of two ellipsoids, of which one may be a sphere.
+    """Apply the contact force of two ellipsoids, one of which may be a sphere.
 
     The axes and half axes of both follow the numbers of a pair.
     """
@@ -129,7 +129,10 @@ def early_return(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats,
 
 
 def are_near(a: Floats, b: Floats, one: float, two: float) -> bool:
-    """Return whether the bounding spheres of two surfaces overlap; two half spaces are never a pair."""
+    """Return whether the bounding spheres of two surfaces overlap.
+
+    Two half spaces are never a pair.
+    """
     if one == inf and two == inf:
         return False
     way = minus(vector(a, 0), vector(b, 0))

@@ -61,7 +61,9 @@ def error_weight(value: float) -> float:
 
 
 def next_step_size(h: float, error: float, accuracy: float, cut: bool, order: float) -> float:
-    """Return the step to try after a step of size h, as Simbody chooses it; it is less than h if error > accuracy.
+    """Return the step to try after a step of size h, as Simbody chooses it.
+
+    It is less than h if error > accuracy.
 
     The estimated error is proportional to a power of h, so that 0.9 h (accuracy / error)^(1/order)
     should just meet the accuracy. That is used if it is at least a fifth longer or, after a failure, a
@@ -84,7 +86,10 @@ def next_step_size(h: float, error: float, accuracy: float, cut: bool, order: fl
 
 
 def step_end(h: Floats) -> float:
-    """Return the time at which a step ends (s); a step that almost reaches the limit is extended to it."""
+    """Return the time at which a step ends (s).
+
+    A step that almost reaches the limit is extended to it.
+    """
     t0, limit, step = h[REACHED], h[LAST_TIME], h[NEXT_STEP]
     return limit if limit <= t0 + 1.001 * step else t0 + step
 

@@ -92,7 +92,7 @@ def evaluate_piecewise(table: Floats, z: float, kind: int) -> tuple[float, float
 def amount_by_one(
     model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, operation: int
 ) -> int:
-    """Compute the amount of an operation, its gradient, rate and curvature by a function of one coordinate."""
+    """Compute the amount of an operation by a function of one coordinate, with its derivatives."""
     j, a = (
         operation_ints(model, operation),
         operation_work(model, data, operation),
@@ -114,7 +114,7 @@ def amount_by_one(
 def amount_by_several(
     model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, operation: int
 ) -> int:
-    """Compute the amount of an operation, its gradient, rate and curvature by a polynomial of several coordinates."""
+    """Compute the amount of an operation by a polynomial of several coordinates, with its derivatives."""
     j, a = (
         operation_ints(model, operation),
         operation_work(model, data, operation),
@@ -189,7 +189,7 @@ def evaluate_monomials(
 def multiply_powers(
     size: int, arguments: Ints, constants: Floats, y: Floats, powers: Floats, one: int, two: int
 ) -> float:
-    """Return the product of powers of all arguments, with those of `one` and `two` (-1 for none) reduced by one."""
+    """Return the product of powers of all arguments; those of `one` and `two` (-1: none) are reduced by 1."""
     total = 1.0
     for index in range(size):
         power = int(powers[index]) - (1 if index == one else 0) - (1 if index == two else 0)

@@ -59,7 +59,11 @@ from osimlite.mechanics.laws.vectors import Vector, dot, rotate_back, store_vect
 def trace_geodesics(
     model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int
 ) -> int:
-    """Write all corners of a path whose length was computed to f, in ground; return their number."""
+    """Write all corners of a path whose length was computed to f, in ground.
+
+    Returns:
+        Their number.
+    """
     i, p, result = (
         at(model, item),
         at(reals, model[item + ITEM.NUMBERS]),
@@ -91,7 +95,11 @@ def trace_geodesics(
 
 
 def trace_cable(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
-    """Write all corners of a cable whose length was computed to f, in ground; return their number."""
+    """Write all corners of a cable whose length was computed to f, in ground.
+
+    Returns:
+        Their number.
+    """
     i, p, result = (
         at(model, item),
         at(reals, model[item + ITEM.NUMBERS]),

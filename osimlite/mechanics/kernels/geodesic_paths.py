@@ -459,7 +459,11 @@ def insert_slot(
 def lay_chain(
     p: Floats, pose: Floats, chain: Floats, count: int, k: int, stage: int, work: Floats
 ) -> bool:
-    """Lay the chain around the surface in a slot, between its neighbours; return whether it touches."""
+    """Lay the chain around the surface in a slot, between its neighbours.
+
+    Returns:
+        Whether it touches.
+    """
     first, second = (
         point_in_surface(pose, line_start(chain, k)),
         point_in_surface(pose, line_end(chain, k, count)),

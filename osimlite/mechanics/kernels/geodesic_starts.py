@@ -261,7 +261,7 @@ def start_on_ellipsoid(
     about: Vector,
     work: Floats,
 ) -> Start:
-    """Return the start on a sphere or an ellipsoid, along a circle where the surface is scaled to the unit sphere.
+    """Return the start on a sphere or an ellipsoid, along a circle on the scaled unit sphere.
 
     The circle is in the plane of the ends and the direction in which the line is least deep.
     """
@@ -345,7 +345,7 @@ def way_out(radii: Vector, middle: Vector, way: Vector, deeper: float) -> Vector
 
 
 def line_depth(aa: float, ab: float, bb: float, ma: float, mb: float, k: int) -> float:
-    """Return the depth of a line in an ellipsoid in a direction across it, from products of scaled directions."""
+    """Return the depth of a line in an ellipsoid in a direction across it."""
     c, s = cos(2.0 * pi / WAYS * k), sin(2.0 * pi / WAYS * k)
     return sqrt(aa * c * c + 2.0 * ab * c * s + bb * s * s) - ma * c - mb * s
 
@@ -443,7 +443,7 @@ def find_tangent(point: Vector, radius: float, normal: Vector, way: float) -> Ve
 def start_on_torus(
     ring: float, tube: float, first: Vector, second: Vector, axis: int, side: float, how: float
 ) -> Start:
-    """Return the start on a torus about z, as on a cylinder at the point of the ring nearest to the line."""
+    """Return the start on a torus about z, as on a cylinder at the nearest point of its ring."""
     x, y, _ = near = nearest_to_ring(ring, first, second)
     if side != 0.0 and not is_on_side(near, axis, side):
         return 0.0, first, near, 0.0
@@ -496,7 +496,7 @@ def distance_from_ring(point: Vector, ring: float) -> float:
 
 
 def vector_in_cylinder(point: Vector, inwards: Vector, tangent: Vector) -> Vector:
-    """Return the components of a vector along the cylinder at the ring: inwards, down, and along the ring."""
+    """Return the components of a vector in the cylinder at the ring: inwards, down, and along it."""
     _, _, z = point
     return dot(inwards, point), -z, dot(tangent, point)
 

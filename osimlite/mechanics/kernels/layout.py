@@ -287,7 +287,7 @@ class COORDINATE(metaclass=Record):
 
 
 class CHAIN(metaclass=Record):
-    """Integers of another program that has joints with one axis each, see :mod:`osimlite.mechanics.kernels.chain`."""
+    """Integers of another program with one-axis joints, see :mod:`osimlite.mechanics.kernels.chain`."""
 
     _at = count()
     DYNAMICS = next(_at)

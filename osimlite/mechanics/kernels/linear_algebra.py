@@ -34,7 +34,11 @@ def factor_size(count: int, size: int) -> int:
 
 
 def factorise_by_law(model: Ints, data: Floats, count: int, a: Floats, smallest: float) -> int:
-    """Factorise equations in all speeds by the law of the model, see `factorise_equations`; return the rank."""
+    """Factorise equations in all speeds by the law of the model, see `factorise_equations`.
+
+    Returns:
+        The rank.
+    """
     data[WORK.SCRATCH] = smallest
     return call(
         model[MODEL.LAWS + model[model[MODEL.CONSTRAINED] + CONSTRAINED.FACTORISE]],
@@ -252,7 +256,9 @@ def write_null_space(size: int, a: Floats, rank: int, basis: Floats) -> None:
 
 
 def factorise_cholesky(size: int, a: Floats, smallest: float) -> bool:
-    """Factorise a symmetric positive definite matrix (size, size) in place; its lower triangle is used.
+    """Factorise a symmetric positive definite matrix (size, size) in place.
+
+    Its lower triangle is used.
 
     Returns:
         Whether each pivot is more than `smallest` times its entry of the matrix.

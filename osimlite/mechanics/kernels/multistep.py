@@ -126,7 +126,9 @@ def adams(model: Ints, reals: Floats, data: Floats, y0: Floats, y1: Floats, plac
 def try_multistep(
     model: Ints, reals: Floats, data: Floats, y0: Floats, y1: Floats, place: int, method: int
 ) -> int:
-    """Try one step from y0, which is followed by its derivative, to y1; write its derivative after y1.
+    """Try one step from y0, which is followed by its derivative, to y1.
+
+    Write its derivative after y1.
 
     Args:
         model: integers of the model.

@@ -185,7 +185,11 @@ def place_points(model: Ints, reals: Floats, data: Floats, y: Floats, item: int)
 
 
 def measure_points(model: Ints, data: Floats, y: Floats, item: int) -> float:
-    """Compute length, speed and directions from the positions of the active nodes; return the length."""
+    """Compute length, speed and directions from the positions of the active nodes.
+
+    Returns:
+        The length.
+    """
     i, result = at(model, item), at(data, model[item + ITEM.RECORD])
     nodes, order, work = (
         at(i, NODES_AT),

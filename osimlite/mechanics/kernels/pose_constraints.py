@@ -52,7 +52,11 @@ ASIDE = 1e-5
 
 
 def fulfil_constraints(m: Fit, y: Floats) -> bool:
-    """Move a pose into the ranges, to prescribed values, and onto couplers and equations; return success."""
+    """Move a pose into the ranges, to prescribed values, and onto couplers and equations.
+
+    Returns:
+        Success.
+    """
     p, c, v, size = m.p, m.c, m.v, m.model[MODEL.DOFS]
     ranges, resolved = at(c, p[RANGES_AT]), at(p, p[RESOLVED_AT])
     for k in range(size):
@@ -74,7 +78,11 @@ def set_dependents(m: Fit, y: Floats) -> None:
 
 
 def restore_equations(m: Fit, y: Floats) -> bool:
-    """Move a pose onto the equations by minimum-norm Newton steps of the free coordinates; return success."""
+    """Move a pose onto the equations by minimum-norm Newton steps of the free coordinates.
+
+    Returns:
+        Success.
+    """
     p, v, size = m.p, m.v, m.model[MODEL.DOFS]
     count, errors, step = count_equations(m), at(v, p[ERRORS]), at(v, p[STEP])
     ranges, before = at(m.c, p[RANGES_AT]), inf

@@ -60,7 +60,10 @@ from osimlite.mechanics.laws.vectors import (
 
 
 def evaluate_cost(m: Fit, y: Floats) -> float:
-    """Return the cost of a pose; compute its gradient and both parts of its Hessian by all free coordinates."""
+    """Return the cost of a pose.
+
+    Compute its gradient and both parts of its Hessian by all free coordinates.
+    """
     model, data, p, v, size = m.model, m.data, m.p, m.v, m.model[MODEL.DOFS]
     evaluate_pose(m, y)
     for k in range(p[BALLS]):

@@ -147,7 +147,11 @@ def start_upside_down(m: Fit, y: Floats, start: Floats, freedom: int) -> bool:
 
 
 def start_off_ends(m: Fit, y: Floats, start: Floats) -> bool:
-    """Write a start in which coordinates at ends of their ranges are inside; return whether there are any."""
+    """Write a start in which coordinates at ends of their ranges are inside.
+
+    Returns:
+        Whether there are any.
+    """
     ranges, result = at(m.c, m.p[RANGES_AT]), False
     for k in range(m.model[MODEL.DOFS]):
         low, high, start[k] = ranges[2 * k], ranges[2 * k + 1], y[k]

@@ -141,7 +141,10 @@ def select_run(
     levels: Floats,
     k: int,
 ) -> Motion:
-    """Return one of several runs; the arguments are those of `run_several`, and the number k of the run."""
+    """Return one of several runs.
+
+    The arguments are those of `run_several`, and the number k of the run.
+    """
     size, pairs = model[MODEL.STATE_SIZE], model[MODEL.CONTACTS]
     return Motion(
         model,
@@ -248,7 +251,9 @@ def integrate_run(m: Motion, y: Floats, is_going: bool) -> int:
 
 
 def is_evaluated(m: Motion, t1: float, y1: Floats, f1: Floats) -> bool:
-    """Evaluate the end of a step unless the method has done so; return whether its derivative is finite.
+    """Evaluate the end of a step unless the method has done so.
+
+    It returns whether its derivative is finite.
 
     A method's derivative is not used where contacts or watches need the results of an evaluation.
     """

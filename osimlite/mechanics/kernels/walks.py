@@ -141,7 +141,11 @@ def select_motion(
 
 
 def integrate_control_step(m: Motion, y: Floats, has_derivative: bool) -> bool:
-    """Integrate a state over one control step, as a run of its own; return whether it reaches the end."""
+    """Integrate a state over one control step, as a run of its own.
+
+    Returns:
+        Whether it reaches the end.
+    """
     m.clock[0] = 0.0
     for k in range(COUNTED):
         m.counts[k] = 0
@@ -173,7 +177,9 @@ def walk_several(
     first: int,
     last: int,
 ) -> int:
-    """Carry out an order for the walks `first` to `last` - 1, see FEEL; the first of all is recorded.
+    """Carry out an order for the walks `first` to `last` - 1, see FEEL.
+
+    The first of all is recorded.
 
     Args:
         model: integers of the model.

@@ -82,7 +82,10 @@ MANDATORY = 2
 
 
 def is_on_side(point: Vector, axis: int, side: float) -> bool:
-    """Return whether a point is on the active side; points between the sides belong to the positive one."""
+    """Return whether a point is on the active side.
+
+    Points between the sides belong to the positive one.
+    """
     return (component(point, axis) >= 0.0) == (side > 0.0)
 
 

@@ -153,7 +153,9 @@ def evaluate_dynamics(
 def millard2012_acceleration(
     now: MuscleInputs, m: Millard2012Acceleration, curves: AccelerationCurves
 ) -> tuple[float, float, float, float, float, float, float, float, bool, float, float, float]:
-    """Compute forces and rates of a muscle; only the rate of activation is bounded, and no fiber length.
+    """Compute forces and rates of a muscle.
+
+    Only the rate of activation is bounded, and no fiber length.
 
     Returns:
         Tension (N), activation, fiber length (m), cosine of pennation, factors of the active force by

@@ -76,7 +76,10 @@ class MillardCurves(NamedTuple):
 
 
 class MillardFibers(NamedTuple):
-    """Intermediate results of a muscle; before a curve is evaluated, its argument is in place of its value."""
+    """Intermediate results of a muscle.
+
+    Before a curve is evaluated, its argument is in place of its value.
+    """
 
     told_by: float  # see NONE
     velocity: float
@@ -93,7 +96,9 @@ class MillardFibers(NamedTuple):
 def millard2012_equilibrium(
     now: MuscleInputs, m: Millard2012Equilibrium, curves: MillardCurves
 ) -> tuple[float, float, float, float, float, float, float, float, bool, float, float, float]:
-    """Compute forces and rates of a muscle; see OpenSim's calcFiberVelocityInfo and calcMuscleDynamicsInfo.
+    """Compute forces and rates of a muscle.
+
+    See OpenSim's calcFiberVelocityInfo and calcMuscleDynamicsInfo.
 
     Fibers at their smallest length stay there as long as they would shorten, and then bear no force. A
     rigid tendon bears no pressure: the damping of fast fibers is bounded instead.

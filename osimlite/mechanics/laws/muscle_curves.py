@@ -275,7 +275,10 @@ def _require_above(slope: float, limit: float, name: str) -> None:
 def _complete_properties(
     given: tuple[float | None, ...], usual: tuple[float, ...], first: str
 ) -> tuple[float, ...]:
-    """Return optional properties, or their defaults if all are omitted; `first` is the name of the first."""
+    """Return optional properties, or their defaults if all are omitted.
+
+    `first` is the name of the first.
+    """
     result = [x for x in given if x is not None]
     _require(
         len(result) in (0, len(usual)),

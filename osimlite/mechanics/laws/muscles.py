@@ -74,12 +74,18 @@ def pennation_constants(
 def cos_pennation(
     length: float, height: float, shortest: float, largest_sin: float, least_cos: float
 ) -> float:
-    """Return the cosine of the pennation angle of fibers of a length (m); other arguments as of `pennation_constants`."""
+    """Return the cosine of the pennation angle of fibers of a length (m).
+
+    The other arguments are those of `pennation_constants`.
+    """
     if length <= shortest or height >= largest_sin * length:
         return least_cos
     return sqrt((length - height) * (length + height)) / length
 
 
 def fiber_length_along(along: float, height: float, shortest: float, least_cos: float) -> float:
-    """Return the fiber length (m) for a length along the tendon (m); other arguments as of `pennation_constants`."""
+    """Return the fiber length (m) for a length along the tendon (m).
+
+    The other arguments are those of `pennation_constants`.
+    """
     return sqrt(height * height + along * along) if along >= shortest * least_cos else shortest

@@ -45,7 +45,7 @@ def transpose_rotation(axes: Axes) -> Axes:
 
 
 def rotation_about_axis(axis: Vector, s: float, c: float) -> Axes:
-    """Return the rotation about a unit vector by an angle with sine s and cosine c (Rodrigues' formula)."""
+    """Return the rotation about a unit vector by Rodrigues' formula, from sine s and cosine c."""
     x, y, z = axis
     d = 1.0 - c
     return (

@@ -280,7 +280,9 @@ def meyer_factor(velocity: float) -> float:
 def meyer(
     now: MuscleInputs, m: SmoothMuscle
 ) -> tuple[float, float, float, float, float, float, float, float, float, float, float]:
-    """Compute forces and rates of Meyer's muscle, whose tendon is rigid; OpenSim defines no energy for it.
+    """Compute forces and rates of Meyer's muscle, whose tendon is rigid.
+
+    OpenSim defines no energy for it.
 
     Returns:
         Tension (N), activation, fiber length (m), cosine of pennation, factors of the active force by

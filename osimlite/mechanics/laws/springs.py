@@ -63,7 +63,10 @@ def path_spring_tension(length: float, rate: float, l0: float, k: float, d: floa
 
 
 def path_spring_energy(length: float, l0: float, k: float) -> float:
-    """Return the energy k (l - l0)^2 / 2 where l > l0, else 0 (J); arguments as of `path_spring_tension`."""
+    """Return the energy k (l - l0)^2 / 2 where l > l0, else 0 (J).
+
+    Arguments as of `path_spring_tension`.
+    """
     return 0.5 * k * (length - l0) * (length - l0) if length > l0 else 0.0
 
 

@@ -103,7 +103,9 @@ def tendon_shape(strain_at_one: float) -> tuple[float, float, float, float]:
 def tendon_force(
     strain: float, toe: float, growth: float, factor: float, slope: float
 ) -> tuple[float, float]:
-    """Return the tendon force and its derivative by strain; the constants are those of `tendon_shape`.
+    """Return the tendon force and its derivative by strain.
+
+    The constants are those of `tendon_shape`.
 
     Returns:
         Force and derivative.
@@ -216,7 +218,9 @@ def equilibrium_tolerance(m: Thelen2003) -> float:
 def thelen2003(
     now: MuscleInputs, m: Thelen2003
 ) -> tuple[float, float, float, float, float, float, float, float, float, float]:
-    """Compute forces and rates of a muscle; see OpenSim's calcFiberVelocityInfo and calcMuscleDynamicsInfo.
+    """Compute forces and rates of a muscle.
+
+    See OpenSim's calcFiberVelocityInfo and calcMuscleDynamicsInfo.
 
     Fibers at their smallest length stay there as long as they would shorten, and then bear no active
     force.
