@@ -20,7 +20,7 @@ import numpy as np
 import osimlite
 from osimlite.simulation import Simulation
 from osimlite.studies.gait.foot_contacts import find_footing
-from osimlite.studies.gait.steps import Scuff, Step, Walk, along_slope, follow_events
+from osimlite.studies.gait.steps import Scuff, Step, Walk, follow_events, measure_along_slope
 
 
 class Order(NamedTuple):
@@ -117,7 +117,7 @@ def _read_off(engine: Any, forces: Any, states: _States) -> Walk:
         engine.contacts,
         [(float(times[k]), contact, begins) for k, contact, begins in changes],
         moments,
-        along_slope(engine, moments)[0],
+        measure_along_slope(engine, moments)[0],
         np.array([pushes[0] for pushes in touching]),
     )
     if walk.walks:

@@ -18,7 +18,9 @@ from osimlite.lint.cache import make_key
 from osimlite.lint.config import Config
 
 
-def answered(question: str, file: str, data: bytes, find: Callable[[], tuple[str, bool]]) -> str:
+def answer_from_cache(
+    question: str, file: str, data: bytes, find: Callable[[], tuple[str, bool]]
+) -> str:
     """What was found for a text before, by this very osimlite, or what is found now.
 
     Args:

@@ -86,10 +86,10 @@ def hand_over(text: str) -> None:
         sys.stdout.buffer.write(text.encode())
         sys.stdout.buffer.flush()
     else:
-        unguarded(sys.stdout).write(text)
+        raw_stream(sys.stdout).write(text)
 
 
-def unguarded(stream: TextIO) -> TextIO:
+def raw_stream(stream: TextIO) -> TextIO:
     """The stream itself: for texts of our own that move the cursor."""
     return stream.stream if isinstance(stream, Guarded) else stream
 

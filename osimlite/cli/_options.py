@@ -233,7 +233,7 @@ def results_folder(file: Path, output: Path | None) -> Path:
     return Path(file.stem)
 
 
-def named_words(
+def parse_named_words(
     words: Iterable[str] | None, option: str, form: str = "NAME=VALUE"
 ) -> dict[str, str]:
     """Text by name from the ``NAME=VALUE`` words of an option; `form` is what the user is told to write.
@@ -254,15 +254,15 @@ def named_words(
     return result
 
 
-def applied_loads(words: Iterable[str] | None) -> dict[str, list[list[str]]]:
-    """What ``--applied-to`` says, as :func:`osimlite.inverse_dynamics` takes it; errors as of `named_words`."""
-    named = named_words(words, "--applied-to", "BODY=FORCE,POINT,MOMENT")
+def parse_applied_loads(words: Iterable[str] | None) -> dict[str, list[list[str]]]:
+    """What ``--applied-to`` says, as :func:`osimlite.inverse_dynamics` takes it; errors as of `parse_named_words`."""
+    named = parse_named_words(words, "--applied-to", "BODY=FORCE,POINT,MOMENT")
     return {
         body: [load.strip().split(",") for load in text.split("+")] for body, text in named.items()
     }
 
 
-def named_numbers(words: Iterable[str] | None, option: str) -> dict[str, float]:
+def parse_named_numbers(words: Iterable[str] | None, option: str) -> dict[str, float]:
     """Numbers by name from the ``NAME=NUMBER`` words of an option.
 
     Raises:
@@ -271,7 +271,7 @@ def named_numbers(words: Iterable[str] | None, option: str) -> dict[str, float]:
     from osimlite.errors import SettingError
 
     result = {}
-    for name, text in named_words(words, option, "NAME=NUMBER").items():
+    for name, text in parse_named_words(words, option, "NAME=NUMBER").items():
         try:
             result[name] = float(text)
         except ValueError:
@@ -299,7 +299,7 @@ def quantities(
 
     result = {}
     form = "COORDINATE=VALUE with a number such as 0.5 or 30deg"
-    for name, text in named_words(words, option, form).items():
+    for name, text in parse_named_words(words, option, form).items():
         try:
             if name in states:
                 result[name] = float(text)
@@ -330,7 +330,7 @@ def read_source(source: str, parameter: Iterable[str] | None) -> tuple[Model, Pa
     from osimlite.models.source import make_model
 
     if Path(source).suffix.lower() != ".osim":
-        return make_model(source, named_words(parameter, "-p")), None
+        return make_model(source, parse_named_words(parameter, "-p")), None
     if parameter:
         raise SettingError(
             f"'{source}' is a file and has no parameters; -p is for functions that build a model"
@@ -338,7 +338,7 @@ def read_source(source: str, parameter: Iterable[str] | None) -> tuple[Model, Pa
     return read(source), Path(source).resolve().parent
 
 
-def named_folders(geometry: Sequence[Path] | None) -> Sequence[Path]:
+def resolve_folders(geometry: Sequence[Path] | None) -> Sequence[Path]:
     """The folders of ``--geometry``.
 
     Raises:
@@ -363,10 +363,10 @@ def mesh_folders(file: Path, geometry: Sequence[Path] | None) -> list[Path]:
     """
     from osimlite.lint.settings import load_settings
 
-    return [*named_folders(geometry), *map(Path, load_settings(file.resolve().parent).mesh_paths)]
+    return [*resolve_folders(geometry), *map(Path, load_settings(file.resolve().parent).mesh_paths)]
 
 
-def checked_numbers(numbers: str) -> NumberStyle:
+def check_number_format(numbers: str) -> NumberStyle:
     """The choice of ``--numbers``.
 
     Raises:

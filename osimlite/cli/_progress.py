@@ -9,7 +9,7 @@ from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING
 
 from osimlite.base.text import escape_unprintable
-from osimlite.cli._console import complain, plain_console, unguarded
+from osimlite.cli._console import complain, plain_console, raw_stream
 
 if TYPE_CHECKING:
     from rich.progress import Progress
@@ -108,7 +108,7 @@ def _started(title: str) -> Progress:
     )
     bar = Progress(
         *columns,
-        console=plain_console(file=unguarded(sys.stderr)),
+        console=plain_console(file=raw_stream(sys.stderr)),
         transient=True,
         auto_refresh=False,
     )

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from osimlite.cli._command import Option
-from osimlite.cli._options import named_words, read_source
+from osimlite.cli._options import parse_named_words, read_source
 
 if TYPE_CHECKING:
     from osimlite.studies.sweep.plan import Plan
@@ -132,7 +132,7 @@ def _plan(
     if Path(source).suffix.lower() == ".osim":
         model, folder = read_source(source, parameter)
         return plan(model, ranges, folder=str(folder), **choices)
-    given = named_words(parameter, "-p")
+    given = parse_named_words(parameter, "-p")
     both = [name for name in ranges if name in given]
     if both:
         raise SettingError(f"the parameter '{both[0]}' is set and varied; do one of the two")
@@ -162,7 +162,7 @@ def _levels(words: Sequence[str] | None, option: str) -> dict[str, str]:
     from osimlite.errors import SettingError
 
     form = "COORDINATE=VALUE with a number such as 0.5 or 30deg"
-    result = named_words(words, option, form)
+    result = parse_named_words(words, option, form)
     for text in result.values():
         if parse_quantity(text) is None:
             raise SettingError(f"{option} takes {form}, got '{text}'")

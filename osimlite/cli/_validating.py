@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from osimlite.base.files import read_standard_input, unsaved
 from osimlite.base.text import format_count, join_words
 from osimlite.cli._console import complain, hand_over, print_diff, say, show, wants_colour
-from osimlite.cli._options import named_folders
+from osimlite.cli._options import resolve_folders
 from osimlite.cli._progress import progress_bar
 from osimlite.errors import MissingFileError, OsimliteError
 from osimlite.lint.config import Config, parse_codes
@@ -47,7 +47,7 @@ def run(
     only_ours: bool = False,
 ) -> int:
     """Check files and folders, write the report to standard output, and return the exit code."""
-    folders = named_folders(geometry)
+    folders = resolve_folders(geometry)
     expect_known(format, fail_on)
     given = Config(
         parse_codes(select),
@@ -135,7 +135,7 @@ def _fail_on_of(files: list[str]) -> Severity:
     return find_settings(files[0]).fail_on or Severity.ERROR if files else Severity.ERROR
 
 
-def _mended(
+def _fix_file(
     source: Source, given: Config, unsafe: bool, put: Callable[[list[bytes | memoryview]], Source]
 ) -> tuple[Source, int, int]:
     """A file once everything is mended, how many mends that took, and how many guesses are left.
@@ -185,7 +185,7 @@ def _mend(path: str, given: Config, unsafe: bool) -> tuple[int, int]:
         pieces.clear()
         return _source(path)
 
-    _, count, left = _mended(_source(path), given, unsafe, put)
+    _, count, left = _fix_file(_source(path), given, unsafe, put)
     return count, left
 
 
@@ -206,7 +206,7 @@ def _show_diff(path: str, given: Config, unsafe: bool) -> tuple[int, int, bool]:
     from osimlite.io.document.source import Source
 
     source = _source(path)
-    after, count, left = _mended(
+    after, count, left = _fix_file(
         source, given, unsafe, lambda pieces: Source(b"".join(pieces), source.file)
     )
     print_diff(source.text, after.text, path, path)

@@ -54,8 +54,8 @@ def build(
         return
     if source is None:
         raise OsimliteError("name a model to build, or use --list")
-    style = options.checked_numbers(numbers)
-    model = make_model(source, options.named_words(parameter, "-p"))
+    style = options.check_number_format(numbers)
+    model = make_model(source, options.parse_named_words(parameter, "-p"))
     report = validate(model)
     if not report.ok:
         from osimlite.lint.reporters import render

@@ -59,7 +59,7 @@ def diff(
     else:
         read = [None if str(file) == "/dev/null" else read_any(file) for file in (old, new)]
         kind = next((type(top) for top in read if top is not None), Model)
-        lines = described(find_differences(*(kind() if top is None else top for top in read)))
+        lines = describe_differences(find_differences(*(kind() if top is None else top for top in read)))
     if git:
         say(f"--- {title}")
         say(f"+++ {title}")
@@ -69,7 +69,7 @@ def diff(
         raise SystemExit(1)
 
 
-def described(found: list[Difference]) -> list[str]:
+def describe_differences(found: list[Difference]) -> list[str]:
     """One or two lines for each difference, grouped by component."""
     lines: list[str] = []
     last = None

@@ -107,12 +107,12 @@ def find_gait(
             force=force,
             stage=stage,
         )
-    _told(gait).show()
+    _describe_result(gait).show()
     if not (gait.walk.walks and not gait.walk.scuffs and gait.found.cycle.largest < 1.0):
         raise SystemExit(1)
 
 
-def _told(gait: Gait) -> Facts:
+def _describe_result(gait: Gait) -> Facts:
     from osimlite.base.text import format_count, join_words
     from osimlite.studies.gait.cycle_search import STARTS, STEPS
 

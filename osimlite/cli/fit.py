@@ -59,7 +59,7 @@ def fit(
         read(file),
         {str(path): path for path in trials},
         static,
-        weights=options.named_numbers(weight, "--weight"),
+        weights=options.parse_named_numbers(weight, "--weight"),
         held=held,
         by_axis=by_axis,
         symmetric=not sides,

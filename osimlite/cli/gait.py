@@ -144,7 +144,7 @@ def gait(
                         progress=progress,
                     )
         files = _write(where, result, pictures) if where else []
-    _told(result, files).show()
+    _describe_cycle(result, files).show()
     if cycle is None:
         raise SystemExit(1)
 
@@ -222,7 +222,7 @@ def simulate_walk(
     return result, step_map
 
 
-def _told(found: GaitReport, files: Sequence[Path]) -> Facts:
+def _describe_cycle(found: GaitReport, files: Sequence[Path]) -> Facts:
     from osimlite.base.text import format_count
     from osimlite.simulation.elements import summarize_skipped
 

@@ -57,7 +57,10 @@ def ik(
     from osimlite.io.tables.storage import write_sto
     from osimlite.schema.markers import Marker
 
-    weights, kept = options.named_numbers(weight, "--weight"), options.named_numbers(keep, "--keep")
+    weights, kept = (
+        options.parse_named_numbers(weight, "--weight"),
+        options.parse_named_numbers(keep, "--keep"),
+    )
     of_sensors = holds_orientations(trial)
     model, data = read(file), None if of_sensors else MarkerData.from_source(trial)
     motion = inverse_kinematics(

@@ -32,7 +32,7 @@ def info(
 
     Example: osimlite info gait2392.osim
     """
-    from osimlite.cli._answers import answered
+    from osimlite.cli._answers import answer_from_cache
     from osimlite.cli._console import Facts, say
     from osimlite.io.document.reader import read_document
     from osimlite.io.document.source import Source
@@ -94,7 +94,7 @@ def info(
             ("constraints", str(len(model.constraint_set.objects))),
             ("components", f"{len(components)} in the file"),
             *_notes(len(document.notes)),
-            ("simulation", answered("simulation", str(file), source.data, simulation)),
+            ("simulation", answer_from_cache("simulation", str(file), source.data, simulation)),
         ]
     ).show()
 
@@ -140,7 +140,7 @@ def _table(file: Path, everything: bool) -> None:
     unit = "Units" if table.is_markers else "inDegrees"
     facts.add(unit, said.get(unit, "not stated"))
     facts.show()
-    _listed("Markers" if table.is_markers else "Columns", table.columns, everything)
+    _print_items("Markers" if table.is_markers else "Columns", table.columns, everything)
 
 
 def _notes(count: int) -> list[tuple[str, str]]:
@@ -180,10 +180,10 @@ def _classes(objects: Sequence[Object], everything: bool) -> None:
     counts = Counter(
         item.class_name if isinstance(item, Unknown) else type(item).__name__ for item in objects
     )
-    _listed("Classes", [f"{count} {name}" for name, count in counts.most_common()], everything)
+    _print_items("Classes", [f"{count} {name}" for name, count in counts.most_common()], everything)
 
 
-def _listed(title: str, items: Sequence[str], everything: bool) -> None:
+def _print_items(title: str, items: Sequence[str], everything: bool) -> None:
     """Print some items, or the first of them."""
     from osimlite.base.text import escape_unprintable
     from osimlite.cli._console import columns, say, show

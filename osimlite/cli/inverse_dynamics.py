@@ -43,7 +43,7 @@ def inverse_dynamics(
     table = forces_of(
         read(file),
         motion,
-        applied_to=options.applied_loads(applied),
+        applied_to=options.parse_applied_loads(applied),
         exclude=exclude or ["Muscles"],
         lowpass=lowpass,
         start=first,

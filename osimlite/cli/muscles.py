@@ -92,7 +92,7 @@ def muscles(
         raise SettingError("--plot needs a --coordinate to draw over")
     model = read(file)
     mechanism = build_mechanism(model)
-    values = _swept(
+    values = _sample_coordinates(
         mechanism, coordinate or (), points or (15 if len(coordinate or ()) > 1 else 50)
     )
     result: dict[str, MuscleCurves] = {}
@@ -129,7 +129,9 @@ def muscles(
         say(f"wrote {len(written)} pictures into {folder}")
 
 
-def _swept(mechanism: Mechanism, words: Sequence[str], points: int) -> dict[str, list[float]]:
+def _sample_coordinates(
+    mechanism: Mechanism, words: Sequence[str], points: int
+) -> dict[str, list[float]]:
     """Values of each coordinate that is swept."""
     from math import isfinite
 

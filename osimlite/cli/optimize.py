@@ -160,10 +160,10 @@ def optimize(
             cluster=cluster,
             progress=progress,
         )
-    _told(objective, result).show()
+    _describe_optimum(objective, result).show()
 
 
-def _told(objective: str, found: Optimum) -> Facts:
+def _describe_optimum(objective: str, found: Optimum) -> Facts:
     from osimlite.studies.sweep.optimize import BEST, HISTORY, PAR, SUMMARY
 
     facts = Facts(f"{objective} {found.value:.6g}")

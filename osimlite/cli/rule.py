@@ -40,7 +40,7 @@ def rule(
 
     for group in rule_groups():
         if code is not None and (code == group.name or code.upper() == group.code):
-            show(_wrapped(format_group_page(group), columns) + "\n\n")
+            show(_wrap_page(format_group_page(group), columns) + "\n\n")
     if len(result) > 1:
         width = max(len(known.name) for known in result)
         for known in result:
@@ -52,10 +52,10 @@ def rule(
                 + "\n"
             )
         return
-    show(_wrapped(format_rule_page(result[0]), columns) + "\n")
+    show(_wrap_page(format_rule_page(result[0]), columns) + "\n")
 
 
-def _wrapped(page: str, columns: int) -> str:
+def _wrap_page(page: str, columns: int) -> str:
     """The page with its prose in lines that fit; examples stay as they are."""
     rows: list[str] = []
     prose: list[str] = []

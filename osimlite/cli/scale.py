@@ -68,10 +68,13 @@ def scale(
             [_pair(pair, body) for pair in pairs.split(",")],
             {body.partition(".")[0]: _axes(body)},
         )
-        for body, pairs in options.named_words(distance, "--distance", "BODY=MARKER:MARKER").items()
+        for body, pairs in options.parse_named_words(
+            distance, "--distance", "BODY=MARKER:MARKER"
+        ).items()
     }
     factors = {
-        body: _factors(text, body) for body, text in options.named_words(factor, "--factor").items()
+        body: _factors(text, body)
+        for body, text in options.parse_named_words(factor, "--factor").items()
     }
     if not (measurements or factors or place or mass > 0.0):
         raise SettingError("there is nothing to scale; add --distance, --factor, --mass or --place")

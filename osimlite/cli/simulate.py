@@ -110,7 +110,7 @@ def simulate(
             complain(
                 f"{how} at {trajectory.times[-1]:.6g} s of {to:g} s; the motion up to there is saved in '{results}'"
             )
-            _told(trajectory, write_files(trajectory, results)).show()
+            _describe_run(trajectory, write_files(trajectory, results)).show()
             if is_failure:
                 raise
             raise SystemExit(130) from None
@@ -132,7 +132,7 @@ def simulate(
                 )
 
         files = write_files(trajectory, results, plot=plot, film=film if animate else None)
-        _told(trajectory, files).show()
+        _describe_run(trajectory, files).show()
         simulation.hold()
 
 
@@ -202,7 +202,7 @@ def write_files(
     return [folder / path.name for path in written]
 
 
-def _told(trajectory: Trajectory, files: Sequence[Path]) -> Facts:
+def _describe_run(trajectory: Trajectory, files: Sequence[Path]) -> Facts:
     from osimlite.simulation.elements import summarize_skipped
 
     summary = trajectory.summary

@@ -64,7 +64,7 @@ def static_optimization(
     found = shared_forces(
         read(file),
         motion,
-        applied_to=options.applied_loads(applied),
+        applied_to=options.parse_applied_loads(applied),
         forces=forces or (),
         replace_forces=replace,
         exponent=exponent,

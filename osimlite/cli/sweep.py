@@ -110,13 +110,13 @@ def sweep(
             cluster=cluster,
             progress=progress,
         )
-    _told(plan, outcome).show()
+    _describe_sweep(plan, outcome).show()
     if outcome.status["failed"] == outcome.count:
         complain("every run failed")
         raise SystemExit(1)
 
 
-def _told(plan: Plan, outcome: Outcome) -> Facts:
+def _describe_sweep(plan: Plan, outcome: Outcome) -> Facts:
     from osimlite.base.text import format_count
     from osimlite.studies.sweep.measures import measure_name
     from osimlite.studies.sweep.results import compute_ranges

@@ -26,7 +26,7 @@ def _choices() -> Iterator[OptionSpec]:
         yield from exporter.choices
 
 
-def _told() -> str:
+def _describe_formats() -> str:
     return "The format: " + "; ".join(
         f"'{name}' writes {each.help}" for name, each in list_exporters("translate").items()
     )
@@ -35,7 +35,7 @@ def _told() -> str:
 @command_with(_choices)
 def translate(
     file: options.File,
-    to: Annotated[str, Option("--to", metavar="FORMAT", help=f"{_told()}.")] = "urdf",
+    to: Annotated[str, Option("--to", metavar="FORMAT", help=f"{_describe_formats()}.")] = "urdf",
     output: options.Folder = None,
     geometry: options.Geometry = None,
     check: Annotated[

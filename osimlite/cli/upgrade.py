@@ -46,7 +46,7 @@ def upgrade(
     from osimlite.schema.base import Object
     from osimlite.schema.model import CURRENT_VERSION
 
-    style = options.checked_numbers(numbers)
+    style = options.check_number_format(numbers)
     require_stated_version(Source.of_file(file))
     document = read_document(Source.of_file(file), of=Object)
     mended = document.fault is not None

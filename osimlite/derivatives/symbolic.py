@@ -16,7 +16,13 @@ from osimlite.derivatives.curves import (
     solve_damped_velocity,
 )
 from osimlite.derivatives.symbols import COUNTERPARTS, UNSET, NoFormula, Vector
-from osimlite.mechanics.codegen.reader import Function, Kernel, copy_tree, name_of, stored
+from osimlite.mechanics.codegen.reader import (
+    Function,
+    Kernel,
+    copy_tree,
+    list_assigned_names,
+    name_of,
+)
 from osimlite.mechanics.kernels import pointers
 from osimlite.mechanics.kernels.functions import evaluate_piecewise
 from osimlite.mechanics.laws.bezier import curve_value
@@ -251,7 +257,7 @@ class _KernelRewriter(Kernel, ast.NodeTransformer):
         part = self._number_part(node)
         is_failure = self._is_failure(node)
         leaves = any(map(_exits_block, (*node.body, *node.orelse)))
-        names = stored(*node.body, *node.orelse)
+        names = list_assigned_names(*node.body, *node.orelse)
         self.generic_visit(node)
         if is_failure:
             node.test = _make_call("fails_", node.test)

@@ -117,7 +117,7 @@ class WrappedPaths:
         self._still = np.zeros(len(mechanism.coordinates))
         self._default = np.array([info.default_value for info in mechanism.coordinates])
         self._system = PathSystem(
-            mechanism.released(),
+            mechanism.without_constraints(),
             Forces(tuple(MeasuredPath(item.path, item.location) for item in owners)),
         )
         poses = self._sample_poses(mechanism)

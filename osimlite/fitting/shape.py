@@ -139,7 +139,7 @@ class _MarkerPoints:
     """Points of bodies of a mechanism in many poses, without regard to constraints."""
 
     def __init__(self, mechanism: Mechanism, stations: Sequence[StationPlacement]) -> None:
-        self._mechanism, free = mechanism, mechanism.released()
+        self._mechanism, free = mechanism, mechanism.without_constraints()
         self._system = System(free, Forces(()), apart=True)
         links = [self._system.placements[place.body][0] for place in stations]
         self._carrying, self._links = np.unique(links, return_inverse=True)

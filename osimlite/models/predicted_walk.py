@@ -85,7 +85,7 @@ def walking_study(model: Model, file: str, guess: str) -> MocoStudy:
     states, controls = _names(model)
     pairs = {
         kind: [
-            MocoPeriodicityGoalPair(initial_variable=name, final_variable=_mirrored(name))
+            MocoPeriodicityGoalPair(initial_variable=name, final_variable=_mirror_path(name))
             for name in names
         ]
         for kind, names in (("state", states), ("control", controls))
@@ -199,7 +199,7 @@ def _names(model: Model) -> tuple[list[str], list[str]]:
     return [*kinematic, *(f"{name}/activation" for name in controls)], controls
 
 
-def _mirrored(name: str) -> str:
+def _mirror_path(name: str) -> str:
     """The path of the same on the other side."""
     swap = str.maketrans("rl", "lr")
     return "/".join(

@@ -164,7 +164,7 @@ def muscle_curves(
     controls = Controls(
         forces.controls.names, ((Constant(activation),),) * len(forces.controls.names)
     )
-    free = mechanism.released()
+    free = mechanism.without_constraints()
     alone = [
         _Muscle(
             result[path],

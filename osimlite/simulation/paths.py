@@ -100,7 +100,9 @@ class Paths:
         # A locked coordinate has a moment arm too, which is that of the coordinate once it is not
         # locked.
         self.routes = {element.path: element.along for element in elements}
-        self.system = PathSystem(self.mechanism.released(), Forces(tuple(elements)), code=code)
+        self.system = PathSystem(
+            self.mechanism.without_constraints(), Forces(tuple(elements)), code=code
+        )
 
     def around_surfaces(self, model: Model, wrapping: str, code: Code | None = None) -> Paths:
         """Those of the paths that have surfaces to wrap around, wrapped otherwise; the mechanism is shared.

@@ -351,7 +351,7 @@ class RecordedMotion(Movement):
             or infinite.
         """
         mechanism = self.mechanism
-        system = System(mechanism.released(), forces or Forces(()))
+        system = System(mechanism.without_constraints(), forces or Forces(()))
         order = list(system.order)
         speeds, accelerations = (rates.copy() for rates in self.rates)
         if mechanism.turning:

@@ -307,7 +307,7 @@ class Motion:
     @cached_property
     def links(self) -> LinkMotion:
         """Positions, velocities and accelerations of the bodies at every time."""
-        system = System(self.mechanism.released(), Forces(()))
+        system = System(self.mechanism.without_constraints(), Forces(()))
         moments = np.column_stack([self.times, system.state.rows(self.values, self.speeds)])
         return LinkMotion.of(system, moments, self.accelerations[:, list(system.order)])
 

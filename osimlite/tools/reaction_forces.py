@@ -232,7 +232,7 @@ class JointWrenches:
 
     def _add_unbalanced_times(self, motion: Motion) -> Array:
         """Return the links at all times (t, l, n), with NaN wrenches at unbalanced times."""
-        still = System(self.mechanism.released(), Forces(()), apart=True)
+        still = System(self.mechanism.without_constraints(), Forces(()), apart=True)
         moments = np.column_stack([motion.times, still.state.rows(motion.values, motion.speeds)])
         links = still.links_in_motion(moments, motion.accelerations[:, list(still.order)])
         links[motion.balanced] = self.moved.links

@@ -33,7 +33,7 @@ from osimlite.tools.trials.folder import SETUPS
 from osimlite.view.lettering import plain_lettering
 from osimlite.view.motion import contact_forces
 from osimlite.view.plots import COLORS, STYLES, figure_of
-from osimlite.view.recording import MeasuredMarkers, Recording, computed_forces
+from osimlite.view.recording import MeasuredMarkers, Recording, compute_forces
 from osimlite.view.shown import Shown
 
 SIDES = {"r": (COLORS[0], "right"), "l": (COLORS[1], "left"), "": ("#444444", "")}
@@ -225,7 +225,7 @@ def _create_recording(
         speeds = np.zeros_like(evidence.values)
     else:
         folder = evidence.file.parent
-        forces = computed_forces(
+        forces = compute_forces(
             evidence.model, mechanism, evidence.times, evidence.values, speeds, folder
         )
     return Recording(

@@ -108,7 +108,7 @@ class Fidelity:
         """Add a record."""
         self.records.append(Record(kind, component, cannot_say, done, detail, errors or {}))
 
-    def named(self, component: str, kind: str, own: str, name: str) -> None:
+    def note_name(self, component: str, kind: str, own: str, name: str) -> None:
         """Take note of what a thing is called that a component became, if that is not the component's own name."""
         if name != own:
             self.renamed.setdefault(component, {})[kind] = name
@@ -126,7 +126,7 @@ class Fidelity:
         changed = {record.component for record in self.records} - dropped
         return len(self.translated.keys() - changed - dropped), len(changed), len(dropped)
 
-    def left_out(self, paths: Iterable[str]) -> list[str]:
+    def list_missing(self, paths: Iterable[str]) -> list[str]:
         """Those of the paths that nothing accounts for: neither translated nor recorded, nor below a record."""
         recorded = {record.component for record in self.records}
         missing = []

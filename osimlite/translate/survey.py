@@ -139,7 +139,7 @@ class _Survey:
                     "merged-body", path, "bodies welded together as links of their own", merged
                 )
             elif path != "/ground" and link.name != path.rsplit("/", 1)[1]:
-                self._renamed(path, f"link {link.name}")
+                self._list_renamed(path, f"link {link.name}")
             if link.mass == 0.0 and link.name in self._moving_ends:
                 done = "written as it is; PyBullet holds its last joint still"
                 self.note("massless-end", path, "a body without mass at the end of a chain", done)
@@ -204,7 +204,7 @@ class _Survey:
             f"joint {driven[0].name}" if joint is None else f"joint {joint.name}"
         )
         if joint is not None and joint.name != path.rsplit("/", 1)[1]:
-            self._renamed(path, f"joint {joint.name}")
+            self._list_renamed(path, f"joint {joint.name}")
         self._range(coordinate, path, unit, hard=joint is not None and joint.limits is not None)
         if coordinate.locked:
             self.note(
@@ -309,5 +309,5 @@ class _Survey:
                 f"in {owner} at ({x:g}, {y:g}, {z:g}) m",
             )
 
-    def _renamed(self, path: str, name: str) -> None:
+    def _list_renamed(self, path: str, name: str) -> None:
         self.note("name", path, "the name of a component as it is", "renamed", name)

@@ -113,7 +113,7 @@ class _Collector:
     def scene(self) -> Scene:
         for component in self.tree.components:
             path = self.tree.path_of(component) or ""
-            with self._remarked(path):
+            with self._remark_failure(path):
                 self._component(component, path)
         bare = [k for k, _ in enumerate(self.mechanism.bodies) if k not in self.drawn]
         for body, ends in draw_sticks(self.mechanism, bare):
@@ -141,7 +141,7 @@ class _Collector:
             frozenset(self.items[place].path for place in self.half_spaces),
             self.remarks,
         )
-        return self._with_half_spaces(scene)
+        return self._widen_half_spaces(scene)
 
     # ------------------------------------------------------------------------------------- kinds of components
     def _component(self, component: Component, path: str) -> None:
@@ -285,15 +285,19 @@ class _Collector:
         """The line of a force between two points, and where the force of a contact is shown."""
         match force:
             case springs.PointToPointSpring():
-                self._between(
+                self._add_line_between(
                     path, force, ("socket_body1", force.point1), ("socket_body2", force.point2)
                 )
             case springs.ExpressionBasedPointToPointForce():
-                self._between(path, force, ("body1", force.point1), ("body2", force.point2))
+                self._add_line_between(
+                    path, force, ("body1", force.point1), ("body2", force.point2)
+                )
             case actuators.PointToPointActuator():
-                self._between(path, force, ("bodyA", force.pointA), ("bodyB", force.pointB))
+                self._add_line_between(
+                    path, force, ("bodyA", force.pointA), ("bodyB", force.pointB)
+                )
             case TwoFrameLinker():
-                self._between(
+                self._add_line_between(
                     path, force, ("socket_frame1", (0, 0, 0)), ("socket_frame2", (0, 0, 0))
                 )
             case HuntCrossleyForce() | contact_forces.ElasticFoundationForce():
@@ -306,7 +310,7 @@ class _Collector:
                 sphere = self.tree.target(force, "socket_sphere", force.socket_sphere)
                 self._push(force.name, path, sphere, "Sphere")
 
-    def _between(self, path: str, force: Any, *ends: tuple[str, Any]) -> None:
+    def _add_line_between(self, path: str, force: Any, *ends: tuple[str, Any]) -> None:
         points = []
         for name, point in ends:
             body, placed = self._place(force, name)
@@ -333,7 +337,7 @@ class _Collector:
 
     # ----------------------------------------------------------------------------------------------- helpers
     @contextmanager
-    def _remarked(self, path: str) -> Iterator[None]:
+    def _remark_failure(self, path: str) -> Iterator[None]:
         """Turns what goes wrong with one component into a remark."""
         try:
             yield
@@ -398,7 +402,7 @@ class _Collector:
         result = self.tree.target(owner, socket, getattr(owner, socket))
         return self.mechanism.coordinate_index(self.tree.path_of(result) or "")
 
-    def _with_half_spaces(self, scene: Scene) -> Scene:
+    def _widen_half_spaces(self, scene: Scene) -> Scene:
         """The same scene with its half spaces made as wide as the model asks for."""
         if self.half_spaces:
             low, high = scene.box(scene.mechanism.values({}))

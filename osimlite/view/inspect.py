@@ -80,19 +80,19 @@ def _list_properties(tree: Tree, item: Object, way: str) -> Iterator[tuple[str, 
                     )
                     yield from _list_properties(tree, held, way + name)
         elif isinstance(spec.kind, Reference):
-            yield way + spec.tag, _named(tree, item, spec.kind, value), given
+            yield way + spec.tag, _name_values(tree, item, spec.kind, value), given
         else:
             yield way + spec.tag, make_formatter(spec.kind, "shortest")(value).strip(), given
 
 
-def _named(tree: Tree, item: Object, reference: Reference, value: Any) -> str:
+def _name_values(tree: Tree, item: Object, reference: Reference, value: Any) -> str:
     if isinstance(value, Component):
         try:
             return tree.text_for(tree.owner_of(item), reference, value)
         except OsimliteError:
             return value.name
     if isinstance(value, tuple):
-        return " ".join(_named(tree, item, reference, word) for word in value)
+        return " ".join(_name_values(tree, item, reference, word) for word in value)
     return "" if value is None else str(value)
 
 

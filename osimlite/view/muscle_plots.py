@@ -13,12 +13,12 @@ from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.simulation.muscle_curves import QUANTITIES, MuscleCurves
 from osimlite.view.lettering import plain_lettering
 from osimlite.view.plots import (
+    divide_among_panels,
     figure_of,
     finish_panels,
     lines_in,
     make_sheet,
     save_figure,
-    shared_out,
 )
 
 _TITLES = {
@@ -100,7 +100,7 @@ def _draw_lines(
     curves: MuscleCurves, mechanism: Mechanism, rows: Any, title: str, other: Any
 ) -> Any:
     label, across = _axis(curves, mechanism, 0)
-    parts = shared_out(dict(zip(_names(curves)[:_MOST], rows.T, strict=False)))
+    parts = divide_among_panels(dict(zip(_names(curves)[:_MOST], rows.T, strict=False)))
     figure, axes = make_sheet(title, [3.0] * len(parts))
     for panel, part in zip(axes, parts, strict=True):
         lines_in(panel, across, part)

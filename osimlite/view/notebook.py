@@ -66,7 +66,9 @@ def model(item: Model) -> str:
 
     head = f"<b>{escape(item.name) or 'a model'}</b>: {format_count(len(own), 'component')}"
     inner = "".join(map(branch, below.get(id(item), [])))
-    return f"<details><summary>{head}</summary>{inner}{_left(len(own), MOST_COMPONENTS)}</details>{_embed_viewer(item)}"
+    hidden = _describe_hidden_rows(len(own), MOST_COMPONENTS)
+    tree = f"<details><summary>{head}</summary>{inner}{hidden}</details>"
+    return tree + _embed_viewer(item)
 
 
 def trajectory(item: Trajectory) -> str:
@@ -190,10 +192,10 @@ def _make_table(
 
     body = "".join(line("td", row) for row in islice(rows, most))
     table = f"<table><thead>{line('th', headings)}</thead><tbody>{body}</tbody></table>"
-    return f"<div style='max-height:{HEIGHT}px;overflow:auto'>{table}</div>{_left(count, most)}"
+    return f"<div style='max-height:{HEIGHT}px;overflow:auto'>{table}</div>{_describe_hidden_rows(count, most)}"
 
 
-def _left(count: int, most: int) -> str:
+def _describe_hidden_rows(count: int, most: int) -> str:
     return f"<div>… and {count - most} more</div>" if count > most else ""
 
 

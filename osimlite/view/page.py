@@ -132,7 +132,7 @@ def page_data(
             ],
             "program": program_data(scene.polylines, mechanism.constraints),
             "constraints": others,
-            **_drawn(scene),
+            **_describe_items(scene),
             "motion": recorded,
             "tree": tree,
             "tags": tags,
@@ -144,7 +144,7 @@ def page_data(
     return data
 
 
-def _drawn(scene: Scene) -> dict[str, Any]:
+def _describe_items(scene: Scene) -> dict[str, Any]:
     routes = count()
     return {
         "surfaces": [_describe_surface(surface) for surface in scene.surfaces],

@@ -138,7 +138,7 @@ def _fill_background(
         _lay_floor(heap, scene, style.floor)
     for item in scene.drawn():
         if item.path in scene.half_spaces:
-            _cut_open(heap, bodies.matrix(item.body, item.matrix))
+            _cut_half_space(heap, bodies.matrix(item.body, item.matrix))
         loaded = item.path in style.loaded
         color, opacity = (
             (TOUCHING, max(item.opacity, 0.75)) if loaded else (item.color, item.opacity)
@@ -154,7 +154,7 @@ def _fill_background(
                     unit_shapes.make_cylinder(8), _make_cylinder(start, end, line.radius), color
                 )
             for corner in corners:
-                heap.put(unit_shapes.make_ball(8, 4), _sized(corner, line.radius), color)
+                heap.put(unit_shapes.make_ball(8, 4), _scale_shape(corner, line.radius), color)
     if "frames" in scene.shown:
         for axes in scene.axes:
             placed = bodies.matrix(axes.body, axes.matrix)
@@ -205,7 +205,7 @@ def _lay_floor(heap: _Heap, scene: Scene, height: float) -> None:
             )
 
 
-def _cut_open(heap: _Heap, placed: Array) -> None:
+def _cut_half_space(heap: _Heap, placed: Array) -> None:
     """A half space seen from its edge: its line, and what is below it, behind everything else."""
     camera, inward = heap.camera, placed[:3, 0] / np.linalg.norm(placed[:3, 0])
     if abs(float(inward @ camera.towards)) > _FROM_THE_EDGE:
@@ -299,7 +299,7 @@ def _make_cylinder(start: Array, end: Array, radius: float) -> Array:
     return matrix
 
 
-def _sized(center: Array, radius: float) -> Array:
+def _scale_shape(center: Array, radius: float) -> Array:
     matrix = np.diag((radius, radius, radius, 1.0))
     matrix[:3, 3] = center
     return matrix

@@ -202,7 +202,9 @@ def _make_panels(
     times: Array, title: str, kinds: Mapping[str, Mapping[str, Array]], note: str = ""
 ) -> Any:
     """A figure with as many panels as the lines of each kind, which has one unit, take."""
-    panels = [(label, part) for label, lines in kinds.items() for part in shared_out(lines)]
+    panels = [
+        (label, part) for label, lines in kinds.items() for part in divide_among_panels(lines)
+    ]
     figure, axes = make_sheet(title, [3.0] * max(1, len(panels)))
     for panel, (label, lines) in zip(axes, panels, strict=False):
         lines_in(panel, times, lines)
@@ -239,7 +241,7 @@ def make_sheet(title: str, heights: Sequence[float]) -> tuple[Any, Any]:
     return figure, panels
 
 
-def shared_out(lines: Mapping[str, Array]) -> list[dict[str, Array]]:
+def divide_among_panels(lines: Mapping[str, Array]) -> list[dict[str, Array]]:
     """The lines of each panel: as many in one as in another, and no more than a reader can follow."""
     items = list(lines.items())
     size = ceil(len(items) / ceil(len(items) / LINES_IN_PANEL))

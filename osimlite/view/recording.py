@@ -85,7 +85,7 @@ def read_recording(
         columns = _find_columns(read_sto(forces), recorded.times)
     elif speeds is not None:
         try:
-            columns = computed_forces(model, mechanism, recorded.times, rows, speeds, folder)
+            columns = compute_forces(model, mechanism, recorded.times, rows, speeds, folder)
         except OsimliteError as error:
             remarks.append(f"no forces are shown: {error.message}")
     still = np.zeros_like(rows) if speeds is None else speeds
@@ -104,7 +104,7 @@ def _follow_couplers(mechanism: Mechanism, rows: Array, missing: set[str]) -> No
         rows[:, coupler.dependent] = [coupler.function.evaluate(row[own])[0] for row in rows]
 
 
-def computed_forces(
+def compute_forces(
     model: Model,
     mechanism: Mechanism,
     times: Array,

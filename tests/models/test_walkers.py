@@ -36,13 +36,13 @@ def test_the_furthest_walker_is_the_exercise_but_for_its_start():
 
 @pytest.mark.parametrize("accuracy", [1e-5, 1e-6, 1e-9])
 def test_the_furthest_walker_makes_four_steps(accuracy):
-    from osimlite.studies.gait.steps import along_slope, walk_many
+    from osimlite.studies.gait.steps import measure_along_slope, walk_many
 
     with Simulation(furthest_walker(), "compiled") as simulation:
         engine = simulation.engine
         start = np.array(simulation.initial_state({}, {}))
         (walk,) = walk_many(engine, start[None], 5.0, accuracy=accuracy)
-        _, depths = along_slope(engine, start[None])
+        _, depths = measure_along_slope(engine, start[None])
     assert [step.foot for step in walk.steps] == [1, 0, 1, 0] and walk.scuffs == []
     assert (walk.ending, walk.fell_on) == ("fell", "RKneeForce")
     assert walk.distance == pytest.approx(0.5136, abs=1e-3) and walk.end == pytest.approx(

@@ -51,7 +51,7 @@ def unaccounted(model: Model, urdf: Urdf) -> list[str]:
     paths = [
         component.path for component in model.components() if not isinstance(component, CONTAINERS)
     ]
-    return urdf.fidelity.left_out(paths)
+    return urdf.fidelity.list_missing(paths)
 
 
 def one_body(*shapes, joint=None, **body) -> Model:

@@ -18,7 +18,7 @@ from osimlite.mechanics.multibody import build_mechanism
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.view import Shown
 from osimlite.view.page import page_data, page_text
-from osimlite.view.recording import computed_forces, read_recording
+from osimlite.view.recording import compute_forces, read_recording
 from tests.view.motions import stroll
 
 
@@ -155,7 +155,7 @@ def test_a_motion_without_speeds_has_no_forces(tmp_path: Path):
     assert set(recording.values[:, knee]) == {-0.5}
     others = np.delete(np.arange(len(motion.coordinates)), knee)
     assert recording.values[:, others] == pytest.approx(motion.values[:, others])
-    assert computed_forces(model, mechanism, motion.times[:2], motion.values[:2], motion.speeds[:2])
+    assert compute_forces(model, mechanism, motion.times[:2], motion.values[:2], motion.speeds[:2])
 
 
 def test_a_picture_shows_the_moment_asked_for(tmp_path: Path):

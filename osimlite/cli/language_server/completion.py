@@ -101,7 +101,7 @@ def _tags(
             for tag in list_class_tags(around.spec.accepts):
                 yield _object(analysis, cursor, tag, bracket, "")
         return
-    given = _given_in(analysis, around)
+    given = _list_written_tags(analysis, around)
     for spec in get_field_specs(around.cls).values():
         if spec in single_objects(around.cls):
             assert spec.accepts is not None
@@ -111,7 +111,7 @@ def _tags(
             yield _property(analysis, cursor, spec, bracket)
 
 
-def _given_in(analysis: Analysis, around: Element) -> set[str]:
+def _list_written_tags(analysis: Analysis, around: Element) -> set[str]:
     """The tags of the properties that an object has in the text."""
     item = analysis.objects.get(around.number) if analysis.is_certain else None
     if item is None:
@@ -136,7 +136,7 @@ def _property(
         choices = (
             ("true", "false") if isinstance(spec.kind, Value) and spec.kind.scalar == "bool" else ()
         )
-        place = f"${{1|{','.join(choices)}|}}" if choices else f"${{1:{_escaped(default)}}}"
+        place = f"${{1|{','.join(choices)}|}}" if choices else f"${{1:{_escape(default)}}}"
         text = f"{bracket}{spec.tag}>{place}</{spec.tag}>"
     item = _item(
         analysis, cursor, spec.tag, text, types.CompletionItemKind.Property, describe_value(spec)
@@ -178,5 +178,5 @@ def _item(
     )
 
 
-def _escaped(text: str) -> str:
+def _escape(text: str) -> str:
     return text.replace("\\", "\\\\").replace("$", "\\$").replace("}", "\\}")

@@ -161,12 +161,12 @@ def _files(folder: str, content: str) -> Iterator[Name]:
     """The files in a folder and in those below it that may hold something."""
     suffixes = _SUFFIXES.get(content, (".xml",))
     for place in (folder, *map(str, list_folders(Path(folder))[:50])):
-        for path in _listed(place, suffixes):
+        for path in _list_entries(place, suffixes):
             likely = content in _SUFFIXES or f"<{content}".encode() in read_beginning(path)
             yield Name(get_relative_path(path, folder), content if likely else "", likely)
 
 
-def _listed(folder: str, suffixes: tuple[str, ...]) -> list[str]:
+def _list_entries(folder: str, suffixes: tuple[str, ...]) -> list[str]:
     try:
         with os.scandir(folder) as entries:
             return sorted(entry.path for entry in entries if entry.name.lower().endswith(suffixes))

@@ -147,21 +147,21 @@ class Project:
             )
         path, changes = f"/{name}", {}
         if own.document is not None and own.document.model is not None:
-            path, edits = _renamed_in_model(own, item, name)
+            path, edits = _rename_in_model(own, item, name)
         else:
             if not name or any(character in name for character in ILLEGAL_CHARACTERS):
                 raise ModelError(f"'{name}' is no name")
-            edits = _renamed_in_setup(own, target, path)
+            edits = _rename_in_setup(own, target, path)
         edits.insert(0, types.TextEdit(own.text.range(*place), name))
         changes[self.uri(own.file)] = edits
         for other in self.naming(target):
-            edits = _renamed_in_setup(other, target, path) if other is not own else []
+            edits = _rename_in_setup(other, target, path) if other is not own else []
             if edits:
                 changes[self.uri(other.file)] = edits
         return changes
 
 
-def _renamed_in_model(
+def _rename_in_model(
     analysis: Analysis, item: object, name: str
 ) -> tuple[str, list[types.TextEdit]]:
     """The new path of a component, and the changes of the references in its model."""
@@ -182,7 +182,7 @@ def _renamed_in_model(
     return model.tree().path_of(target) or f"/{name}", edits
 
 
-def _renamed_in_setup(analysis: Analysis, target: Target, path: str) -> list[types.TextEdit]:
+def _rename_in_setup(analysis: Analysis, target: Target, path: str) -> list[types.TextEdit]:
     """The changes of the names in a setup that lead to something, or through it, once that has another path."""
     edits = []
     for use, start, end in analysis.places:

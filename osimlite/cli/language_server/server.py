@@ -182,7 +182,7 @@ def _add_files(server: Server) -> None:
         uri = params.text_document.uri
         text = server.of(types.TextDocumentIdentifier(uri)).text
         for change in params.content_changes:
-            text = text.changed(change)
+            text = text.apply_change(change)
         # A table may have a million rows: it is checked when it is written.
         if not server.show(uri, text).is_table:
             server.check(uri)

@@ -61,7 +61,7 @@ class Text:
         """The range between two offsets."""
         return types.Range(self.position(start), self.position(end))
 
-    def changed(self, change: types.TextDocumentContentChangeEvent) -> Text:
+    def apply_change(self, change: types.TextDocumentContentChangeEvent) -> Text:
         """The text after a change of a part of it, or of the whole."""
         if not isinstance(change, types.TextDocumentContentChangePartial):
             return Text(change.text, self.unit)

@@ -52,7 +52,7 @@ class Kernel:
     @cached_property
     def own(self) -> list[str]:
         """Names of its other variables, in the order of their first appearance."""
-        return [name for name in stored(self.tree) if name not in self.given]
+        return [name for name in list_assigned_names(self.tree) if name not in self.given]
 
     @property
     def name(self) -> str:
@@ -166,7 +166,7 @@ def name_of(function: Function) -> str:
     return f"{function.__module__.rpartition('.')[2]}_{function.__name__}"
 
 
-def stored(*trees: ast.AST) -> list[str]:
+def list_assigned_names(*trees: ast.AST) -> list[str]:
     """Return the names of the variables that some code assigns, each once."""
     nodes = (node for tree in trees for node in ast.walk(tree))
     return list(

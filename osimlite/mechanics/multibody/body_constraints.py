@@ -72,7 +72,7 @@ class PointOnLineConstraint(Constraint):
         """The two bodies."""
         return self.line.body, self.follower.body
 
-    def across(self) -> list[Array]:
+    def find_normal_directions(self) -> list[Array]:
         """Two unit directions (3,) across the line, in the frame of its body."""
         start = np.eye(3)[int(np.argmin(np.abs(self.along)))]
         across = cross(self.along, start)

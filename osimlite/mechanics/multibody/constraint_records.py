@@ -89,7 +89,10 @@ def constraint_record(constraint: Constraint, places: Places, balls: Balls) -> C
             return _record_between_bodies(_meeting(places, constraint.first, constraint.second))
         case b.PointOnLineConstraint():
             arm = _arm(places, constraint.line, constraint.follower)
-            axes = (_axis(places, constraint.line.body, axis) for axis in constraint.across())
+            axes = (
+                _axis(places, constraint.line.body, axis)
+                for axis in constraint.find_normal_directions()
+            )
             return _record_between_bodies([_Equation(PRODUCT, axis, arm) for axis in axes])
         case b.WeldConstraint():
             return _record_between_bodies(_weld(constraint, places))

@@ -268,7 +268,7 @@ class _Reader:
         step = self._step(register)
         return step.arguments[0] if step.law == law else None
 
-    def _scaled(self, register: int) -> tuple[float, int] | None:
+    def _factor_of_multiple(self, register: int) -> tuple[float, int] | None:
         """Return the factor and the register of a multiple, None if it is none."""
         step = self._step(register)
         factor = self._constant(step.arguments[0]) if step.law == "*" else None
@@ -276,7 +276,7 @@ class _Reader:
 
     def _scale(self, factor: float, register: int) -> int:
         """Return the register of a multiple; a multiple of a multiple has one factor."""
-        inner = self._scaled(register)
+        inner = self._factor_of_multiple(register)
         if inner is not None:
             factor, register = factor * inner[0], inner[1]
         elif (number := self._constant(register)) is not None:
@@ -406,7 +406,7 @@ class _Reader:
             return inner
         if (number := self._constant(one)) is not None:
             return self._derive(-number)
-        if (multiple := self._scaled(one)) is not None:
+        if (multiple := self._factor_of_multiple(one)) is not None:
             return self._scale(-multiple[0], multiple[1])
         return self._append("negative", one)
 

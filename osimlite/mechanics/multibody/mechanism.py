@@ -140,7 +140,7 @@ class Mechanism:
         q = self.assemble({}, time)
         return q, self.project_speeds(q, {}, time)
 
-    def released(self) -> Mechanism:
+    def without_constraints(self) -> Mechanism:
         """The mechanism without constraints, and with no coordinate locked or prescribed: it can be in any state."""
         infos = tuple(replace(info, locked=False, prescribed=None) for info in self.coordinates)
         return replace(self, coordinates=infos, constraints=())
@@ -292,7 +292,7 @@ class Mechanism:
 
     def generalized_forces(self, q: Values, body_wrenches: Mapping[str, Wrench]) -> Array:
         """Generalized forces (n,) of wrenches at the origins of bodies or frames, along ground's axes."""
-        return self._applied(self.at(q), {}, body_wrenches)
+        return self._sum_applied_forces(self.at(q), {}, body_wrenches)
 
     def acceleration(
         self,
@@ -314,7 +314,7 @@ class Mechanism:
             SimulationError: a coordinate moves no mass, or a number is not finite.
         """
         state = self.at(q, u, time)
-        applied = self._applied(
+        applied = self._sum_applied_forces(
             state, {} if generalized_forces is None else generalized_forces, body_wrenches or {}
         )
         return dynamics.accelerations(state, applied)
@@ -325,7 +325,7 @@ class Mechanism:
         """Generalized forces (n,) that give `udot` against gravity and the wrenches, constraints left aside."""
         state = self.at(q, u)
         missing = dynamics.missing_forces(state, self._array(udot, "acceleration"), self.gravity)
-        return missing - self._applied(state, {}, body_wrenches or {})
+        return missing - self._sum_applied_forces(state, {}, body_wrenches or {})
 
     @cached_property
     def total_mass(self) -> float:
@@ -409,7 +409,9 @@ class Mechanism:
         point: Array = placed[:3, :3] @ _make_vector(station, "station") + placed[:3, 3]
         return body, point
 
-    def _applied(self, state: Kinematics, forces: Values, wrenches: Mapping[str, Wrench]) -> Array:
+    def _sum_applied_forces(
+        self, state: Kinematics, forces: Values, wrenches: Mapping[str, Wrench]
+    ) -> Array:
         total = self._array(forces, "force")
         for name, (force, torque) in wrenches.items():
             body, placed = self.placement(name)

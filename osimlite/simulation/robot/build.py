@@ -88,8 +88,8 @@ class _Builder:
             placed[index] = name, frame
             self.links[-1] = replace(
                 self.links[-1],
-                visuals=_placed(visuals.get(body.path, ()), frame),
-                collisions=_placed(collisions.get(body.path, ()), frame),
+                visuals=_place_link(visuals.get(body.path, ()), frame),
+                collisions=_place_link(collisions.get(body.path, ()), frame),
             )
         return Robot(self.mechanism.name, tuple(self.links), tuple(self.joints), self.mechanism)
 
@@ -165,7 +165,7 @@ class _Builder:
         motions: list[AxisMotion] = []
         frames = [start]
         for part in mobilizer.elementary():
-            for factor in self._simplified(part, own):
+            for factor in self._simplify_motion(part, own):
                 if isinstance(factor, Fixed):
                     frames[-1] = frames[-1] @ factor.matrix
                 else:
@@ -173,7 +173,7 @@ class _Builder:
                     frames.append(np.eye(4))
         return motions, frames
 
-    def _simplified(
+    def _simplify_motion(
         self, part: Fixed | AxisMotion, own: Sequence[int]
     ) -> Iterator[Fixed | AxisMotion]:
         """The same motion with what is constant in it taken out."""
@@ -217,7 +217,7 @@ def _carry_back(motions: list[AxisMotion], frames: list[Array]) -> None:
         frames[-2:] = [frames[-2] @ last, np.eye(4)]
 
 
-def _placed(shapes: Sequence[Visual], frame: Array) -> tuple[Visual, ...]:
+def _place_link(shapes: Sequence[Visual], frame: Array) -> tuple[Visual, ...]:
     return tuple(replace(shape, origin=frame @ shape.origin) for shape in shapes)
 
 

@@ -182,7 +182,7 @@ def coordinate_drivers(robot: Robot) -> dict[int, Driver]:
         step = steps.get(place)
         if step is None or step.independent[0] in above | {place}:
             return Driver(place, f.IDENTITY)
-        return _after(step.function, drive(step.independent[0], above | {place}))
+        return _substitute(step.function, drive(step.independent[0], above | {place}))
 
     for place in steps:
         if place not in result and (driver := drive(place, frozenset())).coordinate != place:
@@ -195,7 +195,7 @@ def joint_driver(joint: RobotJoint, drivers: dict[int, Driver]) -> Driver | None
     if len(joint.coordinates) != 1:
         return None
     (place,) = joint.coordinates
-    return _after(joint.function, drivers.get(place, Driver(place, f.IDENTITY)))
+    return _substitute(joint.function, drivers.get(place, Driver(place, f.IDENTITY)))
 
 
 def knots(function: f.Function) -> tuple[float, ...]:
@@ -214,7 +214,7 @@ def knots(function: f.Function) -> tuple[float, ...]:
     return ()
 
 
-def _after(outer: f.Function, driver: Driver) -> Driver:
+def _substitute(outer: f.Function, driver: Driver) -> Driver:
     if driver.coordinate is None:
         return Driver(None, f.Constant(outer.evaluate((driver.function.evaluate((0.0,))[0],))[0]))
     first, second = as_line(driver.function), as_line(outer)

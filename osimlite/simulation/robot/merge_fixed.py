@@ -30,7 +30,7 @@ def merge_fixed(robot: Robot) -> Robot:
         own, root = links[base], base == robot.links[0].name
         if not own.bodies:
             names[base] = joint.child
-        links[base] = _with(own, links[joint.child], placed, massless=root)
+        links[base] = _weld_links(own, links[joint.child], placed, massless=root)
     kept = [link.name for link in robot.links if home[link.name][0] == link.name]
     return replace(
         robot,
@@ -41,7 +41,7 @@ def merge_fixed(robot: Robot) -> Robot:
     )
 
 
-def _with(link: Link, other: Link, placed: Array, *, massless: bool) -> Link:
+def _weld_links(link: Link, other: Link, placed: Array, *, massless: bool) -> Link:
     """`link` with `other` welded to it, whose frame is `placed` (4, 4) in its own."""
     turn, shift = placed[:3, :3], placed[:3, 3]
     visuals, collisions = (

@@ -73,7 +73,7 @@ class MeshFiles:
         misspelt = not source.as_posix().endswith(Path(name).as_posix().removeprefix("./"))
         return MeshCopy(file, source, converted, misspelt)
 
-    def stretched(self, name: str, shape: Surface, size: tuple[float, float, float]) -> str:
+    def name_of_stretched(self, name: str, shape: Surface, size: tuple[float, float, float]) -> str:
         """Relative name of the file of a unit shape that is stretched along its axes."""
         return self.add((name, *size), name, ".obj", shape.stretched(size).obj().encode())
 

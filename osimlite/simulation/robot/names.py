@@ -26,7 +26,7 @@ def legal(name: str) -> str:
     return word if word[0].isalpha() or word[0] == "_" else f"_{word}"
 
 
-def dotted(path: str) -> str:
+def dotted_name(path: str) -> str:
     """A component path as a name."""
     return path.strip("/").replace("/", ".")
 
@@ -60,7 +60,7 @@ def distinct(names: Sequence[str], spell: Callable[[str], str]) -> list[str]:
 
 def joint_names(mechanism: Mechanism) -> list[str]:
     """Of the joints that are coordinates: the coordinate's name, its path with dots where coordinates share a name."""
-    return distinct(mechanism.coordinate_names, lambda name: xml_name(dotted(name)))
+    return distinct(mechanism.coordinate_names, lambda name: xml_name(dotted_name(name)))
 
 
 def coordinate_names(robot: Robot) -> Robot:
@@ -74,7 +74,7 @@ def coordinate_names(robot: Robot) -> Robot:
         own[name] = make_unique_name(xml_name(name), taken)
         taken.add(own[name])
     links = [link.name for link in robot.links]
-    return _renamed(robot, dict(zip(links, distinct(links, xml_name), strict=True)), own)
+    return _make_unique(robot, dict(zip(links, distinct(links, xml_name), strict=True)), own)
 
 
 def legal_names(robot: Robot) -> Robot:
@@ -85,10 +85,10 @@ def legal_names(robot: Robot) -> Robot:
     names = [link.name for link in robot.links] + [joint.name for joint in robot.joints]
     renamed = dict(zip(names, distinct(names, legal), strict=True))
     assert renamed[WORLD] == WORLD
-    return _renamed(robot, renamed, renamed)
+    return _make_unique(robot, renamed, renamed)
 
 
-def _renamed(robot: Robot, links: Mapping[str, str], joints: Mapping[str, str]) -> Robot:
+def _make_unique(robot: Robot, links: Mapping[str, str], joints: Mapping[str, str]) -> Robot:
     if all(old == new for old, new in (*links.items(), *joints.items())):
         return robot
     return replace(

@@ -206,7 +206,7 @@ class _Writer:
         return "\n".join(self._lines) + "\n"
 
     def _start(self, tag: str, attributes: Attributes, end: str) -> None:
-        for line in _wrapped(
+        for line in _wrap_tag(
             [
                 f"<{tag}",
                 *(f"{name}={quote_attribute(value)}" for name, value in attributes.items()),
@@ -216,7 +216,7 @@ class _Writer:
             self.line(line)
 
 
-def _wrapped(words: Sequence[str], end: str) -> Iterator[str]:
+def _wrap_tag(words: Sequence[str], end: str) -> Iterator[str]:
     """The words of a start tag on one line, or one a line if that gets too long."""
     whole = " ".join(words) + end
     if len(whole) <= LONGEST_LINE:

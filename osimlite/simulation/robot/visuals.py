@@ -128,13 +128,13 @@ class _Collector:
                 x, y, z = sizes = tuple(
                     2.0 * half * by for half, by in zip(geometry.half_lengths, scale, strict=True)
                 )
-                return (Box((x, y, z)), here) if self._drawn(path, sizes) else None
+                return (Box((x, y, z)), here) if self._is_drawable(path, sizes) else None
             case Sphere() | Ellipsoid():
                 own = (geometry.radius,) * 3 if isinstance(geometry, Sphere) else geometry.radii
                 a, b, c = sizes = tuple(
                     radius * factor for radius, factor in zip(own, scale, strict=True)
                 )
-                if not self._drawn(path, sizes):
+                if not self._is_drawable(path, sizes):
                     return None
                 if a == b == c:
                     return Ball(a), here
@@ -154,7 +154,7 @@ class _Collector:
                     geometry.radius * scale[2],
                     2 * geometry.half_height * scale[1],
                 )
-                if not self._drawn(path, sizes):
+                if not self._is_drawable(path, sizes):
                     return None
                 if a == b:
                     return Tube(a, length), _Y_TO_Z
@@ -174,7 +174,7 @@ class _Collector:
         note("visual", path, f"a shape of class {type(geometry).__name__}", "left out")
         return None
 
-    def _drawn(self, path: str, sizes: Sequence[float]) -> bool:
+    def _is_drawable(self, path: str, sizes: Sequence[float]) -> bool:
         """Whether programs can draw a shape of these sizes; otherwise that is noted."""
         if all(0.0 < size < GREATEST for size in sizes):
             return True

@@ -13,7 +13,7 @@ from osimlite.simulation.batches import BatchEngine, Floats, Ints
 from osimlite.studies.gait.cycle import Cycle
 from osimlite.studies.gait.starts import lift_to_depth
 from osimlite.studies.gait.stepmap import StepMap
-from osimlite.studies.gait.steps import Walk, along_slope, walk_many
+from osimlite.studies.gait.steps import Walk, measure_along_slope, walk_many
 
 SWEEP_ACCURACY = 1e-5
 """Of the integrator, where many walkers walk many steps."""
@@ -69,7 +69,7 @@ def sample_perturbed_starts(
     here = np.array(state, dtype=float)
     change = np.random.default_rng(seed).uniform(-part, part, (count, len(here))) * here
     engine, footing = step_map.engine, step_map.footing
-    _, depths = along_slope(engine, here[None])
+    _, depths = measure_along_slope(engine, here[None])
     deepest = [
         max(float(depths[0, engine.contacts.index(name)]) for name in foot) for foot in footing.feet
     ]

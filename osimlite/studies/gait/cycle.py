@@ -9,7 +9,7 @@ from osimlite.base.records import dataclass
 from osimlite.errors import OsimliteError
 from osimlite.simulation.batches import Floats
 from osimlite.studies.gait.stepmap import StepMap
-from osimlite.studies.gait.steps import along_slope
+from osimlite.studies.gait.steps import measure_along_slope
 
 CONVERGED = 1e-9
 """A fixed point is found when the map moves it by less than this (rad, m and per second, as a norm)."""
@@ -118,7 +118,7 @@ def find_cycle(
     engine, per_stride = step_map.engine, step_map.exchange is None
     feet = [engine.contacts.index(name) for foot in step_map.footing.feet for name in foot]
     before, after = (
-        along_slope(engine, np.array([state_found, images.states[0]]))[0][:, feet]
+        measure_along_slope(engine, np.array([state_found, images.states[0]]))[0][:, feet]
         .mean(axis=1)
         .tolist()
     )

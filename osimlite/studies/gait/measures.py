@@ -14,8 +14,8 @@ from osimlite.studies.gait.starts import plant_feet as at_rest
 from osimlite.studies.gait.steps import (
     SHORTEST,
     Walk,
-    along_slope,
     make_fall_watches,
+    measure_along_slope,
     room_for,
     walks_of,
 )
@@ -58,7 +58,7 @@ def progress(engine: Any, feet: Sequence[str] | None = None) -> Measure:
 
     def numbers(batch: Batch) -> Floats:
         rows = None if batch.numbers is None else np.arange(len(batch.starts))
-        along = along_slope(batch.engine, batch.runs.states, batch.numbers, rows)[0]
+        along = measure_along_slope(batch.engine, batch.runs.states, batch.numbers, rows)[0]
         places = np.stack([along[:, foot].max(axis=1) for foot in contacts], axis=1)
         result = zip(_walks(footing, batch), places.tolist(), strict=True)
         return np.array([_progress(walk, ends) for walk, ends in result])
@@ -67,7 +67,7 @@ def progress(engine: Any, feet: Sequence[str] | None = None) -> Measure:
 
 
 @registry.start
-def planted(engine: Any, feet: Sequence[str] | None) -> registry.Place:
+def plant_on_ground(engine: Any, feet: Sequence[str] | None) -> registry.Place:
     """On the ground with the deeper foot, at rest there."""
     if engine.name != "compiled":
         raise SettingError("a walker is planted with --engine compiled only")

@@ -7,7 +7,7 @@ import numpy as np
 from osimlite.base.records import dataclass
 from osimlite.simulation.batches import BatchEngine, Floats, Ints
 from osimlite.studies.gait.foot_contacts import FootContacts
-from osimlite.studies.gait.steps import along_slope
+from osimlite.studies.gait.steps import measure_along_slope
 
 APART = 0.1
 """How far a coordinate is moved to see what it carries, rad or m."""
@@ -32,7 +32,7 @@ def find_carriers(engine: BatchEngine, footing: FootContacts) -> Carriers:
     poses = np.hstack((rng.uniform(-0.2, 0.2, (3, n)), np.zeros((3, n))))
     here, depths = (
         _compute_contact_centres(engine, poses)[:, contacts],
-        along_slope(engine, poses)[1][:, contacts],
+        measure_along_slope(engine, poses)[1][:, contacts],
     )
     places, lift = [], None
     for index in range(n):
@@ -44,7 +44,7 @@ def find_carriers(engine: BatchEngine, footing: FootContacts) -> Carriers:
         places.append(index)
         if (
             lift is None
-            and (along_slope(engine, moved)[1][:, contacts] - depths < -0.1 * APART).all()
+            and (measure_along_slope(engine, moved)[1][:, contacts] - depths < -0.1 * APART).all()
         ):
             lift = index
     return Carriers(tuple(places), lift)
@@ -75,7 +75,7 @@ def lift_to_depth(
     one = states.copy()
     one[:, lift] += APART
     now, then = (
-        along_slope(engine, moved, numbers, rows)[1][:, contacts] for moved in (states, one)
+        measure_along_slope(engine, moved, numbers, rows)[1][:, contacts] for moved in (states, one)
     )
     chosen = np.arange(len(states)), now.argmax(axis=1)
     placed = states.copy()
@@ -110,7 +110,7 @@ def plant_feet(
         return placed
     rows = None if numbers is None else count
     feet = np.array([engine.contacts.index(name) for names in footing.feet for name in names])
-    deepest = feet[along_slope(engine, placed, numbers, rows)[1][:, feet].argmax(axis=1)]
+    deepest = feet[measure_along_slope(engine, placed, numbers, rows)[1][:, feet].argmax(axis=1)]
     ahead, back = placed.copy(), placed.copy()
     ahead[:, :n] += NUDGE * placed[:, n:]
     back[:, :n] -= NUDGE * placed[:, n:]

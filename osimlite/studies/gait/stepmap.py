@@ -20,7 +20,13 @@ from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.simulation.batches import BatchEngine, Floats, Ints, Watch, run_many
 from osimlite.simulation.run import kept_constraints
 from osimlite.studies.gait.foot_contacts import FootContacts, find_footing
-from osimlite.studies.gait.steps import Step, along_slope, make_fall_watches, room_for, walks_of
+from osimlite.studies.gait.steps import (
+    Step,
+    make_fall_watches,
+    measure_along_slope,
+    room_for,
+    walks_of,
+)
 from osimlite.studies.gait.symmetry import leg_exchange, neutral_directions
 
 TIGHT = 1e-10
@@ -171,7 +177,7 @@ class StepMap:
         contacts = [self.engine.contacts.index(name) for name in self.footing.feet[foot]]
         rate = np.array(self.engine.derivative(0.0, state.tolist()))
         dt = 1e-7
-        _, depths = along_slope(self.engine, np.array([state, state + dt * rate]))
+        _, depths = measure_along_slope(self.engine, np.array([state, state + dt * rate]))
         touching = contacts[int(np.argmin(np.abs(depths[0, contacts])))]
         speed = (depths[1, touching] - depths[0, touching]) / dt
         return state - depths[0, touching] / speed * rate

@@ -159,7 +159,7 @@ def walks_of(
     counts = [len(events) for events in runs.events]
     moments = np.concatenate([starts, *runs.event_states])
     rows = np.concatenate([row_of, np.repeat(row_of, counts)]).astype(np.int64)
-    reached, depths = along_slope(engine, moments, vectors, rows)
+    reached, depths = measure_along_slope(engine, moments, vectors, rows)
     fatal = np.array([engine.contacts.index(contact) for contact in footing.falls], dtype=np.int64)
     ends = np.cumsum([len(starts), *counts])
     result = []
@@ -249,7 +249,7 @@ def follow_events(
     return walk
 
 
-def along_slope(
+def measure_along_slope(
     engine: BatchEngine,
     states: Floats,
     vectors: Floats | None = None,

@@ -241,7 +241,7 @@ class MuscleVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
     def step(self, actions: Any) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
         """Hold controls (w, c) for a step."""
         again = np.flatnonzero(self._ended)
-        kept = {int(k): self._begun(int(k)) for k in again}
+        kept = {int(k): self._initial_state(int(k)) for k in again}
         rewards, over = self._all.step(actions)
         for k, state in kept.items():
             self._all.copies.put(k, state)
@@ -251,7 +251,7 @@ class MuscleVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
         self._ended = over | late
         return self._all.observed(), rewards, over, late, {}
 
-    def _begun(self, k: int) -> Array:
+    def _initial_state(self, k: int) -> Array:
         """The state in which a copy begins anew."""
         self._all.begin(k, self._random[k])
         return self._all.copies.states[k].copy()

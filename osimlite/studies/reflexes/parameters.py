@@ -76,7 +76,9 @@ class Parameters:
         # ``1~0.5<0,2>``, ``~1<0,2>``, or a block of mean, std, min and max.
         if part.parts:
             wanted = ("mean", None), ("std", np.nan), ("min", -np.inf), ("max", np.inf)
-            return self._asked(part, name, *(part.number(key, value) for key, value in wanted))
+            return self._request_parameter(
+                part, name, *(part.number(key, value) for key, value in wanted)
+            )
         text = part.value
         match = _FORM.match(text)
         if match is None or not text:
@@ -94,11 +96,11 @@ class Parameters:
             float(match[end]) if match[end] is not None else way
             for end, way in (("low", -np.inf), ("high", np.inf))
         )
-        return self._asked(
+        return self._request_parameter(
             part, name, float(mean), np.nan if std is None else float(std), low, high
         )
 
-    def _asked(
+    def _request_parameter(
         self, part: Node, name: str, mean: float, std: float, low: float, high: float
     ) -> Array:
         if not low <= mean <= high:

@@ -88,7 +88,7 @@ def _list_bodies(felt: Felt) -> list[str]:
     return [body.name for body in felt.mechanism.bodies]
 
 
-def _of_muscle(what: str, first: int) -> Feel:
+def _read_muscle(what: str, first: int) -> Feel:
     def feel(felt: Felt, node: Node, number: int, side: str) -> Source:
         return Source(
             f"{felt.paths[number].removeprefix('/')}.{what}",
@@ -180,11 +180,11 @@ def _mirror_axis(felt: Felt, node: Node, number: int, side: str) -> Source:
 
 
 _OF_MUSCLES = (
-    Channel("L", _of_muscle("length", SENSES.LENGTHS), 1.0),
-    Channel("V", _of_muscle("velocity", SENSES.VELOCITIES), is_free=False),
-    Channel("F", _of_muscle("force", SENSES.FORCES)),
+    Channel("L", _read_muscle("length", SENSES.LENGTHS), 1.0),
+    Channel("V", _read_muscle("velocity", SENSES.VELOCITIES), is_free=False),
+    Channel("F", _read_muscle("force", SENSES.FORCES)),
     Channel("S", _spindle, is_free=False),
-    Channel("A", _of_muscle("activation", SENSES.ACTIVATIONS), is_free=False),
+    Channel("A", _read_muscle("activation", SENSES.ACTIVATIONS), is_free=False),
 )
 KINDS = {
     "MuscleReflex": Kind(_list_muscles, _OF_MUSCLES, corrects=False, is_own=True),

@@ -143,7 +143,7 @@ def check_nodes(controls: Mapping[int, Control], interpolation: str, to: float) 
         )
     if interpolation != "cubic":
         return
-    for actuator, parts in _by_actuator(controls, NODE).items():
+    for actuator, parts in _group_by_actuator(controls, NODE).items():
         times = [time for time, _ in parts]
         if len(times) < FEWEST_OF_CUBIC or times[0] > 0.0 or times[-1] < to * (1.0 - 1e-9):
             raise SettingError(
@@ -216,10 +216,10 @@ class VariedControls:
     def __init__(self, model: Model, controls: Mapping[int, Control], interpolation: str) -> None:
         self.controllers: list[Controller] = []
         self._puts: list[tuple[Function, str, Callable[[Values], Any]]] = []
-        for actuator, ((_, place),) in _by_actuator(controls, SCALE).items():
+        for actuator, ((_, place),) in _group_by_actuator(controls, SCALE).items():
             self._scale(model, actuator, place)
         for kind in (OFFSET, NODE, SWITCH):
-            if parts := _by_actuator(controls, kind):
+            if parts := _group_by_actuator(controls, kind):
                 made = _make_controller(model, kind, list(parts))
                 made.ControlFunctions.objects += [
                     self._function(kind, own, interpolation) for own in parts.values()
@@ -281,7 +281,9 @@ class VariedControls:
             )
 
 
-def _by_actuator(controls: Mapping[int, Control], kind: str) -> dict[str, list[tuple[float, int]]]:
+def _group_by_actuator(
+    controls: Mapping[int, Control], kind: str
+) -> dict[str, list[tuple[float, int]]]:
     """For each actuator that has parts of a kind, when or which they are, in order, and places of the variables."""
     result: dict[str, list[tuple[float, int]]] = {}
     for place, part in controls.items():

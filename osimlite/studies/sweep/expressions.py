@@ -176,7 +176,7 @@ def list_quantities(engine: Any) -> Mapping[str, Quantity]:
     return dict(reversed(more)) | result
 
 
-def driven_names(engine: Any) -> set[str]:
+def list_driven_names(engine: Any) -> set[str]:
     """Names of what depends on the controls of that moment, besides on the state."""
     controls = {
         f"{name}/control"

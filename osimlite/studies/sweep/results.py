@@ -176,7 +176,7 @@ class Partial:
                 if is_there:
                     self._reopen()
                 else:
-                    self._put(table)
+                    self._write_batch(table)
             except BaseException:
                 self._let_go()
                 raise
@@ -195,7 +195,7 @@ class Partial:
         batch = pa.record_batch(arrays, schema=self.schema)
         with defer_sigint():
             try:
-                self._put(batch)
+                self._write_batch(batch)
             except OSError as error:
                 raise OsimliteError(
                     f"cannot write here: {error.strerror}; make room, then go on with --resume",
@@ -215,7 +215,7 @@ class Partial:
                 "the file was damaged meanwhile; go on with --resume", file=str(self.partial)
             )
 
-    def _put(self, item: Any) -> None:
+    def _write_batch(self, item: Any) -> None:
         body = item.serialize().to_pybytes()
         self.stream.write(HEAD.pack(_MARK, len(body), _compute_checksum(body)) + body)
         self.stream.flush()

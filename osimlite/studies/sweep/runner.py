@@ -12,7 +12,7 @@ from osimlite.base.records import dataclass, replace
 from osimlite.errors import OsimliteError, SettingError
 from osimlite.simulation.batches import Runs, Watch
 from osimlite.simulation.options import report_times
-from osimlite.studies.sweep.expressions import Expression, driven_names
+from osimlite.studies.sweep.expressions import Expression, list_driven_names
 from osimlite.studies.sweep.measures import (
     Batch,
     Measure,
@@ -85,7 +85,7 @@ class _Look:
             spec for spec in plan.measures if plan.controller is not None and is_expression(spec)
         ]
         for spec in expressions:
-            for name in sorted(Expression(spec, engine).names & driven_names(engine)):
+            for name in sorted(Expression(spec, engine).names & list_driven_names(engine)):
                 raise SettingError(
                     f"the measure '{spec}' looks at '{name}', which the controller has a part in; of runs with a "
                     "controller a sweep keeps states alone"
@@ -248,7 +248,7 @@ class Runner:
             if words == "done" and np.isfinite(state).all():
                 why.append((DONE, None))
             elif words == "stopped":
-                why.append((STOPPED, self._what_stopped(engine, look, runs.events[number], state)))
+                why.append((STOPPED, self._find_stop(engine, look, runs.events[number], state)))
             elif words == "too many steps":
                 why.append(
                     (
@@ -270,7 +270,7 @@ class Runner:
             None if self.variants.is_fixed else np.stack([variant.numbers for variant in variants])
         )
 
-    def _what_stopped(
+    def _find_stop(
         self, engine: Any, look: _Look, events: Sequence[tuple[float, str, bool]], state: Floats
     ) -> str:
         """The watch that ended a run: the last event, if there was room for it, or the level that the state is at."""

@@ -50,7 +50,7 @@ def add_bodies(draft: Draft) -> None:
             )
             if path in draft.tree.by_path:
                 draft.fidelity.translated[path] = f"body {link.name}"
-                draft.fidelity.named(path, "body", path.rpartition("/")[2], link.name)
+                draft.fidelity.note_name(path, "body", path.rpartition("/")[2], link.name)
         draft.bodies[bodies[path]] = element
     for component, path in draft.components(Joint):
         names = [part.name for part in robot.moving if part.source == path]

@@ -100,7 +100,7 @@ def check_mjcf(model: Model, file: str | Path, *, poses: int = 50, seed: int = 7
             file=str(file),
         )
     known, truth = random_poses(paths, poses, seed)
-    lengths, arms, places = zip(*(theirs.measured(q) for q in known.q), strict=True)
+    lengths, arms, places = zip(*(theirs.measure_tendons(q) for q in known.q), strict=True)
     result = []
     for name, tendon in tendons.items():
         own = truth[owners[name]]
@@ -163,7 +163,7 @@ class _Compiled:
         tendon = self.mujoco.mj_name2id(self.model, kinds.mjOBJ_TENDON, name)
         return tendon if tendon >= 0 else None
 
-    def measured(self, q: Array) -> tuple[Array, Array, Array]:
+    def measure_tendons(self, q: Array) -> tuple[Array, Array, Array]:
         """Lengths (T,) of all tendons, moment arms (T, m) about the free coordinates, places (b, 3) of bodies."""
         model, data = self.model, self.data
         data.qpos[:] = model.qpos0

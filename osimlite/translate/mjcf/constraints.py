@@ -52,7 +52,7 @@ def _distance(draft: Draft, item: b.DistanceConstraint) -> str:
     return f"equality {name}"
 
 
-def _on_line(draft: Draft, item: b.PointOnLineConstraint) -> str:
+def _constrain_to_line(draft: Draft, item: b.PointOnLineConstraint) -> str:
     """A speck that slides along the line, and is connected to the follower."""
     name = draft.name("joint", item.name)
     frame = np.eye(4)
@@ -82,5 +82,5 @@ _MAKERS: Mapping[type, Callable[[Draft, Any], str]] = {
     b.WeldConstraint: partial(_sites, "weld"),
     b.PointConstraint: partial(_sites, "connect"),
     b.DistanceConstraint: _distance,
-    b.PointOnLineConstraint: _on_line,
+    b.PointOnLineConstraint: _constrain_to_line,
 }

@@ -25,12 +25,14 @@ FAR = 1e6
 def actuator(draft: Draft, force: CoordinateActuator, path: str, **dynamics: Value) -> str:
     """A force on the joint in proportion to the control."""
     lead, _ = _lead(draft, force)
-    return scaled(
+    return scale_actuator(
         draft, force, path, joint=lead.joint, gear=force.optimal_force / lead.line.slope, **dynamics
     )
 
 
-def scaled(draft: Draft, force: CoordinateActuator | PathActuator, path: str, **on: Value) -> str:
+def scale_actuator(
+    draft: Draft, force: CoordinateActuator | PathActuator, path: str, **on: Value
+) -> str:
     """An actuator whose force is its control times its gear."""
     name, ends = draft.name("actuator", path), (force.min_control, force.max_control)
     finite = all(map(math.isfinite, ends)) and ends[0] < ends[1]

@@ -30,7 +30,7 @@ def add_coordinates(draft: Draft) -> None:
         if lead is None and place not in moving and not info.locked:
             note("coordinate", info.path, "a coordinate that moves nothing", "left out")
         if lead is not None:
-            draft.fidelity.named(info.path, "joint", info.name, lead.joint)
+            draft.fidelity.note_name(info.path, "joint", info.name, lead.joint)
         if lead is not None and lead.line == (1.0, 0.0):
             element = elements[lead.joint]
             if all(map(math.isfinite, info.range)) and info.range[0] < info.range[1]:

@@ -26,7 +26,7 @@ from osimlite.translate.mjcf.bodies import LEAST_MASS
 from osimlite.translate.mjcf.draft import SPECK, Draft, Follower, Lead, add
 from osimlite.translate.mjcf.ellipsoids import add_ellipsoids
 from osimlite.translate.mjcf.moving import composition
-from osimlite.translate.mjcf.polynomials import Fit, quartic, sampled, span
+from osimlite.translate.mjcf.polynomials import Fit, quartic, sample_function, span
 
 PULLED = 0.1
 """Inertia (kg, kg·m²) of helpers: muscles may pull at them, and the equalities that hold them are soft."""
@@ -97,7 +97,8 @@ def _follow(draft: Draft, joint: RobotJoint, driver: Driver, whose: str) -> None
         )
         x = np.linspace(low, high, 400)
         fit = Fit(
-            (), Error.of(Polynomial(outer)(Polynomial(drive)(x)) - sampled(function, x), unit)
+            (),
+            Error.of(Polynomial(outer)(Polynomial(drive)(x)) - sample_function(function, x), unit),
         )
     if fit.error is not None and draft.options.driver:
         follower = follower._replace(function=exact)

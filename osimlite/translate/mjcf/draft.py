@@ -26,7 +26,7 @@ from osimlite.schema.model import Model
 from osimlite.schema.tree import Tree
 from osimlite.simulation.robot.couplings import Line
 from osimlite.simulation.robot.mesh_files import MeshFiles
-from osimlite.simulation.robot.names import dotted, joint_names, xml_name
+from osimlite.simulation.robot.names import dotted_name, joint_names, xml_name
 from osimlite.simulation.robot.robot import Link, Robot
 from osimlite.simulation.robot.urdf import number, numbers
 from osimlite.translate.fidelity import Fidelity
@@ -219,13 +219,13 @@ class Draft:
         """
         taken = self._names.setdefault(kind, set())
         own = path.rsplit("/", 1)[-1]
-        whole = xml_name(dotted(path))
+        whole = xml_name(dotted_name(path))
         name = xml_name(own or whole)
         if name in taken:
             name = whole if whole not in taken else make_unique_name(whole, taken, first=2)
         taken.add(name)
         if path in self.tree.by_path:
-            self.fidelity.named(path, kind, own, name)
+            self.fidelity.note_name(path, kind, own, name)
         return name
 
     def placement(self, owner: Component, socket: str) -> FramePlacement:
@@ -259,7 +259,7 @@ class Draft:
         add(self.bodies[body], "site", name=name, **frame, **attributes)
         return name
 
-    def tied(self, path: str) -> Tied:
+    def find_tendon(self, path: str) -> Tied:
         """The tendon of the path of a force.
 
         Raises:

@@ -124,7 +124,7 @@ class Driver:
         self._following = {
             k: each for k, each in coordinate_drivers(self.mjcf.robot).items() if k not in led
         }
-        self._followed = [self._followed_by(name) for name in self.mjcf.followers]
+        self._followed = [self._list_followers(name) for name in self.mjcf.followers]
         self._free = np.setdiff1d(
             np.arange(self.model.nv), [followed.dof for followed in self._followed]
         )
@@ -152,7 +152,7 @@ class Driver:
             SimulationError: a force has no value in it.
         """
         self._follow()
-        with self._called_back():
+        with self._call_back():
             self._mujoco.mj_forward(self.model, self.data)
 
     def state(self) -> tuple[Array, Array, Array]:
@@ -176,14 +176,14 @@ class Driver:
         Raises:
             SimulationError: a force has no value in the state that is reached.
         """
-        with self._called_back():
+        with self._call_back():
             for _ in range(count):
                 self._mujoco.mj_step(self.model, self.data)
                 self._follow()
 
     # ---------------------------------------------------------------------------------------------- callbacks
     @contextmanager
-    def _called_back(self) -> Iterator[None]:
+    def _call_back(self) -> Iterator[None]:
         mujoco = self._mujoco
         before = mujoco.get_mjcb_control(), mujoco.get_mjcb_act_dyn()
 
@@ -252,9 +252,10 @@ class Driver:
         others = np.setdiff1d(np.arange(data.ne), places)
         rows = data.efc_J.reshape(-1, self.model.nv)[others]
         applied = data.qfrc_passive - data.qfrc_bias + data.qfrc_applied
-        inertia = np.array([self._weighed(data, column) for column in moves.T.copy()]) @ moves
+        inertia = np.array([self._multiply_mass(data, column) for column in moves.T.copy()]) @ moves
         known = np.append(
-            moves.T @ (applied - self._weighed(data, wanted)), data.efc_aref[others] - rows @ wanted
+            moves.T @ (applied - self._multiply_mass(data, wanted)),
+            data.efc_aref[others] - rows @ wanted,
         )
         held = rows @ moves
         matrix = np.block([[inertia, held.T], [held, np.zeros((len(others), len(others)))]])
@@ -262,7 +263,7 @@ class Driver:
             np.linalg.lstsq(matrix, known)[0] if len(others) else np.linalg.solve(matrix, known)
         )
         accelerations = moves @ result[: len(self._free)] + wanted
-        data.qfrc_passive += self._weighed(data, accelerations) - applied
+        data.qfrc_passive += self._multiply_mass(data, accelerations) - applied
         # What `_follow` writes is for the start of a step: within it there are no errors to take
         # back.
         for place, item in zip(places, self._followed, strict=True):
@@ -271,7 +272,7 @@ class Driver:
                 rest + (wanted if len(item.leaders) == 1 else accelerations)[item.dof]
             )
 
-    def _weighed(self, data: Any, accelerations: Array) -> Array:
+    def _multiply_mass(self, data: Any, accelerations: Array) -> Array:
         """The mass matrix times accelerations (nv,)."""
         forces = np.empty(self.model.nv)
         self._mujoco.mj_mulM(self.model, data, forces, accelerations)
@@ -322,7 +323,7 @@ class Driver:
                 self.model.body(link.name).inertia[:] = principal_axes(link.inertia)[0]
         self._mujoco.mj_setConst(self.model, self.data)
 
-    def _followed_by(self, name: str) -> _Followed:
+    def _list_followers(self, name: str) -> _Followed:
         follower, own = self.mjcf.followers[name], self.model.joint(name)
         names = follower.arguments or (() if follower.leader is None else (follower.leader,))
         leaders = [self.model.joint(each) for each in names]

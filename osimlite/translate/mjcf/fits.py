@@ -26,7 +26,7 @@ Wrong = Callable[[Tendon], Array]
 """The residuals of a tendon with a piece of it."""
 
 
-def fitted(router: Router, tendon: Tendon) -> Tendon:
+def fit_tendon(router: Router, tendon: Tendon) -> Tendon:
     """The tendon with surfaces and sites of ours where its error is least, sought from where they are.
 
     Points of the path stay where they are, and so do specks that stand for such points.
@@ -50,9 +50,11 @@ def _search(piece: Tendon, wrong: Wrong) -> Tendon:
         start = best
         size = sum(7 if isinstance(part, Around) else 3 for part in start if _is_free(part))
         guess = search(
-            lambda x, t=start: 1e3 * wrong(_moved(t, x)).ravel(), np.zeros(size), max_nfev=40
+            lambda x, t=start: 1e3 * wrong(_move_free_parts(t, x)).ravel(),
+            np.zeros(size),
+            max_nfev=40,
         )
-        result = _sided(_moved(start, guess.x), wrong)
+        result = _choose_sides(_move_free_parts(start, guess.x), wrong)
         error = _error(wrong(result))
         if error < least:
             best = result
@@ -66,14 +68,14 @@ def _error(residuals: Array) -> float:
     return float(np.sqrt(np.square(residuals).mean(0).sum()))
 
 
-def _sided(piece: Tendon, wrong: Wrong) -> Tendon:
+def _choose_sides(piece: Tendon, wrong: Wrong) -> Tendon:
     """The piece with the best side for each surface."""
     turns = np.arange(SIDES) * (2.0 * np.pi / SIDES)
     directions = np.stack((np.cos(turns), np.sin(turns), 0.0 * turns), axis=1)
     for index, part in enumerate(piece):
         if isinstance(part, Around) and _is_free(part):
             options = [
-                (*piece[:index], part.sided(way), *piece[index + 1 :])
+                (*piece[:index], part.with_side(way), *piece[index + 1 :])
                 for way in (None, *directions)
             ]
             piece = min((piece, *options), key=lambda option: _error(wrong(option)))
@@ -86,7 +88,7 @@ def _is_free(part: Spot | Around) -> bool:
     return not part.name
 
 
-def _moved(piece: Tendon, x: Array) -> Tendon:
+def _move_free_parts(piece: Tendon, x: Array) -> Tendon:
     """The piece with its free parts moved by numbers of the search."""
     parts: list[Spot | Around] = []
     for part in piece:
@@ -98,6 +100,6 @@ def _moved(piece: Tendon, x: Array) -> Tendon:
         else:
             frame = part.frame @ make_offset(SHIFT * x[:3], TURN * x[3:6])
             radius = part.radius * float(np.exp(np.clip(GROW * x[6], -5.0, 5.0)))
-            parts.append(part.moved(frame, radius))
+            parts.append(part.move_to(frame, radius))
             x = x[7:]
     return tuple(parts)

@@ -15,7 +15,7 @@ from numpy.polynomial import Chebyshev, Polynomial
 from osimlite.base.require import require
 from osimlite.mechanics.multibody.functions import Function
 from osimlite.mechanics.multibody.spatial import Array
-from osimlite.translate.mjcf.polynomials import DEGREE, as_polynomial, sampled
+from osimlite.translate.mjcf.polynomials import DEGREE, as_polynomial, sample_function
 
 REACH = 0.02
 """How far (rad) a helper turns: little, so that its inertia hardly weighs on the coordinate that drives it."""
@@ -35,18 +35,16 @@ def composition(functions: Sequence[Function], span: tuple[float, float]) -> tup
     exact = [as_polynomial(function) for function in functions]
     known = [item for item in exact if item is not None and item.degree() <= DEGREE]
     if len(known) == len(exact):
-        return np.eye(DEGREE + 1)[1], np.array([_padded(item) for item in known])
+        return np.eye(DEGREE + 1)[1], np.array([_pad(item) for item in known])
     low, high = span
     at = 0.5 * (low + high) + 0.5 * (high - low) * UNIT
-    values = np.stack([sampled(item, at) for item in functions], axis=1)
+    values = np.stack([sample_function(item, at) for item in functions], axis=1)
     # The two sides of a body have the same functions, or their negatives.
     signs = np.where(values[0] < 0.0, -1.0, 1.0)
     bent, rows = find_nearest((values * signs).tobytes())
     normal = Polynomial((-(low + high) / (high - low), 2.0 / (high - low)))
-    slides = np.array(
-        [_padded(Chebyshev(row).convert(kind=Polynomial)) for row in (rows * signs).T]
-    )
-    return REACH * _padded(Polynomial(bent)(normal)), slides / REACH ** np.arange(DEGREE + 1)
+    slides = np.array([_pad(Chebyshev(row).convert(kind=Polynomial)) for row in (rows * signs).T])
+    return REACH * _pad(Polynomial(bent)(normal)), slides / REACH ** np.arange(DEGREE + 1)
 
 
 @cache
@@ -75,5 +73,5 @@ def find_nearest(data: bytes) -> tuple[Array, Array]:
     return first(best.x), second(best.x)[0]
 
 
-def _padded(polynomial: Polynomial) -> Array:
+def _pad(polynomial: Polynomial) -> Array:
     return np.pad(polynomial.coef, (0, DEGREE + 1 - len(polynomial.coef)))

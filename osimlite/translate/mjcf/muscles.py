@@ -119,7 +119,7 @@ class Curves(NamedTuple):
 
 def muscle(draft: Draft, force: Muscle, path: str) -> str:
     """A muscle on the tendon of its path."""
-    tied = draft.tied(path)
+    tied = draft.find_tendon(path)
     cos = math.cos(force.pennation_angle_at_optimal)
     own = Curves(
         force.tendon_slack_length, force.optimal_fiber_length * cos, force.max_isometric_force * cos
@@ -143,7 +143,7 @@ def muscle(draft: Draft, force: Muscle, path: str) -> str:
         )
     except OsimliteError as error:
         raise Unsayable(f"its tension cannot be computed: {error.message}") from error
-    curves = _fitted(own, spread[0], tensions, free=fits)
+    curves = _fit_curves(own, spread[0], tensions, free=fits)
     name, limits = (
         draft.name("actuator", path),
         (max(force.min_control, 0.0), min(force.max_control, 1.0)),
@@ -213,8 +213,16 @@ without excitation: the integral of 1 / (a (0.5 + 1.5 a)).
 def _read_rates(force: Muscle) -> Rates:
     """Return the greatest velocity and the time constants of a muscle, by the law of its class."""
     if not isinstance(force, Schutte1993Muscle_Deprecated | Delp1990Muscle_Deprecated):
-        vmax, fvmax = _asked(force, "vmax", 0.0), _asked(force, "fvmax", FVMAX)
-        return Rates(vmax, fvmax, _asked(force, "rise", 0.0), _asked(force, "fall", 0.0))
+        vmax, fvmax = (
+            _read_control_range(force, "vmax", 0.0),
+            _read_control_range(force, "fvmax", FVMAX),
+        )
+        return Rates(
+            vmax,
+            fvmax,
+            _read_control_range(force, "rise", 0.0),
+            _read_control_range(force, "fall", 0.0),
+        )
     time = force.time_scale
     if not time > 0.0:
         return Rates(0.0, FVMAX, 0.0, 0.0)
@@ -249,7 +257,7 @@ def _ends_of_velocity_curve(force: Delp1990Muscle_Deprecated) -> tuple[float, fl
     return -max(idle, default=-1.0), max(max(factors), 1.0)
 
 
-def _asked(force: Muscle, name: str, default: float) -> float:
+def _read_control_range(force: Muscle, name: str, default: float) -> float:
     """What MuJoCo asks of a muscle, from the property that its class names."""
     named = ChainMap(
         *(base.__dict__["facts"].mujoco for base in type(force).__mro__ if "facts" in base.__dict__)
@@ -260,7 +268,7 @@ def _asked(force: Muscle, name: str, default: float) -> float:
         return default
 
 
-def _fitted(own: Curves, lengths: Array, tensions: Array, *, free: bool) -> Curves:
+def _fit_curves(own: Curves, lengths: Array, tensions: Array, *, free: bool) -> Curves:
     """The curves nearest to tensions (A, L) at lengths (L,), with tendon, fibers and strength too if `free`."""
     known = _counts(tensions, own)
     if not known.any():

@@ -10,14 +10,16 @@ from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.muscles import PathActuator
 from osimlite.schema.path_forces import Blankevoort1991Ligament, Ligament, PathSpring
 from osimlite.translate.fidelity import Error
-from osimlite.translate.mjcf.coordinate_forces import scaled
+from osimlite.translate.mjcf.coordinate_forces import scale_actuator
 from osimlite.translate.mjcf.draft import Draft, Tied, Unsayable, text
 from osimlite.translate.mjcf.isometric import isometric_tension
 
 
 def actuator(draft: Draft, force: PathActuator, path: str) -> str:
     """A tension in proportion to the control."""
-    made = scaled(draft, force, path, tendon=draft.tied(path).name, gear=-force.optimal_force)
+    made = scale_actuator(
+        draft, force, path, tendon=draft.find_tendon(path).name, gear=-force.optimal_force
+    )
     draft.account(path, made)
     return made
 
@@ -69,5 +71,5 @@ def _line(lengths: Array, tension: Array) -> tuple[float, float]:
 
 def _tendon(draft: Draft, path: str) -> tuple[Tied, _Element]:
     """The tendon of the path of a force, and its element."""
-    tied = draft.tied(path)
+    tied = draft.find_tendon(path)
     return tied, next(item for item in draft.section("tendon") if item.get("name") == tied.name)

@@ -20,10 +20,10 @@ from osimlite.translate.fidelity import LEFT_OUT, Error
 from osimlite.translate.mjcf.bodies import LEAST_MASS
 from osimlite.translate.mjcf.couplings import PULLED, along, helper
 from osimlite.translate.mjcf.draft import Draft, Follower, Tied, Value, add, pose, tidy
-from osimlite.translate.mjcf.fits import fitted
+from osimlite.translate.mjcf.fits import fit_tendon
 from osimlite.translate.mjcf.poses import EXACT, Poses, Truth, arm_errors, random_poses
 from osimlite.translate.mjcf.routes import Router
-from osimlite.translate.mjcf.tendons import Around, Spot, Tendon, measured
+from osimlite.translate.mjcf.tendons import Around, Spot, Tendon, measure
 
 CHOSEN, FITTED, TRIED, HELD_OUT = 100, 250, 500, 100
 """How many random poses a tendon is chosen by, or fitted to and tried in once more, and measured in."""
@@ -60,7 +60,7 @@ def add_paths(draft: Draft) -> None:
         if fits:
             # What is better only where it was fitted, snaps off elsewhere.
             judge = Router(route, other_truth[path], others, draft.options.version)
-            tendon = min(tendon, fitted(router, tendon), key=judge.error)
+            tendon = min(tendon, fit_tendon(router, tendon), key=judge.error)
         name = writer.tendon(path, tendon)
         draft.tendons[path] = Tied(
             name, default[path], truth[path].lengths, held_truth[path].lengths
@@ -75,19 +75,21 @@ def add_paths(draft: Draft) -> None:
         if any(error.max > EXACT for error in errors.values()):
             how = "the nearest tendon that its own points and surfaces make"
             done = f"{how}, fitted" if fits else how
-            draft.fidelity.add("path", own, _what(route, router), done, f"tendon {name}", errors)
+            draft.fidelity.add(
+                "path", own, _describe_inexact_parts(route, router), done, f"tendon {name}", errors
+            )
 
 
 def _errors(draft: Draft, tendon: Tendon, poses: Poses, truth: Truth) -> dict[str, Error]:
     """How far lengths and moment arms are off in poses that the tendon was not chosen by."""
-    lengths, arms = measured(tendon, poses, draft.options.version)
+    lengths, arms = measure(tendon, poses, draft.options.version)
     about = arm_errors(draft.mechanism, arms, truth)
     names = draft.mechanism.coordinate_names
     named = {f"moment arm about {names[place]}": error for place, error in about.items()}
     return {"length": Error.of(lengths - truth.lengths, "m"), **named}
 
 
-def _what(route: ThroughPoints, router: Router) -> str:
+def _describe_inexact_parts(route: ThroughPoints, router: Router) -> str:
     """What of a path MuJoCo has no exact words for."""
     kinds = {point.kind for point in route.points}
     touched = [

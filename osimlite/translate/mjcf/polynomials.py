@@ -69,7 +69,7 @@ def quartic(function: f.Function, span: tuple[float, float], unit: str) -> Fit:
     low, high = span
     middle, half = 0.5 * (high + low), 0.5 * (high - low)
     x = middle + half * np.cos(np.linspace(0.0, np.pi, _SAMPLES))
-    y = sampled(function, x)
+    y = sample_function(function, x)
     basis = np.polynomial.chebyshev.chebvander((x - middle) / half, DEGREE)
     weights, best, least = np.full(_SAMPLES, 1.0 / _SAMPLES), np.zeros(DEGREE + 1), np.inf
     for _ in range(60):
@@ -84,10 +84,12 @@ def quartic(function: f.Function, span: tuple[float, float], unit: str) -> Fit:
         weights /= weights.sum()
     fitted = Chebyshev(best, domain=[low, high]).convert(kind=Polynomial)
     even = np.linspace(low, high, _SAMPLES)
-    return Fit(tuple(fitted.coef.tolist()), Error.of(fitted(even) - sampled(function, even), unit))
+    return Fit(
+        tuple(fitted.coef.tolist()), Error.of(fitted(even) - sample_function(function, even), unit)
+    )
 
 
-def sampled(function: f.Function, x: Array) -> Array:
+def sample_function(function: f.Function, x: Array) -> Array:
     """Values of a function of one argument at many.
 
     Raises:

@@ -34,7 +34,7 @@ class Poses:
     jacobians: Array
     rates: Array  # of all coordinates (P, n, m) by these speeds
 
-    def seen_by(self, columns: Sequence[int]) -> Poses:
+    def select_coordinates(self, columns: Sequence[int]) -> Poses:
         """The same with some of the moving coordinates, by their places in `moving`."""
         own = list(columns)
         return Poses(

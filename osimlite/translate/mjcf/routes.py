@@ -20,7 +20,7 @@ from osimlite.simulation.elements.geometries.paths.geometry_path import Node, Th
 from osimlite.translate.mjcf.moving import composition
 from osimlite.translate.mjcf.poses import Places, Poses, Truth
 from osimlite.translate.mjcf.surfaces import stand_ins, z_to
-from osimlite.translate.mjcf.tendons import Around, Spot, Tendon, measured, measured_each
+from osimlite.translate.mjcf.tendons import Around, Spot, Tendon, measure, measure_each
 from osimlite.translate.mjcf.wrapping import unit
 
 DIRECTIONS = 12
@@ -60,7 +60,7 @@ class Router:
         self.route, self.truth, self.poses, self.version = (
             route,
             truth,
-            poses.seen_by(columns.tolist()),
+            poses.select_coordinates(columns.tolist()),
             version,
         )
         self.wanted = np.concatenate((truth.lengths[:, None], truth.arms[:, columns]), axis=1)
@@ -88,19 +88,19 @@ class Router:
                         [(point,), (), *self._switch(number)]
                         for point, number in zip(own, run, strict=True)
                     ]
-                    ways = [*map(_joined, product(*each)), *self._cylinder(run)]
+                    ways = [*map(_join_pieces, product(*each)), *self._cylinder(run)]
                     settle[len(slots)] = partial(_choose_of, ways)
                 slots.append(own)
                 if between := [
                     k for k, touch in enumerate(self.touches) if np.isin(touch.after, run).any()
                 ]:
-                    settle[len(slots)] = partial(self._around, between)
+                    settle[len(slots)] = partial(self._choose_obstacles, between)
                     slots.append(())
         for _ in range(2 if len(settle) > 1 else 1):
             for place, choice in settle.items():
-                parts = _joined(slots[:place]), slots[place], _joined(slots[place + 1 :])
+                parts = _join_pieces(slots[:place]), slots[place], _join_pieces(slots[place + 1 :])
                 slots[place] = choice(partial(self._least, *parts))
-        return _joined(slots)
+        return _join_pieces(slots)
 
     def _least(
         self, before: Tendon, now: Tendon, after: Tendon, options: Sequence[Tendon]
@@ -109,7 +109,7 @@ class Router:
         head, tail = before[_last_spot(before) :], after[: len(after) - _last_spot(after[::-1])]
         rest = self.residuals((*before, *now, *after)) - self._own((*head, *now, *tail))
         sound = [option for option in options if _is_tendon((*head, *option, *tail))]
-        lengths, arms = measured_each(
+        lengths, arms = measure_each(
             [(*head, *option, *tail) for option in sound], self.poses, self.version
         )
         errors = (
@@ -125,7 +125,7 @@ class Router:
 
     def _own(self, tendon: Tendon) -> Array:
         """Lengths and moment arms (P, 1 + m) of a tendon."""
-        lengths, arms = measured(tendon, self.poses, self.version)
+        lengths, arms = measure(tendon, self.poses, self.version)
         return np.concatenate((lengths[:, None], arms), axis=1)
 
     def _touch(self, number: int) -> Touch:
@@ -141,12 +141,12 @@ class Router:
         at = np.array(poses, dtype=int)
         return Touch(
             at,
-            self._in_body(body, at, np.array(first)),
-            self._in_body(body, at, np.array(second)),
+            self._express_in_body(body, at, np.array(first)),
+            self._express_in_body(body, at, np.array(second)),
             np.array(before),
         )
 
-    def _in_body(self, body: int, at: Places, places: Array) -> Array:
+    def _express_in_body(self, body: int, at: Places, places: Array) -> Array:
         """Places in ground (k, 3) in some of the poses, in the frame of a body."""
         return np.einsum(
             "pji,pj->pi",
@@ -155,14 +155,16 @@ class Router:
         )
 
     # ----------------------------------------------------------------------------------------------- options
-    def _around(self, numbers: Sequence[int], choose: Choose) -> Tendon:
+    def _choose_obstacles(self, numbers: Sequence[int], choose: Choose) -> Tendon:
         """What a tendon goes around between two points: nothing, a surface, or two with a site between them."""
         best: dict[int, Around] = {}
         options: list[Tendon]
         for number in sorted(numbers, key=lambda number: np.mean(self._turn(number, numbers))):
             options = [
                 (sided,)
-                for each in stand_ins(self.route.surfaces[number], self._touched(number))
+                for each in stand_ins(
+                    self.route.surfaces[number], self._find_tangent_points(number)
+                )
                 for sided in self._sides(number, each, DIRECTIONS)
             ]
             if not options:
@@ -172,12 +174,12 @@ class Router:
             best[number] = result
         options = [(), *((each,) for each in best.values())]
         for (one, first), (two, second) in combinations(best.items(), 2):
-            for middle in self._between(one, two):
+            for middle in self._place_sites_between(one, two):
                 sides = product(self._sides(one, first, 0), self._sides(two, second, 0))
                 options += [(sided, middle, other) for sided, other in sides]
         return choose(options)
 
-    def _touched(self, number: int) -> Array:
+    def _find_tangent_points(self, number: int) -> Array:
         """The tangent points (2 k, 3) on a surface, in its own frame."""
         touch, frame = self.touches[number], self.route.surfaces[number].tangent.frame
         return (np.concatenate((touch.first, touch.second)) - frame[:3, 3]) @ frame[:3, :3]
@@ -189,13 +191,13 @@ class Router:
         turned = around.frame[:3, :3].T @ surface.tangent.frame[:3, :3]
         axis, sign = int(surface.numbers[0]), surface.numbers[1]
         if sign:
-            yield around.sided(turned @ (sign * np.eye(3)[axis]))
+            yield around.with_side(turned @ (sign * np.eye(3)[axis]))
         middles = (0.5 * (touch.first + touch.second) - around.frame[:3, 3]) @ around.frame[:3, :3]
-        yield around.sided(unit(middles).mean(0))
+        yield around.with_side(unit(middles).mean(0))
         for turn in np.arange(directions) * (2.0 * np.pi / max(directions, 1)):
-            yield around.sided(np.array((np.cos(turn), np.sin(turn), 0.0)))
+            yield around.with_side(np.array((np.cos(turn), np.sin(turn), 0.0)))
         if directions and around.kind == "sphere":
-            yield from (around.sided(np.array((0.0, 0.0, end))) for end in (1.0, -1.0))
+            yield from (around.with_side(np.array((0.0, 0.0, end))) for end in (1.0, -1.0))
 
     def _turn(self, number: int, numbers: Sequence[int]) -> list[int]:
         """Where a surface stands in the order of those that the path touches, in each pose."""
@@ -206,7 +208,7 @@ class Router:
             result.append([k for k in dict.fromkeys(order) if k in numbers].index(number))
         return result
 
-    def _between(self, one: int, two: int) -> Iterator[Spot]:
+    def _place_sites_between(self, one: int, two: int) -> Iterator[Spot]:
         """Sites between two surfaces: in the body of either, halfway between the points where they are touched."""
         first, second = self.touches[one], self.touches[two]
         both, at_one, at_two = np.intersect1d(first.poses, second.poses, return_indices=True)
@@ -216,7 +218,7 @@ class Router:
         leaves = self.poses.points_at(bodies[0], first.second[at_one], both)
         enters = self.poses.points_at(bodies[1], second.first[at_two], both)
         for body in dict.fromkeys(bodies):
-            yield Spot(body, self._in_body(body, both, 0.5 * (leaves + enters)).mean(0))
+            yield Spot(body, self._express_in_body(body, both, 0.5 * (leaves + enters)).mean(0))
 
     def _switch(self, number: int) -> Iterator[Tendon]:
         """A speck that the path runs through while its side site is inside, which is while the coordinate is in range.
@@ -234,7 +236,10 @@ class Router:
                 continue
             at = spot(self.route.points[other])
             there = self.poses.points(at.body, at.place)
-            toward = self._in_body(point.body, np.arange(len(there)), there).mean(0) - point.place
+            toward = (
+                self._express_in_body(point.body, np.arange(len(there)), there).mean(0)
+                - point.place
+            )
             if not toward.any():
                 continue
             direction = toward / np.linalg.norm(toward)
@@ -295,7 +300,9 @@ class Router:
                     body, placed, "cylinder", radius, length=4.0 * radius, name=points[0].name
                 )
                 for turn in np.linspace(-1.0, 1.0, 5):
-                    yield (around.sided(rotation_about(np.array((0.0, 0.0, 1.0)), turn) @ -into),)
+                    yield (
+                        around.with_side(rotation_about(np.array((0.0, 0.0, 1.0)), turn) @ -into),
+                    )
 
 
 def spot(point: Node) -> Spot:
@@ -326,5 +333,5 @@ def _last_spot(tendon: Tendon) -> int:
     return max((index for index, part in enumerate(tendon) if isinstance(part, Spot)), default=0)
 
 
-def _joined(slots: Sequence[Tendon]) -> Tendon:
+def _join_pieces(slots: Sequence[Tendon]) -> Tendon:
     return tuple(chain.from_iterable(slots))

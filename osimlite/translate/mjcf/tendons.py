@@ -44,7 +44,7 @@ class Around:
     length: float = 0.0  # of the cylinder as it is drawn, m
     name: str = ""  # of the wrap object; empty for one that OpenSim does not know
 
-    def sided(self, direction: Array | None) -> Around:
+    def with_side(self, direction: Array | None) -> Around:
         """The same with the side site in a direction (3,), in the frame of the surface, well outside; or without."""
         if direction is None or not direction.any():
             return replace(self, side=None)
@@ -54,7 +54,7 @@ class Around:
         )
         return replace(self, side=Spot(self.body, place))
 
-    def moved(self, frame: Array, radius: float) -> Around:
+    def move_to(self, frame: Array, radius: float) -> Around:
         """The same elsewhere (4, 4) and of another radius (m), with the side site where it is as seen from there."""
         if self.side is None:
             return replace(self, frame=frame, radius=radius)
@@ -68,7 +68,7 @@ class Around:
 Tendon = tuple[Spot | Around, ...]
 
 
-def measured(tendon: Tendon, poses: Poses, version: int) -> tuple[Array, Array]:
+def measure(tendon: Tendon, poses: Poses, version: int) -> tuple[Array, Array]:
     """Lengths (P,) of a tendon (m) and its moment arms (P, m), as MuJoCo computes them.
 
     Args:
@@ -76,11 +76,11 @@ def measured(tendon: Tendon, poses: Poses, version: int) -> tuple[Array, Array]:
         poses: P poses of m coordinates that move.
         version: of MuJoCo, 3 or 4.
     """
-    lengths, arms = measured_each((tendon,), poses, version)
+    lengths, arms = measure_each((tendon,), poses, version)
     return lengths[0], arms[0]
 
 
-def measured_each(tendons: Sequence[Tendon], poses: Poses, version: int) -> tuple[Array, Array]:
+def measure_each(tendons: Sequence[Tendon], poses: Poses, version: int) -> tuple[Array, Array]:
     """The same of T tendons, (T, P) and (T, P, m): what they do between the same two sites is computed at once."""
     lengths = np.zeros((len(tendons), len(poses.q)))
     arms = np.zeros((*lengths.shape, len(poses.moving)))
@@ -110,7 +110,7 @@ def _section(
     Surfaces that differ in their side sites only are computed once, in each way that the tendon can
     go around them.
     """
-    one, two = (_placed(spot, poses)[None] for spot in (first, second))
+    one, two = (_place_site(spot, poses)[None] for spot in (first, second))
     way, back = two - one, one - two
     lengths, arms = np.zeros(()), np.zeros(())
     chosen: Any = ...
@@ -138,10 +138,12 @@ def _section(
         way, back = leaves - one, returns - two
         lengths = np.where(touches, result.length.reshape(touches.shape) + norm(back), 0.0)
         for place, pull in ((leaves, way), (returns, back)):
-            arms = arms - _worked(body, place, np.where(touches[..., None], unit(pull), 0.0), poses)
+            arms = arms - _compute_work(
+                body, place, np.where(touches[..., None], unit(pull), 0.0), poses
+            )
         chosen = result.choice * len(frames) + owners[:, None], np.arange(len(poses.q))
     for spot, place, pull in ((first, one, unit(way)), (second, two, unit(back))):
-        arms = arms + _worked(spot.body, place, pull, poses)
+        arms = arms + _compute_work(spot.body, place, pull, poses)
         if spot.slides is not None:
             arms = arms + _slid(spot, pull, poses)
     return (lengths + norm(way))[chosen], arms[chosen]
@@ -159,7 +161,7 @@ def sections(tendon: Tendon) -> Iterator[tuple[Spot, Around | None, Spot]]:
             last, around = part, None
 
 
-def _placed(spot: Spot, poses: Poses) -> Array:
+def _place_site(spot: Spot, poses: Poses) -> Array:
     """Where a site is in ground (P, 3)."""
     if spot.slides is None:
         return poses.points(spot.body, spot.place)
@@ -172,10 +174,10 @@ def _station(spot: Spot, body: int, poses: Poses) -> Array:
     """Where a site is in a body: (1, 3) if it is fixed there, else (P, 3)."""
     if spot.body == body and spot.slides is None:
         return spot.place[None]
-    return poses.stations(body, _placed(spot, poses))
+    return poses.stations(body, _place_site(spot, poses))
 
 
-def _worked(body: int, places: Array, force: Array, poses: Poses) -> Array:
+def _compute_work(body: int, places: Array, force: Array, poses: Poses) -> Array:
     """What forces (k, P, 3) on a body at places in ground do at the moving coordinates (k, P, m)."""
     moments = np.cross(places - poses.origins[body], force)
     return each_pose(np.concatenate((moments, force), axis=-1), poses.jacobians[body])

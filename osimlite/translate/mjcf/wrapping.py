@@ -70,7 +70,7 @@ def bend(
         version: of MuJoCo, 3 or 4.
     """
     across = None if kind == "cylinder" else _plane(first, second)
-    p, q = _in(across, first), _in(across, second)
+    p, q = _project_to_plane(across, first), _project_to_plane(across, second)
     reach_p, reach_q = _reach(p, radius), _reach(q, radius)
     between = _angle(p, q)
     signs = (
@@ -83,18 +83,21 @@ def bend(
     least = reach_p + reach_q if version < 4 and sides is not None else -ROUNDING
     winding = np.abs(signs) * (np.mod(signs * between - least, 2.0 * np.pi) + least)
     arc = radius * (winding - reach_p - reach_q)
-    at_p, at_q = _turned(p, signs * reach_p, radius), _turned(q, -signs * reach_q, radius)
+    at_p, at_q = (
+        _turn_on_circle(p, signs * reach_p, radius),
+        _turn_on_circle(q, -signs * reach_q, radius),
+    )
     outside = (norm(p) >= radius) & (norm(q) >= radius)
     touches = outside & (arc > 0.0)
     choice = np.zeros((len(owners), len(p[0])), dtype=int)
     if sides is not None:
-        toward = _in(None if across is None else across[owners], sides)
+        toward = _project_to_plane(None if across is None else across[owners], sides)
         if version >= 4:
             choice = np.where(_angle(p[owners], toward) + _angle(toward, q[owners]) < 0.0, 2, 1)
         else:
             choice = _side(p, q, radius, at_p[1:], at_q[1:], toward, owners)
         if (inside := norm(sides) < radius[owners]).any():
-            through, at = _through(p, q, radius)
+            through, at = _find_passage(p, q, radius)
             touches, arc = np.stack((*touches, outside & through)), np.stack((*arc, 0.0 * between))
             at_p, at_q = np.stack((*at_p, at)), np.stack((*at_q, at))
             choice = np.where(inside, 3, choice)
@@ -134,12 +137,12 @@ def _side(
     nearest = p + part[..., None] * way
     straight = (norm(nearest) > radius)[owners] & (_dot(side, nearest[owners]) >= 0.0)
     middle = unit(at_p + at_q)
-    crossed: Mask = _cut(p, at_p, q, at_q)
+    crossed: Mask = _lines_cross(p, at_p, q, at_q)
     good = np.where(crossed[:, owners], -np.inf, _dot(middle[:, owners], side))
     return np.where(straight | np.all(crossed, axis=0)[owners], 0, 1 + good.argmax(0))
 
 
-def _through(p: Array, q: Array, radius: Array) -> tuple[Mask, Array]:
+def _find_passage(p: Array, q: Array, radius: Array) -> tuple[Mask, Array]:
     """Whether the way through a circle is not straight (P,), and the point of the circle (P, 2) that it then has.
 
     Both lines to that point have the same angle with the radius there.
@@ -152,15 +155,15 @@ def _through(p: Array, q: Array, radius: Array) -> tuple[Mask, Array]:
     low, high = np.zeros(between.shape), np.ones(between.shape)
     for _ in range(50):
         middle = 0.5 * (low + high)
-        at = _turned(p, middle * between, radius)
+        at = _turn_on_circle(p, middle * between, radius)
         slope = sum(
             _cross(at, at - end) / np.maximum(norm(at - end), TINY) for end in (p, q)
         ) * np.sign(between)
         low, high = np.where(slope < 0.0, middle, low), np.where(slope < 0.0, high, middle)
-    return passes, _turned(p, 0.5 * (low + high) * between, radius)
+    return passes, _turn_on_circle(p, 0.5 * (low + high) * between, radius)
 
 
-def _cut(p: Array, one: Array, q: Array, two: Array) -> Mask:
+def _lines_cross(p: Array, one: Array, q: Array, two: Array) -> Mask:
     """Whether the line from p to one and that from q to two have a point in common (...)."""
     way, other, apart = one - p, two - q, q - p
     across = _cross(way, other)
@@ -181,7 +184,7 @@ def _plane(first: Array, second: Array) -> Array:
     return np.stack((along, np.cross(normal, along)), axis=-2)
 
 
-def _in(across: Array | None, points: Array) -> Array:
+def _project_to_plane(across: Array | None, points: Array) -> Array:
     """Points (..., 3) in the plane (..., 2): that of two vectors (..., 2, 3), or the one normal to z."""
     return points[..., :2] if across is None else np.einsum("...ij,...j->...i", across, points)
 
@@ -214,7 +217,7 @@ def _reach(p: Array, radius: Array) -> Array:
     return np.arccos(np.clip(radius / np.maximum(norm(p), TINY), 0.0, 1.0))
 
 
-def _turned(p: Array, angle: Array, radius: Array) -> Array:
+def _turn_on_circle(p: Array, angle: Array, radius: Array) -> Array:
     """On the circle, in the direction of a point turned by an angle (..., 2)."""
     direction = np.arctan2(p[..., 1], p[..., 0]) + angle
     return np.stack((radius * np.cos(direction), radius * np.sin(direction)), axis=-1)

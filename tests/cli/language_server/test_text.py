@@ -35,7 +35,7 @@ def test_a_change_is_the_same_as_a_cut(
     start, end = sorted(data.draw(st.tuples(*[st.integers(0, len(content))] * 2)))
     place = text.range(start, end)
     start, end = text.offset(place.start), text.offset(place.end)
-    changed = text.changed(types.TextDocumentContentChangePartial(place, new))
+    changed = text.apply_change(types.TextDocumentContentChangePartial(place, new))
     assert changed.content == content[:start] + new + content[end:]
 
 
@@ -50,4 +50,4 @@ def test_units() -> None:
 
 
 def test_a_whole_text_is_put_in_its_place() -> None:
-    assert Text("a").changed(types.TextDocumentContentChangeWholeDocument("b")).content == "b"
+    assert Text("a").apply_change(types.TextDocumentContentChangeWholeDocument("b")).content == "b"

@@ -17,7 +17,7 @@ from osimlite.simulation import Simulation
 from osimlite.studies.gait.basin import find_basin, sample_perturbed_starts, walks_from
 from osimlite.studies.gait.cycle import find_cycle, step_matrix
 from osimlite.studies.gait.stepmap import StepMap
-from osimlite.studies.gait.steps import along_slope, walk_many
+from osimlite.studies.gait.steps import measure_along_slope, walk_many
 
 
 @pytest.fixture(scope="module")
@@ -101,7 +101,7 @@ def test_moving_down_the_slope_moves_the_image(steady):
 
 def test_the_section_is_a_heel_strike(steady):
     image = step_map_image(steady)
-    _, depths = along_slope(steady.engine, image[None])
+    _, depths = measure_along_slope(steady.engine, image[None])
     assert depths[0, steady.engine.contacts.index("RFootForce")] == pytest.approx(0.0, abs=1e-12)
 
 
@@ -128,7 +128,7 @@ def test_perturbed_starts_stand_as_deep_as_before(steady):
     )
     place = steady.engine.contacts.index("RFootForce")
     before, after = (
-        along_slope(steady.engine, np.atleast_2d(rows))[1][:, place]
+        measure_along_slope(steady.engine, np.atleast_2d(rows))[1][:, place]
         for rows in (steady.start, starts)
     )
     assert after == pytest.approx(np.full(8, before[0]), abs=1e-9)

@@ -14,7 +14,7 @@ from osimlite.studies.gait.starts import (
     move_along_neutral_directions,
     plant_feet,
 )
-from osimlite.studies.gait.steps import along_slope
+from osimlite.studies.gait.steps import measure_along_slope
 
 
 @pytest.fixture(scope="module")
@@ -51,7 +51,7 @@ def test_a_planted_foot_touches_and_rests(walker, states, slope):
     placed = plant_feet(walker, footing, states, numbers=numbers)
     feet = [walker.contacts.index(foot[0]) for foot in footing.feet]
     which = None if numbers is None else rows
-    depths = along_slope(walker, placed, numbers, which)[1][:, feet]
+    depths = measure_along_slope(walker, placed, numbers, which)[1][:, feet]
     assert np.abs(depths.max(axis=1)).max() < 1e-12
     n, dt = len(walker.order), 1e-6
     later = placed.copy()
@@ -71,7 +71,9 @@ def test_one_foot_is_put_as_deep_as_it_is_wanted(walker, states):
     footing = find_footing(walker)
     for foot in (0, 1):
         placed = lift_to_depth(walker, footing, states, 0.002, foot)
-        depths = along_slope(walker, placed)[1][:, walker.contacts.index(footing.feet[foot][0])]
+        depths = measure_along_slope(walker, placed)[1][
+            :, walker.contacts.index(footing.feet[foot][0])
+        ]
         assert depths == pytest.approx(0.002, abs=1e-12)
 
 

@@ -13,7 +13,7 @@ from osimlite.simulation import Simulation
 from osimlite.simulation.run import simulate
 from osimlite.studies.gait import steps
 from osimlite.studies.gait.foot_contacts import FootContacts, find_footing
-from osimlite.studies.gait.steps import Walk, along_slope, walk_many
+from osimlite.studies.gait.steps import Walk, measure_along_slope, walk_many
 
 FEET = (("RFootForce",), ("LFootForce",))
 
@@ -85,7 +85,7 @@ def test_places_along_the_slope(engine):
     other = one.copy()
     place = engine.order.index(engine.mechanism.coordinate_index("Pelvis_tx"))
     other[place] += 0.25
-    along, depth = along_slope(engine, np.array([one, other]))
+    along, depth = measure_along_slope(engine, np.array([one, other]))
     angle = np.pi / 2 - 1.57  # the exercise's plane is that much off the platform
     assert along[1] - along[0] == pytest.approx(np.full(6, 0.25 * np.cos(angle)), abs=1e-12)
     assert depth[1] - depth[0] == pytest.approx(np.full(6, 0.25 * np.sin(angle)), abs=1e-12)

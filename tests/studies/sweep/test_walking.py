@@ -14,7 +14,7 @@ from osimlite.simulation import Simulation
 from osimlite.studies.gait.foot_contacts import find_footing
 from osimlite.studies.gait.measures import PRESSED
 from osimlite.studies.gait.starts import plant_feet
-from osimlite.studies.gait.steps import along_slope, walk_many
+from osimlite.studies.gait.steps import measure_along_slope, walk_many
 from osimlite.studies.sweep.measures import measure
 from osimlite.studies.sweep.optimize import Objective, optimize
 from osimlite.studies.sweep.plan import plan
@@ -86,7 +86,7 @@ def test_a_planted_walker_stands_at_rest(walker):
     n, which = len(engine.order), np.arange(len(rows))
 
     def of_feet(states):
-        along, depths = along_slope(engine, states)
+        along, depths = measure_along_slope(engine, states)
         return along[:, feet], depths[:, feet]
 
     along, depths = of_feet(starts)

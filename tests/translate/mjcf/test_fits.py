@@ -13,7 +13,7 @@ from osimlite.schema.model import Model
 from osimlite.schema.muscles import PathActuator
 from osimlite.schema.paths import GeometryPath, PathPoint, PathWrap
 from osimlite.schema.wrapping import WrapCylinder, WrapEllipsoid, WrapTorus
-from osimlite.translate.mjcf.fits import fitted
+from osimlite.translate.mjcf.fits import fit_tendon
 from osimlite.translate.mjcf.moving import composition
 from osimlite.translate.mjcf.poses import random_poses
 from osimlite.translate.mjcf.routes import Router
@@ -83,7 +83,7 @@ def test_what_mujoco_has_not_is_near_and_nearer_if_fitted(surface, chosen, after
     tendon = way.best()
     before = way.error(tendon)
     assert before < chosen
-    assert way.error(fitted(way, tendon)) < min(after, 0.9 * before)
+    assert way.error(fit_tendon(way, tendon)) < min(after, 0.9 * before)
 
 
 def test_a_quartic_of_a_quartic():

@@ -154,7 +154,7 @@ class ExpressionWriter:
         code = self.code(node)
         return code.text if code.precedence >= least else f"({code.text})"
 
-    def guarded(self, write: Callable[..., str], *arguments: Any) -> str:
+    def guard_expression(self, write: Callable[..., str], *arguments: Any) -> str:
         """Return the text of an expression that is not always evaluated; its variables are defined within it.
 
         Args:
@@ -169,7 +169,9 @@ class ExpressionWriter:
             self.pending = before
         return f"[&] {{ {' '.join(inner)} return {text}; }}()" if inner else text
 
-    def ordered(self, nodes: Sequence[ast.expr], write: Callable[[ast.expr], str]) -> list[str]:
+    def order_operands(
+        self, nodes: Sequence[ast.expr], write: Callable[[ast.expr], str]
+    ) -> list[str]:
         """Return the texts of operands that C++ may evaluate in any order."""
         if len(nodes) < 2 or not self.function.effects & WRITES:
             return [write(node) for node in nodes]
@@ -243,7 +245,9 @@ class ExpressionWriter:
                 isinstance(part, ast.Starred) for part in node.elts
             ):
                 wanted = dict(zip(node.elts, want.parts, strict=True))
-                texts = self.ordered(node.elts, lambda part: self.text_as(part, wanted[part]))
+                texts = self.order_operands(
+                    node.elts, lambda part: self.text_as(part, wanted[part])
+                )
                 kinds = [
                     self.function.require_type(part) if is_number(own) else own
                     for part, own in wanted.items()
@@ -262,7 +266,10 @@ class ExpressionWriter:
                 sign, precedence = ("&&", AND) if isinstance(op, ast.And) else ("||", OR)
                 first, *others = values
                 texts = [self._condition_part(first, precedence)]
-                texts += [self.guarded(self._condition_part, value, precedence) for value in others]
+                texts += [
+                    self.guard_expression(self._condition_part, value, precedence)
+                    for value in others
+                ]
                 return Code(f" {sign} ".join(texts), precedence)
             case ast.UnaryOp(op=ast.Not(), operand=operand):
                 code = self.condition(operand)
@@ -308,7 +315,7 @@ class ExpressionWriter:
                 sign = {ast.USub: "-", ast.UAdd: "+", ast.Invert: "~"}[type(op)]
                 return Code(f"{sign}{self.text(operand, PRIMARY)}", UNARY)
             case ast.BinOp(left=left, op=op, right=right):
-                texts = self.ordered(
+                texts = self.order_operands(
                     [left, right], lambda part: self._operand(part, op, part is right)
                 )
                 return self.operation(
@@ -321,7 +328,7 @@ class ExpressionWriter:
             case ast.IfExp():
                 return self.choose(node, self.function.require_type(node))
             case ast.Call(func=function, args=arguments):
-                return self.call(node, self.function.called(function), arguments)
+                return self.call(node, self.function.resolve_call(function), arguments)
         raise self.function.refuse(node)
 
     @staticmethod
@@ -349,7 +356,7 @@ class ExpressionWriter:
         """Return the text of an item of a vector or a tuple."""
         kind = self.function.require_type(owner)
         if isinstance(kind, Pointer):
-            texts = self.ordered(
+            texts = self.order_operands(
                 [owner, index], lambda part: self.text(part, PRIMARY if part is owner else CHOICE)
             )
             return Code(f"{texts[0]}[{texts[1]}]")
@@ -357,7 +364,7 @@ class ExpressionWriter:
         constant = self.function.constant_index(index)
         if constant is not None:
             return Code(self.item(self.text(owner, PRIMARY), kind, constant))
-        texts = self.ordered(
+        texts = self.order_operands(
             [owner, index], lambda part: self.text(part, PRIMARY if part is owner else CHOICE)
         )
         # A variable index counts from the start: a test whether it is negative costs more than the
@@ -430,7 +437,7 @@ class ExpressionWriter:
             self.text(first) if isinstance(first, ast.Name) else self.hold(have, self.text(first))
         )
         own = self.cast(name, have, kind)
-        rest = self.guarded(self._decide, op, others, kind)
+        rest = self.guard_expression(self._decide, op, others, kind)
         test = name if have is BOOLEAN else f"{name} != 0"
         return (
             f"({test} ? {rest} : {own})"
@@ -445,13 +452,13 @@ class ExpressionWriter:
         operands = [node.left, *node.comparators]
         if any(self.function.effects_of(operand) & WRITES for operand in operands[2:-1]):
             raise self.function.refuse(node, "an operand that writes memory is compared twice")
-        texts = self.ordered(operands[:2], self._comparand)
+        texts = self.order_operands(operands[:2], self._comparand)
         for operand in operands[2:]:
             before = operands[len(texts) - 1]
             if not is_simple(before):
                 # It is compared twice and evaluated once.
                 texts[-1] = self.hold(self.function.require_type(before), texts[-1])
-            texts.append(self.guarded(self._comparand, operand))
+            texts.append(self.guard_expression(self._comparand, operand))
         signs = [COMPARISONS[type(op)][0] for op in node.ops]
         parts = [f"{a} {sign} {b}" for a, sign, b in zip(texts[:-1], signs, texts[1:], strict=True)]
         return Code(
@@ -470,7 +477,8 @@ class ExpressionWriter:
         if not is_simple(node.left):
             text = self.hold(self.function.require_type(node.left), text)
         tests = [
-            f"{text} == {self.guarded(self._comparand, item)}" for item in node.comparators[0].elts
+            f"{text} == {self.guard_expression(self._comparand, item)}"
+            for item in node.comparators[0].elts
         ]
         inner = f"({' || '.join(tests) or 'false'})"
         return Code(inner) if isinstance(node.ops[0], ast.In) else Code(f"!{inner}", UNARY)
@@ -485,7 +493,7 @@ class ExpressionWriter:
         test = self.condition(node.test)
         question = test.text if test.precedence > CHOICE else f"({test.text})"
         first, second = (
-            self.guarded(self._chosen, part, kind) for part in (node.body, node.orelse)
+            self.guard_expression(self._chosen, part, kind) for part in (node.body, node.orelse)
         )
         return Code(f"{question} ? {first} : {second}", CHOICE)
 
@@ -515,7 +523,7 @@ class ExpressionWriter:
 
         texts: list[str] = []
         kinds: list[Type] = []
-        for node, text in zip(nodes, self.ordered(nodes, write), strict=True):
+        for node, text in zip(nodes, self.order_operands(nodes, write), strict=True):
             if isinstance(node, ast.Starred):
                 kind = self.function.require_type(node.value)
                 assert isinstance(kind, Tuple)

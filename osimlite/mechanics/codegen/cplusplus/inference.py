@@ -260,7 +260,7 @@ class Specialisation(Kernel):
                 self._check_number(test)
                 return self._join(node, self.type_of(body), self.type_of(other))
             case ast.Call(func=function, args=arguments, keywords=[]):
-                return self._type_of_call(node, self.called(function), arguments)
+                return self._type_of_call(node, self.resolve_call(function), arguments)
         raise self.refuse(node)
 
     def _check_number(self, node: ast.expr) -> Type | None:
@@ -378,7 +378,7 @@ class Specialisation(Kernel):
         scope = self.function.__globals__
         return scope[node.id] if node.id in scope else getattr(builtins, node.id, None)
 
-    def called(self, node: ast.expr) -> Any:
+    def resolve_call(self, node: ast.expr) -> Any:
         """Return the function that a call names, which may be one that was passed as an argument."""
         if isinstance(node, ast.Name) and isinstance(kind := self.variables.get(node.id), Callee):
             return kind.function
@@ -461,7 +461,7 @@ class Specialisation(Kernel):
         if isinstance(node, ast.Subscript):
             return READS if isinstance(self.type_of(node.value), Pointer) else 0
         if isinstance(node, ast.Call):
-            function = self.called(node.func)
+            function = self.resolve_call(node.func)
             if (intrinsic := self.intrinsic(function)) is not None:
                 return READS | WRITES if intrinsic.has_effects else 0
             kinds = self.infer_types(node.args)

@@ -115,7 +115,7 @@ class FunctionWriter(ExpressionWriter):
                 return self.branch(node)
             case ast.While():
                 return [
-                    f"while ({self.guarded(self._condition_of, node)}) {{",
+                    f"while ({self.guard_expression(self._condition_of, node)}) {{",
                     *self.inner_block(node.body),
                     "}",
                 ]
@@ -132,7 +132,7 @@ class FunctionWriter(ExpressionWriter):
         lines = [f"if ({self._condition_of(node)}) {{", *self.inner_block(node.body)]
         others = node.orelse
         while len(others) == 1 and isinstance(after := others[0], ast.If):
-            condition = self.guarded(self._condition_of, after)
+            condition = self.guard_expression(self._condition_of, after)
             lines += [f"}} else if ({condition}) {{  // {describe_statement(after, 'elif')}"]
             lines += self.inner_block(after.body)
             others = after.orelse
@@ -159,7 +159,7 @@ class FunctionWriter(ExpressionWriter):
         else:
             assert isinstance(iterated, ast.Tuple)
             kind = self._variable_type(name, iterated)
-            items = self.ordered(iterated.elts, self.text)
+            items = self.order_operands(iterated.elts, self.text)
             parts = [
                 self.cast(text, self.function.require_type(part), kind)
                 for text, part in zip(items, iterated.elts, strict=True)
@@ -178,7 +178,7 @@ class FunctionWriter(ExpressionWriter):
         return kind
 
     def _range_head(self, counter: str, bounds: Sequence[ast.expr], node: ast.expr) -> str:
-        texts = self.ordered(bounds, self.text)
+        texts = self.order_operands(bounds, self.text)
         first, stop, step = ["0", *texts, "1"] if len(texts) == 1 else [*texts, "1"][:3]
         ends = ""
         stop_node = bounds[0] if len(bounds) == 1 else bounds[1]

@@ -69,7 +69,10 @@ def bond(constraint: Constraint, state: Moved) -> Bond:
             return Bond(errors, (along @ arm.jacobian)[None], np.zeros(1), drift)
         case b.PointOnLineConstraint():
             arm = station(state, constraint.follower).minus(station(state, constraint.line))
-            axes = (direction(state, constraint.line.body, axis) for axis in constraint.across())
+            axes = (
+                direction(state, constraint.line.body, axis)
+                for axis in constraint.find_normal_directions()
+            )
             return joined(*(product(axis, arm) for axis in axes))
         case b.WeldConstraint():
             (one, inner), (two, outer) = constraint.first, constraint.second
