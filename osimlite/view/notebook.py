@@ -67,8 +67,8 @@ def model(item: Model) -> str:
     head = f"<b>{escape(item.name) or 'a model'}</b>: {format_count(len(own), 'component')}"
     inner = "".join(map(branch, below.get(id(item), [])))
     hidden = _describe_hidden_rows(len(own), MOST_COMPONENTS)
-    tree = f"<details><summary>{head}</summary>{inner}{hidden}</details>"
-    return tree + _embed_viewer(item)
+    html = f"<details><summary>{head}</summary>{inner}{hidden}</details>"
+    return html + _embed_viewer(item)
 
 
 def trajectory(item: Trajectory) -> str:
