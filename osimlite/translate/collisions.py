@@ -90,7 +90,7 @@ def _shape(
             )
             return Box(SLAB), here
         case ContactEllipsoid() if min(geometry.radii) > 0.0:
-            file = mesh_files.stretched("ellipsoid", make_ball(), geometry.radii)
+            file = mesh_files.name_of_stretched("ellipsoid", make_ball(), geometry.radii)
             told("an ellipsoid, and its material", "a collision shape in a mesh file", file)
             return MeshFile(file), here
         case ContactMesh():

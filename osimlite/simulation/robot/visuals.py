@@ -138,7 +138,7 @@ class _Collector:
                     return None
                 if a == b == c:
                     return Ball(a), here
-                file = self.mesh_files.stretched("ellipsoid", make_ball(), (a, b, c))
+                file = self.mesh_files.name_of_stretched("ellipsoid", make_ball(), (a, b, c))
                 note(
                     "ellipsoid",
                     path,
@@ -158,7 +158,7 @@ class _Collector:
                     return None
                 if a == b:
                     return Tube(a, length), _Y_TO_Z
-                file = self.mesh_files.stretched(
+                file = self.mesh_files.name_of_stretched(
                     "elliptic_cylinder", make_cylinder(), (a, b, length)
                 )
                 note(
