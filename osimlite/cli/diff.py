@@ -59,7 +59,9 @@ def diff(
     else:
         read = [None if str(file) == "/dev/null" else read_any(file) for file in (old, new)]
         kind = next((type(top) for top in read if top is not None), Model)
-        lines = describe_differences(find_differences(*(kind() if top is None else top for top in read)))
+        lines = describe_differences(
+            find_differences(*(kind() if top is None else top for top in read))
+        )
     if git:
         say(f"--- {title}")
         say(f"+++ {title}")
