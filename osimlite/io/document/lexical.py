@@ -160,7 +160,7 @@ def make_converter(kind: Kind) -> Callable[[str], Any]:
 
 
 def reads_as(raw: str, kind: Kind, value: Any) -> bool:
-    """Whether the text of a property of this kind is plainly a value."""
+    """Return whether the text of a property of this kind is plainly a value."""
     try:
         return bool(make_converter(kind)(raw) == value)
     except UncleanText:
@@ -287,7 +287,7 @@ def _make_legacy_converter(read: Callable[[str], Any]) -> Callable[[str], Any]:
 
 
 def format_shortest(value: float) -> str:
-    """The shortest decimal that reads back equal, in OpenSim's spelling of what is not finite."""
+    """Return the shortest decimal that reads back equal, with OpenSim's spelling of NaN and Inf."""
     if value == value and value not in (math.inf, -math.inf):
         words = repr(value)
         return words[:-2] if words.endswith(".0") else words

@@ -29,17 +29,17 @@ _HIDING = ((b"<!--", b"-->"), (b"<![CDATA[", b"]]>"))
 
 
 def as_parsed(name: str) -> str:
-    """A name as it is in the element tree."""
+    """Return a name as it is in the element tree."""
     return name.replace(":", _COLON)
 
 
 def as_written(name: str) -> str:
-    """A name of the element tree, or words of the parser about one, as it is in the text."""
+    """Return a name of the element tree, or a message of the parser with one, as it is in the text."""
     return name.replace(_COLON, ":").replace(_XMLNS, "xmlns")
 
 
 def replace_colons(data: bytes) -> bytes:
-    """UTF-8 text in which no name has a colon; every character keeps its line and column."""
+    """Replace colons in the names of a UTF-8 text; every character keeps its line and column."""
     pieces, done = [], 0
     hidden: list[tuple[int, int]] | None = None
     result = [match.span() for match in _COLONS.finditer(data)]
@@ -61,7 +61,7 @@ def replace_colons(data: bytes) -> bytes:
 
 
 def _find_hidden_text(data: bytes) -> list[tuple[int, int]]:
-    """Where text stands that may look like a tag and is none, in order."""
+    """Return start and end of all comments and CDATA sections, in order."""
     result = []
     for opening, ending in _HIDING:
         place = data.find(opening)

@@ -249,7 +249,7 @@ def _find_silent_properties(cls: type[Object]) -> frozenset[str]:
 
 
 def has_content(value: Any, spec: FieldSpec | None = None) -> bool:
-    """Whether an object or list that no one assigned holds something all the same; the object by its property."""
+    """Return whether an object or list that was not assigned has content to print."""
     if isinstance(value, list):
         return bool(value)
     if not isinstance(value, Object):

@@ -433,7 +433,7 @@ def _with_suggestion(fault: DocumentError, meant: str | None) -> DocumentError:
 
 
 def _guess_root(tag: str, root: etree._Element) -> str | None:
-    """What a root should be called: as that of a document, or as the class of a setup of old releases."""
+    """Return the likely name of a root: that of a document, or the class of an old setup."""
     name = tag.rpartition(":")[2]
     first = _find_first_element(root)
     held = (

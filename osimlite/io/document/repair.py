@@ -118,7 +118,11 @@ def find_elements_at(source: Source, offsets: Sequence[int]) -> Iterator[int]:
 
 
 def repair_text(text: str) -> tuple[str, list[Repair]]:
-    """The text with everything mended whose meaning is certain, and what was mended."""
+    """Repair the syntax errors of a text whose meaning is certain.
+
+    Returns:
+        The repaired text, and the repairs.
+    """
     repairs: list[Repair] = []
     for match in _BLANK_CONTROLS.finditer(text):
         repairs.append(Repair("control-character", match.start(), f"\\x{ord(match[0]):02x}", " "))
@@ -167,7 +171,7 @@ def repair_text(text: str) -> tuple[str, list[Repair]]:
 
 
 def _find_unended(text: str) -> int | None:
-    """Where a comment or its like begins that never ends."""
+    """Return the offset of a comment, CDATA section or instruction without an end."""
     place = 0
     for _, _, end, _ in find_markup(text, as_opensim=True):
         place = end
@@ -176,12 +180,12 @@ def _find_unended(text: str) -> int | None:
 
 
 def _replace_by_blanks(text: str) -> str:
-    """As many spaces, the line ends kept."""
+    """Return a text with every character but line ends replaced by a blank."""
     return re.sub(r"[^\r\n]", " ", text)
 
 
 def _repair_outside(text: str, offset: int, repairs: list[Repair]) -> str:
-    """Text before or after the root: it belongs to nothing."""
+    """Remove text before or after the root element."""
     before, nul, _ = text.partition("\0")
     if offset and nul and not before.strip():
         repairs.append(Repair("overlooked", offset + len(before), nul, "OpenSim reads no further"))
@@ -204,7 +208,7 @@ def _repair_outside(text: str, offset: int, repairs: list[Repair]) -> str:
 
 
 def _repair_comment(piece: str, offset: int, repairs: list[Repair]) -> str:
-    """A comment may not have two hyphens in a row, nor end with one: dashes look the same."""
+    """Replace hyphens that a comment must not have by dashes."""
     inner = piece[4:-3]
     result = _HYPHENS.search(inner)
     if result is None:
@@ -218,21 +222,21 @@ def _repair_comment(piece: str, offset: int, repairs: list[Repair]) -> str:
 
 
 def _repair_attributes(piece: str, offset: int, repairs: list[Repair]) -> str:
-    """Of an attribute that stands twice the last one counts, as for OpenSim."""
-    given = list(ATTRIBUTE.finditer(piece))
-    last = {match["name"]: match for match in given}
-    for match in given:
-        kept = last[match["name"]]
-        if match is not kept:
+    """Remove repeated attributes but the last, which counts for OpenSim."""
+    matches = list(ATTRIBUTE.finditer(piece))
+    last = {match["name"]: match for match in matches}
+    for match in matches:
+        winner = last[match["name"]]
+        if match is not winner:
             repairs.append(
-                Repair("duplicate-attribute", offset + match.start(), match["name"], kept[0])
+                Repair("duplicate-attribute", offset + match.start(), match["name"], winner[0])
             )
             piece = piece[: match.start()] + _replace_by_blanks(match[0]) + piece[match.end() :]
     return piece
 
 
 def _is_no_instruction(piece: str) -> bool:
-    """Whether what stands between ``<?`` and ``>`` is neither a declaration nor an instruction of XML."""
+    """Return whether a text between ``<?`` and ``>`` is neither a declaration nor an instruction."""
     if not piece.endswith("?>"):
         return True
     if _DECLARATION.match(piece):
@@ -241,7 +245,7 @@ def _is_no_instruction(piece: str) -> bool:
 
 
 def _quote_attributes(piece: str, offset: int, repairs: list[Repair]) -> str:
-    """A start tag in which every value of an attribute stands in quotes and a blank before every name."""
+    """Return a start tag with quotes around all values and a blank before each attribute."""
 
     def quote(match: re.Match[str]) -> str:
         if match["name"] is None:
@@ -264,10 +268,10 @@ def _quote_attributes(piece: str, offset: int, repairs: list[Repair]) -> str:
 
 
 def _escape_ampersands(text: str, offset: int, repairs: list[Repair]) -> str:
-    """Text in which an ampersand that begins no reference stands for itself, as does what would end a CDATA section.
+    """Escape ampersands that begin no reference, and ends of CDATA sections outside of one.
 
-    HTML's references mean what they mean in HTML; of a number that is no character OpenSim keeps a
-    byte.
+    References of HTML are replaced by their characters. Of a reference by a number that is no
+    character, OpenSim keeps one byte.
     """
     if "]]>" in text:
         repairs += [

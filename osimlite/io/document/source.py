@@ -113,7 +113,7 @@ class Source:
 
     @property
     def well_formed(self) -> bool:
-        """Whether the text is known to be well-formed."""
+        """True if the text is known to be well-formed."""
         return self.elements is not None
 
     @cached_property
@@ -126,7 +126,7 @@ class Source:
         return spans.tag(number) if isinstance(spans, PlainSpans) else spans[number].tag
 
     def children(self, number: int) -> list[int]:
-        """The numbers of the elements directly inside element `number`."""
+        """Return the indices of the child elements of element `number`."""
         return list(self._inside(number))
 
     def _inside(self, number: int) -> Iterator[int]:
@@ -181,7 +181,7 @@ class Source:
         return re.split(r"\n|\r\n?", self.text)
 
     def position(self, offset: int, length: int = 1) -> Position:
-        """Line and column of a character offset."""
+        """Return line and column of a character offset."""
         before = self._lines_before
         if before is None:
             line = bisect_right(self._line_starts, offset) - 1
@@ -191,7 +191,7 @@ class Source:
         return Position(line + 1, offset - self.text.rfind("\n", 0, offset), length)
 
     def fault(self, kind: type[Fault], message: str, place: Position) -> Fault:
-        """An error about a place in the text."""
+        """Return an error with a position in the text."""
         return kind(message, file=self.file, line=place.line, column=place.column)
 
     def of_tag(self, number: int) -> Position:
@@ -205,7 +205,7 @@ class Source:
         return self.position(self._starts[number], len(self._tag(number)) + 1)
 
     def of_text(self, number: int, word: str | None = None, nth: int = 0) -> Position:
-        """Where the text of element `number` is, or the `nth` word equal to `word` in it; the tag if it has none."""
+        """Return the position of the text of element `number`, or of a word in it; without text that of the tag."""
         span = self.spans[number]
         inner = self.text[span.tag_end : span.inner_end]
         if word:
@@ -219,7 +219,7 @@ class Source:
         return self.position(span.tag_end + inner.index(stripped), len(stripped.splitlines()[0]))
 
     def of_attribute(self, number: int, name: str) -> Position:
-        """Where the value of an attribute is; the tag if the element has no such attribute."""
+        """Return the position of the value of an attribute; without the attribute that of the tag."""
         result = self.attributes_of(number).get(name)
         if result is None:
             return self.of_tag(number)

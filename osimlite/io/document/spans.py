@@ -226,7 +226,7 @@ class PlainSpans(Sequence[Span]):
         return match
 
     def _next_tag(self, place: int) -> int:
-        """Where the next tag begins, behind comments and their like."""
+        """Return the offset of the next tag, behind comments, CDATA sections and instructions."""
         text = self.text
         place = text.index("<", place)
         while text[place + 1] in "!?":
@@ -253,7 +253,7 @@ class PlainSpans(Sequence[Span]):
         return Span(tag, start, tag_end, close, self.text.index(">", close) + 1)
 
     def _is_in_sight(self, place: int, start: int) -> bool:
-        """Whether a place is certainly within no comment, nor the like of one, that begins at `start` or behind it."""
+        """Return whether an offset is certainly in no comment or CDATA section that begins at `start` or later."""
         text = self.text
         # What begins with a rare character is found many times faster than what begins with "<".
         if text.find("![", start, place) >= 0 or text.find("?", start, place) >= 0:
@@ -264,7 +264,7 @@ class PlainSpans(Sequence[Span]):
         return comment < 0 or text.find("-->", comment, place) >= 0
 
     def _close(self, tag: str, place: int) -> int:
-        """Where the closing tag is of the element `tag` whose content begins at `place`."""
+        """Return the position of the closing tag of an element whose content begins at `place`."""
         close = self.text.find("<", place)
         if self.text[close + 1] == "/":
             return close

@@ -1,4 +1,4 @@
-"""Reading for a check: as much of a text as can be read, and every reason why the rest cannot."""
+"""Reading of damaged documents for the linter: everything readable, and all errors."""
 
 from __future__ import annotations
 
@@ -24,10 +24,13 @@ from osimlite.schema.model import CURRENT_VERSION, Model
 
 @dataclass(slots=True)
 class Survey:
-    """What could be read of a text.
+    """Result of reading a text that may be damaged.
 
-    `document` is None if nothing could. `faults` are the errors the reader would have raised. Of a
-    text that is not well-formed only what stands before line `sure_until` was certainly understood.
+    Attributes:
+        source: the text.
+        document: the document; None if nothing is readable.
+        faults: errors that the reader would raise.
+        sure_until: line before which a text with syntax errors was certainly understood.
     """
 
     source: Source
@@ -37,17 +40,19 @@ class Survey:
 
 
 def survey_source(source: Source, *, of: type[Object] = Model) -> Survey:
-    """Read as much of `source` as can be read; raises nothing for what is wrong with the text.
+    """Read as much of a text as possible; errors of the text are part of the result.
 
-    The object at the top is of a class or derived from it.
+    Args:
+        source: the text.
+        of: class of the object, or one of its bases.
     """
     try:
         return Survey(source, read_document(source, of=of, to_check=True))
     except NotWellFormedError as fault:
         return _survey_damaged(source, fault, of)
     except VersionError as fault:
-        # Without a version the document is taken for a current one; an older format would give
-        # false findings.
+        # Without a version the document is read as a current one; with an older format the
+        # findings would be wrong.
         if fault.version is not None:
             return Survey(source, None, [fault])
         try:
@@ -69,11 +74,11 @@ def _survey_damaged(source: Source, fault: NotWellFormedError, of: type[Object])
     if unclosed:
         result.sure_until = int(unclosed[1])
     try:
-        # What the parser takes for a character in spite of all may be none that lxml can give back.
+        # Repair first: lxml cannot return some characters that its parser recovers.
         from osimlite.io.document.repair import repair_text
 
-        mended, _ = repair_text(source.text)
-        root = parse_source(Source(mended.encode("utf-8", "replace"), source.file), recover=True)
+        fixed, _ = repair_text(source.text)
+        root = parse_source(Source(fixed.encode("utf-8", "replace"), source.file), recover=True)
     except NotWellFormedError:
         return result
     if root.tag != ROOT or not _has_same_elements(source, root, result.sure_until):
@@ -94,7 +99,7 @@ def _add_document(found: Survey, root: etree._Element, of: type[Object]) -> Surv
 
 
 def _has_same_elements(source: Source, root: etree._Element, sure_until: int | None) -> bool:
-    """Whether the recovered tree numbers its elements as the text does, as far as that matters."""
+    """Return whether the recovered tree has the elements of the text up to line `sure_until`."""
     numbered = zip(source.spans, root.iter(etree.Element), strict=False)
     for number, (span, element) in enumerate(numbered):
         if sure_until is not None and source.of_tag(number).line >= sure_until:

@@ -28,7 +28,11 @@ class MeshFolders:
 
     @property
     def searched(self) -> tuple[Path, ...]:
-        """In OpenSim's order: the model's folder, its folder ``Geometry``, then those that the user names."""
+        """Folders in OpenSim's order: that of the model, its folder ``Geometry``, those of the user.
+
+        Returns:
+            The folders in the order of the search.
+        """
         own = () if self.beside is None else (self.beside, self.beside / "Geometry")
         return (*own, *self._trusted_elsewhere)
 

@@ -85,7 +85,7 @@ def _parse_lines(content: bytes, name: str) -> tuple[Polygons, Array | None, Ind
 
 
 def _get_index(word: str, count: int) -> int:
-    """From 0 on; numbers count from 1, negative ones back from the last so far.
+    """Return an index from 0; numbers count from 1, negative ones back from the last element.
 
     Raises:
         ValueError: there is no such place.

@@ -126,7 +126,7 @@ class Draft:
 
     @property
     def moves_elements(self) -> bool:
-        """Whether steps move elements; those of version 4 leave every element in its position."""
+        """True if steps move elements; those of version 4 leave every element in its position."""
         return self.version < 40000
 
     @cached_property
