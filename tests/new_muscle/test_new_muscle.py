@@ -83,7 +83,7 @@ def test_states_and_outputs_have_their_names(file, straight_muscle):
 def test_the_linter_knows_its_domains(file):
     assert findings(file, "", "") == []
     for new, code, words in (
-        ("<width>-1</width>", "OSIM206", "more than 0: OpenSim refuses the model"),
+        ("<width>-1</width>", "OSIM206", "more than 0: OpenSim rejects the model"),
         ("<rise_time>0</rise_time>", "OSIM206", "accelerations become NaN"),
         ("<rise_time>-1</rise_time>", "OSIM207", "it should be more than 0"),
         (
@@ -91,7 +91,7 @@ def test_the_linter_knows_its_domains(file):
             "OSIM207",
             "should be 0 to 0",
         ),
-        ("<width>0.1</width>", "OSIM209", "its grip is above 1 + width: OpenSim refuses the model"),
+        ("<width>0.1</width>", "OSIM209", "its grip is above 1 + width: OpenSim rejects the model"),
     ):
         every = findings(file, "<grip>1.2</grip>", f"<grip>1.2</grip>{new}")
         # OSIM531 adds that osimlite computes nothing with a time that is not positive.

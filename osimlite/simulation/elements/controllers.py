@@ -30,13 +30,13 @@ def drive_as_prescribed(
     Raises:
         ModelError: the number of functions is not that of the actuators, or the file does not fit.
     """
-    path, given = builder.path(controller), controller.ControlFunctions.objects
+    path, functions = builder.path(controller), controller.ControlFunctions.objects
     actuators = find_actuators(builder, controller)
-    if len(given) != len(actuators):
+    if len(functions) != len(actuators):
         raise ModelError(
-            f"'{path}' has {len(given)} functions for {len(actuators)} actuators; give it one for each"
+            f"'{path}' has {len(functions)} functions for {len(actuators)} actuators; give it one for each"
         )
-    for actuator, function in zip(actuators, given, strict=True):
+    for actuator, function in zip(actuators, functions, strict=True):
         try:
             signal: Any = builder.read_function(actuator, function, f"control by {path}")
         except UnsupportedError as error:

@@ -39,7 +39,9 @@ class Controls:
         pairs = zip(self.names, self.functions, strict=True)
         return replace(
             self,
-            functions=tuple((*own, more[name]) if name in more else own for name, own in pairs),
+            functions=tuple(
+                (*terms, more[name]) if name in more else terms for name, terms in pairs
+            ),
         )
 
     def make_record(self) -> tuple[list[int], list[float], str | Callable[..., None]]:

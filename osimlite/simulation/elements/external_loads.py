@@ -172,16 +172,16 @@ _read_cached_table = cache_by_file(4)(read_sto)
 def _read_load(
     mechanism: Mechanism, force: ExternalForce, columns: _Columns, file: str | None
 ) -> Load:
-    given = {
+    functions = {
         what: columns.find_functions(identifier, f"the {what}_identifier of '{force.name}'", file)
         for what, identifier in _list_identifiers(force).items()
     }
-    if not given.keys() & {"force", "torque"}:
+    if not functions.keys() & {"force", "torque"}:
         raise DocumentError(
             f"'{force.name}' has no force_identifier and no torque_identifier; give it one",
             file=file,
         )
-    if "point" in given and "force" not in given:
+    if "point" in functions and "force" not in functions:
         raise DocumentError(
             f"'{force.name}' has a point_identifier and no force_identifier; leave it out",
             file=file,
@@ -196,18 +196,18 @@ def _read_load(
         find_frame("applied_to_body"),
         find_frame("force_expressed_in_body"),
         find_frame("point_expressed_in_body"),
-        given.get("force", ()),
-        given.get("point", ()),
-        given.get("torque", ()),
+        functions.get("force", ()),
+        functions.get("point", ()),
+        functions.get("torque", ()),
     )
 
 
 def _list_identifiers(force: ExternalForce) -> dict[str, str]:
     """Return the starts of the labels of a force's columns, by the parts that the force has."""
-    given = {what: (getattr(force, f"{what}_identifier") or "").strip() for what in PARTS}
+    identifiers = {what: (getattr(force, f"{what}_identifier") or "").strip() for what in PARTS}
     return {
         what: identifier
-        for what, identifier in given.items()
+        for what, identifier in identifiers.items()
         if identifier not in ("", "Unassigned")
     }
 

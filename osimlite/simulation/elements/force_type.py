@@ -161,10 +161,10 @@ class ForceType:
         if self.check is not None:
             self.check(builder, force)
         # A state that the component does not have is 0 for the law.
-        own = list_states(force)
+        state_names = list_states(force)
         states = tuple(
             StateVariable(f"{path}/{state.name}", state.initial_value(force), state.is_simbody)
-            if state.name in own
+            if state.name in state_names
             else None
             for state in self.states
         )
@@ -194,7 +194,9 @@ class ForceType:
         """The record offsets, with "actuation" and "speed" of an actuator as names in addition to their own."""
         recorded = self.record_offsets
         others = {"actuation": (self.labels or {}).get("{name}", ""), "speed": self.geometry.speed}
-        return recorded | {name: recorded[own] for name, own in others.items() if own in recorded}
+        return recorded | {
+            alias: recorded[name] for alias, name in others.items() if name in recorded
+        }
 
     @cached_property
     def text(self) -> KernelText:
@@ -218,26 +220,26 @@ class ForceType:
         size = len(self.record_offsets) + self.geometry.record_size(force.location)
         tail = Tail(ITEM.OWN + self.text.int_count + len(ints), self.text.size + len(numbers), size)
         offsets: list[int] = []
-        own: list[float] = []
+        parameters: list[float] = []
         for term, value in zip(self.terms, force.values, strict=True):
             more, plain = term.pack(value, tail, f"'{force.path}'")
             offsets += more
-            own += plain
+            parameters += plain
         at_states = tuple(
             len(offsets) + k for k, state in enumerate(force.optional_states) if state is not None
         )
         all_ints = (*offsets, *[-1] * len(self.states), *ints, *tail.ints)
         there = {
             state.name
-            for state, own in zip(self.states, force.optional_states, strict=True)
-            if own is not None
+            for state, variable in zip(self.states, force.optional_states, strict=True)
+            if variable is not None
         }
         sense = self.geometry.displacement_output[1]
         responds = self.text.responds and not force.form
         item = ForceRecord(
             self.name + force.form,
             all_ints,
-            (*own, *numbers, *tail.numbers),
+            (*parameters, *numbers, *tail.numbers),
             record_size=tail.record_size,
             states=at_states,
             equilibrium=self.name + EQUILIBRIUM
@@ -250,10 +252,10 @@ class ForceType:
         )
         responses = []
         if self.contact_response and not force.form:
-            told = Response(self.contact_response, 0, 0, 1)
+            derivatives = Response(self.contact_response, 0, 0, 1)
             size = ITEM.OWN + 2
             responses = [
-                ForceRecord(ints=(size * (3 - axis), axis), is_part=True, response=told)
+                ForceRecord(ints=(size * (3 - axis), axis), is_part=True, response=derivatives)
                 for axis in range(3)
             ]
         return [*responses, *parts, item]

@@ -171,19 +171,19 @@ class Springs:
             turning: angular velocity of surface 1 relative to surface 2, 1/s.
         """
         first, second = self._first, self._second
-        own = _find_springs_inside(self._stiffness[0], first, one, second, two)
+        springs = _find_springs_inside(self._stiffness[0], first, one, second, two)
         others = _find_springs_inside(self._stiffness[1], second, two, first, one)
         # As in Simbody, a mesh that is completely inside another does not touch it.
-        if not (own or others) or not (
+        if not (springs or others) or not (
             any(
                 mesh.is_one_piece and 0 < len(result) < len(mesh.triangles)
-                for mesh, result in ((first, own), (second, others))
+                for mesh, result in ((first, springs), (second, others))
             )
             or first.crosses(second.transform(one.inverse_times(two)))
         ):
             return ZERO, ZERO, 0.0
         force1, torque1, energy1 = self._add_springs(
-            self.one, own, about, times(-1.0, v), times(-1.0, turning)
+            self.one, springs, about, times(-1.0, v), times(-1.0, turning)
         )
         force2, torque2, energy2 = self._add_springs(self.two, others, about, v, turning)
         return minus(force2, force1), minus(torque2, torque1), energy1 + energy2
@@ -224,10 +224,10 @@ class Pose(NamedTuple):
 
 
 def _find_springs_inside(
-    stiffness: Array, mesh: TriangleMesh, own: Pose, other: TriangleMesh, theirs: Pose
+    stiffness: Array, mesh: TriangleMesh, pose: Pose, other: TriangleMesh, theirs: Pose
 ) -> list[list[float]]:
     """Return the springs of a mesh that are inside another: stiffness, middle and end of each."""
-    middles = own.points(mesh.centroids)
+    middles = pose.points(mesh.centroids)
     seen = (middles - theirs.origin) @ theirs.turn
     boxed = np.all((seen >= other.points.min(axis=0)) & (seen <= other.points.max(axis=0)), axis=1)
     places = np.flatnonzero(boxed)

@@ -132,16 +132,16 @@ class KernelText:
         # Expressions compute in the record. The stored control already includes the reflex (rate 0).
         arguments = [
             f"carrying_room({each}, {count})"
-            if each.startswith("at(found")
+            if each.startswith("at(record")
             else each.replace(", rate)", ", 0.0)")
             for each in arguments
         ]
         if force_type.law_from_record is not None and force_type.law is not None:
-            given = signature(force_type.law).parameters
+            known_parameters = signature(force_type.law).parameters
             arguments += [
-                f"found[{force_type.record_offsets[name]}]"
+                f"record[{force_type.record_offsets[name]}]"
                 for name in signature(force_type.law_from_record).parameters
-                if name not in given
+                if name not in known_parameters
             ]
         # A rate may be named like another state (fiber_velocity), hence the suffix.
         lines = [
@@ -181,12 +181,12 @@ class KernelText:
             self._arguments,
         )
         # The record stores the quantities between the stages.
-        own = (f"found[{place}]" for name, place in recorded.items() if name not in inputs)
-        known = dict(zip(made.known._fields, own, strict=False))
+        offsets = (f"record[{place}]" for name, place in recorded.items() if name not in inputs)
+        known = dict(zip(made.known._fields, offsets, strict=False))
         of_moment = (
             len(self.input_names) + 1 + sum(state.is_argument for state in force_type.states)
         )
-        told = f"known({', '.join(known.values())}), {arguments[of_moment]}"
+        quantities = f"known({', '.join(known.values())}), {arguments[of_moment]}"
         begin = (
             f"{', '.join(known.values())} = {self._write_call(arguments[: of_moment + 1], 'begin')}"
         )
@@ -222,8 +222,8 @@ class KernelText:
             "asked = 0",
             *self._write_loop(
                 [
-                    f"{', '.join(known[name] for name in first.results)} = law({told}, {answers})",
-                    f"which, of_curve, of_argument, total = asking({told})",
+                    f"{', '.join(known[name] for name in first.results)} = law({quantities}, {answers})",
+                    f"which, of_curve, of_argument, total = asking({quantities})",
                     f"place = {place}",
                     "if of_curve == 0.0 and of_argument == 1.0:",
                     "    request_value(reals, lanes, asked, place, total)",
@@ -234,12 +234,12 @@ class KernelText:
             ),
         ]
         lines += [f"compute_requests(lanes, asked, {SEARCH_ITERATIONS})", "asked = 0"]
-        found = ", ".join(known[name] for name in second.results)
+        results = ", ".join(known[name] for name in second.results)
         ended = [
-            f"{found} = found_law({told}, request_result(lanes, asked), request_residual(lanes, asked))",
+            f"{results} = search_law({quantities}, request_result(lanes, asked), request_residual(lanes, asked))",
             "asked += 1",
         ]
-        end = [f"{', '.join(force_type.outputs)} = end({told})"]
+        end = [f"{', '.join(force_type.outputs)} = end({quantities})"]
         end += self._write_results(name for name in recorded if name not in inputs)
         lines += self._write_loop([*ended, *end, *force_type.geometry.apply_code])
         return self._compile(
@@ -254,7 +254,7 @@ class KernelText:
             ],
             **{"known": made.known, "begin": made.begin, "law": first.law, "asking": second.asking},
             **{
-                "found_law": second.law,
+                "search_law": second.law,
                 "end": made.end,
                 "request_value": request_value,
                 "request_sum": request_sum,
@@ -266,7 +266,7 @@ class KernelText:
     def _write_loop(self, lines: Sequence[str]) -> list[str]:
         """Return a loop over the records of a run; a record without a solution reports its number in f[0]."""
         refused = "    return OUTCOME.UNSOLVED"
-        told = [
+        written_lines = [
             new
             for line in lines
             for new in (("    f[0] = number", line) if line == refused else (line,))
@@ -274,7 +274,7 @@ class KernelText:
         return [
             "for number in range(first, end_of_part):",
             "    item = model[model[MODEL.ITEM_AT] + number]",
-            *(f"    {line}" for line in (*self._pointer_lines, *told)),
+            *(f"    {line}" for line in (*self._pointer_lines, *written_lines)),
         ]
 
     @property
@@ -287,9 +287,9 @@ class KernelText:
             for column, name in enumerate(force_type.geometry.inputs)
             if name in inputs
         }
-        given = [column for column, state in enumerate(force_type.states) if state.is_argument]
+        columns = [column for column, state in enumerate(force_type.states) if state.is_argument]
         first = len(inputs) + force_type.has_control
-        return result | {2 + column: first + number for number, column in enumerate(given)}
+        return result | {2 + column: first + number for number, column in enumerate(columns)}
 
     @property
     def responds(self) -> bool:
@@ -316,12 +316,12 @@ class KernelText:
         recorded = len(self.force_type.record_offsets)
         return [
             "i = at(model, item)",
-            "p, found = at(reals, i[ITEM.NUMBERS]), at(data, i[ITEM.RECORD])",
-            f"g, gp, work = at(i, {ITEM.OWN + self.int_count}), at(p, {self.size}), at(found, {recorded})",
+            "p, record = at(reals, i[ITEM.NUMBERS]), at(data, i[ITEM.RECORD])",
+            f"g, gp, work = at(i, {ITEM.OWN + self.int_count}), at(p, {self.size}), at(record, {recorded})",
         ]
 
     def _compile(
-        self, form: str, place: str, lines: Sequence[str], **own: Any
+        self, form: str, place: str, lines: Sequence[str], **scope_of_form: Any
     ) -> Callable[..., int]:
         force_type, name = self.force_type, self.force_type.name + form
         source = "\n    ".join(
@@ -342,7 +342,7 @@ class KernelText:
             name,
             FORCE_TYPES.module_of(force_type.component),
             source,
-            **own,
+            **scope_of_form,
             **force_type.geometry.list_functions(),
             **scope,
         )
@@ -367,11 +367,11 @@ class KernelText:
 
     def _write_record(self, names: Iterable[str]) -> list[str]:
         recorded = self.force_type.record_offsets
-        return [f"found[{recorded[name]}] = {name}" for name in names if name in recorded]
+        return [f"record[{recorded[name]}] = {name}" for name in names if name in recorded]
 
     @property
     def _state_indices(self) -> dict[int, State]:
-        """Each state by the index of its offset among the integers of a record; -1 marks an absent state."""
+        """States by the indices of their offsets among the integers of a record; an offset of -1 marks an absent state."""
         first = ITEM.OWN + sum(term.int_count for term in self.force_type.terms)
         return {first + number: state for number, state in enumerate(self.force_type.states)}
 
@@ -380,8 +380,8 @@ class KernelText:
         """Arguments of the law, as expressions."""
         force_type = self.force_type
         terms = write_arguments(force_type.terms, ITEM.OWN, 0)
-        given = [place for place, state in self._state_indices.items() if state.is_argument]
-        states = [f"(y[i[{place}]] if i[{place}] >= 0 else 0.0)" for place in given]
+        indices = [place for place, state in self._state_indices.items() if state.is_argument]
+        states = [f"(y[i[{place}]] if i[{place}] >= 0 else 0.0)" for place in indices]
         count = 1 if force_type.has_control else 0
         return [*self.input_names, *terms[:count], *states, *terms[count:]]
 
@@ -404,8 +404,8 @@ class KernelText:
             "excitation",
             *(state.name for state in self.force_type.states if state.is_argument),
         )
-        given = dict(zip(names, arguments, strict=False))
-        first = f"{made.__name__}({', '.join(given.get(name, '0.0') for name in made._fields)})"
+        arguments_by_name = dict(zip(names, arguments, strict=False))
+        first = f"{made.__name__}({', '.join(arguments_by_name.get(name, '0.0') for name in made._fields)})"
         return f"{law}({', '.join((first, *arguments[len(names) :]))})"
 
     @property

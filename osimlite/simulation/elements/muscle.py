@@ -70,8 +70,8 @@ def define_curve(
     """
 
     def read(builder: ElementBuilder, force: Any) -> Sequence[float]:
-        own = getattr(force, name)
-        properties = {name: getattr(own, name) for name in type(own).__annotations__} | changed(
+        curve = getattr(force, name)
+        properties = {name: getattr(curve, name) for name in type(curve).__annotations__} | changed(
             force
         )
         try:

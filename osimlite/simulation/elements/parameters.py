@@ -114,7 +114,11 @@ class Number(Parameter):
         return [f"p[{number}]"]
 
     def pack(self, value: float, tail: Tail, where: str) -> tuple[Sequence[int], Sequence[float]]:
-        """Return no integer and the number itself."""
+        """Return no integer and the number itself.
+
+        Returns:
+            Integers and numbers of fixed position.
+        """
         return (), (value,)
 
 
@@ -148,7 +152,11 @@ class Numbers(Parameter):
     def pack(
         self, value: Sequence[float], tail: Tail, where: str
     ) -> tuple[Sequence[int], Sequence[float]]:
-        """Return no integers and the values."""
+        """Return no integers and the values.
+
+        Returns:
+            Integers and numbers of fixed position.
+        """
         return (), value
 
 
@@ -186,13 +194,21 @@ class Fields(Parameter):
         return [f"{self.type.__name__}({', '.join(f'p[{number + k}]' for k in range(self.size))})"]
 
     def list_functions(self) -> dict[str, Callable[..., Any]]:
-        """Return the type of the tuple, by name."""
+        """Return the type of the tuple, by name.
+
+        Returns:
+            Functions or types by name.
+        """
         return {self.type.__name__: self.type}
 
     def pack(
         self, value: Sequence[float], tail: Tail, where: str
     ) -> tuple[Sequence[int], Sequence[float]]:
-        """Return no integers and the values of the tuple."""
+        """Return no integers and the values of the tuple.
+
+        Returns:
+            Integers and numbers of fixed position.
+        """
         return (), value
 
 
@@ -229,7 +245,11 @@ class Curve(Parameter):
     def pack(
         self, value: Function, tail: Tail, where: str
     ) -> tuple[Sequence[int], Sequence[float]]:
-        """Return the offset of the table, which goes into the tail."""
+        """Return the offset of the table, which goes into the tail.
+
+        Returns:
+            Integers and numbers of fixed position.
+        """
         return (tail.put_numbers(table_of_one(value, f"the {self.name} of {where}")),), ()
 
 
@@ -259,12 +279,22 @@ class Together(Parameter):
         return [f"{self.type.__name__}({', '.join(write_arguments(self.terms, head, number))})"]
 
     def list_functions(self) -> dict[str, Callable[..., Any]]:
-        """Return the type of the tuple, by name."""
+        """Return the type of the tuple, by name.
+
+        Returns:
+            Functions or types by name.
+        """
         return {self.type.__name__: self.type}
 
     def pack(self, value: Any, tail: Tail, where: str) -> tuple[Sequence[int], Sequence[float]]:
-        """Return the integers and numbers of all its parameters, one after another."""
-        packed = [term.pack(own, tail, where) for term, own in zip(self.terms, value, strict=True)]
+        """Return the integers and numbers of all its parameters, one after another.
+
+        Returns:
+            Integers and numbers of fixed position.
+        """
+        packed = [
+            term.pack(each, tail, where) for term, each in zip(self.terms, value, strict=True)
+        ]
         return [place for ints, _ in packed for place in ints], [
             x for _, numbers in packed for x in numbers
         ]
@@ -285,10 +315,14 @@ class Expression(Parameter):
 
     def write_arguments(self, head: int, number: int) -> list[str]:
         """Return the pointers to steps, constants and registers."""
-        return [f"at(i, i[{head}])", f"at(p, i[{head + 1}])", f"at(found, i[{head + 2}])"]
+        return [f"at(i, i[{head}])", f"at(p, i[{head + 1}])", f"at(record, i[{head + 2}])"]
 
     def pack(self, value: Formula, tail: Tail, where: str) -> tuple[Sequence[int], Sequence[float]]:
-        """Return the offsets of the steps (after their count), the constants and the registers."""
+        """Return the offsets of the steps (after their count), the constants and the registers.
+
+        Returns:
+            Integers and numbers of fixed position.
+        """
         steps, constants = program(value)
         count = len(steps) // 3
         # Each register may carry its derivatives with respect to the variables.
@@ -314,12 +348,16 @@ class Expressions(Parameter):
 
     def write_arguments(self, head: int, number: int) -> list[str]:
         """Return the pointers to steps, numbers and registers."""
-        return [f"at(i, i[{head}])", "p", f"at(found, i[{head + 1}])"]
+        return [f"at(i, i[{head}])", "p", f"at(record, i[{head + 1}])"]
 
     def pack(
         self, value: Sequence[Formula], tail: Tail, where: str
     ) -> tuple[Sequence[int], Sequence[float]]:
-        """Return the offsets of the steps and of the registers."""
+        """Return the offsets of the steps and of the registers.
+
+        Returns:
+            Integers and numbers of fixed position.
+        """
         ints: list[int] = []
         most = 0
         for formula in value:
@@ -345,7 +383,11 @@ class Control(Parameter):
         return [f"data[model[MODEL.WORK_CONTROL] + i[{head}] + {k}]" for k in range(self.count)]
 
     def pack(self, value: Any, tail: Tail, where: str) -> tuple[Sequence[int], Sequence[float]]:
-        """Return the index and no numbers."""
+        """Return the index and no numbers.
+
+        Returns:
+            Integers and numbers of fixed position.
+        """
         return (value,), ()
 
 
@@ -365,11 +407,19 @@ class ReflexControl(Control):
         return [f"add_reflex(data, model[MODEL.WORK_CONTROL] + i[{head}], p[{number}], rate)"]
 
     def list_functions(self) -> dict[str, Callable[..., Any]]:
-        """Return the function that adds the reflex, by name."""
+        """Return the function that adds the reflex, by name.
+
+        Returns:
+            Functions or types by name.
+        """
         return {"add_reflex": add_reflex}
 
     def pack(
         self, value: tuple[int, float], tail: Tail, where: str
     ) -> tuple[Sequence[int], Sequence[float]]:
-        """Return the index and the gain."""
+        """Return the index and the gain.
+
+        Returns:
+            Integers and numbers of fixed position.
+        """
         return value[:1], value[1:]

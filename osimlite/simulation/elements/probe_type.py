@@ -1,14 +1,14 @@
-"""One declaration for each kind of probe; packing, kernel, integrals and columns follow from it.
+"""Declaration of a probe type, from which its packing, kernel, integrals and columns follow.
 
-A probe adds up, or lists, what a law gives for each of its subjects: actuators or muscles. The law
-is a scalar function of floats; it is given what the record of the subject has, a curve if there is
-one, and a named tuple of numbers. The kernel of a kind is written from this. It runs with the
-forces where the probe integrates, since the integrals are states then, and otherwise when somebody
-asks.
+A probe adds or lists the values of a law for each of its subjects, which are actuators or muscles.
+The law is a scalar function of floats. Its arguments are recorded quantities of the subject, a curve
+if there is one, and a named tuple of numbers. The kernel of a probe type is generated from this. It
+runs together with the forces if the probe integrates, since its integrals are states; otherwise
+it runs on demand.
 
-The integers of the item are: count of the subjects, place among the results of the first (-1 if
-there is only the sum), count of the integrals, the first of them in y, place of the curve, and for
-each subject the places in the work vector of what the law is given.
+Integers of the record: number of subjects; index of the first subject's result (-1 if there is only
+the sum); number of integrals; offset of the first integral in y; offset of the curve; and for each
+subject the offsets in the work vector of the law's inputs.
 """
 
 from __future__ import annotations
@@ -91,26 +91,26 @@ class ProbeType:
     def source(self) -> str:
         """Source text of the kernel."""
         size, count = len(self.numbers._fields), len(self.reads)
-        given = [f"data[a[{k}]]" for k in range(count)]
-        given += [f"at(p, i[{HEAD - 1}])"] if self.has_curve else []
-        given.append(f"{self.numbers.__name__}({', '.join(f'b[{k}]' for k in range(size))})")
+        arguments = [f"data[a[{k}]]" for k in range(count)]
+        arguments += [f"at(p, i[{HEAD - 1}])"] if self.has_curve else []
+        arguments.append(f"{self.numbers.__name__}({', '.join(f'b[{k}]' for k in range(size))})")
         lines = [
             f'def {self.name}({PARAMETERS}, item: "int") -> "int":',
             "i = at(model, item)",
-            "p, found = at(reals, i[ITEM.NUMBERS]), at(data, i[ITEM.RECORD])",
+            "p, record = at(reals, i[ITEM.NUMBERS]), at(data, i[ITEM.RECORD])",
             "first, total = i[ITEM.OWN + 1], p[0]",
             "for k in range(i[ITEM.OWN]):",
             f"    a, b = at(i, {HEAD} + {count} * k), at(p, 1 + {size} * k)",
-            f"    value = law({', '.join(given)})",
+            f"    value = law({', '.join(arguments)})",
             "    total += value",
             "    if first >= 0:",
-            "        found[first + k] = value",
+            "        record[first + k] = value",
             "if first != 0:",
-            "    found[0] = total",
+            "    record[0] = total",
             "if first == 2:",
-            "    found[1] = p[0]",
+            "    record[1] = p[0]",
             "for k in range(i[ITEM.OWN + 2]):",
-            "    f[i[ITEM.OWN + 3] + k] = found[k]",
+            "    f[i[ITEM.OWN + 3] + k] = record[k]",
         ]
         return "\n    ".join([*lines, "return OUTCOME.OK"]) + "\n"
 

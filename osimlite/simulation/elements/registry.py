@@ -48,7 +48,7 @@ class Registry:
         return declaration
 
     def find(self, component: type | str) -> Any:
-        """Return the declaration of a class, or of the class of a name; None if there is none."""
+        """Return the declaration of a class, or of the class of a name, or None."""
         name = component if isinstance(component, str) else component.__name__
         module = self.modules.get(name)
         if module is None:
@@ -62,7 +62,7 @@ class Registry:
         return map(self.find, sorted(self.modules, key=kernel_name))
 
     def find_kernel(self, name: str) -> Any:
-        """Return the declaration whose kernel has a name; None if there is none."""
+        """Return the declaration whose kernel has a name, or None."""
         for component in self.modules:
             if kernel_name(component) == name:
                 return self.find(component)

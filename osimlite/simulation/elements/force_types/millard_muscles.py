@@ -99,17 +99,17 @@ def _adapt_active_curve(force: Any) -> dict[str, float]:
 
 
 def _adapt_velocity_curve(force: Any) -> dict[str, float]:
-    own = force.force_velocity_curve
-    ends = own.concentric_slope_at_vmax, own.eccentric_slope_at_vmax
+    curve = force.force_velocity_curve
+    ends = curve.concentric_slope_at_vmax, curve.eccentric_slope_at_vmax
     if force.is_classic:
         return _set_end_slopes(*map(max, ends, _adapt_inverse_curve(force).values()))
     return _set_end_slopes(*(min(end, 0.0) for end in ends))
 
 
 def _adapt_inverse_curve(force: Any) -> dict[str, float]:
-    own = force.force_velocity_curve
+    curve = force.force_velocity_curve
     return _set_end_slopes(
-        0.5 * own.concentric_slope_near_vmax, 0.5 * own.eccentric_slope_near_vmax
+        0.5 * curve.concentric_slope_near_vmax, 0.5 * curve.eccentric_slope_near_vmax
     )
 
 
@@ -217,12 +217,12 @@ register_force_type(
 
 
 def _read_acceleration_fields(builder: ElementBuilder, force: Any) -> tuple[float, ...]:
-    own = force.muscle_first_order_activation_dynamic_model
+    dynamics = force.muscle_first_order_activation_dynamic_model
     angle = force.pennation_angle_at_optimal
     return (
-        own.activation_time_constant,
-        own.deactivation_time_constant,
-        own.minimum_activation,
+        dynamics.activation_time_constant,
+        dynamics.deactivation_time_constant,
+        dynamics.minimum_activation,
         *pennation_constants(force.optimal_fiber_length, angle, 0.5 * pi),
         cos(angle),
     )

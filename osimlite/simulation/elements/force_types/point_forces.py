@@ -61,10 +61,10 @@ class PrescribedLoad(GivenLoad):
         """Return the load of a force."""
         frame = builder.resolve_target(force, "socket_frame", force.socket_frame)
         placed, ground = builder.find_placement(frame), FramePlacement(GROUND, np.eye(4))
-        given = []
+        groups = []
         for what in ("forceFunctions", "pointFunctions", "torqueFunctions"):
             functions = getattr(force, what).objects
-            given.append(
+            groups.append(
                 tuple(
                     builder.read_function(force, item, what)
                     for item in functions
@@ -77,7 +77,7 @@ class PrescribedLoad(GivenLoad):
             placed,
             ground if force.forceIsGlobal else placed,
             ground if force.pointIsGlobal else placed,
-            *given,
+            *groups,
         )
 
 

@@ -1,1 +1,1 @@
-"""Where forces act: each geometry computes what a law is given, and applies what it gives."""
+"""Geometries: where forces act. Each computes arguments of a law, and applies the law's outputs."""

@@ -116,8 +116,8 @@ class GivenLoad(Geometry):
             Labels.
         """
         load: Load = force.location
-        given = zip(load.labels, load.groups, strict=True)
-        return tuple(f"{label}{axis}" for label, functions in given if functions for axis in "xyz")
+        groups = zip(load.labels, load.groups, strict=True)
+        return tuple(f"{label}{axis}" for label, functions in groups if functions for axis in "xyz")
 
     def report(
         self, force: Any, record: Sequence[float], origins: Sequence[Sequence[float]]

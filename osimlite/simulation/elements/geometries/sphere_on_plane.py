@@ -86,14 +86,14 @@ class SphereOnPlane(Geometry):
             ModelError: a socket names another class.
         """
         surfaces = []
-        for field, wanted in (
+        for field, expected in (
             ("socket_half_space", ContactHalfSpace),
             ("socket_sphere", ContactSphere),
         ):
             geometry = builder.resolve_target(force, field, getattr(force, field))
-            if not isinstance(geometry, wanted):
+            if not isinstance(geometry, expected):
                 raise ModelError(
-                    f"the '{field}' of '{builder.path(force)}' is a {get_class_name(geometry)}; name a {wanted.__name__}"
+                    f"the '{field}' of '{builder.path(force)}' is a {get_class_name(geometry)}; name a {expected.__name__}"
                 )
             surfaces.append(read_surface(builder, force, geometry, NO_MATERIAL))
         return surfaces[0], surfaces[1]
