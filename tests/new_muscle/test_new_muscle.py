@@ -85,11 +85,11 @@ def test_the_linter_knows_its_domains(file):
     for new, code, words in (
         ("<width>-1</width>", "OSIM206", "more than 0: OpenSim rejects the model"),
         ("<rise_time>0</rise_time>", "OSIM206", "accelerations become NaN"),
-        ("<rise_time>-1</rise_time>", "OSIM207", "it should be more than 0"),
+        ("<rise_time>-1</rise_time>", "OSIM207", "expected more than 0"),
         (
             "<pennation_angle_at_optimal>0.1</pennation_angle_at_optimal>",
             "OSIM207",
-            "should be 0 to 0",
+            "expected 0 to 0",
         ),
         ("<width>0.1</width>", "OSIM209", "its grip is above 1 + width: OpenSim rejects the model"),
     ):
