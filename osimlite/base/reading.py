@@ -8,6 +8,7 @@ an untrusted document could block the program or fill the memory.
 from __future__ import annotations
 
 import os
+import re
 import stat
 from pathlib import Path
 from typing import BinaryIO
@@ -92,3 +93,35 @@ def _expect_regular(mode: int, path: str | Path) -> None:
         raise SpecialFileError(
             f"cannot read the file: this is {kind}; only regular files are read", file=str(path)
         )
+
+
+def describe_content(beginning: bytes) -> str | None:
+    """Return the type of a text in words by its beginning; None if it is no result of a tool.
+
+    Args:
+        beginning: the first bytes, with the head of a table or the first element of a document.
+    """
+    if b"\0" in beginning:
+        return None
+    text = beginning.decode("utf-8", "replace").lstrip("\ufeff")
+    if document := _DOCUMENT.match(text):
+        return f"an OpenSim document with <{document[1]}>"
+    first = text.partition("\n")[0]
+    if first.startswith("PathFileType"):
+        return "a table of markers"
+    head, end, _ = text.partition("endheader")
+    if end and re.search(
+        r"^(version|nRows|datarows|DataType) *=", head, re.MULTILINE | re.IGNORECASE
+    ):
+        name = "" if "=" in first else first.strip()
+        return f"a table '{name}' of OpenSim"
+    if _RESIDUALS.match(text):
+        return "a list of residuals"
+    return None
+
+
+_DOCUMENT = re.compile(
+    r"\s*(?:<\?[^>]*>\s*|<!--(?:[^-]|-(?!->))*-->\s*)*<OpenSimDocument\b[^>]*>\s*"
+    r"(?:<!--(?:[^-]|-(?!->))*-->\s*)*<(\w+)"
+)
+_RESIDUALS = re.compile(r"Average Residuals:\s")

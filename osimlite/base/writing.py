@@ -17,7 +17,6 @@ from __future__ import annotations
 
 import errno
 import os
-import re
 import stat
 import sys
 import time
@@ -27,7 +26,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from osimlite.base.pruning import MARKER, is_due, prune_cache
-from osimlite.base.reading import read_at_most
+from osimlite.base.reading import describe_content, read_at_most
 from osimlite.base.records import dataclass
 from osimlite.errors import OsimliteError
 
@@ -357,38 +356,6 @@ def _are_alike(present: str | None, new: str | None) -> bool:
         return False
     is_table = present == UNNAMED_TABLE and new.startswith("a table '")
     return present == new or is_table
-
-
-def describe_content(beginning: bytes) -> str | None:
-    """Return the type of a text in words by its beginning; None if it is no result of a tool.
-
-    Args:
-        beginning: the first bytes, with the head of a table or the first element of a document.
-    """
-    if b"\0" in beginning:
-        return None
-    text = beginning.decode("utf-8", "replace").lstrip("\ufeff")
-    if document := _DOCUMENT.match(text):
-        return f"an OpenSim document with <{document[1]}>"
-    first = text.partition("\n")[0]
-    if first.startswith("PathFileType"):
-        return "a table of markers"
-    head, end, _ = text.partition("endheader")
-    if end and re.search(
-        r"^(version|nRows|datarows|DataType) *=", head, re.MULTILINE | re.IGNORECASE
-    ):
-        name = "" if "=" in first else first.strip()
-        return f"a table '{name}' of OpenSim"
-    if _RESIDUALS.match(text):
-        return "a list of residuals"
-    return None
-
-
-_DOCUMENT = re.compile(
-    r"\s*(?:<\?[^>]*>\s*|<!--(?:[^-]|-(?!->))*-->\s*)*<OpenSimDocument\b[^>]*>\s*"
-    r"(?:<!--(?:[^-]|-(?!->))*-->\s*)*<(\w+)"
-)
-_RESIDUALS = re.compile(r"Average Residuals:\s")
 
 
 def _list_ancestors(folder: str | Path) -> tuple[Path, ...]:

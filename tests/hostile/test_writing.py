@@ -11,10 +11,10 @@ from zlib import crc32
 import pytest
 
 from osimlite import __version__
+from osimlite.base.reading import describe_content
 from osimlite.base.writing import (
     ResultWriter,
     WriteRefusedError,
-    describe_content,
     project_folder,
     write_atomically,
     write_into,
