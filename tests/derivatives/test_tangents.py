@@ -322,7 +322,7 @@ def test_outputs_have_derivatives(name):
     along = rng.normal(size=size + len(u))
 
     def moved(h):
-        return made.observed(0.0, x + h * along[:size], u + h * along[size:], chosen)[0]
+        return made.compute_outputs(0.0, x + h * along[:size], u + h * along[size:], chosen)[0]
 
     both = np.hstack((near.C, near.D))
     off_by, sizes = np.abs(slope(moved, 1e-5) - both @ along), np.abs(both) @ np.abs(along)
