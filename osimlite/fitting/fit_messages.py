@@ -42,31 +42,37 @@ def describe_fit(
         )
         advised += "; check the units of the data" if rms > IMPLAUSIBLE_ERROR_M else ""
         yield (
-            f"{format_count(result['frames'], 'frame')}, {format_count(result['markers'], 'marker')}: "
+            f"{format_count(result['frames'], 'frame')}, "
+            f"{format_count(result['markers'], 'marker')}: "
             f"errors of {100.0 * rms:.2f} cm (root mean square), "
-            f"at most {100.0 * largest:.2f} cm ({result['worst_marker']} at {result['worst_time']:g} s){advised}"
+            f"at most {100.0 * largest:.2f} cm ({result['worst_marker']} at "
+            f"{result['worst_time']:g} s){advised}"
         )
     if "rms_orientation_error" in result:
         rms, largest = (
             math.degrees(result[f"{which}_orientation_error"]) for which in ("rms", "largest")
         )
         yield (
-            f"{result['frames']} frames, {result['sensors']} sensors: errors of {rms:.2f} degrees (root mean square), "
-            f"at most {largest:.2f} degrees ({result['worst_sensor']} at {result['worst_sensor_time']:g} s)"
+            f"{result['frames']} frames, {result['sensors']} sensors: errors of {rms:.2f} degrees "
+            "(root mean square), "
+            f"at most {largest:.2f} degrees ({result['worst_sensor']} at "
+            f"{result['worst_sensor_time']:g} s)"
         )
     if result["partly_unseen"]:
         parts = [f"{name} ({100.0 * part:.3g} %)" for name, part in result["partly_unseen"].items()]
-        yield f"not seen in every frame: {join_words(parts)}"
+        yield f"unseen in some frames: {join_words(parts)}"
     if result["frames_unseen"]:
         frames = format_count(result["frames_unseen"], "frame")
-        yield f"{frames} in which nothing with a weight was seen: the pose stays as it was before"
+        yield f"{frames} without any measurement that has a weight: the pose of the frame before is kept"
     if motion.undetermined:
         yield (
-            f"no measurement determines {join_words(motion.undetermined, most=MAX_NAMED_COORDINATES)}: they stay near the "
-            "default pose (OpenSim may end elsewhere, as in the middle of their ranges); lock them, or give them a task"
+            "no measurement determines "
+            f"{join_words(motion.undetermined, most=MAX_NAMED_COORDINATES)}, which stay near the "
+            "default pose; OpenSim may find other values, such as the middle of their ranges. Lock "
+            "them, or add tasks for them"
         )
     if result["frames_unsettled"]:
-        yield f"in {format_count(result['frames_unsettled'], 'frame')} the best pose was not reached"
+        yield f"the solver did not converge in {format_count(result['frames_unsettled'], 'frame')}"
 
 
 def find_unknown(model: Model) -> list[str]:
@@ -87,6 +93,8 @@ def describe_unknown(model: Model, consequence: str) -> str:
     if not parts:
         return ""
     return (
-        f"{consequence}: {format_count(len(parts), 'part')} of classes that osimlite does not know, "
-        f"{join_words(parts, most=MAX_NAMED_PARTS)}; OpenSim refuses the model unless the plug-in of these classes is loaded"
+        f"{consequence}: {format_count(len(parts), 'part')} of classes that osimlite does not "
+        "know, "
+        f"{join_words(parts, most=MAX_NAMED_PARTS)}; OpenSim refuses the model unless the plug-in "
+        "of these classes is loaded"
     )

@@ -64,7 +64,7 @@ class FrameSolver:
                     f"'{model.name}' has no marker '{name}'{suggest_name(name, stations)}"
                 )
         if not self.markers and not sensors:
-            raise SettingError(f"'{model.name}' has no markers; add some, or name those to fit")
+            raise SettingError(f"'{model.name}' has no markers; add some, or name sensors to fit")
         frames = {
             name: find_sensor_frames(model, mechanism, (name,))[name] for name in self.sensors
         }
@@ -107,14 +107,15 @@ class FrameSolver:
         places, turned = np.asarray(positions, dtype=float), np.asarray(orientations, dtype=float)
         if places.shape != (len(self.markers), 3) and (self.markers or places.size):
             raise SettingError(
-                f"the positions of {len(self.markers)} markers are as many rows of 3 numbers; got "
+                f"expected {len(self.markers)} rows of 3 numbers, one for each marker; found "
                 f"{' × '.join(map(str, places.shape)) or 'one number'}"
             )
         if self.sensors or turned.size:
             turned = to_rotations(turned, "the frame")
             if turned.shape != (len(self.sensors), 3, 3):
                 raise SettingError(
-                    f"the orientations of {len(self.sensors)} sensors are as many quaternions or matrices; got "
+                    f"expected {len(self.sensors)} quaternions or matrices, one for each sensor; "
+                    "found "
                     f"{' × '.join(map(str, turned.shape[:-2])) or 'one'}"
                 )
         return self._frame(np.concatenate((places.reshape(-1), turned.reshape(-1))), time)

@@ -102,7 +102,8 @@ def _compute_target_values(
             else f"'{coordinates.file}' has no such column"
         )
         raise SettingError(
-            f"the value of '{task.name}' is to be from a file, and {where}{suggest_name(task.name, columns)}"
+            f"the value of '{task.name}' is read from a file, but "
+            f"{where}{suggest_name(task.name, columns)}"
         )
     values = (
         np.deg2rad(coordinates[task.name])

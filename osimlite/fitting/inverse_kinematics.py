@@ -78,7 +78,7 @@ def inverse_kinematics(
         UnsupportedError: osimlite does not support a joint or constraint of the model.
     """
     if markers is None and orientations is None:
-        raise SettingError("there is nothing to fit; give markers, orientations, or both")
+        raise SettingError("nothing to fit; pass markers, orientations, or both")
     turned = (
         None
         if orientations is None
@@ -149,8 +149,9 @@ def fit_motion(
         or np.abs(data.times - turned.times).max() > TIME_TOLERANCE_S
     ):
         raise SettingError(
-            f"the {len(data.times)} frames of the markers and the {len(turned.times)} of the orientations are not of "
-            "the same times; give both at the times of one"
+            f"the {len(data.times)} frames of the markers and the {len(turned.times)} frames of "
+            "the orientations have "
+            "different times; resample one of them"
         )
     if not data.names:
         mechanism = lock_translations(mechanism)
@@ -199,7 +200,9 @@ def check_weight(weight: float, what: str) -> None:
         SettingError: the weight is negative, infinite or NaN.
     """
     if not 0.0 <= weight < np.inf:
-        raise SettingError(f"the weight {weight:g} of {what} is no weight; give one from 0 on")
+        raise SettingError(
+            f"the weight {weight:g} of {what} is invalid; set a number that is not negative"
+        )
 
 
 def lock_translations(mechanism: Mechanism) -> Mechanism:

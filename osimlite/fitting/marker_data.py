@@ -80,7 +80,8 @@ def read_trc(path: str | Path) -> MarkerData:
     names = tuple(label.text for label in header.labels)
     if not names or not header.lines[0].lstrip("\ufeff").startswith("PathFileType"):
         raise DocumentError(
-            "it is no marker file: it must begin with 'PathFileType' and name markers", file=file
+            "this is not a marker file: it must begin with 'PathFileType' and name markers",
+            file=file,
         )
     unit = header.entries["Units"].value.text if "Units" in header.entries else ""
     if unit not in METRES:
@@ -120,7 +121,8 @@ def _parse_number(cell: str, file: str, line: int, place: int) -> float:
         return float(text) if text else np.nan
     except ValueError:
         raise DocumentError(
-            f"'{text}' in column {place + 1} is no number; leave the cells of a marker that was not seen empty",
+            f"'{text}' in column {place + 1} is not a number; leave the cells of an unseen marker "
+            "empty",
             file=file,
             line=line,
         ) from None
@@ -139,7 +141,8 @@ def read_sto_markers(path: str | Path) -> MarkerData:
     names = tuple(label.removesuffix(ends[0]) for label in firsts)
     if [f"{name}{end}" for name in names for end in ends] != [*table.columns]:
         raise DocumentError(
-            f"the columns are no places of markers: a marker has three, which end in {', '.join(ends)}",
+            "the columns are not marker positions: each marker has three columns, which end in "
+            f"{', '.join(ends)}",
             file=str(path),
         )
     unit = METRES.get(table.header.get("Units", "m"), 1.0)

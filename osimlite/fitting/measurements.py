@@ -29,14 +29,15 @@ class Measurements:
         twice = sorted({name for name in self.names if self.names.count(name) > 1})
         if twice:
             raise DocumentError(
-                f"two {self.noun}s are called {join_words(twice)}; rename one of each",
+                f"two {self.noun}s have the name {join_words(twice)}; rename one of each",
                 file=self.file,
             )
         if len(self.times) == 0:
-            raise DocumentError(f"there are {self.noun}s but no frames", file=self.file)
+            raise DocumentError(f"the data have {self.noun}s but no frames", file=self.file)
         if self.values.shape != (len(self.times), len(self.names), *self.shape):
             raise SettingError(
-                f"the values of {len(self.names)} {self.noun}s at {len(self.times)} times are an array of that many "
+                f"the values of {len(self.names)} {self.noun}s at {len(self.times)} times are an "
+                "array of that many "
                 f"times, {self.noun}s and {' × '.join(map(str, self.shape))} numbers; got "
                 f"{' × '.join(map(str, self.values.shape))}"
             )
@@ -44,7 +45,8 @@ class Measurements:
         if not (steps > 0.0).all() or not np.isfinite(self.times).all():
             frame = int(np.argmin(steps > 0.0)) + 2 if len(steps) else 1
             raise DocumentError(
-                f"the times of the frames must increase, and frame {frame} does not come after the one before it",
+                f"the times of the frames must increase, but frame {frame} is not later than the "
+                "one before",
                 file=self.file,
             )
 
@@ -61,14 +63,16 @@ class Measurements:
         """
         if not isinstance(arrays, Mapping):
             raise SettingError(
-                f"{cls.noun}s are a file, or arrays by their names, not a {type(arrays).__name__}"
+                f"expected a file or a mapping of names to arrays for {cls.noun}s, found a "
+                f"{type(arrays).__name__}"
             )
         values = [np.asarray(value, dtype=float) for value in arrays.values()]
         values = [value[None] if value.ndim == len(cls.shape) else value for value in values]
         counts = {value.shape for value in values}
         if len(counts) != 1 or next(iter(counts))[1:] != cls.shape:
             raise SettingError(
-                f"every {cls.noun} has {' × '.join(map(str, cls.shape))} numbers for each frame, as many as all others"
+                f"every {cls.noun} has {' × '.join(map(str, cls.shape))} numbers for each frame, "
+                "and all have the same number of frames"
             )
         (count, *_), *_ = counts
         moments = (
@@ -91,7 +95,8 @@ class Measurements:
         """Return the error for a range of times without frames."""
         where = f" of '{self.file}'" if self.file else ""
         return SettingError(
-            f"no frame{where} lies between {first:g} and {last:g} s; the data are from {self.times[0]:g} to "
+            f"no frame{where} lies between {first:g} and {last:g} s; the data are from "
+            f"{self.times[0]:g} to "
             f"{self.times[-1]:g} s"
         )
 
@@ -108,7 +113,7 @@ class Measurements:
         for name in names:
             if name not in places:
                 raise SettingError(
-                    f"there is no {self.noun} '{name}' in {self.source}{suggest_name(name, self.names)}"
+                    f"unknown {self.noun} '{name}' in {self.source}{suggest_name(name, self.names)}"
                 )
         return self.values[:, [places[name] for name in names]]
 
@@ -129,8 +134,10 @@ class Measurements:
         ]
         if not names:
             raise OsimliteError(
-                f"no {self.noun} of {self.source} ({join_words([*self.names])}) is one of the model "
-                f"({join_words([*model]) or 'none'}); give what it is in the model the name that it has in the data"
+                f"no {self.noun} of {self.source} ({join_words([*self.names])}) is one of the "
+                "model "
+                f"({join_words([*model]) or 'none'}); use the same names in the model and in the "
+                "data"
             )
         return names
 

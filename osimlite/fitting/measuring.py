@@ -119,7 +119,7 @@ class ScaleFactorFinder:
             if not np.isfinite(measured):
                 return 0.0, f"{join_words(names)} were not seen in every frame of the time range"
             if not length > 0.0:
-                return 0.0, f"{join_words(names)} are at one place in the model"
+                return 0.0, f"{join_words(names)} have the same position in the model"
             ratios.append(measured / length)
         return (float(np.mean(ratios)), "") if ratios else (0.0, "it has no pairs of markers")
 

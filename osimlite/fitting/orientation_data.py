@@ -92,7 +92,8 @@ def to_rotations(values: ArrayLike, what: str) -> Array:
         return rotation_of(given)
     if given.ndim < 2 or given.shape[-2:] != (3, 3):
         raise SettingError(
-            f"orientations are quaternions of 4 numbers or matrices of 3 × 3; {what} has an array of "
+            f"expected quaternions of 4 numbers or matrices of 3 × 3 for orientations; {what} has "
+            "an array of "
             f"{' × '.join(map(str, given.shape)) or 'one number'}"
         )
     return given
@@ -122,7 +123,8 @@ def read_orientations(path: str | Path) -> OrientationData:
     table = read_sto(path)
     if table.kind != QUATERNION:
         raise DocumentError(
-            f"the table holds {table.kind}, not quaternions; its header must say DataType={QUATERNION}",
+            f"the table holds {table.kind}, not quaternions; its header must have "
+            f"DataType={QUATERNION}",
             file=str(path),
         )
     names = tuple(label.removesuffix("_1") for label in table.columns[::4])

@@ -225,7 +225,7 @@ def _read_trials(
     if static is not None:
         result[STATIC_TRIAL] = MarkerData.from_source(static)
     if not result:
-        raise SettingError("there is nothing to fit; give at least one trial")
+        raise SettingError("nothing to fit; pass at least one trial")
     return result
 
 
@@ -235,7 +235,7 @@ def _report_extreme_factors(factors: Mapping[str, Sequence[float]]) -> Iterator[
         body for body, own in factors.items() if min(own) <= MIN_FACTOR or max(own) >= MAX_FACTOR
     ]
     if ends:
-        yield f"{join_words(ends)}: factors at an end of what is allowed; look at the names and the units of the markers"
+        yield f"{join_words(ends)}: scale factors at a limit; check the names and units of the markers"
 
 
 @dataclass(frozen=True, eq=False)

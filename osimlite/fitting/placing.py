@@ -67,12 +67,14 @@ def place_markers(
     within = (data.times >= first) & (data.times <= last)
     if data.times[0] == data.times[-1]:
         raise SettingError(
-            f"'{data.file or 'the static trial'}' has one frame, at {data.times[0]:g} s, and the markers are averaged "
+            f"'{data.file or 'the static trial'}' has one frame, at {data.times[0]:g} s, but the "
+            "markers are averaged "
             "over a range of times, as in OpenSim; repeat the row at a later time"
         )
     if not within.any() or not first < last:
         raise SettingError(
-            f"the time range of the markers, {first:g} to {last:g} s, holds no frames to average; give one that begins "
+            f"the time range of the markers, {first:g} to {last:g} s, has no frames to average; "
+            "set one that begins "
             f"before it ends, within {data.times[0]:g} to {data.times[-1]:g} s"
         )
     mean = MarkerData(

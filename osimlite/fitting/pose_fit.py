@@ -199,8 +199,9 @@ class PoseFit:
             item.name for item in self.mechanism.constraints if not isinstance(item, Lock)
         )
         return SimulationError(
-            f"no pose of '{self.mechanism.name}' near that of frame {frame + 1} keeps its constraints ({names}); "
-            "change default values, or leave constraints out"
+            f"no pose of '{self.mechanism.name}' near that of frame {frame + 1} satisfies its "
+            f"constraints ({names}); "
+            "change default values, or disable constraints"
         )
 
 

@@ -62,7 +62,7 @@ class ScaledModel:
     unknown: str = ""
 
 
-UNSCALED = "not scaled, but left in the size of the generic model"
+UNSCALED = "not scaled, and left in the size of the generic model"
 """Consequence for parts of unknown classes."""
 
 
@@ -119,7 +119,7 @@ def scale(
     wanted = list(measurements)
     if (wanted or place) and data is None:
         raise SettingError(
-            "the subject is to be measured, and there are no markers of it; give them"
+            "measurements and placement need markers of the standing subject; name a static trial"
         )
     if data is not None and wanted:
         measuring.apply_measurements(wanted, data, start, end)
@@ -129,7 +129,7 @@ def scale(
         three = (given, given, given) if isinstance(given, int | float) else tuple(given)
         if not all(0.0 < number < math.inf for number in three):
             numbers = ", ".join(f"{number:g}" for number in three)
-            raise SettingError(f"factors of '{name}' are positive numbers, not {numbers}")
+            raise SettingError(f"expected positive factors of '{name}', found {numbers}")
         by_hand.append(Scale(segment=name, scales=tuple(map(float, three))))
     measuring.apply_factors(by_hand)
     results, mechanism = measuring.found, measuring.mechanism
@@ -151,11 +151,12 @@ def _create_measurements(pairs: MeasurementPairs) -> list[Measurement]:
     for name, (_, on) in pairs.items():
         if not isinstance(on, Mapping):
             raise SettingError(
-                f"measurement '{name}' is pairs of markers, and by body the axes that they scale"
+                f"measurement '{name}' must have pairs of markers, and by body the axes that they "
+                "scale"
             )
         for body, axes in on.items():
             if not axes or not {*axes.lower()} <= {*"xyz"}:
-                raise SettingError(f"'{axes}' of '{body}' are no axes; write some of XYZ")
+                raise SettingError(f"'{axes}' of '{body}' are not axes; write letters of XYZ")
     return [
         Measurement(
             name=name,
@@ -183,9 +184,7 @@ def compute_scaled_model(tool: ScaleTool, folder: Path) -> ScaledModel:
     """
     maker, scaler, placer = tool.generic_model_maker, tool.model_scaler, tool.marker_placer
     if maker.model_file in NO_FILE:
-        raise SettingError(
-            "the setup names no model; put its file into model_file of GenericModelMaker"
-        )
+        raise SettingError("the setup names no model; set model_file of GenericModelMaker")
     result = ScaledModel(read_copy(folder / maker.model_file, Model))
     model = result.model
     if scaler.apply:
@@ -219,7 +218,7 @@ def _scale_by_setup(tool: ScaleTool, model: Model, folder: Path) -> ScaleFactors
         if word == MEASUREMENTS and any(item.apply for item in scaler.measurement_set.objects):
             if scaler.marker_file in NO_FILE:
                 raise SettingError(
-                    "the model is scaled by measurements, and ModelScaler has no marker_file; name one"
+                    "scaling by measurements needs a marker_file of ModelScaler; set it"
                 )
             data = MarkerData.from_source(folder / scaler.marker_file)
             measuring.apply_measurements(
@@ -230,7 +229,7 @@ def _scale_by_setup(tool: ScaleTool, model: Model, folder: Path) -> ScaleFactors
         elif word != MEASUREMENTS:
             near = suggest_name(word, (MEASUREMENTS, MANUAL_SCALE))
             raise SettingError(
-                f"scaling_order has '{word}'; it consists of {MEASUREMENTS} and {MANUAL_SCALE}{near}"
+                f"scaling_order has '{word}'; expected {MEASUREMENTS} or {MANUAL_SCALE}{near}"
             )
     keeps = scaler.preserve_mass_distribution
     result, mechanism = measuring.found, measuring.mechanism

@@ -241,8 +241,10 @@ class _Scaler:
         factors = self.get_base_factors(self.placements.follow_socket(joint, "socket_parent_frame"))
         if factors is not None and len(set(factors.tolist())) > 1:
             raise ModelError(
-                f"'{coupler.path}' gives a translation of the joint '{joint.path}', whose parent is scaled by "
-                f"{' × '.join(f'{factor:.6g}' for factor in factors)}; give it one factor for all axes"
+                f"'{coupler.path}' determines a translation of the joint '{joint.path}', whose "
+                "parent is scaled by "
+                f"{' × '.join(f'{factor:.6g}' for factor in factors)}; use one factor for all its "
+                "axes"
             )
         return factors
 

@@ -55,11 +55,11 @@ class SelectedFrames:
                 raise SettingError(f"the model has no marker '{name}'{suggest_name(name, known)}")
             check_weight(weight, f"'{name}'")
         if count < 1:
-            raise SettingError(f"{count} frames are none; give at least 1")
+            raise SettingError(f"expected at least 1 frame, found {count}")
         shared = {name for trial in trials.values() for name in trial.find_shared_names(known)}
         self.markers = [name for name in known if name in shared and weights.get(name, 1.0) > 0.0]
         if not self.markers:
-            raise SettingError("no marker counts; give one a weight")
+            raise SettingError("no marker has a positive weight; set one")
         self.weights = np.array([weights.get(name, 1.0) for name in self.markers])
         self.trials, self.notes, times, measured = (
             list[str](),
@@ -125,7 +125,8 @@ class SelectedFrames:
             number = format_count(int(far[:, place].sum()), "frame")
             self.notes.append(
                 f"{self.markers[place]} is left out in {number} of {join_words(where)}: up to "
-                f"{100.0 * np.nanmax(distances[:, place]):.0f} cm away; it may have been taken for another"
+                f"{100.0 * np.nanmax(distances[:, place]):.0f} cm away; it may have been taken for "
+                "another"
             )
         self.measured[far] = np.nan
         return bool(far.any())

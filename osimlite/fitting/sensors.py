@@ -61,13 +61,14 @@ def find_sensor_frames(
         if name in wanted:
             if name in result:
                 raise SettingError(
-                    f"'{model.name}' has several frames '{name}'; a sensor has the name of one"
+                    f"'{model.name}' has several frames '{name}'; the name of a sensor must be "
+                    "unique"
                 )
             result[name] = mechanism.frames[path]
     if not result:
         near = suggest_name(wanted[0], [name for name, _ in frames]) if wanted else ""
         raise SettingError(
-            f"'{model.name}' has no frame that is called as a sensor ({join_words(wanted)}){near}"
+            f"'{model.name}' has no frame with the name of a sensor ({join_words(wanted)}){near}"
         )
     return result
 
@@ -103,7 +104,7 @@ def place_sensors(
     if base and axis:
         if base not in measured:
             raise SettingError(
-                f"there is no sensor '{base}' in {data.source}{suggest_name(base, data.names)}"
+                f"unknown sensor '{base}' in {data.source}{suggest_name(base, data.names)}"
             )
         faced = _get_axis_direction(measured[base], axis)
         heading = _compute_heading(
@@ -119,16 +120,17 @@ def place_sensors(
             continue
         if not np.isfinite(rotation).all():
             raise SettingError(
-                f"{data.source} does not say in its first frame how the sensor '{name}' is turned"
+                f"the first frame of {data.source} has no orientation of the sensor '{name}'"
             )
         body, matrix = mechanism.frames[model.tree().path_of(worn) or ""]
         inside = (state.transform(body) @ matrix)[:3, :3].T @ rotation
         placed.append((name, worn, tuple(angles_xyz(inside).tolist())))
     if not placed:
-        example = f", as '{frames[-1].name}{SENSOR_SUFFIX}' is" if frames else ""
+        example = f"; an example is '{frames[-1].name}{SENSOR_SUFFIX}'" if frames else ""
         raise SettingError(
-            f"no sensor of {data.source} ({join_words(data.names)}) is called as a frame of '{model.name}' "
-            f"with '{SENSOR_SUFFIX}' behind{example}"
+            f"no sensor of {data.source} ({join_words(data.names)}) has the name of a frame of "
+            f"'{model.name}' "
+            f"and the suffix '{SENSOR_SUFFIX}'{example}"
         )
     for name, worn, angles in placed:
         there = _find_single_frame(
@@ -157,7 +159,9 @@ def _find_single_frame(
     """
     result = [frame for frame in frames if frame.name == name]
     if len(result) > 1:
-        raise SettingError(f"'{model.name}' has several frames '{name}'; a sensor is worn on one")
+        raise SettingError(
+            f"'{model.name}' has several frames '{name}'; the frame of a sensor must be unique"
+        )
     return result[0] if result else None
 
 
@@ -165,7 +169,7 @@ def _get_axis_direction(rotation: Array, axis: str) -> Array:
     """Return the direction of an axis of a sensor (3,)."""
     word = axis.lower()
     if word[-1] not in AXES:
-        raise SettingError(f"the axis '{axis}' is none; give x, y, z, -x, -y or -z")
+        raise SettingError(f"unknown axis '{axis}'; expected x, y, z, -x, -y or -z")
     column: Array = rotation[:, AXES.index(word[-1])]
     return -column if word[0] == "-" else column
 
@@ -182,7 +186,7 @@ def _find_forward_direction(model: Model, mechanism: Mechanism, rotations: Array
         ]
         if ends[0] == GROUND:
             return rotations[ends[1]][:, 0]
-    raise SettingError(f"no joint of '{model.name}' begins at ground; leave out base_imu_label")
+    raise SettingError(f"no joint of '{model.name}' has ground as parent; leave out base_imu_label")
 
 
 def _compute_heading(forwards: Array, faced: Array) -> float:

@@ -45,7 +45,7 @@ def run_analyze_tool(job: Job, outcome: Outcome) -> None:
     setup: AnalyzeTool = job.setup
     analyses = find_analyses(job)
     if not analyses:
-        raise job.create_error("none of its analyses is on; give it one")
+        raise job.create_error("no analysis of the setup is on; add one, or set <on>true</on>")
     states = job.find_path("states_file")
     model = build_model(job)
     with build_simulation(job, model) as simulation:
@@ -63,7 +63,8 @@ def run_analyze_tool(job: Job, outcome: Outcome) -> None:
         moments = list(rows)
         if not moments:
             raise job.create_error(
-                f"there is nothing from {setup.initial_time:g} s to {setup.final_time:g} s"
+                f"the motion has no row from {setup.initial_time:g} s to {setup.final_time:g} s; "
+                "change initial_time or final_time"
             )
         times, result = np.array([t for t, _ in moments]), np.array([y for _, y in moments])
         unbalanced: dict[str, BoolArray] = {}
@@ -117,7 +118,8 @@ def equilibrate_rows(
             states[missing, place : place + len(element.states)] = np.nan
         outcome.add_message(
             "no equilibrium",
-            f"of {reasons[path]}: at {np.count_nonzero(missing)} of {len(times)} moments, {_describe_spans(times, missing)}; "
+            f"of {reasons[path]}: at {np.count_nonzero(missing)} of {len(times)} moments, "
+            f"{_describe_spans(times, missing)}; "
             "what depends on its fibers or its force is NaN then",
         )
     outcome.summary["without_equilibrium"] = {
@@ -160,9 +162,7 @@ def _read_coordinate_motion(
     }:
         # Not their default values: so OpenSim's analyses have it, unlike its inverse dynamics.
         recorded.values[:, [*absent.values()]] = 0.0
-        outcome.add_message(
-            "not in the file", f"{join_words([*absent])}: 0 is taken, as in OpenSim"
-        )
+        outcome.add_message("not in the file", f"{join_words([*absent])}: 0 is used, as in OpenSim")
     cutoff = setup.lowpass_cutoff_frequency_for_coordinates
     if cutoff >= 0.0:
         recorded = recorded.lowpassed(cutoff, continued=True)
@@ -223,7 +223,7 @@ def _read_speeds(
     for row, time in zip(rows.tolist(), recorded.times.tolist(), strict=True):
         if row == len(table.times) or abs(table.times[row] - time) > TIME_TOLERANCE_S:
             raise job.create_error(
-                f"'{path}' has no row at {time:.15g} s, at which there are coordinates; give it one"
+                f"'{path}' has no row at {time:.15g} s, unlike the coordinates; add one"
             )
     for name, place in columns.items():
         speeds[:, paths.index(name)] = table.rows[:, place]

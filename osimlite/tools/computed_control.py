@@ -323,8 +323,10 @@ class ComputedControl:
         )
         if lacking:
             result.failure = (
-                f"the actuators cannot give the accelerations that the tasks need at {t:g} s: they lack {lacking} "
-                "(rad/s², m/s²); append reserve actuators, widen their controls, or lower the weights"
+                f"the actuators cannot produce the accelerations that the tasks need at {t:g} s; "
+                f"missing: {lacking} "
+                "(rad/s², m/s²). Append reserve actuators, widen the bounds of controls, or lower "
+                "the weights"
             )
             return low
         if self.has_states:

@@ -111,7 +111,8 @@ def build_model(job: Job) -> Model:
     for controller in model.components(CorrectionController):
         if controller.enabled:
             raise job.create_unsupported_error(
-                f"'{controller.name}', a CorrectionController, cannot be computed yet; say <enabled>false</enabled>"
+                f"osimlite cannot compute the CorrectionController '{controller.name}' yet; set "
+                "<enabled>false</enabled>"
             )
     return model
 
@@ -225,7 +226,7 @@ class StateRows(NamedTuple):
         columns = columns_of_states(table.columns, simulation.paths)
         if table.in_degrees:
             raise job.create_error(
-                f"'{path}' is in degrees, which OpenSim refuses for states; give it in radians"
+                f"OpenSim rejects states in degrees; convert '{path}' to radians"
             )
         if not columns or not len(table.times):
             raise job.create_error(
@@ -270,7 +271,7 @@ class StateRows(NamedTuple):
         """Add a message about states without a column."""
         if self.missing:
             outcome.add_message(
-                "not in the file", f"{join_words(self.missing)}: the default values are taken"
+                "not in the file", f"{join_words(self.missing)}: the default values are used"
             )
 
 

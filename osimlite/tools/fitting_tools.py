@@ -137,11 +137,11 @@ def run_imu_placer(job: Job, outcome: Outcome) -> None:
     outcome.add_message("placed", join_words(placed.names, most=100))
     if placed.left_out:
         outcome.add_message(
-            "left out", f"{join_words(placed.left_out)}: the model has no frame of these names"
+            "left out", f"{join_words(placed.left_out)}: the model has no frames with these names"
         )
     if placed.heading is not None:
         outcome.add_message(
-            "heading", f"turned by {math.degrees(placed.heading):.6g} degrees about the vertical"
+            "heading", f"rotated by {math.degrees(placed.heading):.6g} degrees about the vertical"
         )
 
 
@@ -218,5 +218,5 @@ def run_imu_inverse_kinematics_tool(job: Job, outcome: Outcome) -> None:
         outcome.add_message("sensors", words)
     if silent := [name for name in data.names if name not in frames]:
         outcome.add_message(
-            "left out", f"{join_words(silent)}: the model has no frame of these names"
+            "left out", f"{join_words(silent)}: the model has no frames with these names"
         )

@@ -35,23 +35,27 @@ def run_forward_tool(job: Job, outcome: Outcome) -> None:
     bounds = setup.minimum_integrator_step_size, setup.maximum_integrator_step_size
     if not 0.0 < setup.integrator_error_tolerance < 1.0:
         raise job.create_error(
-            f"integrator_error_tolerance is {setup.integrator_error_tolerance:g}, with which OpenSim does not end; "
-            "give one between 0 and 1, such as 1e-5"
+            "OpenSim does not finish with integrator_error_tolerance "
+            f"{setup.integrator_error_tolerance:g}; "
+            "set a value between 0 and 1, such as 1e-5"
         )
     if not 0.0 <= bounds[0] <= bounds[1] or bounds[1] == 0.0:
         raise job.create_error(
-            f"steps from {bounds[0]:g} s to {bounds[1]:g} s are none; give a longest that is longer"
+            f"step sizes from {bounds[0]:g} s to {bounds[1]:g} s are invalid; set a larger "
+            "maximum_integrator_step_size"
         )
     model = build_model(job)
     with build_simulation(job, model) as simulation:
         start, y = _compute_start(job, outcome, simulation)
         if not start < setup.final_time:
             raise job.create_error(
-                f"the final_time {setup.final_time:g} s does not come after the start at {start:g} s"
+                f"the final_time {setup.final_time:g} s does not come after the start at {start:g} "
+                "s"
             )
         if setup.final_time - start > MOST_STEPS * bounds[1]:
             raise job.create_error(
-                f"the final_time {setup.final_time:g} s is too far away for steps of {bounds[1]:g} s"
+                f"the final_time {setup.final_time:g} s is too far away for steps of {bounds[1]:g} "
+                "s"
             )
         settings = Settings(setup.integrator_error_tolerance, step_bounds=bounds)
         times, states, failure = simulation.every_step(start, y, setup.final_time, settings)
@@ -86,7 +90,9 @@ def _compute_start(job: Job, outcome: Outcome, simulation: Simulation) -> tuple[
         row = given.find_row(start)
         start, y = float(given.table.times[row]), given.create_state(simulation, row)
         if start != setup.initial_time:
-            outcome.add_message("start", f"{start:g} s, the time of the states that are taken")
+            outcome.add_message(
+                "start", f"{start:g} s, the time of the row of the states file that is used"
+            )
     if setup.solve_for_equilibrium_for_auxiliary_states:
         y = simulation.engine.equilibrated(start, y)
     return start, y

@@ -45,8 +45,10 @@ def run_inverse_dynamics_tool(job: Job, outcome: Outcome) -> None:
     if by_path:
         outcome.add_warning(
             "columns",
-            f"'{setup.coordinates_file}' names {join_words(by_path)} by paths, which are understood here; OpenSim's "
-            "inverse dynamics takes the default values of these coordinates instead: its moments are other ones",
+            f"'{setup.coordinates_file}' names {join_words(by_path)} by paths, which osimlite "
+            "reads; OpenSim's "
+            "inverse dynamics uses the default values of these coordinates instead, so its moments "
+            "differ",
         )
     cutoff = setup.lowpass_cutoff_frequency_for_coordinates
     if cutoff >= 0.0:
@@ -122,7 +124,7 @@ def _find_reported_joints(job: Job, model: Model, outcome: Outcome) -> list[Join
         if name in known:
             result.append(known[name])
         else:
-            message = f"there is no joint '{name}'{suggest_name(name, known)}: its loads are left out, as in OpenSim"
+            message = f"unknown joint '{name}'{suggest_name(name, known)}: its loads are left out, as in OpenSim"
             outcome.add_message("joints_to_report_body_forces", message)
     return result
 

@@ -74,7 +74,7 @@ class Job:
         for tag in tags:
             if (path := self.find_path(tag)) is not None:
                 return path
-        raise self.create_error(f"it names no {' or '.join(tags)}; give it one")
+        raise self.create_error(f"the setup names no {' or '.join(tags)}; add one")
 
     def read_model(self) -> Model:
         """Read the model that the setup names, without the cache.

@@ -91,7 +91,8 @@ def find_setups(words: Iterable[str | Path]) -> list[Path]:
             files.update(dict.fromkeys(setups))
         elif os.path.isdir(word):
             raise OsimliteError(
-                f"this is a folder; name the setups in it, as '{os.path.join(word, '*.xml')}'",
+                "expected a setup, found a folder; name the setups in it, for example "
+                f"'{os.path.join(word, '*.xml')}'",
                 file=word,
             )
         else:
@@ -151,7 +152,7 @@ def run_many(
     except KeyboardInterrupt:
         journal.save()
         message = f"interrupted after {len(work.trials)} of {format_count(len(setups), 'setup')}"
-        raise RunInterruption(f"{message}; go on with --resume") from None
+        raise RunInterruption(f"{message}; continue with --resume") from None
     trials = [work.trials[setup] for setup in setups]
     _report_clashes(trials)
     journal.finish(trials)
@@ -167,7 +168,10 @@ def _report_clashes(trials: Sequence[RunRecord]) -> None:
             if other is not trial:
                 for one, another in ((trial, other), (other, trial)):
                     one.status = FAILED
-                    one.message = f"'{another.setup}' writes '{file}' too; give each a place of its own, or -o FOLDER"
+                    one.message = (
+                        f"'{another.setup}' writes '{file}' as well; "
+                        "give each setup a results folder of its own, or use -o FOLDER"
+                    )
 
 
 def assign_folders(setups: Sequence[Path], output: Path | None) -> dict[Path, Path | None]:
@@ -380,7 +384,7 @@ class _Schedule:
                     one for one in needed if self.trials[Path(one)].status in (FAILED, WAITED)
                 ]
                 if broken:
-                    message = f"it needs what {join_words(broken)} should have made"
+                    message = f"it needs results of {join_words(broken)}, which failed"
                     self.record_run(RunRecord(str(setup), WAITED, message=message))
                 elif (trial := self.journal.find_finished(setup)) is not None:
                     self.record_run(trial)
@@ -435,9 +439,7 @@ class _Schedule:
                         self.record_run(pool.result()[1])
                 except WorkerLostError:
                     self.record_run(
-                        RunRecord(
-                            str(setup), FAILED, message="the process that ran it has ended, twice"
-                        )
+                        RunRecord(str(setup), FAILED, message="the process that ran it died twice")
                     )
 
 

@@ -157,7 +157,7 @@ def run_moco_inverse(job: Job, outcome: Outcome) -> None:
 
     if job.setup.output_paths:
         raise job.create_unsupported_error(
-            "output_paths is given, and outputs of the solution are not computed here; leave it empty"
+            "osimlite does not compute outputs of the solution; leave output_paths empty"
         )
     problem = build_inverse_problem(job.setup, job.file)
     solution = solve_inverse_problem(problem, make_progress_callback(outcome), job.refine)

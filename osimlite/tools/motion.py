@@ -339,7 +339,7 @@ class Motion:
             return list(range(len(names)))
         for name in asked:
             if name not in names:
-                raise SettingError(f"there is no '{name}' for {what}{suggest_name(name, names)}")
+                raise SettingError(f"unknown name '{name}' for {what}{suggest_name(name, names)}")
         return [names.index(name) for name in asked]
 
 

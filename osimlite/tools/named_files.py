@@ -80,7 +80,7 @@ def limit_documents(documents: set[str], setup: str) -> None:
         DocumentError: there are more than `MAX_DOCUMENTS`.
     """
     if len(documents) > MAX_DOCUMENTS:
-        message = f"it names more than {MAX_DOCUMENTS} documents, with those that they name"
+        message = f"the setup names more than {MAX_DOCUMENTS} documents, directly or through others"
         raise DocumentError(message, file=setup)
 
 

@@ -29,7 +29,7 @@ DYNAMICS_TITLE = "Inverse Dynamics Generalized Forces"
 def _create_number_error(what: str, time: float) -> SimulationError:
     """Return the error for a result that is infinite or not a number."""
     return SimulationError(
-        f"{what} at {time:g} s; look for a number in the data that is far too large"
+        f"{what} at {time:g} s; check the data for a number that is far too large"
     )
 
 
@@ -69,7 +69,8 @@ class Outcome:
         """
         if precision > MAX_PRECISION:
             raise SettingError(
-                f"output_precision is {precision}; give the digits behind the point, {PRECISION} or 16"
+                f"output_precision is {precision}; set the number of digits after the decimal "
+                f"point, for example {PRECISION} or 16"
             )
         if (missing := self._note_missing(path, table)) and "NaN" not in description:
             description = f"{description}\n{missing}" if description else f"\n{missing}\n"
@@ -156,7 +157,7 @@ class Outcome:
             if path.name in self.tables or path.suffix.lower() != ".osim"
         ]
         for path in find_inputs(kept, setup):
-            message = f"a result would replace '{path}', which it is computed from; give it another name or place"
+            message = f"a result would replace '{path}', from which it is computed; give it another name or folder"
             raise DocumentError(message, file=str(setup))
 
     def write(self, setup: Path, writer: ResultWriter) -> None:

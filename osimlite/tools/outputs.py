@@ -245,7 +245,8 @@ def _read_joint_power(motion: Motion, joint: Joint, path: str) -> Array:
         for info in motion.mechanism.coordinates
     ):
         raise UnsupportedError(
-            f"the power of '{tree.path_of(joint)}', which has prescribed coordinates, is not known"
+            f"osimlite cannot compute the power of '{tree.path_of(joint)}', which has prescribed "
+            "coordinates"
         )
     return np.zeros((len(motion.times), 1))
 

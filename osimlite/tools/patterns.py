@@ -88,6 +88,7 @@ class _Search:
         self.left -= len(found)
         if self.left < 0:
             raise OsimliteError(
-                f"the pattern '{self.pattern}' looks at more than {MAX_ENTRIES} files; name the folders"
+                f"the search for '{self.pattern}' reads more than {MAX_ENTRIES} files; name the "
+                "folders"
             )
         return found

@@ -123,7 +123,7 @@ def report(outcomes: Mapping[str | Path, Outcome], path: str | Path) -> Path:
     """
     trials = collect_trials(outcomes)
     if all(trial.evidence is None for trial in trials):
-        raise OsimliteError("there is nothing to report: none of the setups has a motion")
+        raise OsimliteError("nothing to report: no setup has a motion")
     with plain_lettering():
         parts = "".join([*_render_trials(trials), *_render_verdicts(outcomes)])
     title = html.escape(join_words([trial.name for trial in trials]))
@@ -180,16 +180,19 @@ def _render_verdicts(outcomes: Mapping[str | Path, Outcome]) -> Iterator[str]:
     if result is None or not result.verdicts:
         return
     rows = "".join(
-        f'<tr><td class="{item.verdict}">{item.verdict}</td><td class="number">{html.escape(item.shown)}</td>'
+        f'<tr><td class="{item.verdict}">{item.verdict}</td><td '
+        f'class="number">{html.escape(item.shown)}</td>'
         f'<td class="number">{item.limits}</td><td>{html.escape(item.words)} '
         f'<span class="source">{html.escape(item.source)}</span></td></tr>'
         for item in result.worst
     )
     left = "".join(f"<li>{html.escape(why)}</li>" for why in result.unchecked)
-    left = f'<p class="note">Not looked at:</p><ul class="note">{left}</ul>' if left else ""
+    left = f'<p class="note">Not checked:</p><ul class="note">{left}</ul>' if left else ""
     yield (
-        '<h2>Is it good enough?</h2><p class="note">The worst of each kind: good is within every published limit, okay '
-        "beyond the stricter of two, bad beyond all.</p><table><tr><th></th><th></th><th>limits</th><th></th></tr>"
+        '<h2>Is it good enough?</h2><p class="note">The worst value of each kind. Good: within '
+        "every published limit; okay: "
+        "beyond the stricter of two limits; bad: beyond "
+        "all.</p><table><tr><th></th><th></th><th>limits</th><th></th></tr>"
         f"{rows}</table>{left}"
     )
 
@@ -384,9 +387,9 @@ def _render_section(title: str, panels: Mapping[str, list[_Curve]]) -> Iterator[
         panel.set_visible(False)
     _add_legend(figure, lines)
     if cyclic:
-        note = "Over the gait cycle, from each strike of the foot on its side to the next: thin each, thick their mean."
+        note = "Over the gait cycle, from each strike of the foot on the same side to the next. Thin: each cycle; thick: mean."
         if any(not line.side for line in lines):
-            note += " What has no side goes by the right foot."
+            note += " Curves without a side follow the right foot."
     else:
         note = "Over time"
         note += (
@@ -467,7 +470,7 @@ def _render_errors(trial: TrialOutcomes, name: str) -> Iterator[str]:
             "cm",
             [100.0 * end for end in MARKER_ERROR_LIMITS_M],
         )
-        note = "Dashed: what OpenSim advises at most, 2 cm for the root mean square and 4 cm for the largest."
+        note = "Dashed: OpenSim's limits, 2 cm for the root mean square and 4 cm for the largest error."
         yield f'<h2>Marker errors{html.escape(name)}</h2><p class="note">{note}</p>{_render_image(figure)}'
     if evidence.angles is not None and evidence.sensors:
         figure = _draw_errors(

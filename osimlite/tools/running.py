@@ -101,13 +101,13 @@ def run(
         OsimliteError: the tool failed; then it has written nothing.
     """
     if not isinstance(setup, str | os.PathLike):
-        raise OsimliteError(f"the file of a setup is wanted here, not a {type(setup).__name__}")
+        raise OsimliteError(f"expected the path of a setup file, found a {type(setup).__name__}")
     file = Path(setup)
     top = read_any(file)
     tag = type(top).__name__
     if tag not in TOOLS:
         raise NotRunnable(
-            f"setups of {tag} cannot be run; those of {join_words(list_runnable())} can",
+            f"osimlite cannot run a {tag}; it runs {join_words(list_runnable())}",
             file=str(file),
         )
     if refine is not None and not tag.startswith("Moco"):
@@ -122,7 +122,10 @@ def run(
         ]:
             raise FaultySetup(Report(errors, report.texts))
         if away:
-            outcome.add_message("taken from here", f"{join_words(away)}, not beside the setup")
+            outcome.add_message(
+                "current folder",
+                f"contains {join_words(away)}, which the folder of the setup lacks",
+            )
         outcome.warnings = sorted(
             report.errors + report.warnings, key=lambda found: found.suggestion is None
         )
@@ -143,7 +146,7 @@ def run(
         subject = load_subject(str(file), Config()) if isinstance(error, MissingFileError) else None
         if isinstance(subject, Setup) and (maker := subject.find_writer(error.file)) is not None:
             error.message += (
-                f"; run '{get_relative_path(maker, Path.cwd())}' first, which should make it"
+                f"; run '{get_relative_path(maker, Path.cwd())}' first, which writes it"
             )
         raise
     return outcome

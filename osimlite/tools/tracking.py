@@ -81,7 +81,7 @@ class DesiredMotion:
         setup: RRATool | CMCTool = job.setup
         if job.find_path("desired_points_file") is not None:
             raise job.create_unsupported_error(
-                "desired_points_file is given, and points cannot be followed yet; leave it empty"
+                "osimlite cannot track points yet; leave desired_points_file empty"
             )
         mechanism = simulation.mechanism
         recorded = RecordedMotion.read(mechanism, job.require_path("desired_kinematics_file"))
@@ -91,7 +91,7 @@ class DesiredMotion:
             ]
             recorded.values[:, places] = 0.0
             outcome.add_message(
-                "not in the file", f"{join_words(recorded.missing)}: 0 is taken, as in OpenSim"
+                "not in the file", f"{join_words(recorded.missing)}: 0 is used, as in OpenSim"
             )
         start, end = float(recorded.times[0]), float(recorded.times[-1])
         times, values = (
@@ -163,8 +163,9 @@ def _apply_locks(
             unit = "rad" if info.motion_type == "rotational" else "m"
             outcome.add_message(
                 info.name,
-                f"locked at {info.default_value:g} {unit}; the desired motion is up to {apart:.3g} {unit} away from "
-                "that: as in OpenSim, the lock wins, and a task of this coordinate has nothing to do",
+                f"locked at {info.default_value:g} {unit}, up to {apart:.3g} {unit} from the "
+                "desired motion; "
+                "as in OpenSim, the lock wins, and a task of this coordinate has no effect",
             )
 
 
@@ -215,12 +216,12 @@ class TrackingTasks:
         names = mechanism.coordinate_names
         for item in job.read_object(path, CMC_TaskSet).objects:
             if type(item) is not CMC_Joint:
-                message = f"the task '{item.name}' is a {type(item).__name__}, which cannot be followed yet"
+                message = f"the task '{item.name}' is a {type(item).__name__}, which osimlite cannot track yet"
                 raise NotRunnable(message, file=str(path))
             for tag in ("active", "weight", "kp", "kv", "ka"):
                 if not getattr(item, tag):
                     raise job.create_error(
-                        f"the task '{item.name}' of '{path}' has an empty '{tag}'; give it a value"
+                        f"the task '{item.name}' of '{path}' has an empty '{tag}'; set a value"
                     )
             # As in OpenSim, `on` means nothing.
             if not item.active[0]:
@@ -229,7 +230,8 @@ class TrackingTasks:
                 if name not in names:
                     near = suggest_name(name, names)
                     raise job.create_error(
-                        f"the task '{item.name}' of '{path}' follows no coordinate: '{name}'{near}"
+                        f"the task '{item.name}' of '{path}' names an unknown coordinate "
+                        f"'{name}'{near}"
                     )
             weight, kp, kv, ka = (
                 float(getattr(item, tag)[0]) for tag in ("weight", "kp", "kv", "ka")
@@ -310,7 +312,8 @@ class ForceDistribution:
         if not self.optimal.all():
             lame = [name for name, force in zip(self.names, self.optimal, strict=True) if not force]
             raise job.create_error(
-                f"{join_words(lame)} can have no force: the optimal force is 0; give another"
+                f"{join_words(lame)}: an actuator with an optimal force of 0 has no force; set a "
+                "positive optimal force"
             )
 
     def compute_responses(self, t: float, q: Array, u: Array) -> tuple[Array, Array, Array]:
@@ -444,5 +447,8 @@ def refuse_controllers(job: Job, model: Model) -> None:
     """
     for controller in model.controller_set.objects:
         if getattr(controller, "enabled", True):
-            message = f"'{controller.name}' would add to the controls that the tool computes; take it out of the model"
+            message = (
+                f"the controller '{controller.name}' would add to the controls that the tool computes; "
+                "remove it from the model"
+            )
             raise SettingError(message, file=str(job.file))

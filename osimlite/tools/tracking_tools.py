@@ -94,13 +94,14 @@ def _move_mass_center(
     bodies = {body.name: body for body in model.components(Body)}
     if name not in bodies:
         raise job.create_error(
-            f"adjusted_com_body is '{name}', which is no body of the model{suggest_name(name, bodies)}"
+            f"adjusted_com_body is '{name}', which is not a body of the "
+            f"model{suggest_name(name, bodies)}"
         )
     body, gravity = bodies[name], model.gravity
     weight = abs(gravity[1]) * body.mass
     if weight < 2.0**-45.5:
         outcome.add_message(
-            "mass center", f"'{name}' has no weight: it stays where it is, as in OpenSim"
+            "mass center", f"'{name}' has no weight, so its mass centre stays, as in OpenSim"
         )
         return
     before = _compute_average_residuals(job, model, desired)
@@ -159,7 +160,8 @@ def run_cmc_tool(job: Job, outcome: Outcome) -> None:
     setup: CMCTool = job.setup
     if setup.actuators_to_exclude:
         raise job.create_unsupported_error(
-            "actuators_to_exclude is given, and all actuators are controlled here; leave it empty"
+            "osimlite does not support actuators_to_exclude, and controls all actuators; leave it "
+            "empty"
         )
     model = build_model(job)
     with build_simulation(job, model) as simulation:
@@ -203,7 +205,8 @@ def _track_motion(
     start, end = max(setup.initial_time, desired.start), min(setup.final_time, desired.end)
     if not start < end - window:
         raise job.create_error(
-            f"there is no window of {window:g} s from {start:g} s to {end:g} s; give a later final_time"
+            f"the motion from {start:g} s to {end:g} s is shorter than a window of {window:g} s; "
+            "set a later final_time"
         )
     with build_simulation(job, model) as simulation:
         tasks = TrackingTasks.read(job, simulation.mechanism)

@@ -141,7 +141,9 @@ def test_the_frame_solver_finds_the_same_poses() -> None:
     assert solver.places == pytest.approx(whole.places[-1], abs=1e-12)
     solver.reset()
     assert solver.step(places[0]) == pytest.approx(whole.values[0], abs=1e-9)
-    with pytest.raises(SettingError, match="4 markers are as many rows of 3 numbers; got 3 × 3"):
+    with pytest.raises(
+        SettingError, match="expected 4 rows of 3 numbers, one for each marker; found 3 × 3"
+    ):
         solver.step(places[0, :3])
     with pytest.raises(SettingError, match="no marker 'tree'; did you mean 'three'"):
         osimlite.FrameSolver(model, markers=["tree"])
@@ -180,12 +182,12 @@ def test_weights_count() -> None:
             lambda t: t.replace("\tm\t", "\tfeet\t"),
             r":3: the markers are in 'feet'; Units is one of m, mm",
         ),
-        (lambda t: t.replace("one\t", "two\t"), "two markers are called two"),
+        (lambda t: t.replace("one\t", "two\t"), "two markers have the name two"),
         (lambda t: "".join(t.splitlines(keepends=True)[:6]), "markers but no frames"),
-        (lambda t: t.replace("\n2\t0.5", "\n2\t-0.5"), "frame 2 does not come after"),
+        (lambda t: t.replace("\n2\t0.5", "\n2\t-0.5"), "frame 2 is not later than"),
         (
             lambda t: t.replace("\n2\t0.5\t", "\n2\t0.5\tgap"),
-            r":8: 'gap.*' in column 3 is no number",
+            r":8: 'gap.*' in column 3 is not a number",
         ),
         (
             lambda t: t.replace("\n2\t0.5\t", "\n2\t0.5\t1\t1\t"),
@@ -210,13 +212,13 @@ def test_what_cannot_be_fitted_is_told() -> None:
         osimlite.inverse_kinematics(model, {"hip": places["one"]})
     with pytest.raises(SettingError, match="no marker 'fore'; did you mean 'four'"):
         osimlite.inverse_kinematics(model, places, weights={"fore": 1.0})
-    with pytest.raises(SettingError, match="is no weight"):
+    with pytest.raises(SettingError, match="is invalid"):
         osimlite.inverse_kinematics(model, places, weights={"one": -1.0})
     with pytest.raises(SettingError, match="no frame lies between 7 and 9 s"):
         osimlite.inverse_kinematics(model, places, start=7.0, end=9.0)
-    with pytest.raises(SettingError, match="by their names, not a ndarray"):
+    with pytest.raises(SettingError, match="found a ndarray"):
         osimlite.inverse_kinematics(free_body(), np.zeros((4, 3)))  # type: ignore[arg-type]
-    with pytest.raises(SettingError, match="as many as all others"):
+    with pytest.raises(SettingError, match="the same number of frames"):
         osimlite.inverse_kinematics(model, {"one": places["one"], "two": places["two"][:1]})
     with pytest.raises(OsimliteError, match="no coordinate"):
         osimlite.inverse_kinematics(model, places, coordinates={"knee": 1.0})

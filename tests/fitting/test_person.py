@@ -216,7 +216,7 @@ def test_the_setup_makes_the_same_model(tmp_path: Path) -> None:
     [
         ({"held": ["LeftShank_uper"]}, "LeftShank_upper"),
         ({"weights": {"LeftShank_uper": 1.0}}, "LeftShank_upper"),
-        ({"weights": {"LeftShank_upper": -1.0}}, "no weight"),
+        ({"weights": {"LeftShank_upper": -1.0}}, "is invalid"),
         ({"frames": 0}, "at least 1"),
         ({"trials": {}}, "at least one trial"),
         ({"trials": {"walk": {"nose": np.zeros((3, 3))}}}, "nose"),

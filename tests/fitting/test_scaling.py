@@ -200,10 +200,10 @@ def test_what_cannot_be_scaled_is_told() -> None:
     with pytest.raises(SettingError, match="no body 'tigh'; did you mean 'thigh'"):
         osimlite.scale(model, factors={"tigh": 1.2})
     with pytest.raises(
-        SettingError, match="measurement 'thigh' is pairs of markers, and by body the axes"
+        SettingError, match="measurement 'thigh' must have pairs of markers, and by body the axes"
     ):
         osimlite.scale(model, {}, measurements={"thigh": ([("one", "two")], ["thigh"])})  # type: ignore[arg-type]
-    with pytest.raises(SettingError, match="there are no markers of it"):
+    with pytest.raises(SettingError, match="need markers of the standing subject"):
         osimlite.scale(model, measurements=LENGTH)
     notes = osimlite.scale(model, {"top": STATIC["top"]}, measurements=LENGTH).measured
     assert notes is not None and notes.notes == [
@@ -229,7 +229,7 @@ def test_what_cannot_be_scaled_is_told() -> None:
             coupled_coordinates_function=osimlite.LinearFunction(coefficients=(1.0, 0.0)),
         )
     )
-    with pytest.raises(ModelError, match="give it one factor for all axes"):
+    with pytest.raises(ModelError, match="use one factor for all its axes"):
         scale_model(slider, {"ground": (1.0, 2.0, 1.0)})
 
 

@@ -84,7 +84,7 @@ def test_steps_keep_their_bounds(setup: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("1e-06", "0", "with which OpenSim does not end"),
+        ("1e-06", "0", "OpenSim does not finish with"),
         ("<final_time>0.3", "<final_time>0.2", "does not come after the start at 0.2 s"),
         (
             "<integrator_error",

@@ -234,7 +234,7 @@ def test_inverse_dynamics_of_columns_by_paths(tmp_path: Path) -> None:
     folder = copy_lab("paths", tmp_path)
     done = run("run", "id.xml", "-o", "out", folder=folder)
     assert done.code == 0
-    assert "OpenSim's inverse dynamics takes the default values" in " ".join(done.err.split())
+    assert "OpenSim's inverse dynamics uses the default values" in " ".join(done.err.split())
     with pytest.warns(DoubtfulWarning, match="by paths"):
         by_path = next(iter(osimlite.run(folder / "id.xml", folder / "one").tables.values()))
     text = (folder / "walk.mot").read_text()

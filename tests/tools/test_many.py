@@ -99,7 +99,7 @@ def test_a_failure_stops_only_what_needs_it_and_is_mended_by_resuming(trials: Pa
     )
     done = run("run", "trial*/*.xml", folder=trials)
     assert done.code == 2 and "6 setups: 4 done, 1 failed, 1 not run" in done.out
-    assert "needs what trial1/z_ik.xml should have made" in " ".join(done.out.split())
+    assert "needs results of trial1/z_ik.xml, which failed" in " ".join(done.out.split())
     assert (trials / JOURNAL).exists()
     file.write_text(whole)
     # What is done is not done again, unless its inputs or its results are others.
@@ -248,7 +248,7 @@ def test_what_is_there_is_whole_and_resuming_ends_with_the_same_bytes(
             process.returncode == (130 if how == "keyboard" else -signal.SIGKILL)
             and "Traceback" not in err
         )
-        assert how != "keyboard" or ("interrupted after" in err and "go on with --resume" in err)
+        assert how != "keyboard" or ("interrupted after" in err and "continue with --resume" in err)
         there = results(trials)
         assert there.items() <= whole.items()
         done = run("run", "trial*/*.xml", "--resume", folder=trials)

@@ -71,11 +71,12 @@ def test_a_file_of_the_current_folder_is_told(setup: Path, monkeypatch: pytest.M
     for name in ("setup.xml", "walker.osim"):
         (trial / name).write_bytes((setup.parent / name).read_bytes())
     monkeypatch.chdir(setup.parent)
-    assert ("taken from here", "walk.mot, not beside the setup") in osimlite.run(
-        "trial/setup.xml"
-    ).told
+    assert (
+        "current folder",
+        "contains walk.mot, which the folder of the setup lacks",
+    ) in osimlite.run("trial/setup.xml").told
     done = run("run", "trial/setup.xml", "setup.xml", "-o", "out", folder=setup.parent)
-    assert done.out.count("taken from here walk.mot, not beside") == 1
+    assert done.out.count("current folder contains walk.mot,") == 1
 
 
 def test_the_setup_that_makes_what_is_missing_is_told(setup: Path) -> None:
@@ -131,18 +132,22 @@ def test_only_files_are_run(setup: Path) -> None:
     for wrong in ([setup], osimlite.read_document(setup)):
         with pytest.raises(
             OsimliteError,
-            match=rf"the file of a setup is wanted here, not a {type(wrong).__name__}",
+            match=rf"expected the path of a setup file, found a {type(wrong).__name__}",
         ):
             osimlite.run(wrong)  # type: ignore[arg-type]
     done = run("run", ".", folder=setup.parent)
-    assert done.code == 2 and ".: this is a folder; name the setups in it, as './*.xml'" in done.err
+    assert (
+        done.code == 2
+        and ".: expected a setup, found a folder; name the setups in it, for example './*.xml'"
+        in done.err
+    )
 
 
 @pytest.mark.parametrize("tag", ["IKTaskSet", "Model"])
 def test_what_cannot_be_run_is_refused_by_name(setup: Path, tag: str) -> None:
     setup.write_text(f'<OpenSimDocument Version="40600"><{tag} name="it"/></OpenSimDocument>')
     with pytest.raises(
-        NotRunnable, match=f"setups of {tag} cannot be run; those of .*InverseDynamicsTool"
+        NotRunnable, match=f"osimlite cannot run a {tag}; it runs .*InverseDynamicsTool"
     ):
         osimlite.run(setup)
     assert run("run", "setup.xml", folder=setup.parent).code == 2
@@ -162,7 +167,7 @@ def test_an_analysis_that_cannot_be_computed_is_refused_before_anything_is_writt
 def test_times_and_files_that_mean_nothing(setup: Path) -> None:
     for old, new, said in (
         ("0.02 0.1", "0.1 0.02", "give the first time first"),
-        ("walker.osim", "", "it names no model_file"),
+        ("walker.osim", "", "the setup names no model_file"),
     ):
         setup.write_text(SETUP.replace(old, new))
         with pytest.raises(OsimliteError, match=said):

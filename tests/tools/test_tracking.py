@@ -151,7 +151,7 @@ def test_a_point_is_refused_by_name(folder: Path) -> None:
     (folder / "tasks.xml").write_text(
         text.replace("CMC_Joint", "CMC_Point").replace("<coordinate>angle</coordinate>", "")
     )
-    with pytest.raises(OsimliteError, match="CMC_Point, which cannot be followed yet"):
+    with pytest.raises(OsimliteError, match="CMC_Point, which osimlite cannot track yet"):
         osimlite.run(folder / "setup.xml")
 
 

@@ -50,7 +50,7 @@ def test_no_result_replaces_an_input(trial: Path, setup: str, result: str, into:
     change(trial / setup, result, into)
     before = state(trial.parent)
     with pytest.raises(
-        OsimliteError, match=rf"{setup}: a result would replace .*, which it is computed from"
+        OsimliteError, match=rf"{setup}: a result would replace .*, from which it is computed"
     ):
         osimlite.run(trial / setup)
     assert state(trial.parent) == before
@@ -161,5 +161,7 @@ def test_more_digits_than_there_are(trial: Path) -> None:
 def test_markers_without_weights_are_not_told_to_be_unseen(trial: Path) -> None:
     """The weight of a task of OpenSim's is 0 unless it is given."""
     told = osimlite.run(trial / "scale.xml").told
-    words = "1 frame in which nothing with a weight was seen: the pose stays as it was before"
+    words = (
+        "1 frame without any measurement that has a weight: the pose of the frame before is kept"
+    )
     assert ("markers", words) in [tuple(fact) for fact in told]

@@ -32,7 +32,8 @@ def smooth_contacts(model: Model) -> None:
         planes = [name for name in known if isinstance(geometries.get(name), ContactHalfSpace)]
         if len(spheres) + len(planes) < len(known) or not planes or not spheres:
             raise UnsupportedError(
-                f"'{force.name}' is not between spheres and half spaces, for which alone there is a smooth force"
+                f"'{force.name}' is not between spheres and half spaces; only these have a smooth "
+                "force"
             )
         made = [
             _create_smooth_force(force, sphere, plane, known, len(spheres) * len(planes) > 1)

@@ -156,8 +156,9 @@ def _replace_with_degroote(model: Model, operator: Any, folder: Path) -> None:
             }
         else:
             raise UnsupportedError(
-                f"'{muscle.name}' is a {type(muscle).__name__}, which has no DeGrooteFregly2016Muscle of the same "
-                "behavior; there is one for Thelen2003Muscle and Millard2012EquilibriumMuscle"
+                f"'{muscle.name}' is a {type(muscle).__name__}, which no DeGrooteFregly2016Muscle "
+                "replaces with the same "
+                "behavior; Thelen2003Muscle and Millard2012EquilibriumMuscle can be replaced"
             )
         for name in (
             "default_activation",
@@ -195,11 +196,12 @@ def _add_reserves(model: Model, operator: p.ModOpAddReserves, folder: Path) -> N
     """Add reserve actuators for coordinates."""
     if operator.optimal_force <= 0.0:
         raise ModelError(
-            f"reserve actuators have an optimal_force of {operator.optimal_force:g}; give a positive one"
+            f"reserve actuators have an optimal_force of {operator.optimal_force:g}; set a "
+            "positive one"
         )
     if operator.bound is not None and operator.bound < 0.0:
         raise ModelError(
-            f"reserve actuators have a bound of {operator.bound:g}; give one that is not negative"
+            f"reserve actuators have a bound of {operator.bound:g}; set one that is not negative"
         )
     tree, mechanism = model.tree(), build_mechanism(model)
     driven = {tree.path_of(item) for item in _find_driven_coordinates(model)}
@@ -310,7 +312,8 @@ def replace_paths(model: Model, paths: Any) -> None:
         force = forces.get(path.name)
         if force is None or not hasattr(force, "geometry_path"):
             raise ModelError(
-                f"the model has no force with a path '{path.name}'{suggest_name(path.name, [*forces])}"
+                "the model has no force with a path "
+                f"'{path.name}'{suggest_name(path.name, [*forces])}"
             )
         force.geometry_path = path.copy_deep()
         force.geometry_path.name = "path"
@@ -345,7 +348,7 @@ def process_model(processor: ModelProcessor, folder: str | Path = ".") -> Model:
     elif processor.model is not None:
         model = processor.model.copy_deep()
     else:
-        raise ModelError("a ModelProcessor has neither a filepath nor a model; give it one")
+        raise ModelError("a ModelProcessor has neither a filepath nor a model; set one of them")
     apply_operators(model, processor.operators, folder)
     return model
 
@@ -368,5 +371,5 @@ def apply_operators(
         if operation is None:
             name = getattr(operator, "class_name", "") or type(operator).__name__
             known = ", ".join(cls.__name__ for cls in OPERATIONS)
-            raise UnsupportedError(f"a {name} cannot be applied; there are {known}")
+            raise UnsupportedError(f"osimlite cannot apply a {name}; it has {known}")
         operation(model, operator, Path(folder))

@@ -62,7 +62,9 @@ def _parse_welds(value: str) -> Any:
     """Return the operator for ``weld:NAME,NAME``."""
     kind, _, names = value.partition(":")
     if kind != "weld" or not names:
-        raise SettingError(f"joints={value} is none; say joints=weld:NAME, or several with commas")
+        raise SettingError(
+            f"unknown replacement joints={value}; write joints=weld:NAME, with commas between names"
+        )
     return p.ModOpReplaceJointsWithWelds(joint_paths=tuple(names.split(",")))
 
 
@@ -93,7 +95,7 @@ def _parse_number(name: str, text: str) -> float:
     try:
         return float(text)
     except ValueError:
-        raise SettingError(f"{name} takes a number, not '{text}'") from None
+        raise SettingError(f"{name} expects a number, found '{text}'") from None
 
 
 def find_change(name: str, value: str) -> Change:
@@ -112,11 +114,10 @@ def find_change(name: str, value: str) -> Change:
         return _create_change(OPERATORS_BY_NAME[name](value))
     names = sorted({*CHANGES_BY_WORD, *OPERATORS_BY_NAME})
     if name not in names:
-        raise SettingError(
-            f"nothing is called '{name}' that could be replaced{suggest_or_list(name, names)}"
-        )
+        raise SettingError(f"unknown part '{name}' to replace{suggest_or_list(name, names)}")
     raise SettingError(
-        f"{name} cannot be replaced with '{value}'{suggest_or_list(value, sorted(CHANGES_BY_WORD[name]))}"
+        f"{name} cannot be replaced with "
+        f"'{value}'{suggest_or_list(value, sorted(CHANGES_BY_WORD[name]))}"
     )
 
 

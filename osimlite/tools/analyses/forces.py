@@ -55,7 +55,7 @@ def write_joint_reactions(analysis: JointReaction, motion: Motion, tables: Analy
     for joint, word, asked in zip(joints, sides, frames, strict=True):
         side = word.lower()
         if side not in ("child", "parent"):
-            raise tables.job.create_error(f"apply_on_bodies has '{side}'; it says child or parent")
+            raise tables.job.create_error(f"apply_on_bodies has '{side}'; expected child or parent")
         bases = {end: _find_base_path(model, joint, end) for end in ("child", "parent")}
         frame = _find_frame_path(motion, asked, bases, tables)
         force, moment, place = loads.get_reaction(joint, side)
@@ -86,7 +86,7 @@ def _find_joints(analysis: JointReaction, model: Model, tables: AnalysisTables) 
     for name in names:
         if name not in known:
             raise tables.job.create_error(
-                f"there is no joint '{name}' for '{analysis.name}'{suggest_name(name, known)}"
+                f"unknown joint '{name}' for '{analysis.name}'{suggest_name(name, known)}"
             )
     return [known[name] for name in names]
 
@@ -101,7 +101,7 @@ def _expand_words(
     if len(words) != len(joints):
         count = format_count(len(joints), "joint")
         raise tables.job.create_error(
-            f"{what} has {len(words)} words for {count}; give one, or as many"
+            f"{what} has {len(words)} words for {count}; write one word, or one for each joint"
         )
     return words
 
@@ -127,7 +127,7 @@ def _find_frame_path(
         asked.lower()
     )
     if result is None:
-        message = f"express_in_frame has '{asked}', which is no frame of the model; say child, parent or a frame"
+        message = f"express_in_frame has '{asked}', which is not a frame of the model; write child, parent or the name of a frame"
         raise tables.job.create_error(message)
     return result
 
@@ -162,7 +162,8 @@ def _override_forces(
     if lacking:
         tables.outcome.add_message(
             analysis.name,
-            f"'{path}' has no column for {join_words(lacking)}: the forces are those of the states, as in OpenSim",
+            f"'{path}' has no column for {join_words(lacking)}: the forces follow from the states, "
+            "as in OpenSim",
         )
         return motion, None
     model.controller_set.objects.clear()
@@ -174,7 +175,8 @@ def _override_forces(
         other = ideal(item, 1.0)
         if other is None or id(item) not in places:
             raise tables.job.create_unsupported_error(
-                f"the {type(item).__name__} '{item.name}' cannot push as '{path}' says, which is not done yet"
+                f"the {type(item).__name__} '{item.name}' cannot take its force from '{path}'; "
+                "osimlite does not support that yet"
             )
         model.force_set.objects[places[id(item)]] = other
     simulation = build_simulation(tables.job, model)
@@ -220,8 +222,9 @@ def write_actuation(analysis: Actuation, motion: Motion, tables: AnalysisTables)
     for item in actuators:
         if item.control_count != 1:
             raise tables.job.create_unsupported_error(
-                f"'{analysis.name}' asks for one force of '{item.name}', a {type(item).__name__}, which has several; "
-                "OpenSim crashes there"
+                f"'{analysis.name}' needs one force of '{item.name}', a {type(item).__name__}, "
+                "which has several; "
+                "OpenSim crashes on such a model"
             )
     tree = motion.model.tree()
     known = motion.read_records(

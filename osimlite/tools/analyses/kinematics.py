@@ -143,7 +143,7 @@ def write_point_kinematics(
         result = (result[..., None, :] @ rotation)[..., 0, :]
     elif beside not in ("", "none"):
         tables.outcome.add_message(
-            analysis.name, f"there is no frame '{beside}': results are in ground, as in OpenSim"
+            analysis.name, f"unknown frame '{beside}': results are in ground, as in OpenSim"
         )
     labels = [f"state_{axis}" for axis in range(3)]
     for rows, (suffix, title) in zip(result, POINT_TABLES, strict=True):

@@ -43,11 +43,11 @@ def write_muscle_analysis(analysis: MuscleAnalysis, motion: Motion, tables: Anal
     )
     muscles = [every[place] for place in chosen]
     for muscle in muscles:
-        why = "which it cannot analyse yet" if type(muscle) not in CORRECTIONS else ""
+        why = "which osimlite cannot analyse yet" if type(muscle) not in CORRECTIONS else ""
         why = why or ("" if muscle.appliesForce else "which applies no force")
         if why:
             raise tables.job.create_unsupported_error(
-                f"'{analysis.name}' asks for '{muscle.name}', a {type(muscle).__name__}, {why}"
+                f"'{analysis.name}' requests '{muscle.name}', a {type(muscle).__name__}, {why}"
             )
     names = [muscle.name for muscle in muscles]
     result = _compute_tables(motion, muscles)
@@ -118,11 +118,11 @@ def write_static_optimization(
     job = tables.job
     if motion.record is None:
         raise job.create_unsupported_error(
-            f"'{analysis.name}' cannot be computed of a motion that was not measured; give it to an AnalyzeTool"
+            f"'{analysis.name}' needs a measured motion; use it in an AnalyzeTool"
         )
     if not analysis.use_model_force_set:
         raise job.create_unsupported_error(
-            f"'{analysis.name}' has use_model_force_set off, with which OpenSim crashes; set it to true"
+            f"OpenSim crashes without use_model_force_set; set it to true in '{analysis.name}'"
         )
     muscles = "active" if analysis.use_muscle_physiology else "isometric"
     problem = build_static_optimization(

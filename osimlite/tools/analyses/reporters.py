@@ -48,13 +48,13 @@ def write_outputs(analysis: OutputReporter, motion: Motion, tables: AnalysisTabl
         parts = OUTPUT_PATTERN.fullmatch(asked.strip())
         if parts is None:
             raise tables.job.create_error(
-                f"'{analysis.name}' asks for '{asked}', which is no output; write path|output"
+                f"'{analysis.name}' requests '{asked}', which is not an output; write path|output"
             )
         path = "/" + parts["path"].strip("/")
         component = tree.walk(path, "", "Component").target if path != "/" else motion.model
         if not isinstance(component, Component):
             raise tables.job.create_error(
-                f"'{analysis.name}' asks for an output of '{path}', which is not in the model"
+                f"'{analysis.name}' requests an output of '{path}', which is not in the model"
             )
         outputs = list_outputs(type(component))
         reader = find_reader(motion, component, parts["output"])
@@ -69,7 +69,8 @@ def write_outputs(analysis: OutputReporter, motion: Motion, tables: AnalysisTabl
             )
         if reader is None or parts["channel"]:
             raise tables.job.create_unsupported_error(
-                f"'{analysis.name}' asks for '{asked}' of a {type(component).__name__}, which cannot be computed yet"
+                f"'{analysis.name}' requests '{asked}' of a {type(component).__name__}, which "
+                "osimlite cannot compute yet"
             )
         columns[kind].append(parts["alias"] or f"{path}|{parts['output']}")
         rows[kind].append(reader(motion, component, path))
@@ -142,7 +143,8 @@ def write_probes(analysis: ProbeReporter, motion: Motion, tables: AnalysisTables
     for probe in motion.model.components(Probe):
         if probe.enabled and tree.path_of(probe) not in computed:
             raise tables.job.create_unsupported_error(
-                f"'{analysis.name}' asks for '{probe.name}', a {type(probe).__name__} that cannot be computed"
+                f"'{analysis.name}' requests '{probe.name}', a {type(probe).__name__} that "
+                "osimlite cannot compute"
             )
     rows = motion.compute_balanced(_compute_probe_rows)
     # Components with outputs are reported in a run, and not here.

@@ -170,7 +170,7 @@ def measure_reserves(
     )
     wanted = [name for name in own if name in crossed]
     if not actuators.muscles or not wanted:
-        raise MissingInput(f"{tool} has no reserve actuators beside muscles")
+        raise MissingInput(f"{tool} has no reserve actuators besides muscles")
     moments = _find_joint_moments(tool, table, others)
     judged = 0
     for name in wanted:
@@ -264,7 +264,7 @@ def _find_joint_moments(
                 return {columns[label]: known[label] for label in known.columns if label in columns}
     if tool.find_input(*MOTIONS) is None:
         raise MissingInput(
-            f"there are no joint moments beside the reserves of {tool}; run inverse dynamics"
+            f"no joint moments to compare with the reserves of {tool}; run inverse dynamics"
         )
     known = inverse_dynamics(
         tool.model,

@@ -131,7 +131,8 @@ def check_trial(
             progress(count, len(measures))
     if not folder.tools and not numbers:
         raise OsimliteError(
-            f"there is nothing of a trial here: no setup of {', '.join(SETUPS[:-1])} or {SETUPS[-1]}, and no results",
+            f"this is not a trial: it has no setup of {', '.join(SETUPS[:-1])} or {SETUPS[-1]}, "
+            "and no results",
             file=", ".join(map(str, paths)),
         )
     report = TrialReport(texts=SourceTexts(), unchecked=[*unchecked])
@@ -269,7 +270,8 @@ def _plan_tracking(
     claimed.update(file for file in (force, error) if file is not None)
     if force is None:
         gone = MissingInput(
-            f"the forces of {tool} are missing ('{tool.setup.name}_Actuation_force.sto'); run it in OpenSim"
+            f"the forces of {tool} are missing ('{tool.setup.name}_Actuation_force.sto'); run it "
+            "in OpenSim"
         )
         yield "residuals", partial(_raise_missing, gone)
     else:
@@ -379,6 +381,6 @@ def _plan_results_without_setup(
     lacking = [tag for tag in SETUPS if tag not in has]
     if lacking:
         yield (
-            "all else",
+            "other results",
             partial(_raise_missing, MissingInput(f"there is no setup of {join_words(lacking)}")),
         )

@@ -90,7 +90,7 @@ class TrialFolder:
             if not path.is_dir():
                 if type(read_any(path)).__name__ not in SETUPS:
                     raise OsimliteError(
-                        f"this is no setup of {', '.join(SETUPS[:-1])} or {SETUPS[-1]}",
+                        f"this is not a setup of {', '.join(SETUPS[:-1])} or {SETUPS[-1]}",
                         file=str(path),
                     )
                 setups.setdefault(os.path.realpath(path), path)

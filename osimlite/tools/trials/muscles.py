@@ -73,7 +73,7 @@ def compute_passive_forces(tool: TrialTool, file: Path, *, is_states: bool) -> S
     first, last = max(float(times[0]), tool.span[0]), min(float(times[-1]), tool.span[1])
     count = int(((times >= first) & (times <= last)).sum())
     if not count or not any(True for _ in tool.model.components(Muscle)):
-        raise MissingInput(f"{tool} has no muscles, or '{file}' none of its times")
+        raise MissingInput(f"{tool} has no muscles, or '{file}' has no row in its time range")
     analysis = MuscleAnalysis(name="muscles", moment_arm_coordinate_list=(), compute_moments=False)
     analysis.step_interval = max(1, count // MAX_ROWS)
     setup = AnalyzeTool(

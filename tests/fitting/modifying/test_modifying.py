@@ -38,16 +38,16 @@ def test_words_are_done_in_their_order() -> None:
     [
         (
             ("muscle", "degroote"),
-            "nothing is called 'muscle' that could be replaced; did you mean 'muscles'",
+            "unknown part 'muscle' to replace; did you mean 'muscles'",
         ),
         (
             ("muscles", "degrote"),
             "muscles cannot be replaced with 'degrote'; did you mean 'degroote'",
         ),
-        (("joints", "mtp_r"), "say joints=weld:NAME"),
+        (("joints", "mtp_r"), "write joints=weld:NAME"),
         (("joints", "weld:hipp_r"), "no joint 'hipp_r'"),
-        (("reserves", "many"), "reserves takes a number"),
-        (("reserves", "-1"), "give a positive one"),
+        (("reserves", "many"), "reserves expects a number"),
+        (("reserves", "-1"), "set a positive one"),
     ],
 )
 def test_what_is_none_is_refused(words: tuple[str, str], message: str) -> None:

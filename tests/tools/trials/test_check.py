@@ -208,7 +208,7 @@ def test_the_command_shows_verdicts_and_exits_as_validate(tmp_path: Path, capsys
     with pytest.raises(SystemExit) as stopped:
         main(["check-trial", str(tmp_path)])
     out = capsys.readouterr().out
-    assert stopped.value.code == 1 and "OSIM911" in out and "Not looked at: all else" in out
+    assert stopped.value.code == 1 and "OSIM911" in out and "Not looked at: other results" in out
     assert any(line.startswith("bad") and "30 N" in line for line in out.splitlines())
     assert (
         max(
@@ -239,7 +239,7 @@ def test_the_command_shows_verdicts_and_exits_as_validate(tmp_path: Path, capsys
 
 
 def test_a_folder_without_anything_of_a_trial_is_an_error(tmp_path: Path) -> None:
-    with pytest.raises(OsimliteError, match="nothing of a trial"):
+    with pytest.raises(OsimliteError, match="this is not a trial"):
         osimlite.check_trial(tmp_path)
     with pytest.raises(OsimliteError, match="no such"):
         osimlite.check_trial(tmp_path / "absent")
