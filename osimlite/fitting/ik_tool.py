@@ -34,10 +34,10 @@ NO_FILE = ("", "Unassigned")
 class FitTargets(NamedTuple):
     """Targets of inverse kinematics."""
 
-    # of the markers that are fitted or reported, in the order of the data
+    # Weights of the markers that are fitted or reported, in the order of the data.
     weights: dict[str, float]
-    goals: list[CoordinateTarget]  # coordinates that are to have values
-    wanted: Array  # these values (t, k), rad or m
+    goals: list[CoordinateTarget]  # coordinates with target values
+    wanted: Array  # target values (t, k), rad or m
 
 
 def collect_targets(

@@ -18,12 +18,12 @@ from osimlite.mechanics.multibody.spatial import Array
 class Measurements:
     """Measurements of m markers or sensors at t times."""
 
-    names: tuple[str, ...]  # of the things (m,)
-    times: Array  # (t,), s
-    values: Array  # of each time and thing (t, m, ...); NaN where it was not seen
-    file: str | None = None  # where they were read from
-    noun: ClassVar[str]  # what the things are
-    shape: ClassVar[tuple[int, ...]]  # of the numbers of one thing
+    names: tuple[str, ...]  # names of the markers or sensors (m,)
+    times: Array  # times (t,), s
+    values: Array  # values (t, m, ...); NaN where one was not seen
+    file: str | None = None  # file of the measurements
+    noun: ClassVar[str]  # noun for messages
+    shape: ClassVar[tuple[int, ...]]  # shape of one value
 
     def __post_init__(self) -> None:
         twice = sorted({name for name in self.names if self.names.count(name) > 1})

@@ -25,10 +25,10 @@ TIME_TOLERANCE_S = 1e-16
 class ScaleFactors(NamedTuple):
     """Scale factors of bodies, and the measurements behind them."""
 
-    # along the three axes of every physical frame, by their names in the order of the model
+    # Factors along the three axes of every physical frame, by name in the order of the model.
     factors: dict[str, list[float]]
-    ratios: dict[str, float]  # of each measurement that counts, measured to model, by name
-    notes: list[str]  # what was left out, and why
+    ratios: dict[str, float]  # ratio of measured to model distances by measurement
+    notes: list[str]  # messages about measurements that are left out
 
 
 class ScaleFactorFinder:

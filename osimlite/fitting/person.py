@@ -357,7 +357,7 @@ class _PersonFit:
             own = seen[frame]
             scaled = roots[own, None, None]
             rows = (scaled * by[frame, own]).reshape(-1, size)
-            # What poses make good is no error of sizes: the part across their directions counts.
+            # Errors that a change of the pose removes do not count: project them out.
             moved = (scaled * moves[own]).reshape(len(rows), moves.shape[-1])
             squares, axes = np.linalg.eigh(moved.T @ moved)
             certain = squares > 1e-12 * squares.max(initial=1e-300)

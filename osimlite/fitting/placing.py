@@ -28,10 +28,10 @@ from osimlite.simulation.states import StateLayout, in_model_order
 class MarkerPlacement:
     """Placed markers, and the pose of the model."""
 
-    # of the model as the subject stood, with the errors of the markers before they were moved
+    # Pose of the standing subject, with the errors of the markers before they were moved.
     pose: FittedMotion
-    removed: tuple[str, ...]  # markers of the model that the data do not have; it has them no more
-    moved: dict[str, float]  # by how much each marker was moved in its frame, m
+    removed: tuple[str, ...]  # removed markers, which the data lack
+    moved: dict[str, float]  # distance by which each marker moved, m
 
     def describe_pose(self) -> Iterator[str]:
         """Yield messages about the pose, with OpenSim's limits for a static trial."""

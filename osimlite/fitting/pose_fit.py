@@ -33,16 +33,18 @@ from osimlite.simulation.system import System
 class FittedPoses(NamedTuple):
     """Poses that fit measurements."""
 
-    values: Array  # of all coordinates (t, n), rad and m
-    places: Array  # of the markers in these poses (t, m, 3), m
-    turns: Array  # of the sensors from where they were measured (t, k, 3), in ground, rad; NaN where one was not
-    # half the weighted means of the squared distances of the markers and of the squared angles of
-    # the sensors, and the squares of the goals (t,)
+    values: Array  # values of all coordinates (t, n), rad and m
+    places: Array  # positions of the markers (t, m, 3), m
+    # Rotation vectors of the sensors from their measurements (t, k, 3), in ground, rad; NaN if not
+    # measured.
+    turns: Array
+    # Half the weighted means of squared distances of markers and of squared angles of sensors,
+    # plus half the weighted squares of the deviations from target values (t,).
     costs: Array
-    steps: Array  # Newton steps that were taken (t,)
-    # frames of which nothing was measured: they have the pose of the frame before
+    steps: Array  # Newton steps (t,)
+    # Frames without measurements, which have the pose of the frame before.
     unseen: tuple[int, ...]
-    unsettled: tuple[int, ...]  # frames in which the search ended before the best pose was certain
+    unsettled: tuple[int, ...]  # frames in which the solver did not converge
 
 
 class PoseFit:
@@ -100,7 +102,7 @@ class PoseFit:
         ] * constraints
         fixed = {place for place in range(len(infos)) if place not in free or place in self._held}
         self._couplers, others = separate_couplers(acting, fixed)
-        # A goal of a coordinate that cannot move changes nothing.
+        # A target of a coordinate that cannot move has no effect.
         self._goals = [number for number, goal in enumerate(goals) if goal.coordinate not in fixed]
         unlocked = replace(mechanism, coordinates=tuple(infos), constraints=tuple(others))
         self.system = _System(unlocked, Forces(()), code=code)

@@ -27,7 +27,7 @@ class MarkerTarget:
     """Point of a body with a measured position."""
 
     station: StationPlacement  # body and point
-    weight: float = 1.0  # how much its squared distance counts beside those of others
+    weight: float = 1.0  # weight of its squared distance
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ def separate_couplers(
     while pending:
         known = [item for item in pending if not depend & set(item.independent)]
         if not known:
-            # They go round in circles; without one of them the others may not.
+            # The couplers depend on each other in a circle; move one of them to the constraints.
             first = pending.pop(0)
             others.append(first)
             depend.discard(first.dependent)

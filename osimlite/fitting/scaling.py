@@ -180,7 +180,7 @@ class _Scaler:
         self.tree = model.tree()
         self.placements = Placements(self.tree)
         self.factors = {name: np.array(given, dtype=float) for name, given in factors.items()}
-        # What frames lead to does not change while they are scaled.
+        # Resolve all frames before scaling changes their offsets.
         for frame in model.components(PhysicalFrame):
             self.placements.resolve_frame(frame)
         self.mechanism = mechanism
@@ -272,7 +272,7 @@ def _multiply_value(value: Any, factors: Array) -> Any:
     if isinstance(value, SpatialTransform):
         for name in TRANSLATIONS:
             axis = getattr(value, name)
-            # An axis that moves as its coordinate does is no length.
+            # A translation that equals its coordinate is not a length of the model.
             if isinstance(axis.function, LinearFunction) and tuple(axis.function.coefficients) == (
                 1.0,
                 0.0,

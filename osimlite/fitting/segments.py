@@ -26,10 +26,10 @@ class Segment(NamedTuple):
 class Segments(NamedTuple):
     """Parameters (k,) that determine the scale factors of all bodies."""
 
-    parts: tuple[Segment, ...]  # whose factor each number is
-    # pairs of lists of numbers whose means are much the same: segments that hang on one another
+    parts: tuple[Segment, ...]  # segment of each parameter
+    # Neighbouring segments: pairs of lists of parameters whose means are similar.
     alike: tuple[tuple[tuple[int, ...], tuple[int, ...]], ...]
-    # pairs of a number and the list of all numbers of its segment
+    # Pairs of a parameter and the list of all parameters of its segment.
     sides: tuple[tuple[int, tuple[int, ...]], ...]
 
     @classmethod

@@ -112,7 +112,7 @@ class SelectedFrames:
                     for own in distances.T
                 ]
             )
-        # What is taken for another pulls its neighbours with it.
+        # A swapped marker pulls its neighbours along; only the worst ones of a frame are outliers.
         with np.errstate(invalid="ignore"):
             worst = np.nanmax(
                 np.where(np.isfinite(distances), distances, 0.0), axis=1, keepdims=True

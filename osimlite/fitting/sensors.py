@@ -32,10 +32,10 @@ AXES = "xyz"
 class PlacedSensors(NamedTuple):
     """Sensors that were placed on a model."""
 
-    names: tuple[str, ...]  # of the sensors
-    left_out: tuple[str, ...]  # names of those of the data for which the model has no frame
-    # angle about the vertical by which the data were turned so that the base faces where the model
-    # does (rad), None if they were not
+    names: tuple[str, ...]  # names of the sensors
+    left_out: tuple[str, ...]  # names of sensors without a frame in the model
+    # Angle about the vertical by which the data were rotated, so that the base faces where the
+    # model does, rad; None without a base.
     heading: float | None
 
 

@@ -160,7 +160,7 @@ def _read_coordinate_motion(
     if absent := {
         info.name: k for k, info in infos if info.name in recorded.missing and not info.locked
     }:
-        # Not their default values: so OpenSim's analyses have it, unlike its inverse dynamics.
+        # OpenSim's analyses use 0 here, and its inverse dynamics the default values.
         recorded.values[:, [*absent.values()]] = 0.0
         outcome.add_message("not in the file", f"{join_words([*absent])}: 0 is used, as in OpenSim")
     cutoff = setup.lowpass_cutoff_frequency_for_coordinates
@@ -168,8 +168,8 @@ def _read_coordinate_motion(
         recorded = recorded.lowpassed(cutoff, continued=True)
     before = recorded
     recorded = recorded.between(setup.initial_time, setup.final_time)
-    # OpenSim takes the rates of coordinates for the speeds, as they are before the constraints
-    # change the values.
+    # OpenSim uses the rates of the coordinates as speeds, before the constraints change the
+    # values.
     given = job.find_path("speeds_file")
     others: dict[int, Array] = {}
     if given is None:

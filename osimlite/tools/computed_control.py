@@ -107,7 +107,7 @@ class ActuatorControl:
     def _create_from_bounds(cls, found: ControlLinear) -> ActuatorControl:
         """Return the control of an actuator with the bounds of a document."""
         default = found.default_min, found.default_max
-        # As in OpenSim, upper bounds count only where there are lower ones.
+        # As in OpenSim, upper bounds have an effect only together with lower ones.
         curves = [
             make_node_curve(found, nodes) if nodes and found.min_nodes else None
             for nodes in (found.min_nodes, found.max_nodes)
@@ -127,7 +127,7 @@ class ActuatorControl:
     def create_function(self) -> Function:
         """Return the control as a function of time through all nodes."""
         if self.is_step:
-            # A value holds up to its own time, that included.
+            # A value holds up to and including its time.
             return PiecewiseConstant(
                 (self.times[0], *(nextafter(t, inf) for t in self.times[:-1])), tuple(self.values)
             )
@@ -226,7 +226,6 @@ class ComputedControl:
         self._poses: dict[float, list[float]] = {}
         self.has_states = self.engine.state.size > self._first
 
-    # ----------------------------------------------------------------------------------------------- windows
     def follow_motion(
         self, start: float, y: list[float], end: float, settings: Settings
     ) -> TrackedMotion:
@@ -337,7 +336,7 @@ class ComputedControl:
             values = forces / self.sharing.optimal
         self._drive_window(t, target, values)
         for item, value in zip(self.controls, values.tolist(), strict=True):
-            # What is computed again takes the place of what was computed before.
+            # A window that is computed again replaces its earlier result.
             if item.times and item.times[-1] == target:
                 del item.times[-1], item.values[-1]
             item.times.append(target)
@@ -360,7 +359,6 @@ class ComputedControl:
         """Drive the model with the computed controls of all windows."""
         self._drive_functions([item.create_function() for item in self.controls])
 
-    # ----------------------------------------------------------------------------------------------- foresight
     def _predict_forces(self, t: float, target: float, z: Array, controls: Array) -> Array:
         """Predict the forces of the actuators at the end of a window.
 

@@ -102,8 +102,8 @@ def build_model(job: Job) -> Model:
     for controller in setup.controller_set.objects:
         own = _resolve_files(job, controller.copy_deep())
         actuators = list(model.components(Actuator))
-        # Older setups name all actuators by one word, which they cannot spell out without the
-        # model.
+        # Older setups request all actuators by one word; their names are known from the model
+        # only.
         functions = own.ControlFunctions.objects if isinstance(own, PrescribedController) else []
         if functions and not own.socket_actuators and len(functions) == len(actuators):
             own.socket_actuators = tuple(actuators)
@@ -197,7 +197,7 @@ def satisfy_constraints(
         return recorded.values, speeds
     recorded = recorded.assembled()
     if not model.constraint_set.objects:
-        # Only then OpenSim changes the speeds.
+        # OpenSim projects the speeds only in this case.
         moments = zip(recorded.times.tolist(), recorded.values, speeds, strict=True)
         speeds = np.array([recorded.mechanism.project_speeds(q, u, time) for time, q, u in moments])
     return recorded.values, speeds
@@ -206,9 +206,9 @@ def satisfy_constraints(
 class StateRows(NamedTuple):
     """States of a model in a file."""
 
-    table: StoTable  # the file
-    columns: dict[str, int]  # places of the columns by the paths of the states
-    missing: tuple[str, ...]  # paths of the states that have no column
+    table: StoTable  # table of the file
+    columns: dict[str, int]  # indices of columns by path of the state
+    missing: tuple[str, ...]  # paths of states without a column
 
     @classmethod
     def read(cls, job: Job, path: Path, simulation: Simulation) -> StateRows:

@@ -29,21 +29,21 @@ MIN_PHASE_S = 0.1
 class Evidence:
     """Motion of a run, and the measurements behind it."""
 
-    model: Model  # what moves
-    file: Path  # of the model
-    times: Array  # (t,), s
+    model: Model  # the model
+    file: Path  # file of the model
+    times: Array  # times (t,), s
     coordinates: Sequence[str]  # names of the n coordinates
-    values: Array  # (t, n), rad and m
-    turning: Sequence[bool]  # which of them are angles
-    markers: Sequence[str] = ()  # names of the m markers that were fitted
-    measured: Array | None = None  # where they were (t, m, 3), m; NaN where one was not seen
-    places: Array | None = None  # where they are in the model (t, m, 3), m
-    loads: Path | None = None  # the file of measured loads
-    sensors: Sequence[str] = ()  # names of the k sensors that were fitted
-    # how far they are turned from where they were measured (t, k), rad; NaN where one was not
+    values: Array  # values of the coordinates (t, n), rad and m
+    turning: Sequence[bool]  # which coordinates are angles
+    markers: Sequence[str] = ()  # names of the m fitted markers
+    measured: Array | None = None  # measured positions (t, m, 3), m; NaN if unseen
+    places: Array | None = None  # positions in the model (t, m, 3), m
+    loads: Path | None = None  # file of measured loads
+    sensors: Sequence[str] = ()  # names of the k fitted sensors
+    # rotation angles of the sensors from their measurements (t, k), rad; NaN if not measured
     angles: Array | None = None
-    # of a motion that goes by its own muscles and contacts: the generalized speeds (t, n), other
-    # states by their paths, and the controls, with NaN where there are none
+    # Of a motion that is driven by muscles and contacts: generalized speeds (t, n), other states
+    # by path, and controls, NaN where unknown.
     speeds: Array | None = None
     states: Mapping[str, Array] = field(default_factory=dict)
     controls: StoTable | None = None

@@ -50,7 +50,7 @@ def run_inverse_kinematics_tool(job: Job, outcome: Outcome) -> None:
             job.get_output_path(setup.output_motion_file), create_motion_table(motion), f"\n{UNITS}"
         )
     if setup.report_errors:
-        # Of the markers that are seen; like OpenSim, the mean is over all markers, seen or not.
+        # Only seen markers have errors, but as in OpenSim the mean is over all markers.
         squares = np.nan_to_num(motion.marker_errors**2)
         totals = squares.sum(axis=1)
         rows = np.column_stack(
@@ -184,7 +184,7 @@ def run_imu_inverse_kinematics_tool(job: Job, outcome: Outcome) -> None:
         )
     }
     if setup.report_errors:
-        # A sensor that was not measured has no error, which OpenSim writes as 0.
+        # OpenSim writes 0 for a sensor that was not measured.
         errors = np.nan_to_num(motion.orientation_errors)
         table = StoTable(
             ORIENTATION_ERRORS,

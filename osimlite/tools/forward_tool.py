@@ -125,7 +125,7 @@ otherdata 1
 range {times[0]:f} {times[-1]:f}"""
     add("states_degrees.mot", StoTable(name, times, paths, rows * turning, in_degrees=True), simm)
     labels = tuple(path.rpartition("/")[2] for path in simulation.forces.controls.names)
-    # Of a model without actuators OpenSim writes a table without rows.
+    # For a model without actuators OpenSim writes a table without rows.
     result = (
         motion.evaluate_kernels(motion.system.places_of_controls) if labels else np.empty((0, 0))
     )

@@ -52,7 +52,7 @@ def run_inverse_dynamics_tool(job: Job, outcome: Outcome) -> None:
         )
     cutoff = setup.lowpass_cutoff_frequency_for_coordinates
     if cutoff >= 0.0:
-        # OpenSim takes what its filter adds for part of the motion.
+        # OpenSim's filter extends the motion; OpenSim treats the extension as measured.
         recorded = recorded.lowpassed(cutoff, continued=True)
     recorded = recorded.between(*expect_time_range(setup.time_range))
     exclude_forces(model, map(str, setup.forces_to_exclude))
@@ -157,12 +157,12 @@ def compute_joint_loads(
     for joint in joints:
         frame = placements.follow_socket(joint, "socket_child_frame")
         base, _ = placements.resolve_frame(frame)
-        # OpenSim asks what carries the child, and besides what has the joint's coordinates: others
-        # if it closes a loop.
+        # OpenSim adds the mobilizer of the child's body and the one that has the joint's
+        # coordinates; they differ if the joint closes a loop.
         asked.append((joint, {carried[base], by_joint[placements.path(joint)]}))
         root = f"{joint.name}_{placements.path(frame).rpartition('/')[2]}"
         labels += [f"{root}_{what}{axis}" for what in "FM" for axis in "XYZ"]
-    # OpenSim moves a scapula by two mobilizers: along the ellipsoid, and about the axis of winging.
+    # OpenSim has two mobilizers for a scapula: along the ellipsoid, and about the winging axis.
     hinges = [
         [
             _split_mobilizer(mechanism, body, apart=isinstance(joint, ScapulothoracicJoint))

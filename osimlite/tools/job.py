@@ -27,12 +27,12 @@ class NotRunnable(UnsupportedError):
 class Job:
     """Setup of a tool, with the paths of its inputs and results."""
 
-    setup: Any  # what the document says
-    file: Path  # the document
-    output: Path | None = None  # folder for all results, in place of those that the setup names
-    # to what error meshes of optimal control are refined, if they are
+    setup: Any  # object of the setup
+    file: Path  # file of the setup
+    output: Path | None = None  # folder for all results, instead of those of the setup
+    # Error to which optimal control refines its mesh; None for no refinement.
     refine: float | str | None = None
-    simulates: bool = False  # whether what optimal control finds is simulated, too
+    simulates: bool = False  # whether to simulate the solution of optimal control
 
     def create_error(self, message: str) -> DocumentError:
         """Return an error about the setup."""

@@ -48,17 +48,17 @@ SAVE_INTERVAL_S = 1.0
 class RunRecord:
     """Record of the run of one setup."""
 
-    setup: str  # the file
-    status: str  # see `DONE` and the others
-    told: list[tuple[str, str]] = field(default_factory=list)  # names, and what is said of each
-    summary: dict[str, Any] = field(default_factory=dict)  # numbers that say how it went
-    files: list[str] = field(default_factory=list)  # that were written
-    message: str = ""  # why it failed
-    # what the check found beside errors; what has a suggestion first
+    setup: str  # file of the setup
+    status: str  # one of `STATUSES`
+    told: list[tuple[str, str]] = field(default_factory=list)  # names and messages
+    summary: dict[str, Any] = field(default_factory=dict)  # numbers that describe the result
+    files: list[str] = field(default_factory=list)  # written files
+    message: str = ""  # reason of the failure
+    # Findings of the check that are not errors; those with a suggestion first.
     warnings: list[str] = field(default_factory=list)
-    seconds: float = 0.0  # that it took
-    digest: str = ""  # of the setup and all files that it names, as they were
-    was_done: bool = False  # whether that was before this run
+    seconds: float = 0.0  # duration
+    digest: str = ""  # digest of the setup and of all files that it names
+    was_done: bool = False  # whether an earlier run finished it
 
 
 class RunInterruption(OsimliteError):
@@ -284,7 +284,7 @@ class _Journal:
         self.path, self.noted = folder / JOURNAL, dict[str, RunRecord]()
         self._saved, self._is_kept = time.monotonic(), is_kept
         lines: list[bytes] = []
-        # Without a readable journal the work is done again.
+        # Without a readable journal all setups are run again.
         with suppress(OsimliteError):
             lines = read_file(self.path).splitlines() if resume else []
         for line in lines:
@@ -305,8 +305,8 @@ class _Journal:
         """Add a record, and save the journal from time to time."""
         self.noted[trial.setup] = trial
         if time.monotonic() - self._saved > SAVE_INTERVAL_S:
-            # Where nothing can be noted, as beside setups that may only be read, the work goes on
-            # all the same.
+            # The runs continue if the journal cannot be written, for example in a read-only
+            # folder.
             with suppress(OsimliteError):
                 self.save()
 
@@ -346,7 +346,7 @@ def read_record(line: bytes) -> RunRecord | None:
             } as values if status in STATUSES:
                 pairs = [(name, said) for name, said in told]
                 words = (*files, *warnings, *(word for pair in pairs for word in pair))
-                # Tables of many trials are sorted by this number.
+                # The table of all runs is sorted by this number, so it must be one.
                 error = values["summary"].get("rms_marker_error", 0.0)
                 if isinstance(error, int | float) and all(isinstance(word, str) for word in words):
                     return RunRecord(**{**values, "told": pairs})
@@ -463,7 +463,7 @@ def _find_needs(setups: Sequence[Path]) -> dict[Path, list[Path]]:
         needs[setup] = list(
             {makers[name]: None for name in sorted(names & makers.keys()) if makers[name] != setup}
         )
-    # What goes round in a circle is run in the order that was given.
+    # Setups that need each other are run in the given order.
     done: set[Path] = set()
     while len(done) < len(setups):
         free = [setup for setup in setups if setup not in done and done.issuperset(needs[setup])]

@@ -29,7 +29,7 @@ def run_moco_study(job: Job, outcome: Outcome) -> None:
         job: setup, a MocoStudy.
         outcome: collects the results.
     """
-    # CasADi is loaded with it.
+    # This imports CasADi, which is slow.
     from osimlite.optimal.problem import Problem
     from osimlite.optimal.program import Program
     from osimlite.optimal.solution import solve_program
@@ -126,7 +126,7 @@ def run_moco_track(job: Job, outcome: Outcome) -> None:
         job: setup, a MocoTrack.
         outcome: collects the results.
     """
-    # CasADi is loaded with it.
+    # This imports CasADi, which is slow.
     from osimlite.optimal.program import Program
     from osimlite.optimal.solution import solve_program
     from osimlite.optimal.track import build_track_problem
@@ -152,7 +152,7 @@ def run_moco_inverse(job: Job, outcome: Outcome) -> None:
         job: setup, a MocoInverse.
         outcome: collects the results.
     """
-    # CasADi is loaded with it.
+    # This imports CasADi, which is slow.
     from osimlite.optimal.inverse import build_inverse_problem, solve_inverse_problem
 
     if job.setup.output_paths:

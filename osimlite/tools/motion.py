@@ -44,21 +44,20 @@ MIN_TIMES = 6
 class Motion:
     """States of a model over time."""
 
-    model: Model  # what moves
-    simulation: Simulation  # that computes its forces and accelerations
-    times: Array  # (t,), s
-    states: Array  # (t, y), in the order of the simulation's engine
-    # the start and the ends of all steps, if the motion was integrated
+    model: Model  # the model
+    simulation: Simulation  # computes forces and accelerations
+    times: Array  # times (t,), s
+    states: Array  # states (t, y), in the order of the simulation's engine
+    # Start and ends of all steps, if the motion was integrated.
     steps: Sequence[Moment] = ()
-    record: Callable[[], SpeedRecord] | None = (
-        None  # gives what was measured, of which the motion is a part
-    )
-    # By path of each muscle without an equilibrium at some times: whether it has none (t,). Its
-    # states are NaN then.
+    # Returns the whole measured motion, of which this is a part.
+    record: Callable[[], SpeedRecord] | None = None
+    # By path of each muscle without an equilibrium at some times: mask of these times (t,), at
+    # which its states are NaN.
     unbalanced: Mapping[str, BoolArray] = field(default_factory=dict)
-    # Makes the simulation of another version of the model; needed if some muscles are unbalanced.
+    # Simulates another version of the model; required if some muscles are unbalanced.
     simulate: Callable[[Model], Simulation] | None = None
-    left_out: frozenset[str] = frozenset()  # paths of muscles of the model that were switched off
+    left_out: frozenset[str] = frozenset()  # paths of muscles that are off
 
     @cached_property
     def _cache(self) -> dict[str, Any]:
@@ -140,7 +139,7 @@ class Motion:
         tree = model.tree()
         for path in muscles:
             tree.at(path).appliesForce = False
-        # The states of what is off count for nothing, but must be numbers.
+        # States of muscles that are off have no effect, but must be finite.
         states = np.nan_to_num(part.states)
         simulation = self.simulate(model)
         return replace(
@@ -348,10 +347,10 @@ class AnalysisTables:
     """Writer of the tables of one analysis."""
 
     job: Job  # the setup
-    outcome: Outcome  # that has them written
-    name: str  # of the analysis
-    times: Array  # of all rows (t,), s
-    note: str = ""  # what the header says of rows that are no numbers
+    outcome: Outcome  # collects the tables
+    name: str  # name of the analysis
+    times: Array  # times of all rows (t,), s
+    note: str = ""  # note in the header about missing numbers
 
     def add_table(
         self,

@@ -65,12 +65,12 @@ def compute_quantities(known: Mapping[str, Array], muscles: Sequence[Any]) -> Mu
         known["passive_fiber_force"],
         known["tension"],
     )
-    # OpenSim counts the power of damping, which is part of the passive force, to the active power.
+    # OpenSim counts the power of damping as active, although its force counts as passive.
     spring = known.get(SPRING, passive)
     optimal = np.array([muscle.optimal_fiber_length for muscle in muscles])
     fastest = np.array([muscle.max_contraction_velocity for muscle in muscles])
     angle = np.arccos(np.clip(cos, -1.0, 1.0))
-    # The fibers keep their distance across the tendon.
+    # The width of the muscle, across the tendon, is constant.
     turning = -speed / length * np.tan(angle)
     along = speed * cos - length * np.sin(angle) * turning
     result = {

@@ -49,7 +49,7 @@ def find_named_files(setup: str, rule: str) -> Iterator[str]:
         file = waiting.popleft()
         subject = read_subject(file)
         if subject is None:
-            # The error says that the file is missing.
+            # This raises the error for a missing file.
             subject = load_subject(file, Config())
         if not isinstance(subject, Setup):
             continue

@@ -37,19 +37,19 @@ def _create_number_error(what: str, time: float) -> SimulationError:
 class Outcome:
     """Results of a setup: tables, files, messages and a summary."""
 
-    tables: dict[str, StoTable] = field(default_factory=dict)  # by the names of their files
-    summary: dict[str, Any] = field(default_factory=dict)  # numbers that say how it went
-    # the same in words: a name, and what is said of it
+    tables: dict[str, StoTable] = field(default_factory=dict)  # tables by the names of their files
+    summary: dict[str, Any] = field(default_factory=dict)  # numbers that describe the results
+    # Messages about the results: names and words.
     told: list[tuple[str, str]] = field(default_factory=list)
-    files: list[Path] = field(default_factory=list)  # those that were written
-    # what the check of the setup and of what it names found beside errors; what has a suggestion
-    # first
+    files: list[Path] = field(default_factory=list)  # written files
+    # Findings about the setup, and files that it names, that are not errors; those with a
+    # suggestion first.
     warnings: list[Finding] = field(default_factory=list)
-    evidence: Evidence | None = None  # what a report shows besides
-    title: str = ""  # of a report of this alone, in the place of its folder's name
-    # is told, line by line, how far a long search has come
+    evidence: Evidence | None = None  # motion for a report
+    title: str = ""  # title of a report of this alone, instead of its folder
+    # Function that receives lines about the progress of a long search.
     progress: Callable[[str], None] | None = None
-    # whether the tool did what it was asked for; what it found is written all the same
+    # Whether the tool succeeded; its results are written in either case.
     done: bool = True
     _texts: dict[Path, Iterable[str]] = field(default_factory=dict)
 
@@ -174,11 +174,11 @@ class Outcome:
         self._require_numbers()
         self._protect_inputs(setup)
         with ExitStack() as all_or_none:
-            # All names are checked before the first folder is made.
+            # All names are checked before the first folder is created.
             for path in self._texts:
                 writer.resolve(path)
-            # They are put in their places in the end, the last first: of one place the last one
-            # stays.
+            # Files are moved to their paths on exit from the stack, in reverse order. Of two results
+            # with one path the later one is therefore moved last.
             for path, lines in reversed(self._texts.items()):
                 all_or_none.enter_context(writer.written(path, lines))
         self.files += self._texts

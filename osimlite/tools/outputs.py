@@ -94,7 +94,7 @@ def _create_station_reader(which: int) -> Reader:
         tree = motion.model.tree()
         holder = tree.parent_of(station)
         if isinstance(holder, PathPoint):
-            # OpenSim keeps the place of a path point in a station of its own.
+            # In OpenSim the location of a path point belongs to a station inside it.
             station = holder
         frame = tree.target(station, "socket_parent_frame", station.socket_parent_frame)
         body, placed = motion.mechanism.placement(tree.path_of(frame) or "")
@@ -279,7 +279,7 @@ def _read_muscle_output(
 
 
 MUSCLE_OUTPUTS: dict[str, Callable[[dict[str, Array]], Array]] = {
-    # What MuscleAnalysis has tables of, whose names are the same in other letters.
+    # Tables of MuscleAnalysis have the same names in camel case.
     **{
         name: itemgetter("".join(map(str.capitalize, name.split("_"))))
         for name in (

@@ -64,7 +64,7 @@ class _Search:
     def _walk_folders(self, places: Iterable[str]) -> Iterator[str]:
         """Yield some folders and all folders below them, each once."""
         visited: set[str] = set()
-        # Folders behind links come last, so that a folder is known by its own name.
+        # Folders behind links come last, so that results have the real names of folders.
         waiting, behind_links = deque(places), deque[str]()
         while waiting or behind_links:
             folder = (waiting or behind_links).popleft()

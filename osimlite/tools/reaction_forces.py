@@ -37,8 +37,8 @@ from osimlite.tools.motion import Motion
 class ConstraintForces:
     """Forces of the constraints of a mechanism at one state."""
 
-    state: Kinematics  # at which they are, with the accelerations that they lead to
-    # of the constraints, one number (m,) for each of the equations of each
+    state: Kinematics  # kinematics of the state
+    # Constraints, each with its multipliers (m,), one for each equation.
     multipliers: list[tuple[Constraint, Array]]
 
     @classmethod
@@ -58,7 +58,7 @@ class ConstraintForces:
             state = mechanism.at(q, u, t)
             blocks = [item.acceleration_equations(state)[0] for item in kept]
             rows = np.concatenate(blocks)[:, order].T
-            # What has no mass, constraints may drive.
+            # The mass matrix is singular if constraints drive massless bodies.
             with suppress(np.linalg.LinAlgError):
                 factor = np.linalg.cholesky(mass_matrix(state)[np.ix_(order, order)])
                 rows, missing = (
@@ -96,7 +96,7 @@ class ConstraintForces:
             )
         evaluate_constraints(program.model, program.reals, data, y, f)
         wrenches = (multipliers @ program.equations(data).rows).reshape(-1, 6)
-        # What pushes ground pushes back at the other bodies.
+        # The wrench on ground is opposite to the sum of the others.
         force = -wrenches[bodies, 3:].sum(axis=0)
         torque = -(
             wrenches[bodies, :3] + np.cross(state.origins[bodies], wrenches[bodies, 3:])
@@ -146,7 +146,7 @@ def compute_constraint_records(motion: Motion) -> tuple[list[str], Array]:
     for moment, forces in enumerate(ConstraintForces.compute_along(motion)):
         row: list[Array] = []
         for constraint, multipliers in forces.multipliers:
-            # Not those that hold coordinates, or close loops of joints.
+            # Skip constraints that lock coordinates or close loops of joints.
             name = names.get(constraint.name)
             if name is None:
                 continue
@@ -270,7 +270,7 @@ class JointWrenches:
         outer = self.carried[joint.path]
         body, link = self.mechanism.bodies[outer], self.moved.links[:, outer]
         mobilizer = body.mobilizer
-        # The body that the joint carries in the tree gets what is missing there, the other one the
+        # The outer body of the joint in the tree receives the wrench, the inner body the
         # opposite.
         is_outer = (side == "child") != mobilizer.reversed
         wrench = (-1.0 if is_outer else 1.0) * link[:, LINK_WORK.WRENCH : LINK_WORK.WRENCH + 6]

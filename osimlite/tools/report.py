@@ -72,8 +72,8 @@ NO_SIDEBAR_STYLE = "body{grid-template-columns:1fr!important}aside{display:none!
 class TrialOutcomes(NamedTuple):
     """Outcomes of the setups of one trial."""
 
-    name: str  # what it is called
-    outcomes: Sequence[Outcome]  # of the setups that belong to it
+    name: str  # name of the trial
+    outcomes: Sequence[Outcome]  # outcomes of its setups
 
     @property
     def evidence(self) -> Evidence | None:
@@ -209,7 +209,7 @@ def _render_viewer(evidence: Evidence) -> str:
         measured = MeasuredMarkers(names, stations, evidence.measured[:, known])
     motion = _create_recording(evidence, mechanism, measured)
     shown = Shown.of(evidence.model, mechanism, file=evidence.file, motion=motion)
-    # Nobody mends the model here.
+    # A report shows no findings about the model.
     page = (
         replace(shown, findings=())
         .page_text()

@@ -231,5 +231,5 @@ def _check_documents(setup: str, away: dict[str, None]) -> Iterator[Report]:
                 visited.add(real)
                 limit_documents(visited, setup)
                 named.append(path)
-        # What a document names is reported before what its neighbours name.
+        # Depth first: files that a document names come before those of the next document.
         waiting.extendleft(reversed(named))

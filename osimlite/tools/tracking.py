@@ -104,11 +104,11 @@ class DesiredMotion:
             )
         _apply_locks(outcome, mechanism, recorded, values)
         padded = replace(recorded, times=times, values=values)
-        # OpenSim takes the rates of coordinates for the speeds, as they are before the constraints
-        # change the values.
+        # OpenSim uses the rates of the coordinates as speeds, before the constraints change the
+        # values.
         values, speeds = satisfy_constraints(padded, padded.rates[0], simulation, model)
-        # OpenSim assembles every row of the desired motion at the time 0: its functions say one
-        # value for all rows.
+        # OpenSim assembles every row of the desired motion at time 0, so a prescribed coordinate
+        # has one value in all rows.
         for place, info in enumerate(mechanism.coordinates):
             if info.prescribed is not None:
                 values[:, place] = info.prescribed.evaluate((0.0,))[0]
@@ -223,7 +223,7 @@ class TrackingTasks:
                     raise job.create_error(
                         f"the task '{item.name}' of '{path}' has an empty '{tag}'; set a value"
                     )
-            # As in OpenSim, `on` means nothing.
+            # As in OpenSim, `on` has no effect.
             if not item.active[0]:
                 continue
             for name in (item.name, str(item.coordinate)):
@@ -362,8 +362,8 @@ class ForceDistribution:
             )
         weights = np.sqrt(self.tasks.weights)
         share = math.sqrt(self.tasks.compute_force_weight(errors))
-        # What is left of the accelerations is an unknown too, whose square is to be small as those
-        # of the others.
+        # The acceleration errors are unknowns as well, and their squares are minimized together with
+        # those of the forces.
         size, scale = len(own), self.optimal / max(share, MIN_FORCE_WEIGHT)
         given = np.hstack([weights[:, None] * columns * scale, np.eye(size)])
         free = np.full(size, np.inf)
@@ -397,11 +397,11 @@ class ForceDistribution:
         """
         assert self._strong is not None
         strengths = self._strong.strengths(np.array([t]), q[None], u[None])
-        # The forces of muscles whose fibers can give none count without end: they are as small as
-        # they can be.
+        # Forces of muscles whose fibers have no strength have infinite cost: they are as small as
+        # their bounds allow.
         able = np.abs(strengths) > MIN_STRENGTH * np.abs(self.optimal)
         forces = np.clip(0.0, *bounds)
-        # A locked coordinate has no acceleration that forces could change.
+        # Forces cannot change the acceleration of a locked coordinate.
         infos = [self.mechanism.coordinates[k] for k in self.tasks.coordinates]
         has_target = (self.tasks.weights != 0.0) & ~np.array([info.locked for info in infos])
         each, left = (
@@ -411,8 +411,8 @@ class ForceDistribution:
         scale = strengths[able]
         scaled = np.sort(np.array(bounds)[:, able] / scale, axis=0)
         # Accelerations of feet and of the pelvis differ by orders of magnitude, and every force
-        # moves all of them: as equations of the generalized forces that the tasks take, the least
-        # of reserves counts, beside full muscles.
+        # changes all of them. Multiplied by the mass matrix of the tasks, they become generalized
+        # forces, so that small reserves count beside strong muscles.
         mass = np.linalg.pinv(
             lightness[np.ix_(has_target, has_target)], RANK_TOLERANCE, hermitian=True
         )

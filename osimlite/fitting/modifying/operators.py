@@ -325,7 +325,7 @@ def _add_external_loads(model: Model, operator: p.ModOpAddExternalLoads, folder:
     file = folder / operator.filepath.strip()
     loads = read_document(Source.of_file(file), of=ExternalLoads).top
     assert isinstance(loads, ExternalLoads)
-    loads.name = "externalloads"  # OpenSim loses the name that the file says.
+    loads.name = "externalloads"  # OpenSim drops the name in the file.
     loads.datafile = str((file.parent / loads.datafile.strip()).absolute())
     model.add(loads)
 

@@ -95,7 +95,7 @@ def _sample_poses(mechanism: Mechanism, count: int) -> tuple[Array, list[int]]:
     ]
     bounds = np.array([_limit_range(infos[k].range) for k in free]).reshape(-1, 2)
     rng = np.random.default_rng(0)
-    # One in each of as many equal parts of every range.
+    # Latin hypercube: one sample in each of `count` equal parts of every range.
     parts = np.array([rng.permutation(count) for _ in free]).T.reshape(
         count, len(free)
     ) + rng.random((count, len(free)))

@@ -167,8 +167,8 @@ def _override_forces(
         )
         return motion, None
     model.controller_set.objects.clear()
-    # Probes are not needed here, and those of muscles would miss the forces that are replaced
-    # below.
+    # Probes are not needed here, and those of muscles would not find the muscles, which are
+    # replaced below.
     model.probe_set.objects.clear()
     places = {id(force): number for number, force in enumerate(model.force_set.objects)}
     for item in actuators:
@@ -231,7 +231,7 @@ def write_actuation(analysis: Actuation, motion: Motion, tables: AnalysisTables)
         [tree.path_of(item) or "" for item in actuators], "actuation", "speed"
     )
     force, speed = known["actuation"], known["speed"]
-    # A tension pulls against the lengthening speed.
+    # A tension does work against the lengthening speed.
     sense = np.array([-1.0 if isinstance(item, PathActuator) else 1.0 for item in actuators])
     names = [item.name for item in actuators]
     for suffix, title, rows in (

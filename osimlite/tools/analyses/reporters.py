@@ -147,7 +147,7 @@ def write_probes(analysis: ProbeReporter, motion: Motion, tables: AnalysisTables
                 "osimlite cannot compute"
             )
     rows = motion.compute_balanced(_compute_probe_rows)
-    # Components with outputs are reported in a run, and not here.
+    # A run reports outputs of other components as well, which are no probes of OpenSim.
     shown = [
         issubclass(probe.component, Probe) for probe in engine.probes for _ in probe.reading.labels
     ]

@@ -42,9 +42,9 @@ TIME_SLACK_S = 0.1
 class ActuatorRoles(NamedTuple):
     """Roles of the actuators of a tool."""
 
-    residuals: Mapping[str, str]  # units of those that push the body at the root, by their names
-    reserves: Mapping[str, str]  # coordinates of those that push others, by their names
-    muscles: Sequence[str]  # names
+    residuals: Mapping[str, str]  # units of actuators at the root, by name
+    reserves: Mapping[str, str]  # coordinates of other actuators, by name
+    muscles: Sequence[str]  # names of the muscles
 
 
 def find_actuators(tool: TrialTool | None) -> ActuatorRoles:

@@ -50,7 +50,7 @@ def measure_scale_errors(tool: TrialTool) -> Numbers:
     result = compute_scaled_model(tool.setup, tool.job.file.parent).placed
     if result is None:
         raise MissingInput(f"{tool} places no markers")
-    # Markers that weigh less than a tenth of the others go where their segment takes them.
+    # Markers with less than a tenth of the largest weight hardly influence the pose.
     tasks = [
         task for task in placer.ik_task_set.objects if task.apply and isinstance(task, IKMarkerTask)
     ]

@@ -98,7 +98,7 @@ class TrialFolder:
             top = get_object(str(file))
             if top is not None and type(top).__name__ in SETUPS:
                 self.tools.append(TrialTool(self, Job(top, file)))
-        # In the order in which a trial is worked on.
+        # The order in which a trial is processed.
         self.tools.sort(key=lambda tool: SETUPS.index(tool.tag))
 
     def compute_once(self, key: Any, make: Callable[[], T]) -> T:

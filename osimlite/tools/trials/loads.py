@@ -34,9 +34,9 @@ MIN_WEIGHT_FRACTION = 0.05
 class MeasuredLoad(NamedTuple):
     """Force that was measured."""
 
-    item: ExternalForce  # of the document
-    force: Array  # in its frame (t, 3), N
-    point: Array | None  # in its frame (t, 3), m; None if there is none
+    item: ExternalForce  # force of the document
+    force: Array  # force in its frame (t, 3), N
+    point: Array | None  # point in its frame (t, 3), m; None if not measured
 
 
 class LoadScale(NamedTuple):
