@@ -155,12 +155,14 @@ def fit_motion(
         )
     if not data.names:
         mechanism = lock_translations(mechanism)
-    names, sensors = tuple(weights), find_sensor_frames(model, mechanism, sensed) if sensed else {}
+    names = tuple(weights)
+    sensors = find_sensor_frames(model, mechanism, sensed) if sensed else {}
     stations = find_marker_stations(model, mechanism)
     points = [MarkerTarget(stations[name], weights[name]) for name in names]
     turning = [SensorTarget(frame, (sensed or {})[name]) for name, frame in sensors.items()]
     fit = PoseFit(mechanism, points, turning, goals, constraints=constraints)
-    measured, count = data.select_values(names), len(data.times)
+    measured = data.select_values(names)
+    count = len(data.times)
     given = measured, turned.select_values([*sensors]), wanted
     poses: FittedPoses = fit.fit_frames(
         np.hstack([item.reshape(count, -1) for item in given]),
@@ -232,7 +234,8 @@ def find_marker_stations(model: Model, mechanism: Mechanism) -> dict[str, Statio
     Returns:
         Stations by name.
     """
-    tree, result = model.tree(), dict[str, StationPlacement]()
+    tree = model.tree()
+    result = dict[str, StationPlacement]()
     for marker in model.components(ModelMarker):
         placed = mechanism.stations.get(tree.path_of(marker) or "")
         if placed is not None:

@@ -22,7 +22,8 @@ from osimlite.mechanics.multibody.spatial import Array
 class MarkerData(Measurements):
     """Measured positions of m markers in ground (t, m, 3), m; NaN where a marker was not seen."""
 
-    noun, shape = "marker", (3,)
+    noun = "marker"
+    shape = (3,)
 
     @classmethod
     def from_source(cls, source: MarkerSource, times: ArrayLike | None = None) -> MarkerData:
@@ -59,7 +60,8 @@ class MarkerData(Measurements):
         Raises:
             SettingError: there is no frame between these times.
         """
-        low, high = max(first, float(self.times[0])), min(last, float(self.times[-1]))
+        low = max(first, float(self.times[0]))
+        high = min(last, float(self.times[-1]))
         if not low <= high:
             raise self.create_range_error(first, last)
         start, end = (int(np.argmin(np.abs(self.times - t))) for t in (low, high))

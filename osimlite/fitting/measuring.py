@@ -44,7 +44,8 @@ class ScaleFactorFinder:
     """
 
     def __init__(self, model: Model) -> None:
-        self._model, self.mechanism = model, build_mechanism(model)
+        self._model = model
+        self.mechanism = build_mechanism(model)
         self._stations = find_marker_stations(model, self.mechanism)
         self._state = self.mechanism.at(_compute_default_pose(self.mechanism))
         names = [frame.name for frame in model.components(PhysicalFrame)]

@@ -25,7 +25,8 @@ TIME_TOLERANCE_S = 1e-14
 class OrientationData(Measurements):
     """Rotation matrices of k sensors in ground (t, k, 3, 3); NaN where one was not measured."""
 
-    noun, shape = "sensor", (3, 3)
+    noun = "sensor"
+    shape = (3, 3)
 
     @classmethod
     def from_source(

@@ -265,8 +265,11 @@ class _PersonFit:
     def __init__(
         self, shape: ScalableMarkers, chosen: SelectedFrames, free: Sequence[bool]
     ) -> None:
-        self._shape, self._chosen, self._free = shape, chosen, np.flatnonzero(free)
-        self._sizes, self._moved = len(shape.segments.parts), 3 * len(self._free)
+        self._shape = shape
+        self._chosen = chosen
+        self._free = np.flatnonzero(free)
+        self._sizes = len(shape.segments.parts)
+        self._moved = 3 * len(self._free)
         frames = len(chosen.times)
         self._unit = min(1.0, INDEPENDENT_FRAMES / frames) / SKIN_MOTION_M**2
         self._prior, self._wanted = shape.segments.compute_prior(
@@ -287,7 +290,8 @@ class _PersonFit:
             known: estimate to start from.
             enough: largest change of a size or offset (m) by the last step.
         """
-        here, damping = self._evaluate(known.sizes, known.offsets, known.values), 1e-6
+        here = self._evaluate(known.sizes, known.offsets, known.values)
+        damping = 1e-6
         for _ in range(MAX_STEPS):
             matrix, slope = self._compute_normal_equations(here)
             while True:
@@ -300,7 +304,8 @@ class _PersonFit:
                     break
                 damping = 10.0 * max(damping, 1e-9)
             if there.cost <= here.cost:
-                here, damping = there, 0.1 * damping
+                here = there
+                damping = 0.1 * damping
             if np.abs(step).max() < enough:
                 break
         return here
@@ -346,7 +351,8 @@ class _PersonFit:
         for number, place in enumerate(self._free):
             first = self._sizes + 3 * number
             by[:, place, :, first : first + 3] = turned[:, place]
-        matrix, slope = np.zeros((size, size)), np.zeros(size)
+        matrix = np.zeros((size, size))
+        slope = np.zeros(size)
         matrix[: self._sizes, : self._sizes] = self._prior.T @ self._prior
         slope[: self._sizes] = self._prior.T @ (self._prior @ here.sizes - self._wanted)
         far = here.offsets[self._free]

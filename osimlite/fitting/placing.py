@@ -63,7 +63,8 @@ def place_markers(
     Raises:
         SettingError: the range has no frames, or a task has an unknown name.
     """
-    first, last = max(first, float(data.times[0])), min(last, float(data.times[-1]))
+    first = max(first, float(data.times[0]))
+    last = min(last, float(data.times[-1]))
     within = (data.times >= first) & (data.times <= last)
     if data.times[0] == data.times[-1]:
         raise SettingError(
@@ -92,7 +93,8 @@ def place_markers(
     mechanism = build_mechanism(model)
     asked = collect_targets(model, mechanism, tasks, mean, coordinates)
     pose = fit_motion(model, mechanism, mean, asked.weights, asked.goals, asked.wanted)
-    state, moved = mechanism.at(pose.values[0]), dict[str, float]()
+    state = mechanism.at(pose.values[0])
+    moved = dict[str, float]()
     for marker in model.components(Marker):
         if marker.fixed or marker.name not in target or not np.isfinite(target[marker.name]).all():
             continue
@@ -118,7 +120,8 @@ def format_pose(model: Model, placed: MarkerPlacement) -> str:
         model: the model.
         placed: its markers and pose.
     """
-    mechanism, motion = placed.pose.mechanism, placed.pose
+    mechanism = placed.pose.mechanism
+    motion = placed.pose
     elements = force_elements(model, mechanism, skip_unsupported=True).elements
     layout = StateLayout(mechanism, range(len(mechanism.coordinates)), elements)
     values = motion.values[0].tolist()

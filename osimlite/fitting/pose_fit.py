@@ -85,11 +85,9 @@ class PoseFit:
         constraints: bool = True,
         code: Code | None = None,
     ) -> None:
-        self.mechanism, self.markers, self.measured = (
-            mechanism,
-            len(markers),
-            3 * len(markers) + 9 * len(sensors),
-        )
+        self.mechanism = mechanism
+        self.markers = len(markers)
+        self.measured = 3 * len(markers) + 9 * len(sensors)
         infos = list(mechanism.coordinates)
         self._held: dict[int, Function | None] = {}
         free = set(free_coordinates(mechanism))
@@ -116,10 +114,8 @@ class PoseFit:
         )
         self._history = self.layout.work[self.layout.ints[fit.HISTORY] :]
         self.width = self.measured + len(kept) + len(self._held)
-        self.sensors, self.found = (
-            len(sensors),
-            len(self.order) + 3 * (len(markers) + len(sensors)) + 3,
-        )
+        self.sensors = len(sensors)
+        self.found = len(self.order) + 3 * (len(markers) + len(sensors)) + 3
 
     def set_pose(self, q: Array) -> None:
         """Start from the values (n,) of all coordinates."""
@@ -142,7 +138,8 @@ class PoseFit:
         """
         if q is not None:
             self.set_pose(q)
-        count, free = len(measured), len(self.order)
+        count = len(measured)
+        free = len(self.order)
         given = measured.reshape(count, -1)
         frames, result = np.empty((count, self.width)), np.empty((count, self.found))
         frames[:, : self.measured] = given[:, : self.measured]
@@ -162,7 +159,8 @@ class PoseFit:
         unseen, unsettled = (
             tuple(np.flatnonzero(status == what).tolist()) for what in (UNSEEN, STUCK)
         )
-        places, turns = vectors[:, : self.markers], vectors[:, self.markers :]
+        places = vectors[:, : self.markers]
+        turns = vectors[:, self.markers :]
         return FittedPoses(values, places, turns, result[:, -3], result[:, -2], unseen, unsettled)
 
     def bind_arrays(self, frames: Array, found: Array) -> Callable[[int], int]:
@@ -227,11 +225,14 @@ class SingleFrameFit:
     """Fit of one frame at a time that allocates nothing but the result."""
 
     def __init__(self, fit: PoseFit) -> None:
-        self._fit, self._values = fit, fit.mechanism.values({}).copy()
+        self._fit = fit
+        self._values = fit.mechanism.values({}).copy()
         self._row, self._found = np.empty(fit.width), np.empty(fit.found)
         self._run = fit.bind_arrays(self._row, self._found)
-        free, end = len(fit.order), len(fit.order) + 3 * fit.markers
-        self._given, self._q = self._row[: fit.measured], self._found[:free]
+        free = len(fit.order)
+        end = len(fit.order) + 3 * fit.markers
+        self._given = self._row[: fit.measured]
+        self._q = self._found[:free]
         self.places: Array = self._found[free:end].reshape(-1, 3)
         self.turns: Array = self._found[end:-3].reshape(-1, 3)
 

@@ -105,11 +105,14 @@ class FitLayout:
         held: Sequence[int],
         couplers: Sequence[Coupler],
     ) -> None:
-        s, size = system.structure, len(system.order)
-        links, equations = int(s[MODEL.LINKS]), 0
+        s = system.structure
+        size = len(system.order)
+        links = int(s[MODEL.LINKS])
+        equations = 0
         if s[MODEL.CONSTRAINED]:
             equations = int(s[s[MODEL.CONSTRAINED] + CONSTRAINED.POSITIONS])
-        ints, numbers = [0] * fit.FIT_HEAD, list[float]()
+        ints = [0] * fit.FIT_HEAD
+        numbers = list[float]()
         self._append_list(
             ints,
             fit.MARKERS,
@@ -169,7 +172,8 @@ class FitLayout:
             ints[place] = work
             work += length
         self.ints = np.array(ints, dtype=np.int64)
-        self.numbers, self.work = np.array(numbers, dtype=float), np.zeros(work)
+        self.numbers = np.array(numbers, dtype=float)
+        self.work = np.zeros(work)
 
     @staticmethod
     def _append_list(ints: list[int], count: int, place: int, items: Sequence[int]) -> None:
@@ -200,7 +204,9 @@ class FitLayout:
     @staticmethod
     def _append_axes(ints: list[int], model: Ints, numbers: Floats, links: int) -> None:
         """Append the axes of each link, from the inner to the outer ones."""
-        first, axes, balls = [0], list[tuple[int, int]](), list[int]()
+        first = [0]
+        axes = list[tuple[int, int]]()
+        balls = list[int]()
         for link in range(links):
             record = model[model[MODEL.LINK_AT] + LINK.SIZE * link :]
             for operation in range(record[LINK.FIRST_OPERATION], record[LINK.END_OPERATION]):
@@ -274,7 +280,8 @@ def _find_allowed_interval(
         if outside is None:
             result.append(end)
             continue
-        inner, outer = float(scan[outside - 1]), float(scan[outside])
+        inner = float(scan[outside - 1])
+        outer = float(scan[outside])
         while abs(outer - inner) > 1e-15 * (1.0 + abs(inner)):
             middle = 0.5 * (inner + outer)
             if middle in (inner, outer):

@@ -213,7 +213,8 @@ def compute_scaled_model(tool: ScaleTool, folder: Path) -> ScaledModel:
 
 def _scale_by_setup(tool: ScaleTool, model: Model, folder: Path) -> ScaleFactors:
     """Scale a model by the measurements and factors of a setup."""
-    scaler, measuring = tool.model_scaler, ScaleFactorFinder(model)
+    scaler = tool.model_scaler
+    measuring = ScaleFactorFinder(model)
     for word in scaler.scaling_order:
         if word == MEASUREMENTS and any(item.apply for item in scaler.measurement_set.objects):
             if scaler.marker_file in NO_FILE:

@@ -141,7 +141,8 @@ def scale_inertia(body: Body, factors: Array, *, scales_mass: bool) -> None:
         factors: factors along its axes (3,).
         scales_mass: whether the mass grows with the volume.
     """
-    mass, volume = body.mass, abs(float(np.prod(factors)))
+    mass = body.mass
+    volume = abs(float(np.prod(factors)))
     xx, yy, zz, xy, xz, yz = body.inertia
     moments, products = np.array((xx, yy, zz)), np.array((xy, xz, yz))
     if scales_mass:

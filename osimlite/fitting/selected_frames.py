@@ -61,12 +61,10 @@ class SelectedFrames:
         if not self.markers:
             raise SettingError("no marker has a positive weight; set one")
         self.weights = np.array([weights.get(name, 1.0) for name in self.markers])
-        self.trials, self.notes, times, measured = (
-            list[str](),
-            list[str](),
-            list[float](),
-            list[Array](),
-        )
+        self.trials = list[str]()
+        self.notes = list[str]()
+        times = list[float]()
+        measured = list[Array]()
         moving = sum(len(trial.times) for name, trial in trials.items() if name != STATIC_TRIAL)
         for name, trial in trials.items():
             share = (

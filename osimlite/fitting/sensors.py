@@ -55,7 +55,9 @@ def find_sensor_frames(
     Raises:
         SettingError: no frame has such a name, or several have the same.
     """
-    tree, wanted, result = model.tree(), list(wanted), dict[str, FramePlacement]()
+    tree = model.tree()
+    wanted = list(wanted)
+    result = dict[str, FramePlacement]()
     frames = [(frame.name, tree.path_of(frame) or "") for frame in model.components(PhysicalFrame)]
     for name, path in frames:
         if name in wanted:
@@ -112,7 +114,8 @@ def place_sensors(
         )
         turn = rotation_about_space((0.0, heading, 0.0))
         measured = {name: turn @ rotation for name, rotation in measured.items()}
-    frames, placed = list(model.components(PhysicalFrame)), []
+    frames = list(model.components(PhysicalFrame))
+    placed = []
     for name, rotation in measured.items():
         owner, ending, _ = name.rpartition(SENSOR_SUFFIX)
         worn = _find_single_frame(frames, owner, model) if ending else None

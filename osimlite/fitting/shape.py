@@ -41,7 +41,8 @@ class ScalableMarkers:
         self._bare = model.copy_deep()
         for held in (self._bare.force_set, self._bare.controller_set, self._bare.probe_set):
             held.objects.clear()
-        self._names, self.segments = list(names), segments
+        self._names = list(names)
+        self.segments = segments
         ones = np.ones(len(segments.parts))
         self._first = self._create_points(ones)
         self._larger = [self._create_points(ones + unit) for unit in np.eye(len(ones))]
@@ -57,7 +58,8 @@ class ScalableMarkers:
         """
         model = self._bare.copy_deep()
         scale_model(model, self.segments.expand_factors(sizes))
-        mechanism, tree = build_mechanism(model), model.tree()
+        mechanism = build_mechanism(model)
+        tree = model.tree()
         places: dict[str, StationPlacement] = {}
         for marker in model.components(ModelMarker):
             places.setdefault(marker.name, mechanism.stations[tree.path_of(marker) or ""])
@@ -139,7 +141,8 @@ class _MarkerPoints:
     """Points of bodies of a mechanism in many poses, without regard to constraints."""
 
     def __init__(self, mechanism: Mechanism, stations: Sequence[StationPlacement]) -> None:
-        self._mechanism, free = mechanism, mechanism.without_constraints()
+        self._mechanism = mechanism
+        free = mechanism.without_constraints()
         self._system = System(free, Forces(()), apart=True)
         links = [self._system.placements[place.body][0] for place in stations]
         self._carrying, self._links = np.unique(links, return_inverse=True)
@@ -207,7 +210,8 @@ class _MarkerPoints:
 
     def _compute_link_motion(self, values: Array, speeds: Array) -> Array:
         """Return the records of the markers' links (t, m, ...)."""
-        order, still = list(self._system.order), np.zeros((len(values), 1))
+        order = list(self._system.order)
+        still = np.zeros((len(values), 1))
         result = self._system.links_of(
             np.hstack((still, values[:, order], speeds[:, order])), self._carrying.tolist()
         )

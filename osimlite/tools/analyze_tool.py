@@ -213,7 +213,8 @@ def _read_speeds(
     Raises:
         DocumentError: the file has no speeds, or lacks a time of the motion.
     """
-    table, infos = read_sto(path), recorded.mechanism.coordinates
+    table = read_sto(path)
+    infos = recorded.mechanism.coordinates
     paths = [f"{info.path}/speed" for info in infos]
     columns = columns_of_states(table.columns, paths)
     if not columns:
@@ -228,7 +229,8 @@ def _read_speeds(
     for name, place in columns.items():
         speeds[:, paths.index(name)] = table.rows[:, place]
     state = simulation.state
-    first, auxiliary = 2 * len(state.order), columns_of_states(table.columns, state.paths)
+    first = 2 * len(state.order)
+    auxiliary = columns_of_states(table.columns, state.paths)
     others = {
         first + state.paths.index(name): table.rows[rows, place]
         for name, place in auxiliary.items()

@@ -208,13 +208,13 @@ class ComputedControl:
         controls: Sequence[ActuatorControl],
         window: float,
     ) -> None:
-        self.simulation, self.desired, self.tasks, self.sharing = (
-            simulation,
-            desired,
-            tasks,
-            sharing,
-        )
-        self.controls, self.window, self._job = list(controls), window, job
+        self.simulation = simulation
+        self.desired = desired
+        self.tasks = tasks
+        self.sharing = sharing
+        self.controls = list(controls)
+        self.window = window
+        self._job = job
         assert isinstance(simulation.engine, System)
         self.engine: Any = simulation.engine
         self._first = 2 * len(self.engine.order)
@@ -250,7 +250,8 @@ class ComputedControl:
             result.times.append(t)
             result.states.append(state)
 
-        t, stepper = start, None
+        t = start
+        stepper = None
         while t < end:
             target = t + self.window
             self.compute_controls(t, target, y, result)
@@ -309,10 +310,8 @@ class ComputedControl:
         )
         z = np.array(y[self._first :])
         self._poses.clear()
-        least, most = (
-            self._predict_forces(t, target, z, low),
-            self._predict_forces(t, target, z, high),
-        )
+        least = self._predict_forces(t, target, z, low)
+        most = self._predict_forces(t, target, z, high)
         end = self._predict_state(target, z)
         high = np.where(most - least < MIN_FORCE_RANGE, low, high)
         q_end, u_end = np.array(state.values(end)), np.array(state.speeds(end))
@@ -430,7 +429,8 @@ class ComputedControl:
                 raise self.engine.refusal(status, time, y)
             return np.array(self.engine.found()[self._first :])
 
-        step, time = min(MAX_PREDICTION_STEP_S, target - t), t
+        step = min(MAX_PREDICTION_STEP_S, target - t)
+        time = t
         while time < target:
             h = min(step, target - time)
             if not held:
@@ -444,7 +444,8 @@ class ComputedControl:
             off = h * np.abs(2 * k1 - 9 * k3 + 8 * k4 - k5) / 30
             error = float(np.sqrt(np.sum(off**2) / count))
             if error <= PREDICTION_TOLERANCE or h < 1e-9:
-                time, z = (target if h == target - time else time + h), new
+                time = target if h == target - time else time + h
+                z = new
             factor = 0.9 * (PREDICTION_TOLERANCE / error) ** 0.25 if error else 5.0
             step = min(MAX_PREDICTION_STEP_S, h * min(5.0, max(0.1, factor)))
         return z

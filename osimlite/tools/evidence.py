@@ -104,10 +104,8 @@ def find_steps(loads: Path, up: int) -> dict[str, Steps]:
     table = read_loads_table(document, loads.parent, str(loads))
     result: dict[str, Array] = {}
     for force in document.objects:
-        side, label = (
-            split_side(str(force.applied_to_body))[1],
-            f"{(force.force_identifier or '').strip()}{'xyz'[up]}",
-        )
+        side = split_side(str(force.applied_to_body))[1]
+        label = f"{(force.force_identifier or '').strip()}{'xyz'[up]}"
         if side and label in table.columns:
             result[side] = result.get(side, 0.0) + table[label]
     return {

@@ -159,7 +159,8 @@ def run_imu_inverse_kinematics_tool(job: Job, outcome: Outcome) -> None:
         outcome: collects the results.
     """
     setup: IMUInverseKinematicsTool = job.setup
-    model, file = job.read_model(), job.require_path("orientations_file")
+    model = job.read_model()
+    file = job.require_path("orientations_file")
     data = (
         OrientationData.from_source(file)
         .select_times(*expect_time_range(setup.time_range))

@@ -81,14 +81,16 @@ def _compute_start(job: Job, outcome: Outcome, simulation: Simulation) -> tuple[
         Time in s, and state (y,).
     """
     setup: ForwardTool = job.setup
-    start, path = setup.initial_time, job.find_path("states_file")
+    start = setup.initial_time
+    path = job.find_path("states_file")
     if path is None:
         y = simulation.initial_state({}, {})
     else:
         given = StateRows.read(job, path, simulation)
         given.report_missing(outcome)
         row = given.find_row(start)
-        start, y = float(given.table.times[row]), given.create_state(simulation, row)
+        start = float(given.table.times[row])
+        y = given.create_state(simulation, row)
         if start != setup.initial_time:
             outcome.add_message(
                 "start", f"{start:g} s, the time of the row of the states file that is used"

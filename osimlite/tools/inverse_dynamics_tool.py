@@ -100,7 +100,8 @@ def _report_residuals(outcome: Outcome, mechanism: Mechanism, table: StoTable) -
         ]
         if own:
             sizes = np.linalg.norm(own, axis=0)
-            rms, most = float(np.sqrt(np.mean(sizes**2))), float(sizes.max())
+            rms = float(np.sqrt(np.mean(sizes**2)))
+            most = float(sizes.max())
             outcome.summary |= {f"rms_residual_{what}": rms, f"largest_residual_{what}": most}
             part = (
                 f", {100.0 * most / weight:.3g} % of the weight"
@@ -150,7 +151,8 @@ def compute_joint_loads(
     Returns:
         Force (N) and torque (N m) at the child frame of each joint, in ground.
     """
-    mechanism, placements = recorded.mechanism, Placements(model.tree())
+    mechanism = recorded.mechanism
+    placements = Placements(model.tree())
     carried = {body.path: index for index, body in enumerate(mechanism.bodies)}
     by_joint = {body.mobilizer.joint: index for index, body in enumerate(mechanism.bodies)}
     asked, labels = [], []
@@ -205,7 +207,8 @@ def _split_mobilizer(
             replace(m, coordinates=tuple(map(used.index, m.coordinates))) for m in motions
         ]
         places = [mobilizer.coordinates[place] for place in used]
-        still, count = np.eye(4), tuple(range(len(used)))
+        still = np.eye(4)
+        count = tuple(range(len(used)))
         alone = replace(
             mobilizer, motions=renumbered, coordinates=count, parent_frame=still, child_frame=still
         )
@@ -230,7 +233,8 @@ def _compute_joint_load(
         hinges: hinges from the parent to the child.
         forces: generalized forces (n,).
     """
-    rotation, load = state.rotations[parent] @ inner, np.zeros((2, 3))
+    rotation = state.rotations[parent] @ inner
+    load = np.zeros((2, 3))
     for places, hinge in hinges:
         across = hinge.at(state.q[places])
         load += _compute_hinge_load(across.jacobians[0].T, forces[places]) @ rotation.T
@@ -245,7 +249,8 @@ def _compute_hinge_load(hinge: Array, wanted: Array) -> Array:
         hinge: Jacobian of the hinge's motion (k, 6), rotations first.
         wanted: generalized forces (k,).
     """
-    turning, moving = hinge[:, :3], hinge[:, 3:]
+    turning = hinge[:, :3]
+    moving = hinge[:, 3:]
     force, torque = _solve_shortest(moving, wanted), _solve_shortest(turning, wanted)
     by_force, by_torque = moving @ force, turning @ torque
     size_by_force, size_by_torque = np.linalg.norm(by_force), np.linalg.norm(by_torque)

@@ -59,7 +59,8 @@ class Job:
         name = name.strip()
         if name in NO_FILE:
             return None
-        there, here = self.file.parent / name, Path(name)
+        there = self.file.parent / name
+        here = Path(name)
         return here if not os.path.exists(there) and os.path.exists(here) else there
 
     def require_path(self, *tags: str) -> Path:
@@ -112,7 +113,8 @@ class Job:
         OpenSim creates only the last folder of that path. Folders in the name are dropped, and a
         name without suffix gets `.sto`.
         """
-        folder, last = self.setup.results_directory.strip(), Path(name).name
+        folder = self.setup.results_directory.strip()
+        last = Path(name).name
         own = Path(last if "." in last else f"{last}.sto")
         return self._join_output(own, self.file.parent / ("" if folder in NO_FILE else folder))
 

@@ -281,8 +281,10 @@ class _Journal:
     """Journal of finished runs; a run of one setup has none."""
 
     def __init__(self, folder: Path, resume: bool, *, is_kept: bool) -> None:
-        self.path, self.noted = folder / JOURNAL, dict[str, RunRecord]()
-        self._saved, self._is_kept = time.monotonic(), is_kept
+        self.path = folder / JOURNAL
+        self.noted = dict[str, RunRecord]()
+        self._saved = time.monotonic()
+        self._is_kept = is_kept
         lines: list[bytes] = []
         # Without a readable journal all setups are run again.
         with suppress(OsimliteError):

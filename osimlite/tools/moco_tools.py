@@ -62,7 +62,8 @@ def report_solution(job: Job, problem: Problem, solution: MocoSolution, outcome:
         solution: its solution.
         outcome: collects the results.
     """
-    outcome.done, outcome.title = solution.success, job.setup.name
+    outcome.done = solution.success
+    outcome.title = job.setup.name
     outcome.summary |= {
         "objective": solution.objective,
         "terms": solution.terms,
@@ -97,7 +98,8 @@ def report_solution(job: Job, problem: Problem, solution: MocoSolution, outcome:
 def _collect_evidence(job: Job, problem: Problem, solution: MocoSolution) -> Evidence:
     """Return the motion with its controls; of a periodic motion the whole stride."""
     trajectory = solution.stride or solution.trajectory
-    mechanism, columns = build_mechanism(problem.model), trajectory.columns
+    mechanism = build_mechanism(problem.model)
+    columns = trajectory.columns
     values, speeds = (
         np.column_stack([columns[f"{info.path}/{what}"] for info in mechanism.coordinates])
         for what in ("value", "speed")

@@ -117,7 +117,8 @@ class Motion:
         """
         if not self.unbalanced:
             return [(np.ones(len(self.times), dtype=bool), self)]
-        names, missing = [*self.unbalanced], np.column_stack([*self.unbalanced.values()])
+        names = [*self.unbalanced]
+        missing = np.column_stack([*self.unbalanced.values()])
         result = []
         for pattern in np.unique(missing, axis=0):
             rows = (missing == pattern).all(axis=1)
@@ -281,7 +282,8 @@ class Motion:
     @cached_property
     def accelerations(self) -> Array:
         """Derivatives of the speeds (t, n) under all forces; NaN without an equilibrium."""
-        order, result = list(self.simulation.state.order), np.zeros_like(self.values)
+        order = list(self.simulation.state.order)
+        result = np.zeros_like(self.values)
         first = self.system.room + len(order)
         result[:, order] = self.evaluate_kernels(
             range(first, first + len(order)), STAGE.ACCELERATION

@@ -60,11 +60,9 @@ def compute_quantities(known: Mapping[str, Array], muscles: Sequence[Any]) -> Mu
         muscles: m muscles.
     """
     length, cos, speed = known["fiber_length"], known["cos_pennation"], known["fiber_velocity"]
-    active, passive, tension = (
-        known["active_fiber_force"],
-        known["passive_fiber_force"],
-        known["tension"],
-    )
+    active = known["active_fiber_force"]
+    passive = known["passive_fiber_force"]
+    tension = known["tension"]
     # OpenSim counts the power of damping as active, although its force counts as passive.
     spring = known.get(SPRING, passive)
     optimal = np.array([muscle.optimal_fiber_length for muscle in muscles])

@@ -69,7 +69,8 @@ def _create_frame_reader(part: str) -> Reader:
 
     def read(motion: Motion, frame: Frame, path: str) -> Array:
         body, placed = motion.mechanism.placement(path)
-        turning, moving = motion.links.turning(body), motion.links.point(body, placed[:3, 3])
+        turning = motion.links.turning(body)
+        moving = motion.links.point(body, placed[:3, 3])
         return {
             "position": lambda: moving[0],
             "angular_velocity": lambda: turning[0],
@@ -120,7 +121,8 @@ def _create_momentum_reader(about_origin: bool, part: slice) -> Reader:
         spin = rotation @ (
             mass.inertia @ (rotation.transpose(0, 2, 1) @ motion.links.turning(place)[0][..., None])
         )
-        angular, linear = spin[..., 0], mass.mass * velocity
+        angular = spin[..., 0]
+        linear = mass.mass * velocity
         if about_origin:
             angular = angular + np.cross(center - origin, linear)
         return np.hstack((angular, linear))[:, part]
@@ -132,7 +134,8 @@ def _create_system_reader(name: str) -> Reader:
     """Return a reader of a quantity of all bodies together."""
 
     def read(motion: Motion, model: Model, path: str) -> Array:
-        mechanism, rows = motion.mechanism, []
+        mechanism = motion.mechanism
+        rows = []
         for q, u, udot in zip(motion.values, motion.speeds, motion.accelerations, strict=True):
             rows.append(np.atleast_1d(SYSTEM_OUTPUTS[name](mechanism, q, u, udot)))
         return np.array(rows)
@@ -148,11 +151,13 @@ def _compute_central_momentum(mechanism: Any, q: Array, u: Array) -> Array:
 
 def _compute_com_acceleration(mechanism: Any, q: Array, u: Array, udot: Array) -> Array:
     """Return the acceleration of the mass centre of all bodies (3,), m/s²."""
-    accelerations, rows = mechanism.at(q, u).accelerations(udot), []
+    accelerations = mechanism.at(q, u).accelerations(udot)
+    rows = []
     state = mechanism.at(q, u)
     for index, body in enumerate(mechanism.bodies):
         arm = state.rotations[index] @ body.mass_properties.center
-        w, own = state.velocities[index][:3], accelerations[index]
+        w = state.velocities[index][:3]
+        own = accelerations[index]
         rows.append(
             body.mass_properties.mass
             * (own[3:] + np.cross(own[:3], arm) + np.cross(w, np.cross(w, arm)))

@@ -65,7 +65,8 @@ class _Search:
         """Yield some folders and all folders below them, each once."""
         visited: set[str] = set()
         # Folders behind links come last, so that results have the real names of folders.
-        waiting, behind_links = deque(places), deque[str]()
+        waiting = deque(places)
+        behind_links = deque[str]()
         while waiting or behind_links:
             folder = (waiting or behind_links).popleft()
             real = os.path.realpath(folder or ".")

@@ -78,7 +78,8 @@ class ConstraintForces:
         Returns:
             Moment (N m) and force (N) on each body (k, 6), about the body's origin, in ground.
         """
-        mechanism, state = self.state.mechanism, self.state
+        mechanism = self.state.mechanism
+        state = self.state
         bodies = [body for body in constraint.bodies if body != GROUND]
         held: Any = constraint
         program = _build_separate_bodies(mechanism, held)
@@ -139,7 +140,8 @@ def compute_constraint_records(motion: Motion) -> tuple[list[str], Array]:
         result = np.full((len(motion.times), len(columns)), np.nan)
         result[motion.balanced] = part
         return columns, result
-    mechanism, tree = motion.mechanism, motion.model.tree()
+    mechanism = motion.mechanism
+    tree = motion.model.tree()
     names = {tree.path_of(item): item.name for item in motion.model.components(schema.Constraint)}
     labels: list[str] = []
     rows = []
@@ -249,7 +251,8 @@ class JointWrenches:
             for body, wrench in zip(
                 constraint.bodies, forces.compute_wrenches(constraint, multipliers), strict=True
             ):
-                force, here = wrench[3:], forces.state.origins[body]
+                force = wrench[3:]
+                here = forces.state.origins[body]
                 while body != GROUND:
                     arm = here - links[body, LINK_WORK.ORIGIN : LINK_WORK.ORIGIN + 3]
                     about = np.concatenate([wrench[:3] + np.cross(arm, force), force])
@@ -268,7 +271,8 @@ class JointWrenches:
             (t, 3) in ground.
         """
         outer = self.carried[joint.path]
-        body, link = self.mechanism.bodies[outer], self.moved.links[:, outer]
+        body = self.mechanism.bodies[outer]
+        link = self.moved.links[:, outer]
         mobilizer = body.mobilizer
         # The outer body of the joint in the tree receives the wrench, the inner body the
         # opposite.

@@ -223,7 +223,8 @@ def _create_recording(
     evidence: Evidence, mechanism: Mechanism, measured: MeasuredMarkers | None = None
 ) -> Recording:
     """Return the motion for the viewer, with contact forces if the speeds are known."""
-    speeds, forces = evidence.speeds, dict[str, Array]()
+    speeds = evidence.speeds
+    forces = dict[str, Array]()
     if speeds is None:
         speeds = np.zeros_like(evidence.values)
     else:
@@ -316,7 +317,8 @@ def collect_controls(trials: Sequence[TrialOutcomes]) -> dict[str, list[_Curve]]
             continue
         for label in evidence.controls.columns:
             stem, side = split_side(label.rpartition("/")[2])
-            column, times = evidence.controls[label], evidence.controls.times
+            column = evidence.controls[label]
+            times = evidence.controls.times
             known = np.isfinite(column)
             line = _Curve(times[known], column[known], side, STYLES[number % 3], trial.name, {})
             panels.setdefault(stem, []).append(line)
@@ -375,7 +377,8 @@ def _render_section(title: str, panels: Mapping[str, list[_Curve]]) -> Iterator[
         for line in lines
         for side in (line.side or "r",)
     )
-    columns, rows = 3, -(-len(panels) // 3)
+    columns = 3
+    rows = -(-len(panels) // 3)
     figure = figure_of("", (11.0, 0.4 + 2.1 * rows))
     axes = figure.subplots(rows, columns, squeeze=False).ravel()
     for panel, (label, group) in zip(axes, panels.items(), strict=False):

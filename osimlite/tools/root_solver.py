@@ -81,7 +81,8 @@ def _interpolate_step(
     width = c - b
     if a == c:
         ratio = fb / fa
-        p, q = width * ratio, 1.0 - ratio
+        p = width * ratio
+        q = 1.0 - ratio
     else:
         q, t1, t2 = fa / fc, fb / fc, fb / fa
         p = t2 * (width * q * (q - t1) - (b - a) * (t1 - 1.0))

@@ -211,7 +211,8 @@ def _check_documents(setup: str, away: dict[str, None]) -> Iterator[Report]:
         away: receives the files that are in the current folder, but not in the folder of the
             document that names them.
     """
-    waiting, visited = deque([setup]), {os.path.realpath(setup)}
+    waiting = deque([setup])
+    visited = {os.path.realpath(setup)}
     while waiting:
         file = waiting.popleft()
         subject = load_subject(file, find_settings(file).config_for(file, Config()))

@@ -93,11 +93,10 @@ class DesiredMotion:
             outcome.add_message(
                 "not in the file", f"{join_words(recorded.missing)}: 0 is used, as in OpenSim"
             )
-        start, end = float(recorded.times[0]), float(recorded.times[-1])
-        times, values = (
-            continued(recorded.times, PADDING_ROWS),
-            continued(recorded.values, PADDING_ROWS),
-        )
+        start = float(recorded.times[0])
+        end = float(recorded.times[-1])
+        times = continued(recorded.times, PADDING_ROWS)
+        values = continued(recorded.values, PADDING_ROWS)
         if setup.lowpass_cutoff_frequency >= 0.0:
             times, values = lowpassed_by_sinc(
                 times, values, setup.lowpass_cutoff_frequency, FILTER_ORDER
@@ -236,7 +235,8 @@ class TrackingTasks:
             weight, kp, kv, ka = (
                 float(getattr(item, tag)[0]) for tag in ("weight", "kp", "kv", "ka")
             )
-            own, wanted = names.index(str(item.coordinate)), names.index(item.name)
+            own = names.index(str(item.coordinate))
+            wanted = names.index(item.name)
             result.append(TrackingTask(item.name, own, wanted, weight, kp, kv, ka, item.limit))
         if not result:
             raise job.create_error(
@@ -265,7 +265,8 @@ class TrackingTasks:
         Returns:
             Errors of the values and of the speeds, each (k,) for k tasks.
         """
-        own, other = self.coordinates, [task.wanted for task in self.tasks]
+        own = self.coordinates
+        other = [task.wanted for task in self.tasks]
         return wanted[0, other] - q[own], wanted[2, other] - u[own]
 
     def compute_accelerations(self, errors: tuple[Array, Array], ahead: Array) -> Array:
@@ -328,7 +329,9 @@ class ForceDistribution:
             Accelerations without actuator forces (n,), by each actuator force (n, a), and by each
             generalized force (n, n) of 1 N or N m.
         """
-        times, values, speeds = np.array([t]), q[None], u[None]
+        times = np.array([t])
+        values = q[None]
+        speeds = u[None]
         return self._unit.responses(times, values, speeds)
 
     def compute_forces(
@@ -355,7 +358,8 @@ class ForceDistribution:
         """
         still, each, lightness = self.compute_responses(t, q, u)
         own = self.tasks.coordinates
-        columns, rest = each[own], wanted - still[own]
+        columns = each[own]
+        rest = wanted - still[own]
         if self.exact:
             return self._compute_exact_forces(
                 t, q, u, columns, rest, lightness[np.ix_(own, own)], bounds
@@ -364,7 +368,8 @@ class ForceDistribution:
         share = math.sqrt(self.tasks.compute_force_weight(errors))
         # The acceleration errors are unknowns as well, and their squares are minimized together with
         # those of the forces.
-        size, scale = len(own), self.optimal / max(share, MIN_FORCE_WEIGHT)
+        size = len(own)
+        scale = self.optimal / max(share, MIN_FORCE_WEIGHT)
         given = np.hstack([weights[:, None] * columns * scale, np.eye(size)])
         free = np.full(size, np.inf)
         ends = np.hstack([np.sort(np.array(bounds) / scale, axis=0), [-free, free]])
@@ -404,10 +409,8 @@ class ForceDistribution:
         # Forces cannot change the acceleration of a locked coordinate.
         infos = [self.mechanism.coordinates[k] for k in self.tasks.coordinates]
         has_target = (self.tasks.weights != 0.0) & ~np.array([info.locked for info in infos])
-        each, left = (
-            columns[has_target][:, able],
-            (rest - columns[:, ~able] @ forces[~able])[has_target],
-        )
+        each = columns[has_target][:, able]
+        left = (rest - columns[:, ~able] @ forces[~able])[has_target]
         scale = strengths[able]
         scaled = np.sort(np.array(bounds)[:, able] / scale, axis=0)
         # Accelerations of feet and of the pelvis differ by orders of magnitude, and every force

@@ -53,7 +53,8 @@ def run_rra_tool(job: Job, outcome: Outcome) -> None:
         outcome: collects the results.
     """
     setup: RRATool = job.setup
-    model, whole = build_model(job), job.read_model()
+    model = build_model(job)
+    whole = job.read_model()
     with build_simulation(job, model) as simulation:
         desired = DesiredMotion.read(job, outcome, simulation, model)
     if setup.adjust_com_to_reduce_residuals:
@@ -97,7 +98,8 @@ def _move_mass_center(
             f"adjusted_com_body is '{name}', which is not a body of the "
             f"model{suggest_name(name, bodies)}"
         )
-    body, gravity = bodies[name], model.gravity
+    body = bodies[name]
+    gravity = model.gravity
     weight = abs(gravity[1]) * body.mass
     if weight < 2.0**-45.5:
         outcome.add_message(
@@ -213,7 +215,8 @@ def _track_motion(
         sharing = ForceDistribution(job, model, simulation.mechanism, tasks, exact)
         controls = _create_controls(job, sharing, model)
         tracker = ComputedControl(job, simulation, desired, tasks, sharing, controls, window)
-        y, followed = _compute_first_state(job, simulation, desired, start), TrackedMotion()
+        y = _compute_first_state(job, simulation, desired, start)
+        followed = TrackedMotion()
         if tracker.has_states:
             start, y = tracker.settle_muscles(start, y, followed)
         if not followed.failure:

@@ -203,7 +203,8 @@ def _add_reserves(model: Model, operator: p.ModOpAddReserves, folder: Path) -> N
         raise ModelError(
             f"reserve actuators have a bound of {operator.bound:g}; set one that is not negative"
         )
-    tree, mechanism = model.tree(), build_mechanism(model)
+    tree = model.tree()
+    mechanism = build_mechanism(model)
     driven = {tree.path_of(item) for item in _find_driven_coordinates(model)}
     dependent = {item.dependent for item in mechanism.constraints if isinstance(item, Coupler)}
     fixed = {
@@ -268,10 +269,8 @@ def _replace_joints_with_welds(
             )
         frames: list[PhysicalOffsetFrame] = []
         for socket in ("socket_parent_frame", "socket_child_frame"):
-            frame, base = (
-                tree.target(joint, socket, getattr(joint, socket)),
-                _find_base(model, joint, socket),
-            )
+            frame = tree.target(joint, socket, getattr(joint, socket))
+            base = _find_base(model, joint, socket)
             offset = PhysicalOffsetFrame(
                 name=f"{base.name}_offset", socket_parent=tree.path_of(base) or ""
             )

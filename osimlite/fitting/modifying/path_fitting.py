@@ -70,7 +70,8 @@ def fit_paths(
     still = np.zeros(len(mechanism.coordinates))
     lengths = np.array([known.system.measured(row, still, LENGTH) for row in q])
     arms = known.all_moment_arms(q)
-    tree, result = model.tree(), []
+    tree = model.tree()
+    result = []
     for place, name in enumerate(known.names):
         if isinstance(getattr(tree.at(name), "geometry_path", None), FunctionBasedPath):
             continue
@@ -129,7 +130,9 @@ def _fit_path(
     """Fit the polynomial of one path."""
     own = [k for k in free if np.nanmax(np.abs(arms[:, k])) > MIN_MOMENT_ARM_M] or free[:1]
     good = np.isfinite(lengths) & np.isfinite(arms[:, own]).all(axis=1)
-    x, wanted, pulls = q[good][:, own], lengths[good], arms[good][:, own]
+    x = q[good][:, own]
+    wanted = lengths[good]
+    pulls = arms[good][:, own]
     best: PathFit | None = None
     for order in ORDERS:
         powers = np.array(
@@ -143,7 +146,8 @@ def _fit_path(
         sizes = np.linalg.norm(matrix, axis=0)
         coefficients = np.linalg.lstsq(matrix / sizes, right, 1e-12)[0] / sizes
         off = matrix @ coefficients - right
-        length, arm = off[: len(wanted)], off[len(wanted) :]
+        length = off[: len(wanted)]
+        arm = off[len(wanted) :]
         polynomial = MultivariatePolynomialFunction(
             dimension=len(own), order=order, coefficients=tuple(coefficients.tolist())
         )

@@ -55,13 +55,13 @@ def write_body_kinematics(analysis: BodyKinematics, motion: Motion, tables: Anal
         motion: the motion.
         tables: writer of the tables.
     """
-    bodies, tree = motion.model.body_set.objects, motion.model.tree()
+    bodies = motion.model.body_set.objects
+    tree = motion.model.tree()
     places = {body.path: place for place, body in enumerate(motion.mechanism.bodies)}
-    local, total = (
-        analysis.express_results_in_body_local_frame,
-        sum(body.mass for body in bodies) or 1.0,
-    )
-    result, whole = [], np.zeros((3, len(motion.times), 3))
+    local = analysis.express_results_in_body_local_frame
+    total = sum(body.mass for body in bodies) or 1.0
+    result = []
+    whole = np.zeros((3, len(motion.times), 3))
     for body in bodies:
         place = places[tree.path_of(body) or ""]
         linear = np.array(motion.links.point(place, np.array(body.mass_center)))
@@ -127,11 +127,9 @@ def write_point_kinematics(
         motion: the motion.
         tables: writer of the tables.
     """
-    mechanism, own, beside = (
-        motion.mechanism,
-        str(analysis.body_name),
-        str(analysis.relative_to_body_name),
-    )
+    mechanism = motion.mechanism
+    own = str(analysis.body_name)
+    beside = str(analysis.relative_to_body_name)
     body, placed = mechanism.placement(motion.find_frame_path(own, *FRAME_SEARCH) or own)
     result = np.array(
         motion.links.point(body, placed[:3, :3] @ np.array(analysis.point) + placed[:3, 3])

@@ -84,7 +84,8 @@ def _add_moments(
     tension: Array,
 ) -> None:
     """Write the tables of moment arms and moments about coordinates."""
-    infos, tree = motion.mechanism.coordinates, motion.model.tree()
+    infos = motion.mechanism.coordinates
+    tree = motion.model.tree()
     paths = Paths(motion.model)
     rows = [paths.names.index(tree.path_of(muscle) or "") for muscle in muscles]
     arms = paths.all_moment_arms(motion.values)[:, rows]
@@ -95,7 +96,8 @@ def _add_moments(
     for place in motion.find_indices(
         asked, [info.name for info in infos], f"coordinates of '{analysis.name}'"
     ):
-        names, own = [muscle.name for muscle in muscles], arms[:, :, place]
+        names = [muscle.name for muscle in muscles]
+        own = arms[:, :, place]
         for what, result in (("MomentArm", own), ("Moment", own * tension)):
             title = f"{what}_{infos[place].name}"
             tables.add_table(title, title, names, result, description=MUSCLE_DESCRIPTION)

@@ -41,7 +41,8 @@ def write_outputs(analysis: OutputReporter, motion: Motion, tables: AnalysisTabl
         motion: the motion.
         tables: writer of the tables.
     """
-    tree, columns = motion.model.tree(), {kind: list[str]() for kind in OUTPUT_FILES}
+    tree = motion.model.tree()
+    columns = {kind: list[str]() for kind in OUTPUT_FILES}
     rows = {kind: [np.empty((len(motion.times), 0))] for kind in OUTPUT_FILES}
     left_out = []
     for asked in map(str, analysis.output_paths):
@@ -105,7 +106,8 @@ def write_forces(analysis: ForceReporter, motion: Motion, tables: AnalysisTables
     labels = label_as_opensim(motion.system.columns)
     if analysis.include_constraint_forces and motion.simulation.constraints:
         more, result = compute_constraint_records(motion)
-        labels, rows = labels + more, np.hstack([rows, result])
+        labels = labels + more
+        rows = np.hstack([rows, result])
     tables.add_table("forces", "ModelForces", labels, rows, description=FORCES_DESCRIPTION)
 
 
@@ -138,7 +140,8 @@ def write_probes(analysis: ProbeReporter, motion: Motion, tables: AnalysisTables
         motion: the motion.
         tables: writer of the table.
     """
-    engine, tree = motion.simulation.engine, motion.model.tree()
+    engine = motion.simulation.engine
+    tree = motion.model.tree()
     computed = {probe.path for probe in engine.probes}
     for probe in motion.model.components(Probe):
         if probe.enabled and tree.path_of(probe) not in computed:

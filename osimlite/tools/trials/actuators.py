@@ -51,7 +51,10 @@ def find_actuators(tool: TrialTool | None) -> ActuatorRoles:
     """Return the roles of a tool's actuators; without a tool, those that their names imply."""
     if tool is None:
         return ActuatorRoles(RESIDUALS, {}, ())
-    mechanism, residuals, reserves, muscles = tool.mechanism, dict[str, str](), dict[str, str](), []
+    mechanism = tool.mechanism
+    residuals = dict[str, str]()
+    reserves = dict[str, str]()
+    muscles = []
     infos = {info.name: info for info in mechanism.coordinates}
     root = {mechanism.coordinates[place].name for place in find_root_coordinates(mechanism)}
     joints = {infos[name].joint for name in root}
@@ -110,11 +113,9 @@ def measure_residuals(
                 if unit == "N"
                 else ("residual-moment", scale.moment)
             )
-            of, where, at = (
-                f"{column} of {what}",
-                f"at {table.times[row]:g} s",
-                folder.locate_row(file, row),
-            )
+            of = f"{column} of {what}"
+            where = f"at {table.times[row]:g} s"
+            at = folder.locate_row(file, row)
             yield (
                 file,
                 Measurement(rule, "peak", of, float(values[row]), unit, size, where, at, is_final),
@@ -174,7 +175,8 @@ def measure_reserves(
     moments = _find_joint_moments(tool, table, others)
     judged = 0
     for name in wanted:
-        reserve, moment = np.abs(table[own[name]]), moments.get(name)
+        reserve = np.abs(table[own[name]])
+        moment = moments.get(name)
         row = int(np.argmax(reserve))
         if moment is None or reserve[row] < MIN_RESERVE_NM:
             continue
@@ -206,7 +208,8 @@ def _find_crossed_coordinates(tool: TrialTool) -> set[str]:
     """Return the names of the coordinates that a muscle crosses."""
     model, mechanism = tool.model, tool.mechanism
     paths = Paths(model)
-    tree, names = model.tree(), paths.names
+    tree = model.tree()
+    names = paths.names
     rows = [
         names.index(path) for path in map(tree.path_of, model.components(Muscle)) if path in names
     ]
@@ -245,10 +248,8 @@ def _find_joint_moments(
     for tag in ("InverseDynamicsTool", "RRATool"):
         for other in (other for other in others if other.tag == tag):
             if tag == "RRATool":
-                name, columns = (
-                    f"{other.setup.name}_Actuation_force.sto",
-                    find_actuators(other).reserves,
-                )
+                name = f"{other.setup.name}_Actuation_force.sto"
+                columns = find_actuators(other).reserves
             else:
                 name, columns = (
                     other.setup.output_gen_force_file,
@@ -283,7 +284,8 @@ def measure_activations(folder: TrialFolder, file: Path, muscles: Sequence[str])
         file: table of activations.
         muscles: names of the muscles.
     """
-    table, most = folder.read_table(file), 0
+    table = folder.read_table(file)
+    most = 0
     for place, label in enumerate(table.columns):
         name = label.removesuffix("/activation").removesuffix(".activation").rpartition("/")[2]
         if name not in muscles or (
@@ -293,11 +295,10 @@ def measure_activations(folder: TrialFolder, file: Path, muscles: Sequence[str])
         full = np.flatnonzero(table.rows[:, place] >= FULL_ACTIVATION)
         if len(full):
             most += 1
-            share, time = 100.0 * len(full) / len(table.times), table.times[full[0]]
-            of, at = (
-                f"share of the time that '{name}' is fully active",
-                folder.locate_row(file, int(full[0])),
-            )
+            share = 100.0 * len(full) / len(table.times)
+            time = table.times[full[0]]
+            of = f"share of the time that '{name}' is fully active"
+            at = folder.locate_row(file, int(full[0]))
             yield (
                 file,
                 Measurement(

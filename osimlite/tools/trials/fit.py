@@ -110,7 +110,8 @@ def measure_marker_errors(tool: TrialTool) -> Numbers:
     data = tool.require_input("marker_file")
     pairs = [*_find_swapped_markers(tool, motion)]
     for one, other, frames in pairs:
-        share, times = 100.0 * len(frames) / SWAP_FRAMES, motion.times[frames]
+        share = 100.0 * len(frames) / SWAP_FRAMES
+        times = motion.times[frames]
         of = (
             f"share of frames in which the markers '{one}' and '{other}' would fit better exchanged"
         )
@@ -136,11 +137,9 @@ def measure_written_errors(folder: TrialFolder, file: Path) -> Numbers:
     of = "the errors of the markers"
     rms = float(np.sqrt(np.mean(table["marker_error_RMS"] ** 2)))
     row = int(np.argmax(table["marker_error_max"]))
-    yield (
-        file,
-        Measurement("marker-error", "rms", of, 100.0 * rms, "cm", at=folder.locate_row(file, 0)),
-    )
-    peak, where = 100.0 * float(table["marker_error_max"][row]), f"at {table.times[row]:g} s"
+    yield file, Measurement("marker-error", "rms", of, 100.0 * rms, "cm", at=folder.locate_row(file, 0))
+    peak = 100.0 * float(table["marker_error_max"][row])
+    where = f"at {table.times[row]:g} s"
     yield (
         file,
         Measurement(
@@ -252,8 +251,10 @@ def measure_ranges(tool: TrialTool, file: Path) -> Numbers:
         tool: tool with the model.
         file: table of the motion.
     """
-    motion, mechanism = tool.folder.read_motion(file, tool.model_file), tool.mechanism
-    root, beyond = find_root_coordinates(mechanism), 0
+    motion = tool.folder.read_motion(file, tool.model_file)
+    mechanism = tool.mechanism
+    root = find_root_coordinates(mechanism)
+    beyond = 0
     for place, info in enumerate(mechanism.coordinates):
         low, high = info.range
         excess = np.maximum(low - motion.values[:, place], motion.values[:, place] - high)
@@ -263,8 +264,10 @@ def measure_ranges(tool: TrialTool, file: Path) -> Numbers:
             continue
         beyond += 1
         most = f"{_to_display_unit(info, low):.3g} to {_to_display_unit(info, high):.3g} {_get_display_unit(info)}"
-        time, unit = float(motion.times[row]), _get_display_unit(info)
-        where, of = f"at {time:g} s, the range is {most}", f"'{info.name}' beyond its range"
+        time = float(motion.times[row])
+        unit = _get_display_unit(info)
+        where = f"at {time:g} s, the range is {most}"
+        of = f"'{info.name}' beyond its range"
         yield (
             file,
             Measurement(
@@ -304,18 +307,18 @@ def measure_tracking_errors(folder: TrialFolder, file: Path, tool: TrialTool | N
         column = np.abs(table[name]) * (
             100.0 if not turning else 1.0 if table.in_degrees else degrees(1.0)
         )
-        row, unit = int(np.argmax(column)), "deg" if turning else "cm"
+        row = int(np.argmax(column))
+        unit = "deg" if turning else "cm"
         of = f"the error of '{name}'"
-        where, at = f"at {table.times[row]:g} s", folder.locate_row(file, row)
+        where = f"at {table.times[row]:g} s"
+        at = folder.locate_row(file, row)
         yield (
             file,
             Measurement("tracking-error", "peak", of, float(column[row]), unit, where=where, at=at),
         )
-        kind, value = "rms" if turning else "rms-translation", float(np.sqrt(np.mean(column**2)))
-        yield (
-            file,
-            Measurement("tracking-error", kind, of, value, unit, at=folder.locate_row(file, 0)),
-        )
+        kind = "rms" if turning else "rms-translation"
+        value = float(np.sqrt(np.mean(column**2)))
+        yield file, Measurement("tracking-error", kind, of, value, unit, at=folder.locate_row(file, 0))
 
 
 def measure_filter(tool: TrialTool) -> Numbers:
@@ -333,7 +336,9 @@ def measure_filter(tool: TrialTool) -> Numbers:
                 info, float(np.sqrt(np.mean((column - motion.values[own, place]) ** 2)))
             )
             if lost > size:
-                worst, size, unit = info.name, lost, _get_display_unit(info)
+                worst = info.name
+                size = lost
+                unit = _get_display_unit(info)
         of = f"change of '{worst}' (root mean square) by the filter of {tool.cutoff:g} Hz"
         yield tool.job.file, Measurement("filter-content", "change", of, size, unit)
         motion = filtered
@@ -368,7 +373,8 @@ def _measure_noise(motion: RecordedMotion, first: float, last: float) -> float |
     if len(times) < 8 or times[-1] - times[0] < MIN_PERIODS / MAX_MOVEMENT_HZ:
         return None
     step = (times[-1] - times[0]) / (len(times) - 1)
-    values, even = motion.values[own], np.linspace(times[0], times[-1], len(times))
+    values = motion.values[own]
+    even = np.linspace(times[0], times[-1], len(times))
     if step > 0.5 / (1.5 * MAX_MOVEMENT_HZ):
         return None
     shares = []

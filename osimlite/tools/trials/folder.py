@@ -197,7 +197,9 @@ class TrialTool:
     """
 
     def __init__(self, folder: TrialFolder, job: Job) -> None:
-        self.folder, self.job, self.setup = folder, job, job.setup
+        self.folder = folder
+        self.job = job
+        self.setup = job.setup
         self.tag = type(job.setup).__name__
 
     def __str__(self) -> str:

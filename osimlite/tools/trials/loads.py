@@ -92,7 +92,8 @@ def compute_scale(tool: TrialTool) -> LoadScale:
         return LoadScale()
     force = float(np.nanmax(np.linalg.norm(sum(load.force[own] for load in loads), axis=1)))
     try:
-        motion, up = tool.motion, _find_up(tool)
+        motion = tool.motion
+        up = _find_up(tool)
     except OsimliteError:
         return LoadScale(force)
     chosen = np.unique(np.linspace(0, len(motion.times) - 1, TIME_COUNT).astype(int))
@@ -174,7 +175,8 @@ def _measure_distances(
     )
     if not len(rows):
         return None
-    mechanism, result = motion.mechanism, []
+    mechanism = motion.mechanism
+    result = []
     places = {body.name.rpartition("/")[2]: body for body in mechanism.bodies}
     for row in np.unique(rows[np.linspace(0, len(rows) - 1, TIME_COUNT).astype(int)]):
         q = motion.values[int(np.argmin(np.abs(motion.times - table.times[row])))]
@@ -193,7 +195,8 @@ def _measure_distances(
 def measure_weight(tool: TrialTool) -> Numbers:
     """Yield the difference of the model's mass from the mass that the plates carry."""
     _, table, loads = read_loads(tool)
-    motion, up = tool.motion, _find_up(tool)
+    motion = tool.motion
+    up = _find_up(tool)
     gravity = float(np.linalg.norm(tool.mechanism.gravity))
     mass = tool.mechanism.total_mass
     if not loads or not mass or not gravity:
@@ -210,7 +213,8 @@ def measure_weight(tool: TrialTool) -> Numbers:
     if len(inside) < 2 or times[inside[-1]] - times[inside[0]] < MIN_DURATION_S:
         raise MissingInput(f"no foot stands on a plate for {MIN_DURATION_S:g} s in {tool}")
     own = slice(int(inside[0]), int(inside[-1]) + 1)
-    first, last = float(times[own][0]), float(times[own][-1])
+    first = float(times[own][0])
+    last = float(times[own][-1])
     mean = float(np.trapezoid(lift[own], times[own])) / (last - first)
     smooth = motion.lowpassed(tool.cutoff) if tool.cutoff > 0.0 else motion
     speeds = [_compute_rising_speed(smooth, time, up) for time in (first, last)]

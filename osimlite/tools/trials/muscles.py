@@ -70,7 +70,8 @@ def compute_passive_forces(tool: TrialTool, file: Path, *, is_states: bool) -> S
         is_states: whether the file has states.
     """
     times = tool.folder.read_table(file).times
-    first, last = max(float(times[0]), tool.span[0]), min(float(times[-1]), tool.span[1])
+    first = max(float(times[0]), tool.span[0])
+    last = min(float(times[-1]), tool.span[1])
     count = int(((times >= first) & (times <= last)).sum())
     if not count or not any(True for _ in tool.model.components(Muscle)):
         raise MissingInput(f"{tool} has no muscles, or '{file}' has no row in its time range")
