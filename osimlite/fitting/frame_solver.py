@@ -104,11 +104,16 @@ class FrameSolver:
             SettingError: the arrays do not fit the numbers of markers and sensors.
             SimulationError: no pose satisfies the constraints.
         """
-        places, turned = np.asarray(positions, dtype=float), np.asarray(orientations, dtype=float)
-        if places.shape != (len(self.markers), 3) and (self.markers or places.size):
+        marker_positions, turned = (
+            np.asarray(positions, dtype=float),
+            np.asarray(orientations, dtype=float),
+        )
+        if marker_positions.shape != (len(self.markers), 3) and (
+            self.markers or marker_positions.size
+        ):
             raise SettingError(
                 f"expected {len(self.markers)} rows of 3 numbers, one for each marker; found "
-                f"{' × '.join(map(str, places.shape)) or 'one number'}"
+                f"{' × '.join(map(str, marker_positions.shape)) or 'one number'}"
             )
         if self.sensors or turned.size:
             turned = to_rotations(turned, "the frame")
@@ -118,7 +123,7 @@ class FrameSolver:
                     "found "
                     f"{' × '.join(map(str, turned.shape[:-2])) or 'one'}"
                 )
-        return self._frame(np.concatenate((places.reshape(-1), turned.reshape(-1))), time)
+        return self._frame(np.concatenate((marker_positions.reshape(-1), turned.reshape(-1))), time)
 
     @property
     def places(self) -> Array:

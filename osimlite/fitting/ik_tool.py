@@ -75,21 +75,21 @@ def collect_targets(
     goals, wanted = [], []
     for task in applied:
         if isinstance(task, IKCoordinateTask):
-            place = mechanism.coordinate_index(task.name)
-            goals.append(CoordinateTarget(place, float(task.weight)))
-            wanted.append(_compute_target_values(task, mechanism, place, data.times, coordinates))
+            index = mechanism.coordinate_index(task.name)
+            goals.append(CoordinateTarget(index, float(task.weight)))
+            wanted.append(_compute_target_values(task, mechanism, index, data.times, coordinates))
     return FitTargets(weights, goals, np.array(wanted).reshape(len(goals), len(data.times)).T)
 
 
 def _compute_target_values(
     task: IKCoordinateTask,
     mechanism: Mechanism,
-    place: int,
+    index: int,
     times: Array,
     coordinates: StoTable | None,
 ) -> Array:
     """Return the target values of a coordinate over time, rad or m."""
-    info = mechanism.coordinates[place]
+    info = mechanism.coordinates[index]
     if task.value_type == "manual_value":
         return np.full(len(times), float(task.value))
     if task.value_type != "from_file":

@@ -106,11 +106,11 @@ def inverse_kinematics(
                 kind[name] = float(weight)
     goals, wanted = [], []
     for name, goal in (coordinates or {}).items():
-        place = mechanism.coordinate_index(name)
+        index = mechanism.coordinate_index(name)
         weight, value = (
-            goal if isinstance(goal, tuple) else (goal, mechanism.coordinates[place].default_value)
+            goal if isinstance(goal, tuple) else (goal, mechanism.coordinates[index].default_value)
         )
-        goals.append(CoordinateTarget(place, float(weight)))
+        goals.append(CoordinateTarget(index, float(weight)))
         wanted.append(float(value))
     rows = np.tile(wanted, (len(data.times), 1))
     return fit_motion(model, mechanism, data, weighed, goals, rows, constraints, turned, sensed)

@@ -116,14 +116,14 @@ def read_trc(path: str | Path) -> MarkerData:
     )
 
 
-def _parse_number(cell: str, file: str, line: int, place: int) -> float:
+def _parse_number(cell: str, file: str, line: int, index: int) -> float:
     """Return the number in a cell; NaN for an empty one."""
     text = cell.strip()
     try:
         return float(text) if text else np.nan
     except ValueError:
         raise DocumentError(
-            f"'{text}' in column {place + 1} is not a number; leave the cells of an unseen marker "
+            f"'{text}' in column {index + 1} is not a number; leave the cells of an unseen marker "
             "empty",
             file=file,
             line=line,

@@ -109,13 +109,13 @@ class Measurements:
         Raises:
             SettingError: a name is unknown.
         """
-        places = {name: index for index, name in enumerate(self.names)}
+        indices = {name: index for index, name in enumerate(self.names)}
         for name in names:
-            if name not in places:
+            if name not in indices:
                 raise SettingError(
                     f"unknown {self.noun} '{name}' in {self.source}{suggest_name(name, self.names)}"
                 )
-        return self.values[:, [places[name] for name in names]]
+        return self.values[:, [indices[name] for name in names]]
 
     def find_shared_names(
         self, model: Sequence[str], chosen: Mapping[str, float] | None = None

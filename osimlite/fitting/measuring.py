@@ -115,8 +115,8 @@ class ScaleFactorFinder:
                     )
             one, two = (self._state.point(*self._stations[marker]) for marker in names)
             length = float(np.linalg.norm(one - two))
-            places = data.select_values(names)[frames]
-            measured = float(np.mean(np.linalg.norm(places[:, 0] - places[:, 1], axis=1)))
+            positions = data.select_values(names)[frames]
+            measured = float(np.mean(np.linalg.norm(positions[:, 0] - positions[:, 1], axis=1)))
             if not np.isfinite(measured):
                 return 0.0, f"{join_words(names)} were not seen in every frame of the time range"
             if not length > 0.0:

@@ -151,9 +151,9 @@ def fit(
     """
     mechanism = build_mechanism(model)
     stations = {
-        name: place
-        for name, place in find_marker_stations(model, mechanism).items()
-        if place.body != GROUND
+        name: station
+        for name, station in find_marker_stations(model, mechanism).items()
+        if station.body != GROUND
     }
     chosen = SelectedFrames(_read_trials(trials, static), list(stations), frames, weights or {})
     moving = {marker.name for marker in model.components(ModelMarker) if not marker.fixed}
@@ -348,9 +348,9 @@ class _PersonFit:
         size = self._sizes + self._moved
         by = np.zeros((*errors.shape, size))
         by[..., : self._sizes] = columns
-        for number, place in enumerate(self._free):
+        for number, index in enumerate(self._free):
             first = self._sizes + 3 * number
-            by[:, place, :, first : first + 3] = turned[:, place]
+            by[:, index, :, first : first + 3] = turned[:, index]
         matrix = np.zeros((size, size))
         slope = np.zeros(size)
         matrix[: self._sizes, : self._sizes] = self._prior.T @ self._prior

@@ -91,14 +91,14 @@ class PoseFit:
         infos = list(mechanism.coordinates)
         self._held: dict[int, Function | None] = {}
         free = set(free_coordinates(mechanism))
-        for place, info in enumerate(infos):
-            if place in free and (info.locked or info.prescribed is not None):
-                self._held[place] = None if info.locked else info.prescribed
-                infos[place] = replace(info, locked=False, prescribed=None)
+        for index, info in enumerate(infos):
+            if index in free and (info.locked or info.prescribed is not None):
+                self._held[index] = None if info.locked else info.prescribed
+                infos[index] = replace(info, locked=False, prescribed=None)
         acting = [
             item for item in mechanism.constraints if not isinstance(item, Lock | Prescribed)
         ] * constraints
-        fixed = {place for place in range(len(infos)) if place not in free or place in self._held}
+        fixed = {index for index in range(len(infos)) if index not in free or index in self._held}
         self._couplers, others = separate_couplers(acting, fixed)
         # A target of a coordinate that cannot move has no effect.
         self._goals = [number for number, goal in enumerate(goals) if goal.coordinate not in fixed]
@@ -106,7 +106,7 @@ class PoseFit:
         self.system = _System(unlocked, Forces(()), code=code)
         self.order = list(self.system.order)
         places = Places(
-            unlocked, {place: k for k, place in enumerate(self.order)}, self.system.placements
+            unlocked, {index: k for k, index in enumerate(self.order)}, self.system.placements
         )
         kept = [goals[number] for number in self._goals]
         self.layout = FitLayout(
@@ -159,9 +159,11 @@ class PoseFit:
         unseen, unsettled = (
             tuple(np.flatnonzero(status == what).tolist()) for what in (UNSEEN, STUCK)
         )
-        places = vectors[:, : self.markers]
+        positions = vectors[:, : self.markers]
         turns = vectors[:, self.markers :]
-        return FittedPoses(values, places, turns, result[:, -3], result[:, -2], unseen, unsettled)
+        return FittedPoses(
+            values, positions, turns, result[:, -3], result[:, -2], unseen, unsettled
+        )
 
     def bind_arrays(self, frames: Array, found: Array) -> Callable[[int], int]:
         """Return a function that fits a number of frames in fixed arrays.
@@ -181,9 +183,9 @@ class PoseFit:
             moments: times (t,), s.
         """
         columns = frames[:, self.width - len(self._held) :]
-        for column, (place, function) in enumerate(self._held.items()):
+        for column, (index, function) in enumerate(self._held.items()):
             if function is None:
-                columns[:, column] = self.mechanism.coordinates[place].default_value
+                columns[:, column] = self.mechanism.coordinates[index].default_value
             else:
                 columns[:, column] = [
                     function.evaluate(np.array((t,)))[0] for t in moments.tolist()

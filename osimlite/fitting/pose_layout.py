@@ -129,16 +129,16 @@ class FitLayout:
         self._append_list(
             ints, fit.GOALS, fit.GOAL_AT, [places.freedom(goal.coordinate) for goal in goals]
         )
-        self._append_list(ints, fit.HELD, fit.HELD_AT, [places.freedom(place) for place in held])
+        self._append_list(ints, fit.HELD, fit.HELD_AT, [places.freedom(index) for index in held])
         ints[fit.RANGES_AT] = len(numbers)
         for low, high in compute_ranges(system.mechanism, system.order, couplers):
             numbers += low, high
         records = []
         for coupler in couplers:
             records.append(len(ints))
-            arguments = [places.freedom(place) for place in coupler.independent]
+            arguments = [places.freedom(index) for index in coupler.independent]
             ints += [places.freedom(coupler.dependent), len(numbers), len(arguments), *arguments]
-            numbers += [places.locked_value(place) for place in coupler.independent]
+            numbers += [places.locked_value(index) for index in coupler.independent]
             numbers += function_table(coupler.function, f"the function of '{coupler.name}'")
         self._append_list(ints, fit.COUPLERS, fit.COUPLER_AT, records)
         self._append_axes(ints, s, system.numbers, links)
@@ -168,17 +168,17 @@ class FitLayout:
             fit.PATTERN: len(markers) + len(sensors) + len(goals) + 1,
         }
         work = 0
-        for place, length in lengths.items():
-            ints[place] = work
+        for entry, length in lengths.items():
+            ints[entry] = work
             work += length
         self.ints = np.array(ints, dtype=np.int64)
         self.numbers = np.array(numbers, dtype=float)
         self.work = np.zeros(work)
 
     @staticmethod
-    def _append_list(ints: list[int], count: int, place: int, items: Sequence[int]) -> None:
+    def _append_list(ints: list[int], count: int, offset: int, items: Sequence[int]) -> None:
         """Append items to the integers, and set their count and offset."""
-        ints[count], ints[place] = len(items), len(ints)
+        ints[count], ints[offset] = len(items), len(ints)
         ints += items
 
     @staticmethod
@@ -239,8 +239,8 @@ def compute_ranges(
         couplers: couplers that determine a coordinate.
     """
     ends = {
-        place: info.range if info.clamped else (-np.inf, np.inf)
-        for place, info in enumerate(mechanism.coordinates)
+        index: info.range if info.clamped else (-np.inf, np.inf)
+        for index, info in enumerate(mechanism.coordinates)
     }
     for coupler in reversed(couplers):
         low, high = ends[coupler.dependent]
@@ -249,7 +249,7 @@ def compute_ranges(
             ends[other] = _find_allowed_interval(
                 coupler, mechanism.coordinates[other].default_value, ends[other], low, high
             )
-    yield from (ends[place] for place in order)
+    yield from (ends[index] for index in order)
 
 
 def _find_allowed_interval(
@@ -265,8 +265,8 @@ def _find_allowed_interval(
         high: upper bound of the coupled coordinate.
     """
 
-    def is_inside(place: float) -> bool:
-        value = coupler.function.evaluate(np.array((place,)))[0]
+    def is_inside(argument: float) -> bool:
+        value = coupler.function.evaluate(np.array((argument,)))[0]
         return low - 1e-12 <= value <= high + 1e-12
 
     start = min(max(start, ends[0]), ends[1])
@@ -276,7 +276,7 @@ def _find_allowed_interval(
     for end, side in zip(ends, (-1.0, 1.0), strict=True):
         furthest = end if np.isfinite(end) else start + side * 2.0 * np.pi
         scan = np.linspace(start, furthest, SCAN_POINTS)
-        outside = next((k for k, place in enumerate(scan.tolist()) if not is_inside(place)), None)
+        outside = next((k for k, value in enumerate(scan.tolist()) if not is_inside(value)), None)
         if outside is None:
             result.append(end)
             continue

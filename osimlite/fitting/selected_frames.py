@@ -93,16 +93,16 @@ class SelectedFrames:
         self.times, self.measured = np.array(times), np.array(measured)
         self.measured[~np.isfinite(self.measured).all(axis=2)] = np.nan
 
-    def exclude_outliers(self, places: Array) -> bool:
+    def exclude_outliers(self, positions: Array) -> bool:
         """Exclude measured positions that are much farther from fitted ones than usual.
 
         Args:
-            places: fitted positions of the markers (t, m, 3), m.
+            positions: fitted positions of the markers (t, m, 3), m.
 
         Returns:
             Whether any position was excluded.
         """
-        distances = np.linalg.norm(places - self.measured, axis=2)
+        distances = np.linalg.norm(positions - self.measured, axis=2)
         with np.errstate(all="ignore"):
             usual = np.array(
                 [
@@ -118,12 +118,12 @@ class SelectedFrames:
             far = (distances > np.maximum(OUTLIER_RATIO * usual, OUTLIER_DISTANCE_M)) & (
                 distances > 0.5 * worst
             )
-        for place in np.flatnonzero(far.any(axis=0)):
-            where = sorted({self.trials[frame] for frame in np.flatnonzero(far[:, place])})
-            number = format_count(int(far[:, place].sum()), "frame")
+        for index in np.flatnonzero(far.any(axis=0)):
+            where = sorted({self.trials[frame] for frame in np.flatnonzero(far[:, index])})
+            number = format_count(int(far[:, index].sum()), "frame")
             self.notes.append(
-                f"{self.markers[place]} is left out in {number} of {join_words(where)}: up to "
-                f"{100.0 * np.nanmax(distances[:, place]):.0f} cm away; it may have been taken for "
+                f"{self.markers[index]} is left out in {number} of {join_words(where)}: up to "
+                f"{100.0 * np.nanmax(distances[:, index]):.0f} cm away; it may have been taken for "
                 "another"
             )
         self.measured[far] = np.nan

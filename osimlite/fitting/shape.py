@@ -60,10 +60,10 @@ class ScalableMarkers:
         scale_model(model, self.segments.expand_factors(sizes))
         mechanism = build_mechanism(model)
         tree = model.tree()
-        places: dict[str, StationPlacement] = {}
+        stations: dict[str, StationPlacement] = {}
         for marker in model.components(ModelMarker):
-            places.setdefault(marker.name, mechanism.stations[tree.path_of(marker) or ""])
-        return mechanism, [places[name] for name in self._names]
+            stations.setdefault(marker.name, mechanism.stations[tree.path_of(marker) or ""])
+        return mechanism, [stations[name] for name in self._names]
 
     def _create_points(self, sizes: Array) -> _MarkerPoints:
         """Return the marker points for parameters (k,)."""
@@ -79,9 +79,9 @@ class ScalableMarkers:
             Derivatives (t, m, 3, k) of the positions by the factors, m; rotations (t, m, 3, 3) of
             the markers' bodies.
         """
-        places, rotations = self._first.compute_positions(values)
+        positions, rotations = self._first.compute_positions(values)
         return np.stack(
-            [larger.compute_positions(values)[0] - places for larger in self._larger], axis=-1
+            [larger.compute_positions(values)[0] - positions for larger in self._larger], axis=-1
         ), rotations
 
 
@@ -100,13 +100,13 @@ class ScaledPoseFit:
     ) -> None:
         self.mechanism, stations = shape.scale_mechanism(sizes)
         moved = [
-            place._replace(location=place.location + by)
-            for place, by in zip(stations, offsets, strict=True)
+            station._replace(location=station.location + by)
+            for station, by in zip(stations, offsets, strict=True)
         ]
         self._points = _MarkerPoints(self.mechanism, moved)
         markers = [
-            MarkerTarget(place, weight)
-            for place, weight in zip(moved, weights.tolist(), strict=True)
+            MarkerTarget(station, weight)
+            for station, weight in zip(moved, weights.tolist(), strict=True)
         ]
         self._fit = PoseFit(self.mechanism, markers)
 
@@ -144,12 +144,12 @@ class _MarkerPoints:
         self._mechanism = mechanism
         free = mechanism.without_constraints()
         self._system = System(free, Forces(()), apart=True)
-        links = [self._system.placements[place.body][0] for place in stations]
+        links = [self._system.placements[station.body][0] for station in stations]
         self._carrying, self._links = np.unique(links, return_inverse=True)
-        frames = [self._system.placements[place.body][1] for place in stations]
+        frames = [self._system.placements[station.body][1] for station in stations]
         located = zip(frames, stations, strict=True)
         self._own = np.array(
-            [frame[:3, :3] @ place.location + frame[:3, 3] for frame, place in located]
+            [frame[:3, :3] @ station.location + frame[:3, 3] for frame, station in located]
         )
         self._turned = np.array([frame[:3, :3] for frame in frames])
         holds = [item for item in mechanism.constraints if not isinstance(item, Lock | Prescribed)]

@@ -114,8 +114,8 @@ def equilibrate_rows(
     for path, missing in unbalanced.items():
         element = elements[path]
         if element.states:
-            place = simulation.state.first_of(element)
-            states[missing, place : place + len(element.states)] = np.nan
+            index = simulation.state.first_of(element)
+            states[missing, index : index + len(element.states)] = np.nan
         outcome.add_message(
             "no equilibrium",
             f"of {reasons[path]}: at {np.count_nonzero(missing)} of {len(times)} moments, "
@@ -185,8 +185,8 @@ def _read_coordinate_motion(
     def states() -> Iterator[tuple[float, list[float]]]:
         for number, (t, q, u) in enumerate(rows):
             y = simulation.state.pack(q.tolist(), u.tolist())
-            for place, column in others.items():
-                y[place] = float(column[number])
+            for index, column in others.items():
+                y[index] = float(column[number])
             yield t, y
 
     first = int(np.searchsorted(before.times, recorded.times[0]))
@@ -226,13 +226,13 @@ def _read_speeds(
             raise job.create_error(
                 f"'{path}' has no row at {time:.15g} s, unlike the coordinates; add one"
             )
-    for name, place in columns.items():
-        speeds[:, paths.index(name)] = table.rows[:, place]
+    for name, index in columns.items():
+        speeds[:, paths.index(name)] = table.rows[:, index]
     state = simulation.state
     first = 2 * len(state.order)
     auxiliary = columns_of_states(table.columns, state.paths)
     others = {
-        first + state.paths.index(name): table.rows[rows, place]
-        for name, place in auxiliary.items()
+        first + state.paths.index(name): table.rows[rows, index]
+        for name, index in auxiliary.items()
     }
     return (table.times, speeds), speeds[rows], others

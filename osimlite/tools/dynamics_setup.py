@@ -247,7 +247,7 @@ class StateRows(NamedTuple):
             simulation: simulation of the model.
             row: number of the row.
         """
-        given = {path: float(self.table.rows[row, place]) for path, place in self.columns.items()}
+        given = {path: float(self.table.rows[row, index]) for path, index in self.columns.items()}
         own = [path for path in simulation.state.paths if path in given]
         moving = {path: value for path, value in given.items() if path not in own}
         q, u, _ = starting(simulation.mechanism, moving, {})

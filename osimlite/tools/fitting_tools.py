@@ -62,8 +62,10 @@ def run_inverse_kinematics_tool(job: Job, outcome: Outcome) -> None:
     if setup.report_marker_locations:
         columns = tuple(f"{name}_t{axis}" for name in motion.markers for axis in "xyz")
         path = job.get_results_path(f"{setup.name}_ik_model_marker_locations.sto")
-        places = motion.places.reshape(len(times), -1)
-        outcome.add_table(path, StoTable("Model Marker Locations from IK", times, columns, places))
+        positions = motion.places.reshape(len(times), -1)
+        outcome.add_table(
+            path, StoTable("Model Marker Locations from IK", times, columns, positions)
+        )
     outcome.evidence = Evidence.from_values(
         model,
         job.require_path("model_file"),
@@ -195,11 +197,11 @@ def run_imu_inverse_kinematics_tool(job: Job, outcome: Outcome) -> None:
             header={"name": ORIENTATION_ERRORS},
         )
         tables[f"{name}_orientationErrors.sto"] = table
-    for place, table in tables.items():
+    for file_name, table in tables.items():
         if folder or job.output is not None:
-            outcome.add_typed_table(job.get_results_path(place), table)
+            outcome.add_typed_table(job.get_results_path(file_name), table)
         elif asked:
-            outcome.add_typed_table(job.get_output_path(str(Path(beside) / place)), table)
+            outcome.add_typed_table(job.get_output_path(str(Path(beside) / file_name)), table)
     if not outcome.tables:
         outcome.add_message(
             "nothing written",

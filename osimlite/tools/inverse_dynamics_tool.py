@@ -63,7 +63,7 @@ def run_inverse_dynamics_tool(job: Job, outcome: Outcome) -> None:
     if joints:
         result = np.empty_like(table.rows)
         result[
-            :, [place for body in recorded.mechanism.bodies for place in body.mobilizer.coordinates]
+            :, [index for body in recorded.mechanism.bodies for index in body.mobilizer.coordinates]
         ] = table.rows
         at_joints = compute_joint_loads(model, joints, recorded, result)
         outcome.add_table(job.get_results_path(setup.output_body_forces_file), at_joints)
@@ -92,7 +92,7 @@ def _report_residuals(outcome: Outcome, mechanism: Mechanism, table: StoTable) -
         mechanism: mechanism of the model.
         table: generalized forces.
     """
-    names = [mechanism.coordinates[place].name for place in find_root_coordinates(mechanism)]
+    names = [mechanism.coordinates[index].name for index in find_root_coordinates(mechanism)]
     weight = mechanism.total_mass * float(np.linalg.norm(mechanism.gravity))
     for what, unit in (("force", "N"), ("moment", "N m")):
         own = [
@@ -202,11 +202,11 @@ def _split_mobilizer(
     groups = [[motion] for motion in mobilizer.motions] if apart else [[*mobilizer.motions]]
     hinges: list[_Hinge] = []
     for motions in groups[::-1] if mobilizer.reversed else groups:
-        used = sorted({place for motion in motions for place in motion.coordinates})
+        used = sorted({index for motion in motions for index in motion.coordinates})
         renumbered: Any = [
             replace(m, coordinates=tuple(map(used.index, m.coordinates))) for m in motions
         ]
-        places = [mobilizer.coordinates[place] for place in used]
+        indices = [mobilizer.coordinates[index] for index in used]
         still = np.eye(4)
         count = tuple(range(len(used)))
         alone = replace(
@@ -214,9 +214,10 @@ def _split_mobilizer(
         )
         carried = replace(mechanism.bodies[body], parent=GROUND, mobilizer=alone)
         infos = tuple(
-            replace(mechanism.coordinates[place], locked=False, prescribed=None) for place in places
+            replace(mechanism.coordinates[index], locked=False, prescribed=None)
+            for index in indices
         )
-        hinges.append((places, Mechanism(mobilizer.joint, (carried,), infos)))
+        hinges.append((indices, Mechanism(mobilizer.joint, (carried,), infos)))
     inner = mobilizer.child_frame if mobilizer.reversed else mobilizer.parent_frame
     return mechanism.bodies[body].parent, inner[:3, :3], hinges
 
@@ -235,9 +236,9 @@ def _compute_joint_load(
     """
     rotation = state.rotations[parent] @ inner
     load = np.zeros((2, 3))
-    for places, hinge in hinges:
-        across = hinge.at(state.q[places])
-        load += _compute_hinge_load(across.jacobians[0].T, forces[places]) @ rotation.T
+    for indices, hinge in hinges:
+        across = hinge.at(state.q[indices])
+        load += _compute_hinge_load(across.jacobians[0].T, forces[indices]) @ rotation.T
         rotation = rotation @ across.rotations[0]
     return load
 

@@ -140,9 +140,9 @@ def run_many(
         OsimliteError: the cluster cannot be reached.
     """
     journal = _Journal(output or Path(), resume, is_kept=len(setups) > 1)
-    places = assign_folders(setups, output)
+    folders = assign_folders(setups, output)
     work = _Schedule(setups, journal, progress)
-    do = partial(_run_one, places, work.needs, kept, overwrite, write_outside)
+    do = partial(_run_one, folders, work.needs, kept, overwrite, write_outside)
     try:
         if cluster is None and workers == 1:
             for setup in work.yield_ready():
@@ -195,14 +195,14 @@ def assign_folders(setups: Sequence[Path], output: Path | None) -> dict[Path, Pa
 
 
 def find_substitutes(
-    setup: Path, needs: Sequence[Path], places: Mapping[Path, Path | None]
+    setup: Path, needs: Sequence[Path], folders: Mapping[Path, Path | None]
 ) -> dict[str, str]:
     """Return the present paths of inputs that other setups wrote into other folders.
 
     Args:
         setup: setup that names the inputs.
         needs: setups that write them.
-        places: folder of the results by setup; None if the setup names the folder itself.
+        folders: folder of the results by setup; None if the setup names the folder itself.
 
     Returns:
         Present path of each input by its absolute path in the setup.
@@ -210,7 +210,7 @@ def find_substitutes(
     result = {}
     named = {os.path.realpath(name) for name in find_named_files(str(setup), "file")}
     for maker in needs:
-        folder = places[maker]
+        folder = folders[maker]
         if folder is None:
             continue
         for path in named & {
@@ -223,7 +223,7 @@ def find_substitutes(
 
 
 def _run_one(
-    places: dict[Path, Path | None],
+    folders: dict[Path, Path | None],
     needs: dict[Path, list[Path]],
     kept: dict[str | Path, Outcome] | None,
     overwrite: bool,
@@ -234,10 +234,10 @@ def _run_one(
     started = time.perf_counter()
     try:
         digest = compute_digest(setup)
-        substitutes = find_substitutes(setup, needs[setup], places)
+        substitutes = find_substitutes(setup, needs[setup], folders)
         outcome = run(
             setup,
-            places[setup],
+            folders[setup],
             overwrite=overwrite,
             write_outside=write_outside,
             substitutes=substitutes,

@@ -209,18 +209,18 @@ class Motion:
             )
         return {path: columns[path] for path in self.simulation.paths}
 
-    def evaluate_kernels(self, places: Sequence[int], stage: int = STAGE.FORCE) -> Array:
+    def evaluate_kernels(self, offsets: Sequence[int], stage: int = STAGE.FORCE) -> Array:
         """Evaluate entries of the work vector of the kernels at every time; see `System.looked`.
 
         Args:
-            places: offsets of m entries in the work vector.
+            offsets: offsets of m entries in the work vector.
             stage: stage up to which to realize each state.
 
         Returns:
             Entries (t, m); NaN at times at which a muscle lacks an equilibrium.
         """
         return self.compute_balanced(
-            lambda motion: motion.system.looked(motion.table, places, stage)
+            lambda motion: motion.system.looked(motion.table, offsets, stage)
         )
 
     def read_records(self, paths: Sequence[str], *names: str) -> dict[str, Array]:
@@ -251,8 +251,8 @@ class Motion:
         """
         result = np.full((len(self.times), len(paths), len(names)), np.nan)
         there = [k for k, path in enumerate(paths) if path not in self.left_out]
-        places = [place for k in there for place in self.system.places_of(paths[k], names)]
-        result[:, there] = self.evaluate_kernels(places).reshape(
+        offsets = [offset for k in there for offset in self.system.places_of(paths[k], names)]
+        result[:, there] = self.evaluate_kernels(offsets).reshape(
             len(self.times), len(there), len(names)
         )
         return result
@@ -312,16 +312,16 @@ class Motion:
         moments = np.column_stack([self.times, system.state.rows(self.values, self.speeds)])
         return LinkMotion.of(system, moments, self.accelerations[:, list(system.order)])
 
-    def find_frame_path(self, asked: str, kind: str, *places: str) -> str | None:
+    def find_frame_path(self, asked: str, kind: str, *parents: str) -> str | None:
         """Return the path of a frame that a name or relative path denotes, or None.
 
         Args:
             asked: name or path as in a setup.
             kind: class of the frame.
-            places: paths of components below which to search after the model itself.
+            parents: paths of components below which to search after the model itself.
         """
         tree = self.model.tree()
-        result = (tree.walk(asked, place, kind).target for place in ("", *places))
+        result = (tree.walk(asked, parent, kind).target for parent in ("", *parents))
         return next((tree.path_of(item) for item in result if item is not None), None)
 
     def find_indices(self, wanted: Sequence[Any], names: Sequence[str], what: str) -> list[int]:

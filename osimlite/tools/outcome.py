@@ -123,7 +123,7 @@ class Outcome:
         missing = np.isnan(table.rows).any(axis=0) if table.rows.size else np.zeros(0, dtype=bool)
         if not missing.any():
             return ""
-        names = join_words([f"'{table.columns[place]}'" for place in np.flatnonzero(missing)])
+        names = join_words([f"'{table.columns[index]}'" for index in np.flatnonzero(missing)])
         if not any("NaN" in words for _, words in self.told):
             self.add_message(
                 "not a number", f"{path.name} has NaN where there is no value: {names}"
@@ -137,16 +137,16 @@ class Outcome:
         """
         motion = self.evidence
         if motion is not None and not np.isfinite(motion.values).all():
-            row, place = np.argwhere(~np.isfinite(motion.values))[0]
+            row, index = np.argwhere(~np.isfinite(motion.values))[0]
             raise _create_number_error(
-                f"'{motion.coordinates[place]}' is {motion.values[row, place]}", motion.times[row]
+                f"'{motion.coordinates[index]}' is {motion.values[row, index]}", motion.times[row]
             )
         for table in self.tables.values():
             odd = ~np.isfinite(table.rows) if table.name == DYNAMICS_TITLE else np.isinf(table.rows)
             if odd.any():
-                row, place = np.argwhere(odd)[0]
+                row, index = np.argwhere(odd)[0]
                 raise _create_number_error(
-                    f"'{table.columns[place]}' is {table.rows[row, place]}", table.times[row]
+                    f"'{table.columns[index]}' is {table.rows[row, index]}", table.times[row]
                 )
 
     def _protect_inputs(self, setup: Path) -> None:

@@ -114,12 +114,12 @@ def _create_momentum_reader(about_origin: bool, part: slice) -> Reader:
     """
 
     def read(motion: Motion, body: Body, path: str) -> Array:
-        place, _ = motion.mechanism.placement(path)
-        mass = motion.mechanism.bodies[place].mass_properties
-        rotation, origin = motion.links.placed(place, np.eye(4))
-        center, velocity, _ = motion.links.point(place, mass.center)
+        index, _ = motion.mechanism.placement(path)
+        mass = motion.mechanism.bodies[index].mass_properties
+        rotation, origin = motion.links.placed(index, np.eye(4))
+        center, velocity, _ = motion.links.point(index, mass.center)
         spin = rotation @ (
-            mass.inertia @ (rotation.transpose(0, 2, 1) @ motion.links.turning(place)[0][..., None])
+            mass.inertia @ (rotation.transpose(0, 2, 1) @ motion.links.turning(index)[0][..., None])
         )
         angular = spin[..., 0]
         linear = mass.mass * velocity

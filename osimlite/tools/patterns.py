@@ -28,10 +28,10 @@ def find_files(pattern: str) -> list[str]:
     rooted = rest.startswith(("/", os.sep))
     parts = [part for part in rest.replace(os.sep, "/").split("/") if part]
     search = _Search(pattern)
-    places = [drive + os.sep if rooted else drive]
+    paths = [drive + os.sep if rooted else drive]
     for part in parts:
-        places = list(dict.fromkeys(search.match_part(places, part)))
-    return sorted(filter(os.path.isfile, places))
+        paths = list(dict.fromkeys(search.match_part(paths, part)))
+    return sorted(filter(os.path.isfile, paths))
 
 
 class _Search:
@@ -40,32 +40,32 @@ class _Search:
     def __init__(self, pattern: str) -> None:
         self.pattern, self.left = pattern, MAX_ENTRIES
 
-    def match_part(self, places: Iterable[str], part: str) -> Iterator[str]:
+    def match_part(self, folders: Iterable[str], part: str) -> Iterator[str]:
         """Yield the paths that match one part of a pattern.
 
         Args:
-            places: folders in which to match.
+            folders: folders in which to match.
             part: name or pattern between two slashes.
         """
         if part == "**":
-            yield from self._walk_folders(places)
+            yield from self._walk_folders(folders)
             return
-        for place in places:
+        for folder in folders:
             if not has_magic(part):
-                path = os.path.join(place, part)
+                path = os.path.join(folder, part)
                 if os.path.lexists(path):
                     yield path
                 continue
-            for entry in self._list_entries(place):
+            for entry in self._list_entries(folder):
                 is_shown = not entry.name.startswith(".") or part.startswith(".")
                 if is_shown and fnmatch(entry.name, part):
-                    yield os.path.join(place, entry.name)
+                    yield os.path.join(folder, entry.name)
 
-    def _walk_folders(self, places: Iterable[str]) -> Iterator[str]:
+    def _walk_folders(self, folders: Iterable[str]) -> Iterator[str]:
         """Yield some folders and all folders below them, each once."""
         visited: set[str] = set()
         # Folders behind links come last, so that results have the real names of folders.
-        waiting = deque(places)
+        waiting = deque(folders)
         behind_links = deque[str]()
         while waiting or behind_links:
             folder = (waiting or behind_links).popleft()

@@ -169,11 +169,11 @@ def compute_constraint_records(motion: Motion) -> tuple[list[str], Array]:
                     for axis in "xyz"
                 ]
             else:
-                places = _find_mobilities(mechanism, constraint)
+                indices = _find_mobilities(mechanism, constraint)
                 row.append(
-                    (multipliers @ constraint.acceleration_equations(forces.state)[0])[places]
+                    (multipliers @ constraint.acceleration_equations(forces.state)[0])[indices]
                 )
-                columns = [f"mobility_F{number}" for number in range(len(places))]
+                columns = [f"mobility_F{number}" for number in range(len(indices))]
             if moment == 0:
                 labels += [f"{name}_{column}" for column in columns]
         rows.append(-np.concatenate([[], *row]))
@@ -189,12 +189,12 @@ def _find_mobilities(mechanism: Mechanism, constraint: Constraint) -> list[int]:
     """Return the indices of all coordinates of the joints of a coupler, the dependent one last."""
     assert isinstance(constraint, Coupler)
     owners = {
-        place: body.mobilizer.coordinates
+        index: body.mobilizer.coordinates
         for body in mechanism.bodies
-        for place in body.mobilizer.coordinates
+        for index in body.mobilizer.coordinates
     }
-    joints = dict.fromkeys(owners[place] for place in constraint.coordinates)
-    return [place for joint in joints for place in joint]
+    joints = dict.fromkeys(owners[index] for index in constraint.coordinates)
+    return [index for joint in joints for index in joint]
 
 
 class JointWrenches:
@@ -279,6 +279,6 @@ class JointWrenches:
         is_outer = (side == "child") != mobilizer.reversed
         wrench = (-1.0 if is_outer else 1.0) * link[:, LINK_WORK.WRENCH : LINK_WORK.WRENCH + 6]
         frame = mobilizer.child_frame if side == "child" else mobilizer.parent_frame
-        _, place = self.moved.placed(outer if is_outer else body.parent, frame)
-        arm = place - link[:, LINK_WORK.ORIGIN : LINK_WORK.ORIGIN + 3]
-        return wrench[:, 3:], wrench[:, :3] - np.cross(arm, wrench[:, 3:]), place
+        _, point = self.moved.placed(outer if is_outer else body.parent, frame)
+        arm = point - link[:, LINK_WORK.ORIGIN : LINK_WORK.ORIGIN + 3]
+        return wrench[:, 3:], wrench[:, :3] - np.cross(arm, wrench[:, 3:]), point

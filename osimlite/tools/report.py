@@ -203,8 +203,8 @@ def _render_viewer(evidence: Evidence) -> str:
     measured = None
     if evidence.measured is not None:
         own = {path.rpartition("/")[2]: station for path, station in mechanism.stations.items()}
-        known = [place for place, name in enumerate(evidence.markers) if name in own]
-        names = [evidence.markers[place] for place in known]
+        known = [index for index, name in enumerate(evidence.markers) if name in own]
+        names = [evidence.markers[index] for index in known]
         stations = [(own[name].body, np.asarray(own[name].location)) for name in names]
         measured = MeasuredMarkers(names, stations, evidence.measured[:, known])
     motion = _create_recording(evidence, mechanism, measured)
@@ -364,7 +364,7 @@ def _find_root_names(evidence: Evidence | None) -> set[str]:
     if evidence is None:
         return set()
     mechanism = build_mechanism(evidence.model)
-    return {mechanism.coordinates[place].name for place in find_root_coordinates(mechanism)}
+    return {mechanism.coordinates[index].name for index in find_root_coordinates(mechanism)}
 
 
 def _render_section(title: str, panels: Mapping[str, list[_Curve]]) -> Iterator[str]:
@@ -514,7 +514,7 @@ def _draw_errors(
     _style_axes(over, "time (s)")
     each = np.sqrt((filled**2).sum(axis=0) / np.maximum(seen.sum(axis=0), 1))
     worst = np.argsort(-each)[:MAX_NAMED_MARKERS][::-1]
-    beside.barh([names[place] for place in worst], each[worst], color=COLORS[0], height=0.7)
+    beside.barh([names[index] for index in worst], each[worst], color=COLORS[0], height=0.7)
     beside.tick_params(axis="y", labelsize=8)
     beside.set_title(f"worst {noun}s", fontsize=10, loc="left")
     _style_axes(beside, f"root mean square ({unit})")

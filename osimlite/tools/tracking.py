@@ -86,10 +86,10 @@ class DesiredMotion:
         mechanism = simulation.mechanism
         recorded = RecordedMotion.read(mechanism, job.require_path("desired_kinematics_file"))
         if recorded.missing:
-            places = [
+            indices = [
                 k for k, info in enumerate(mechanism.coordinates) if info.name in recorded.missing
             ]
-            recorded.values[:, places] = 0.0
+            recorded.values[:, indices] = 0.0
             outcome.add_message(
                 "not in the file", f"{join_words(recorded.missing)}: 0 is used, as in OpenSim"
             )
@@ -108,9 +108,9 @@ class DesiredMotion:
         values, speeds = satisfy_constraints(padded, padded.rates[0], simulation, model)
         # OpenSim assembles every row of the desired motion at time 0, so a prescribed coordinate
         # has one value in all rows.
-        for place, info in enumerate(mechanism.coordinates):
+        for index, info in enumerate(mechanism.coordinates):
             if info.prescribed is not None:
-                values[:, place] = info.prescribed.evaluate((0.0,))[0]
+                values[:, index] = info.prescribed.evaluate((0.0,))[0]
         (accelerations,) = derivatives_of_samples(times, speeds, times, (1,))
         return cls(start, end, times, values, speeds, accelerations)
 
@@ -153,11 +153,11 @@ def _apply_locks(
         recorded: motion of the file.
         values: values of the padded rows (t, n), changed in place.
     """
-    for place, info in enumerate(mechanism.coordinates):
+    for index, info in enumerate(mechanism.coordinates):
         if not info.locked:
             continue
-        values[:, place] = info.default_value
-        apart = float(np.abs(info.default_value - recorded.values[:, place]).max())
+        values[:, index] = info.default_value
+        apart = float(np.abs(info.default_value - recorded.values[:, index]).max())
         if info.name not in recorded.missing and apart > LOCK_TOLERANCE:
             unit = "rad" if info.motion_type == "rotational" else "m"
             outcome.add_message(

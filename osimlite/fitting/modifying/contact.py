@@ -40,8 +40,8 @@ def smooth_contacts(model: Model) -> None:
             for plane in planes
             for sphere in spheres
         ]
-        place = model.force_set.objects.index(force)
-        model.force_set.objects[place : place + 1] = made
+        index = model.force_set.objects.index(force)
+        model.force_set.objects[index : index + 1] = made
 
 
 def _get_geometry_name(item: Any) -> str:

@@ -209,8 +209,8 @@ def _add_reserves(model: Model, operator: p.ModOpAddReserves, folder: Path) -> N
     dependent = {item.dependent for item in mechanism.constraints if isinstance(item, Coupler)}
     fixed = {
         info.path
-        for place, info in enumerate(mechanism.coordinates)
-        if info.locked or info.prescribed is not None or place in dependent
+        for index, info in enumerate(mechanism.coordinates)
+        if info.locked or info.prescribed is not None or index in dependent
     }
     for coordinate in list(model.components(Coordinate)):
         path = tree.path_of(coordinate) or ""

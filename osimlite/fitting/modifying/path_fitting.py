@@ -72,11 +72,11 @@ def fit_paths(
     arms = known.all_moment_arms(q)
     tree = model.tree()
     result = []
-    for place, name in enumerate(known.names):
+    for index, name in enumerate(known.names):
         if isinstance(getattr(tree.at(name), "geometry_path", None), FunctionBasedPath):
             continue
         result.append(
-            _fit_path(known, mechanism, name, q, free, lengths[:, place], arms[:, place], tolerance)
+            _fit_path(known, mechanism, name, q, free, lengths[:, index], arms[:, index], tolerance)
         )
     return result
 
@@ -151,8 +151,10 @@ def _fit_path(
         polynomial = MultivariatePolynomialFunction(
             dimension=len(own), order=order, coefficients=tuple(coefficients.tolist())
         )
-        places = tuple(mechanism.coordinates[k].path for k in own)
-        path = FunctionBasedPath(name=name, coordinate_paths=places, length_function=polynomial)
+        coordinate_paths = tuple(mechanism.coordinates[k].path for k in own)
+        path = FunctionBasedPath(
+            name=name, coordinate_paths=coordinate_paths, length_function=polynomial
+        )
         best = PathFit(
             path,
             order,

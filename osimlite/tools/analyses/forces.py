@@ -58,10 +58,10 @@ def write_joint_reactions(analysis: JointReaction, motion: Motion, tables: Analy
             raise tables.job.create_error(f"apply_on_bodies has '{side}'; expected child or parent")
         bases = {end: _find_base_path(model, joint, end) for end in ("child", "parent")}
         frame = _find_frame_path(motion, asked, bases, tables)
-        force, moment, place = loads.get_reaction(joint, side)
+        force, moment, point = loads.get_reaction(joint, side)
         rotation, origin = loads.moved.placed(*mechanism.placement(frame))
         back = rotation.transpose(0, 2, 1)
-        rows += [(back @ item[..., None])[..., 0] for item in (force, moment, place - origin)]
+        rows += [(back @ item[..., None])[..., 0] for item in (force, moment, point - origin)]
         root = f"{joint.name}_on_{_get_last_name(bases[side])}_in_{_get_last_name(frame)}"
         columns += [f"{root}_{ending}" for ending in REACTION_ENDINGS]
     tables.add_table(
@@ -170,15 +170,15 @@ def _override_forces(
     # Probes are not needed here, and those of muscles would not find the muscles, which are
     # replaced below.
     model.probe_set.objects.clear()
-    places = {id(force): number for number, force in enumerate(model.force_set.objects)}
+    indices = {id(force): number for number, force in enumerate(model.force_set.objects)}
     for item in actuators:
         other = ideal(item, 1.0)
-        if other is None or id(item) not in places:
+        if other is None or id(item) not in indices:
             raise tables.job.create_unsupported_error(
                 f"the {type(item).__name__} '{item.name}' cannot take its force from '{path}'; "
                 "osimlite does not support that yet"
             )
-        model.force_set.objects[places[id(item)]] = other
+        model.force_set.objects[indices[id(item)]] = other
     simulation = build_simulation(tables.job, model)
     forces = {item.name: (table.times, table[item.name]) for item in actuators}
     first, last = (float(time) for time in motion.times[[0, -1]])

@@ -22,18 +22,18 @@ def write_kinematics(analysis: Kinematics, motion: Motion, tables: AnalysisTable
     """
     infos = motion.mechanism.coordinates
     names = [info.name for info in infos]
-    places = motion.find_indices(analysis.coordinates, names, f"coordinates of '{analysis.name}'")
-    turns = [analysis.in_degrees and infos[place].motion_type == "rotational" for place in places]
+    indices = motion.find_indices(analysis.coordinates, names, f"coordinates of '{analysis.name}'")
+    turns = [analysis.in_degrees and infos[index].motion_type == "rotational" for index in indices]
     for suffix, name, rows in (
         ("q", "Coordinates", motion.values),
         ("u", "Speeds", motion.speeds),
         ("dudt", "Accelerations", motion.accelerations),
     ):
-        chosen = rows[:, places]
+        chosen = rows[:, indices]
         tables.add_table(
             suffix,
             name,
-            [names[place] for place in places],
+            [names[index] for index in indices],
             np.where(turns, np.degrees(chosen), chosen),
             in_degrees=analysis.in_degrees,
             description=f"\n{UNITS}",
@@ -57,17 +57,17 @@ def write_body_kinematics(analysis: BodyKinematics, motion: Motion, tables: Anal
     """
     bodies = motion.model.body_set.objects
     tree = motion.model.tree()
-    places = {body.path: place for place, body in enumerate(motion.mechanism.bodies)}
+    indices = {body.path: index for index, body in enumerate(motion.mechanism.bodies)}
     local = analysis.express_results_in_body_local_frame
     total = sum(body.mass for body in bodies) or 1.0
     result = []
     whole = np.zeros((3, len(motion.times), 3))
     for body in bodies:
-        place = places[tree.path_of(body) or ""]
-        linear = np.array(motion.links.point(place, np.array(body.mass_center)))
+        index = indices[tree.path_of(body) or ""]
+        linear = np.array(motion.links.point(index, np.array(body.mass_center)))
         whole += body.mass / total * linear
-        rotation, _ = motion.links.placed(place, np.eye(4))
-        rows = np.stack([linear, [angles_xyz(rotation), *motion.links.turning(place)]], axis=2)
+        rotation, _ = motion.links.placed(index, np.eye(4))
+        rows = np.stack([linear, [angles_xyz(rotation), *motion.links.turning(index)]], axis=2)
         if local:
             rows[1:] = rows[1:] @ rotation
         if analysis.in_degrees:
@@ -77,11 +77,11 @@ def write_body_kinematics(analysis: BodyKinematics, motion: Motion, tables: Anal
     chosen = motion.find_indices(
         analysis.bodies, [*names, CENTER_OF_MASS], f"bodies of '{analysis.name}'"
     )
-    own = [place for place in chosen if place < len(names)]
+    own = [index for index in chosen if index < len(names)]
     columns = [
-        f"{names[place]}_{what}" for place in own for what in ("X", "Y", "Z", "Ox", "Oy", "Oz")
+        f"{names[index]}_{what}" for index in own for what in ("X", "Y", "Z", "Ox", "Oy", "Oz")
     ]
-    parts = [np.empty((3, len(motion.times), 0)), *(result[place] for place in own)]
+    parts = [np.empty((3, len(motion.times), 0)), *(result[index] for index in own)]
     if len(names) in chosen:
         parts.append(whole)
         columns += [f"{CENTER_OF_MASS}_{axis}" for axis in "XYZ"]

@@ -41,7 +41,7 @@ def write_muscle_analysis(analysis: MuscleAnalysis, motion: Motion, tables: Anal
     chosen = motion.find_indices(
         analysis.muscle_list, [muscle.name for muscle in every], f"muscles of '{analysis.name}'"
     )
-    muscles = [every[place] for place in chosen]
+    muscles = [every[index] for index in chosen]
     for muscle in muscles:
         why = "which osimlite cannot analyse yet" if type(muscle) not in CORRECTIONS else ""
         why = why or ("" if muscle.appliesForce else "which applies no force")
@@ -64,12 +64,12 @@ def _compute_tables(motion: Motion, muscles: list[Muscle]) -> dict[str, Array]:
     result: dict[str, Array] = {}
     tree = motion.model.tree()
     for cls in dict.fromkeys(map(type, muscles)):
-        own = [place for place, muscle in enumerate(muscles) if type(muscle) is cls]
-        paths = [tree.path_of(muscles[place]) or "" for place in own]
+        own = [index for index, muscle in enumerate(muscles) if type(muscle) is cls]
+        paths = [tree.path_of(muscles[index]) or "" for index in own]
         names = LAW_RECORDS if not motion.system.knows(paths[0], SPRING) else (*LAW_RECORDS, SPRING)
         with np.errstate(invalid="ignore", divide="ignore"):
             of_class = compute_quantities(
-                motion.read_records(paths, *names), [muscles[place] for place in own]
+                motion.read_records(paths, *names), [muscles[index] for index in own]
             )
         for suffix, rows in of_class.items():
             result.setdefault(suffix, np.empty((len(motion.times), len(muscles))))[:, own] = rows
@@ -93,13 +93,13 @@ def _add_moments(
         "all" if str(name).lower() == "all" else name
         for name in analysis.moment_arm_coordinate_list
     ]
-    for place in motion.find_indices(
+    for index in motion.find_indices(
         asked, [info.name for info in infos], f"coordinates of '{analysis.name}'"
     ):
         names = [muscle.name for muscle in muscles]
-        own = arms[:, :, place]
+        own = arms[:, :, index]
         for what, result in (("MomentArm", own), ("Moment", own * tension)):
-            title = f"{what}_{infos[place].name}"
+            title = f"{what}_{infos[index].name}"
             tables.add_table(title, title, names, result, description=MUSCLE_DESCRIPTION)
 
 

@@ -56,12 +56,12 @@ def find_actuators(tool: TrialTool | None) -> ActuatorRoles:
     reserves = dict[str, str]()
     muscles = []
     infos = {info.name: info for info in mechanism.coordinates}
-    root = {mechanism.coordinates[place].name for place in find_root_coordinates(mechanism)}
+    root = {mechanism.coordinates[index].name for index in find_root_coordinates(mechanism)}
     joints = {infos[name].joint for name in root}
     bodies = {
         body.name.rpartition("/")[2]
         for body in mechanism.bodies
-        if any(mechanism.coordinates[place].joint in joints for place in body.mobilizer.coordinates)
+        if any(mechanism.coordinates[index].joint in joints for index in body.mobilizer.coordinates)
     }
     for force in tool.forces:
         if isinstance(force, CoordinateActuator):
@@ -142,8 +142,8 @@ def measure_inverse_dynamics(tool: TrialTool, *, is_final: bool) -> Numbers:
             f"the forces of {tool} are missing ('{tool.setup.output_gen_force_file}'); run it"
         )
     units = {}
-    for place in find_root_coordinates(tool.mechanism):
-        info = tool.mechanism.coordinates[place]
+    for index in find_root_coordinates(tool.mechanism):
+        info = tool.mechanism.coordinates[index]
         turning = info.motion_type == "rotational"
         units[f"{info.name}_{'moment' if turning else 'force'}"] = "N m" if turning else "N"
     yield from measure_residuals(
@@ -286,13 +286,13 @@ def measure_activations(folder: TrialFolder, file: Path, muscles: Sequence[str])
     """
     table = folder.read_table(file)
     most = 0
-    for place, label in enumerate(table.columns):
+    for index, label in enumerate(table.columns):
         name = label.removesuffix("/activation").removesuffix(".activation").rpartition("/")[2]
         if name not in muscles or (
             label != name and not label.endswith(("/activation", ".activation"))
         ):
             continue
-        full = np.flatnonzero(table.rows[:, place] >= FULL_ACTIVATION)
+        full = np.flatnonzero(table.rows[:, index] >= FULL_ACTIVATION)
         if len(full):
             most += 1
             share = 100.0 * len(full) / len(table.times)

@@ -58,7 +58,7 @@ def measure_scale_errors(tool: TrialTool) -> Numbers:
     most = max(weights.values(), default=0.0)
     pose = result.pose
     chosen = [
-        place for place, name in enumerate(pose.markers) if weights.get(name, 1.0) > 0.1 * most
+        index for index, name in enumerate(pose.markers) if weights.get(name, 1.0) > 0.1 * most
     ]
     errors = pose.marker_errors[:, chosen]
     if not np.isfinite(errors).any():
@@ -181,7 +181,7 @@ def _read_fitted_motion(tool: TrialTool, file: Path) -> FittedMotion:
     near = near[np.unique(np.linspace(0, len(near) - 1, min(len(near), MAX_FRAMES)).astype(int))]
     values = recorded.values[near]
     states = [mechanism.at(q) for q in values]
-    places = np.array([[state.point(*stations[name]) for name in names] for state in states])
+    positions = np.array([[state.point(*stations[name]) for name in names] for state in states])
     nothing = np.zeros(len(values))
     return FittedMotion(
         mechanism,
@@ -189,7 +189,7 @@ def _read_fitted_motion(tool: TrialTool, file: Path) -> FittedMotion:
         values,
         tuple(names),
         data.select_values(names)[rows[near]],
-        places,
+        positions,
         nothing,
         nothing,
     )
@@ -255,12 +255,12 @@ def measure_ranges(tool: TrialTool, file: Path) -> Numbers:
     mechanism = tool.mechanism
     root = find_root_coordinates(mechanism)
     beyond = 0
-    for place, info in enumerate(mechanism.coordinates):
+    for index, info in enumerate(mechanism.coordinates):
         low, high = info.range
-        excess = np.maximum(low - motion.values[:, place], motion.values[:, place] - high)
+        excess = np.maximum(low - motion.values[:, index], motion.values[:, index] - high)
         row = int(np.argmax(excess))
         size = _to_display_unit(info, float(excess[row]))
-        if place in root or info.name in motion.missing or info.locked or size < 0.05:
+        if index in root or info.name in motion.missing or info.locked or size < 0.05:
             continue
         beyond += 1
         most = f"{_to_display_unit(info, low):.3g} to {_to_display_unit(info, high):.3g} {_get_display_unit(info)}"
@@ -330,10 +330,10 @@ def measure_filter(tool: TrialTool) -> Numbers:
         filtered = motion.lowpassed(tool.cutoff)
         own = (motion.times >= first) & (motion.times <= last)
         worst, size, unit = "", 0.0, "deg"
-        for place, info in enumerate(motion.mechanism.coordinates):
-            column = np.interp(motion.times[own], filtered.times, filtered.values[:, place])
+        for index, info in enumerate(motion.mechanism.coordinates):
+            column = np.interp(motion.times[own], filtered.times, filtered.values[:, index])
             lost = _to_display_unit(
-                info, float(np.sqrt(np.mean((column - motion.values[own, place]) ** 2)))
+                info, float(np.sqrt(np.mean((column - motion.values[own, index]) ** 2)))
             )
             if lost > size:
                 worst = info.name
@@ -379,10 +379,10 @@ def _measure_noise(motion: RecordedMotion, first: float, last: float) -> float |
         return None
     shares = []
     frequencies = np.fft.rfftfreq(len(times), step)
-    for place, info in enumerate(motion.mechanism.coordinates):
-        if np.ptp(values[:, place]) < MIN_CHANGE[info.motion_type != "rotational"]:
+    for index, info in enumerate(motion.mechanism.coordinates):
+        if np.ptp(values[:, index]) < MIN_CHANGE[info.motion_type != "rotational"]:
             continue
-        acceleration = np.interp(even, times, motion.rates[1][own, place])
+        acceleration = np.interp(even, times, motion.rates[1][own, index])
         power = (
             np.abs(np.fft.rfft((acceleration - acceleration.mean()) * np.hanning(len(times)))) ** 2
         )

@@ -75,10 +75,10 @@ def _select_loads(items: Sequence[ExternalForce], table: StoTable) -> Iterator[M
 def _read_vectors(table: StoTable, identifier: str | None) -> Array | None:
     """Return the three columns (t, 3) whose labels begin with an identifier; None without them."""
     start = (identifier or "").strip()
-    places = [
-        place for place, label in enumerate(table.columns) if start and label.startswith(start)
+    indices = [
+        index for index, label in enumerate(table.columns) if start and label.startswith(start)
     ]
-    return table.rows[:, places] if len(places) == 3 else None
+    return table.rows[:, indices] if len(indices) == 3 else None
 
 
 def compute_scale(tool: TrialTool) -> LoadScale:
@@ -177,7 +177,7 @@ def _measure_distances(
         return None
     mechanism = motion.mechanism
     result = []
-    places = {body.name.rpartition("/")[2]: body for body in mechanism.bodies}
+    bodies_by_name = {body.name.rpartition("/")[2]: body for body in mechanism.bodies}
     for row in np.unique(rows[np.linspace(0, len(rows) - 1, TIME_COUNT).astype(int)]):
         q = motion.values[int(np.argmin(np.abs(motion.times - table.times[row])))]
         point = load.point[row]
@@ -185,7 +185,7 @@ def _measure_distances(
         if frame != "ground":
             point = mechanism.station_position(frame, point, q)
         centres = [
-            mechanism.station_position(name, places[name].mass_properties.center, q)
+            mechanism.station_position(name, bodies_by_name[name].mass_properties.center, q)
             for name in bodies
         ]
         result.append([float(np.linalg.norm(point - centre)) for centre in centres])
