@@ -67,18 +67,18 @@ def collect_targets(
     applied = [task for task in tasks if task.apply]
     for task in applied:
         check_weight(task.weight, f"the task '{task.name}'")
-    asked = {
+    requested = {
         task.name: float(task.weight) for task in applied if isinstance(task, IKMarkerTask)
     } or None
-    names = data.find_shared_names([*find_marker_stations(model, mechanism)], asked)
-    weights = {name: 1.0 if asked is None else asked[name] for name in names}
-    goals, wanted = [], []
+    names = data.find_shared_names([*find_marker_stations(model, mechanism)], requested)
+    weights = {name: 1.0 if requested is None else requested[name] for name in names}
+    goals, targets = [], []
     for task in applied:
         if isinstance(task, IKCoordinateTask):
             index = mechanism.coordinate_index(task.name)
             goals.append(CoordinateTarget(index, float(task.weight)))
-            wanted.append(_compute_target_values(task, mechanism, index, data.times, coordinates))
-    return FitTargets(weights, goals, np.array(wanted).reshape(len(goals), len(data.times)).T)
+            targets.append(_compute_target_values(task, mechanism, index, data.times, coordinates))
+    return FitTargets(weights, goals, np.array(targets).reshape(len(goals), len(data.times)).T)
 
 
 def _compute_target_values(

@@ -104,15 +104,15 @@ def inverse_kinematics(
         for kind in (weighed, sensed):
             if name in kind:
                 kind[name] = float(weight)
-    goals, wanted = [], []
+    goals, targets = [], []
     for name, goal in (coordinates or {}).items():
         index = mechanism.coordinate_index(name)
         weight, value = (
             goal if isinstance(goal, tuple) else (goal, mechanism.coordinates[index].default_value)
         )
         goals.append(CoordinateTarget(index, float(weight)))
-        wanted.append(float(value))
-    rows = np.tile(wanted, (len(data.times), 1))
+        targets.append(float(value))
+    rows = np.tile(targets, (len(data.times), 1))
     return fit_motion(model, mechanism, data, weighed, goals, rows, constraints, turned, sensed)
 
 
@@ -122,7 +122,7 @@ def fit_motion(
     data: MarkerData,
     weights: Mapping[str, float],
     goals: Sequence[CoordinateTarget],
-    wanted: Array,
+    targets: Array,
     constraints: bool = True,
     orientations: OrientationData | None = None,
     sensed: Mapping[str, float] | None = None,
@@ -135,7 +135,7 @@ def fit_motion(
         data: measured markers.
         weights: weights of the markers to fit, by name.
         goals: k coordinates with target values.
-        wanted: target values (t, k), rad or m.
+        targets: target values (t, k), rad or m.
         constraints: whether the constraints of the model hold.
         orientations: measured orientations of sensors, or None.
         sensed: weights of the sensors to fit, by name.
@@ -163,7 +163,7 @@ def fit_motion(
     fit = PoseFit(mechanism, points, turning, goals, constraints=constraints)
     measured = data.select_values(names)
     count = len(data.times)
-    given = measured, turned.select_values([*sensors]), wanted
+    given = measured, turned.select_values([*sensors]), targets
     poses: FittedPoses = fit.fit_frames(
         np.hstack([item.reshape(count, -1) for item in given]),
         data.times,

@@ -118,19 +118,19 @@ class Measurements:
         return self.values[:, [indices[name] for name in names]]
 
     def find_shared_names(
-        self, model: Sequence[str], chosen: Mapping[str, float] | None = None
+        self, model: Sequence[str], selected: Mapping[str, float] | None = None
     ) -> list[str]:
         """Return the names that a model has as well, in the order of the data.
 
         Args:
             model: names in the model.
-            chosen: if given, only these names count.
+            selected: if given, only these names count.
 
         Raises:
             OsimliteError: the data and the model share no name.
         """
         names = [
-            name for name in self.names if name in model and (chosen is None or name in chosen)
+            name for name in self.names if name in model and (selected is None or name in selected)
         ]
         if not names:
             raise OsimliteError(

@@ -103,9 +103,9 @@ class Person:
         """
         result = {}
         for trial in dict.fromkeys(self.trials):
-            chosen = [name == trial for name in self.trials]
+            selected = [name == trial for name in self.trials]
             result[trial] = sqrt(
-                float(np.nanmean(((places - self.measured)[chosen] ** 2).sum(axis=-1)))
+                float(np.nanmean(((places - self.measured)[selected] ** 2).sum(axis=-1)))
             )
         return result
 
@@ -155,7 +155,7 @@ def fit(
         for name, station in find_marker_stations(model, mechanism).items()
         if station.body != GROUND
     }
-    chosen = SelectedFrames(_read_trials(trials, static), list(stations), frames, weights or {})
+    selected = SelectedFrames(_read_trials(trials, static), list(stations), frames, weights or {})
     moving = {marker.name for marker in model.components(ModelMarker) if not marker.fixed}
     if held is not None:
         unknown = [name for name in held if name not in stations]
@@ -168,25 +168,27 @@ def fit(
     carriers = {
         body.name: names[body.parent] if body.parent != GROUND else "" for body in mechanism.bodies
     }
-    marked = {names[stations[marker].body] for marker in chosen.markers}
+    marked = {names[stations[marker].body] for marker in selected.markers}
     segments = Segments.group_bodies(carriers, marked, by_axis=by_axis, symmetric=symmetric)
     search = _PersonFit(
-        ScalableMarkers(model, chosen.markers, segments),
-        chosen,
-        [name in moving for name in chosen.markers],
+        ScalableMarkers(model, selected.markers, segments),
+        selected,
+        [name in moving for name in selected.markers],
     )
     result = search.start_from_model(mechanism)
     before = result.places
     for _ in range(OUTLIER_ROUNDS):
         result = search.run(result, OUTLIER_STEP)
-        if not chosen.exclude_outliers(result.places):
+        if not selected.exclude_outliers(result.places):
             break
     result = search.run(result, FINAL_STEP)
     scaled = model.copy_deep()
     factors = segments.expand_factors(result.sizes)
     scale_model(scaled, factors, mass)
     offsets = {
-        name: by for name, by in zip(chosen.markers, result.offsets, strict=True) if name in moving
+        name: by
+        for name, by in zip(selected.markers, result.offsets, strict=True)
+        if name in moving
     }
     placements = Placements(scaled.tree())
     for marker in scaled.components(ModelMarker):
@@ -201,13 +203,13 @@ def fit(
         factors,
         segments.expand_factors(search.compute_deviations(result)),
         offsets,
-        tuple(chosen.trials),
-        chosen.times,
-        tuple(chosen.markers),
-        chosen.measured,
+        tuple(selected.trials),
+        selected.times,
+        tuple(selected.markers),
+        selected.measured,
         before,
         result.places,
-        (*chosen.notes, *_report_extreme_factors(factors)),
+        (*selected.notes, *_report_extreme_factors(factors)),
     )
 
 
@@ -263,14 +265,14 @@ class _PersonFit:
     """Maximum a posteriori estimate of sizes and offsets."""
 
     def __init__(
-        self, shape: ScalableMarkers, chosen: SelectedFrames, free: Sequence[bool]
+        self, shape: ScalableMarkers, selected: SelectedFrames, free: Sequence[bool]
     ) -> None:
         self._shape = shape
-        self._chosen = chosen
+        self._chosen = selected
         self._free = np.flatnonzero(free)
         self._sizes = len(shape.segments.parts)
         self._moved = 3 * len(self._free)
-        frames = len(chosen.times)
+        frames = len(selected.times)
         self._unit = min(1.0, INDEPENDENT_FRAMES / frames) / SKIN_MOTION_M**2
         self._prior, self._wanted = shape.segments.compute_prior(
             FIRST_SIZE_DEVIATION, NEIGHBOUR_DEVIATION, AXIS_DEVIATION
@@ -310,9 +312,9 @@ class _PersonFit:
                 break
         return here
 
-    def compute_deviations(self, found: _Estimate) -> Array:
+    def compute_deviations(self, estimate: _Estimate) -> Array:
         """Return the standard deviations (k,) of the sizes."""
-        return np.sqrt(np.diag(np.linalg.inv(self._compute_normal_equations(found)[0])))[
+        return np.sqrt(np.diag(np.linalg.inv(self._compute_normal_equations(estimate)[0])))[
             : self._sizes
         ]
 

@@ -83,16 +83,18 @@ def place_markers(
     )
     averaged = data.positions[select_frames(data.times, first, last)]
     seen = np.asarray(np.isfinite(averaged).all(axis=2))
-    chosen = np.where(seen[..., None], averaged, 0.0)
+    selected = np.where(seen[..., None], averaged, 0.0)
     with np.errstate(invalid="ignore"):
-        target = dict(zip(data.names, chosen.sum(axis=0) / seen.sum(axis=0)[:, None], strict=True))
+        target = dict(
+            zip(data.names, selected.sum(axis=0) / seen.sum(axis=0)[:, None], strict=True)
+        )
     markers = model.marker_set.objects
     removed = tuple(marker.name for marker in markers if marker.name not in target)
     for marker in [marker for marker in markers if marker.name in removed]:
         model.remove(marker)
     mechanism = build_mechanism(model)
-    asked = collect_targets(model, mechanism, tasks, mean, coordinates)
-    pose = fit_motion(model, mechanism, mean, asked.weights, asked.goals, asked.wanted)
+    requested = collect_targets(model, mechanism, tasks, mean, coordinates)
+    pose = fit_motion(model, mechanism, mean, requested.weights, requested.goals, requested.wanted)
     state = mechanism.at(pose.values[0])
     moved = dict[str, float]()
     for marker in model.components(Marker):

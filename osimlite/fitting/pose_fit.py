@@ -165,15 +165,15 @@ class PoseFit:
             values, positions, turns, result[:, -3], result[:, -2], unseen, unsettled
         )
 
-    def bind_arrays(self, frames: Array, found: Array) -> Callable[[int], int]:
+    def bind_arrays(self, frames: Array, results: Array) -> Callable[[int], int]:
         """Return a function that fits a number of frames in fixed arrays.
 
         Args:
             frames: frames (t, width), which the caller keeps alive.
-            found: results (t, found), which the caller keeps alive.
+            results: results (t, found), which the caller keeps alive.
         """
         shape = self.layout
-        return self.system.bind_arrays(shape.ints, shape.numbers, shape.work, frames, found)
+        return self.system.bind_arrays(shape.ints, shape.numbers, shape.work, frames, results)
 
     def fill_prescribed(self, frames: Array, moments: Array) -> None:
         """Write the values of locked and prescribed coordinates into frames.

@@ -70,7 +70,7 @@ class Segments(NamedTuple):
         for name, bodies in groups.items():
             axes = ((0,), (1,), (2,)) if by_axis else ((0, 1, 2),)
             numbers[name] = tuple(range(len(parts), len(parts) + len(axes)))
-            parts += [Segment(bodies, chosen) for chosen in axes]
+            parts += [Segment(bodies, selected) for selected in axes]
         pairs = {
             (first[body], first[carrier]) for body, carrier in carriers.items() if carrier in first
         }
@@ -139,13 +139,13 @@ def get_opposite_name(name: str, names: Mapping[str, object]) -> str:
         The other name, or the same one if the other is unknown.
     """
 
-    def swap_word(found: re.Match[str]) -> str:
-        word = OPPOSITE_WORDS[found[0].lower()]
+    def swap_word(match: re.Match[str]) -> str:
+        word = OPPOSITE_WORDS[match[0].lower()]
         return (
             word.upper()
-            if found[0].isupper()
+            if match[0].isupper()
             else word.capitalize()
-            if found[0][0].isupper()
+            if match[0][0].isupper()
             else word
         )
 

@@ -40,14 +40,14 @@ class PlacedSensors(NamedTuple):
 
 
 def find_sensor_frames(
-    model: Model, mechanism: Mechanism, wanted: Iterable[str]
+    model: Model, mechanism: Mechanism, requested: Iterable[str]
 ) -> dict[str, FramePlacement]:
     """Return the frames of a model with the names of sensors, in the model's order.
 
     Args:
         model: the model.
         mechanism: mechanism of the model.
-        wanted: names of the sensors.
+        requested: names of the sensors.
 
     Returns:
         Frames by name.
@@ -56,11 +56,11 @@ def find_sensor_frames(
         SettingError: no frame has such a name, or several have the same.
     """
     tree = model.tree()
-    wanted = list(wanted)
+    requested = list(requested)
     result = dict[str, FramePlacement]()
     frames = [(frame.name, tree.path_of(frame) or "") for frame in model.components(PhysicalFrame)]
     for name, path in frames:
-        if name in wanted:
+        if name in requested:
             if name in result:
                 raise SettingError(
                     f"'{model.name}' has several frames '{name}'; the name of a sensor must be "
@@ -68,9 +68,9 @@ def find_sensor_frames(
                 )
             result[name] = mechanism.frames[path]
     if not result:
-        near = suggest_name(wanted[0], [name for name, _ in frames]) if wanted else ""
+        near = suggest_name(requested[0], [name for name, _ in frames]) if requested else ""
         raise SettingError(
-            f"'{model.name}' has no frame with the name of a sensor ({join_words(wanted)}){near}"
+            f"'{model.name}' has no frame with the name of a sensor ({join_words(requested)}){near}"
         )
     return result
 

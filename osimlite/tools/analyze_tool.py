@@ -130,9 +130,9 @@ def equilibrate_rows(
     return unbalanced
 
 
-def _describe_spans(times: Array, chosen: BoolArray) -> str:
+def _describe_spans(times: Array, selected: BoolArray) -> str:
     """Return the spans of consecutive selected times, in words."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], chosen, [False]]).astype(int)))
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], selected, [False]]).astype(int)))
     spans = [(times[first], times[last - 1]) for first, last in edges.reshape(-1, 2)]
     words = [f"at {a:g} s" if a == b else f"from {a:g} s to {b:g} s" for a, b in spans]
     return join_words(words, most=MAX_NAMED_SPANS)

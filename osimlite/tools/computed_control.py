@@ -83,9 +83,9 @@ class ActuatorControl:
             else [item for item in given.objects if isinstance(item, ControlLinear)]
         )
         for name in (actuator.name + EXCITATION, actuator.name):
-            found = next((item for item in own if item.name == name), None)
-            if found is not None:
-                return cls._create_from_bounds(found)
+            bounds = next((item for item in own if item.name == name), None)
+            if bounds is not None:
+                return cls._create_from_bounds(bounds)
         low = (
             max(actuator.min_control, -UNBOUNDED_CONTROL)
             if actuator.min_control == -inf
@@ -104,13 +104,13 @@ class ActuatorControl:
         )
 
     @classmethod
-    def _create_from_bounds(cls, found: ControlLinear) -> ActuatorControl:
+    def _create_from_bounds(cls, control: ControlLinear) -> ActuatorControl:
         """Return the control of an actuator with the bounds of a document."""
-        default = found.default_min, found.default_max
+        default = control.default_min, control.default_max
         # As in OpenSim, upper bounds have an effect only together with lower ones.
         curves = [
-            make_node_curve(found, nodes) if nodes and found.min_nodes else None
-            for nodes in (found.min_nodes, found.max_nodes)
+            make_node_curve(control, nodes) if nodes and control.min_nodes else None
+            for nodes in (control.min_nodes, control.max_nodes)
         ]
 
         def create_bound(number: int) -> Callable[[float], float]:
@@ -119,9 +119,9 @@ class ActuatorControl:
                 return lambda t: default[number]
             return lambda t: float(curve.evaluate(np.array([t]))[0])
 
-        nodes = list(found.min_nodes), list(found.max_nodes)
+        nodes = list(control.min_nodes), list(control.max_nodes)
         return cls(
-            found.name, found.use_steps, create_bound(0), create_bound(1), default, bounds=nodes
+            control.name, control.use_steps, create_bound(0), create_bound(1), default, bounds=nodes
         )
 
     def create_function(self) -> Function:
@@ -304,7 +304,7 @@ class ComputedControl:
         self._corrections = np.stack([q - now[0], u - now[1]])
         errors = self.tasks.compute_errors(now, q, u)
         result.errors[t] = errors[0]
-        wanted = self.tasks.compute_accelerations(errors, ahead)
+        requested = self.tasks.compute_accelerations(errors, ahead)
         low, high = (
             np.array([getattr(item, name)(t) for item in self.controls]) for name in ("low", "high")
         )
@@ -317,7 +317,7 @@ class ComputedControl:
         q_end, u_end = np.array(state.values(end)), np.array(state.speeds(end))
         bounds = np.minimum(least, most), np.maximum(least, most)
         forces, lacking = self.sharing.compute_forces(
-            target, q_end, u_end, wanted, errors[0], bounds
+            target, q_end, u_end, requested, errors[0], bounds
         )
         if lacking:
             result.failure = (

@@ -81,14 +81,14 @@ def run_inverse_kinematics_tool(job: Job, outcome: Outcome) -> None:
     outcome.summary |= motion.summary
     for words in describe_fit(motion):
         outcome.add_message("markers", words)
-    asked = [
+    requested = [
         task.name
         for task in setup.ik_task_set.objects
         if task.apply and isinstance(task, IKMarkerTask)
     ]
     for what, names in (
         ("not fitted", [name for name in data.names if name not in motion.markers]),
-        ("not in the data", [name for name in asked if name not in data.names]),
+        ("not in the data", [name for name in requested if name not in data.names]),
     ):
         if names:
             outcome.summary[what.replace(" ", "_")] = names
@@ -175,11 +175,11 @@ def run_imu_inverse_kinematics_tool(job: Job, outcome: Outcome) -> None:
         if item.name in frames
     }
     motion = inverse_kinematics(model, orientations=data, weights=weights)
-    asked, folder = (
+    requested, folder = (
         "" if name.strip() in NO_FILE else name.strip()
         for name in (setup.output_motion_file, setup.results_directory)
     )
-    beside, _, name = asked.replace("\\", "/").rpartition("/")
+    beside, _, name = requested.replace("\\", "/").rpartition("/")
     name = name or f"ik_{file.stem}"
     tables = {
         name if "." in name else f"{name}.mot": replace(
@@ -200,7 +200,7 @@ def run_imu_inverse_kinematics_tool(job: Job, outcome: Outcome) -> None:
     for file_name, table in tables.items():
         if folder or job.output is not None:
             outcome.add_typed_table(job.get_results_path(file_name), table)
-        elif asked:
+        elif requested:
             outcome.add_typed_table(job.get_output_path(str(Path(beside) / file_name)), table)
     if not outcome.tables:
         outcome.add_message(

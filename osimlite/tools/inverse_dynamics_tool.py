@@ -155,13 +155,13 @@ def compute_joint_loads(
     placements = Placements(model.tree())
     carried = {body.path: index for index, body in enumerate(mechanism.bodies)}
     by_joint = {body.mobilizer.joint: index for index, body in enumerate(mechanism.bodies)}
-    asked, labels = [], []
+    requested, labels = [], []
     for joint in joints:
         frame = placements.follow_socket(joint, "socket_child_frame")
         base, _ = placements.resolve_frame(frame)
         # OpenSim adds the mobilizer of the child's body and the one that has the joint's
         # coordinates; they differ if the joint closes a loop.
-        asked.append((joint, {carried[base], by_joint[placements.path(joint)]}))
+        requested.append((joint, {carried[base], by_joint[placements.path(joint)]}))
         root = f"{joint.name}_{placements.path(frame).rpartition('/')[2]}"
         labels += [f"{root}_{what}{axis}" for what in "FM" for axis in "XYZ"]
     # OpenSim has two mobilizers for a scapula: along the ellipsoid, and about the winging axis.
@@ -170,7 +170,7 @@ def compute_joint_loads(
             _split_mobilizer(mechanism, body, apart=isinstance(joint, ScapulothoracicJoint))
             for body in bodies
         ]
-        for joint, bodies in asked
+        for joint, bodies in requested
     ]
     rows = np.zeros((len(recorded.times), len(joints), 2, 3))
     for row, q, own in zip(rows, recorded.values, forces, strict=True):
@@ -243,23 +243,23 @@ def _compute_joint_load(
     return load
 
 
-def _compute_hinge_load(hinge: Array, wanted: Array) -> Array:
+def _compute_hinge_load(hinge: Array, target_forces: Array) -> Array:
     """Return force and torque (2, 3) for the generalized forces of one hinge.
 
     Args:
         hinge: Jacobian of the hinge's motion (k, 6), rotations first.
-        wanted: generalized forces (k,).
+        target_forces: generalized forces (k,).
     """
     turning = hinge[:, :3]
     moving = hinge[:, 3:]
-    force, torque = _solve_shortest(moving, wanted), _solve_shortest(turning, wanted)
+    force, torque = _solve_shortest(moving, target_forces), _solve_shortest(turning, target_forces)
     by_force, by_torque = moving @ force, turning @ torque
     size_by_force, size_by_torque = np.linalg.norm(by_force), np.linalg.norm(by_torque)
     if size_by_force > SIGNIFICANT_REAL and size_by_torque > SIGNIFICANT_REAL:
         if size_by_torque * np.linalg.norm(force) > size_by_force * np.linalg.norm(torque):
-            force = _solve_shortest(moving, wanted - by_torque)
+            force = _solve_shortest(moving, target_forces - by_torque)
         else:
-            torque = _solve_shortest(turning, wanted - by_force)
+            torque = _solve_shortest(turning, target_forces - by_force)
     return np.array((force, torque))
 
 

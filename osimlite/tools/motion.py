@@ -172,10 +172,10 @@ class Motion:
         Returns:
             Rows (t, ...).
         """
-        rows = [(chosen, compute(part)) for chosen, part in self.parts]
+        rows = [(selected, compute(part)) for selected, part in self.parts]
         result = np.full((len(self.times), *rows[0][1].shape[1:]), np.nan)
-        for chosen, part in rows:
-            result[chosen] = part
+        for selected, part in rows:
+            result[selected] = part
         return result
 
     @property
@@ -265,17 +265,17 @@ class Motion:
             paths: paths of p force elements.
             names: names of m quantities.
         """
-        wanted = [k for k, name in enumerate(names) if name in PATH_RECORDS]
-        chosen = [k for k, path in enumerate(paths) if path in self.unbalanced]
-        if not (wanted and chosen):
+        requested = [k for k, name in enumerate(names) if name in PATH_RECORDS]
+        selected = [k for k, path in enumerate(paths) if path in self.unbalanced]
+        if not (requested and selected):
             return
         measured = Paths(self.model)
         for row in np.flatnonzero(~self.balanced):
             lengths = measured.lengths(self.values[row])
             speeds = measured.speeds(self.values[row], self.speeds[row])
-            for muscle in chosen:
+            for muscle in selected:
                 if self.unbalanced[paths[muscle]][row]:
-                    for k in wanted:
+                    for k in requested:
                         source = lengths if PATH_RECORDS[names[k]] == "length" else speeds
                         result[row, muscle, k] = source[paths[muscle]]
 
@@ -312,36 +312,36 @@ class Motion:
         moments = np.column_stack([self.times, system.state.rows(self.values, self.speeds)])
         return LinkMotion.of(system, moments, self.accelerations[:, list(system.order)])
 
-    def find_frame_path(self, asked: str, kind: str, *parents: str) -> str | None:
+    def find_frame_path(self, requested: str, kind: str, *parents: str) -> str | None:
         """Return the path of a frame that a name or relative path denotes, or None.
 
         Args:
-            asked: name or path as in a setup.
+            requested: name or path as in a setup.
             kind: class of the frame.
             parents: paths of components below which to search after the model itself.
         """
         tree = self.model.tree()
-        result = (tree.walk(asked, parent, kind).target for parent in ("", *parents))
+        result = (tree.walk(requested, parent, kind).target for parent in ("", *parents))
         return next((tree.path_of(item) for item in result if item is not None), None)
 
-    def find_indices(self, wanted: Sequence[Any], names: Sequence[str], what: str) -> list[int]:
+    def find_indices(self, requested: Sequence[Any], names: Sequence[str], what: str) -> list[int]:
         """Return the indices of the names that an analysis requests; "all" requests all of them.
 
         Args:
-            wanted: requested names.
+            requested: requested names.
             names: all names.
             what: description of the names for the message.
 
         Raises:
             SettingError: a requested name is unknown.
         """
-        asked = [str(name) for name in wanted]
-        if "all" in asked:
+        words = [str(name) for name in requested]
+        if "all" in words:
             return list(range(len(names)))
-        for name in asked:
+        for name in words:
             if name not in names:
                 raise SettingError(f"unknown name '{name}' for {what}{suggest_name(name, names)}")
-        return [names.index(name) for name in asked]
+        return [names.index(name) for name in words]
 
 
 @dataclass(frozen=True, eq=False)

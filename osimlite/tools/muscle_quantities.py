@@ -94,26 +94,26 @@ def compute_quantities(known: Mapping[str, Array], muscles: Sequence[Any]) -> Mu
     return result | CORRECTIONS[type(muscles[0])](result, muscles)
 
 
-def _correct_thelen(found: MuscleTables, muscles: Sequence[Any]) -> MuscleTables:
+def _correct_thelen(tables: MuscleTables, muscles: Sequence[Any]) -> MuscleTables:
     """Correct Thelen2003Muscle: fibers at rest at their minimum length have no force.
 
     That holds although there is a passive force.
     """
-    still = (found["FiberVelocity"] == 0.0) & (found["ActiveFiberForce"] == 0.0)
-    return {"FiberForce": np.where(still, 0.0, found["FiberForce"])}
+    still = (tables["FiberVelocity"] == 0.0) & (tables["ActiveFiberForce"] == 0.0)
+    return {"FiberForce": np.where(still, 0.0, tables["FiberForce"])}
 
 
-def _correct_millard(found: MuscleTables, muscles: Sequence[Any]) -> MuscleTables:
+def _correct_millard(tables: MuscleTables, muscles: Sequence[Any]) -> MuscleTables:
     """Correct Millard2012EquilibriumMuscle."""
-    return _correct_tendon_power(found, [muscle.ignore_tendon_compliance for muscle in muscles])
+    return _correct_tendon_power(tables, [muscle.ignore_tendon_compliance for muscle in muscles])
 
 
-def _correct_tendon_power(found: MuscleTables, is_rigid: Sequence[bool]) -> MuscleTables:
+def _correct_tendon_power(tables: MuscleTables, is_rigid: Sequence[bool]) -> MuscleTables:
     """Set the tendon power of muscles with a rigid tendon to zero."""
-    return {"TendonPower": np.where(is_rigid, 0.0, found["TendonPower"])}
+    return {"TendonPower": np.where(is_rigid, 0.0, tables["TendonPower"])}
 
 
-def _correct_acceleration_muscle(found: MuscleTables, muscles: Sequence[Any]) -> MuscleTables:
+def _correct_acceleration_muscle(tables: MuscleTables, muscles: Sequence[Any]) -> MuscleTables:
     """Correct Millard2012AccelerationMuscle.
 
     The fiber force includes the damping. The passive power includes the power of the mass at the
@@ -123,32 +123,32 @@ def _correct_acceleration_muscle(found: MuscleTables, muscles: Sequence[Any]) ->
         muscle.fiber_damping * muscle.max_isometric_force / muscle.optimal_fiber_length
         for muscle in muscles
     ]
-    damped = found["FiberVelocity"] * np.array(damping)
-    along = found["MuscleActuatorPower"] - found["TendonPower"]
+    damped = tables["FiberVelocity"] * np.array(damping)
+    along = tables["MuscleActuatorPower"] - tables["TendonPower"]
     return {
-        "FiberForce": found["FiberForce"] + damped,
-        "FiberPassivePower": along - found["FiberActivePower"],
+        "FiberForce": tables["FiberForce"] + damped,
+        "FiberPassivePower": along - tables["FiberActivePower"],
     }
 
 
-def _correct_degroote(found: MuscleTables, muscles: Sequence[Any]) -> MuscleTables:
+def _correct_degroote(tables: MuscleTables, muscles: Sequence[Any]) -> MuscleTables:
     """Correct DeGrooteFregly2016Muscle: pennation angles beyond 90° count as their supplement.
 
     The angular velocity has the sign of the uncorrected angle.
     """
-    angle = np.minimum(found["PennationAngle"], np.pi - found["PennationAngle"])
+    angle = np.minimum(tables["PennationAngle"], np.pi - tables["PennationAngle"])
     modes = [getattr(muscle, "tendon_compliance_dynamics_mode", "implicit") for muscle in muscles]
     rigid = [
         muscle.ignore_tendon_compliance or mode == "implicit"
         for muscle, mode in zip(muscles, modes, strict=True)
     ]
-    return {"PennationAngle": angle} | _correct_tendon_power(found, rigid)
+    return {"PennationAngle": angle} | _correct_tendon_power(tables, rigid)
 
 
-def _correct_rigid_tendon(found: MuscleTables, muscles: Sequence[Any]) -> MuscleTables:
+def _correct_rigid_tendon(tables: MuscleTables, muscles: Sequence[Any]) -> MuscleTables:
     """Correct RigidTendonMuscle: the tendon has its slack length, even if the path is shorter."""
     slack = np.array([muscle.tendon_slack_length for muscle in muscles])
-    nothing = np.zeros_like(found["Length"])
+    nothing = np.zeros_like(tables["Length"])
     return {
         "TendonLength": nothing + slack,
         "TendonPower": nothing,
@@ -156,7 +156,7 @@ def _correct_rigid_tendon(found: MuscleTables, muscles: Sequence[Any]) -> Muscle
     }
 
 
-def _correct_deprecated(found: MuscleTables, muscles: Sequence[Any]) -> MuscleTables:
+def _correct_deprecated(tables: MuscleTables, muscles: Sequence[Any]) -> MuscleTables:
     """Correct deprecated classes: OpenSim does not compute these quantities."""
     names = (
         "FiberForce",
@@ -166,7 +166,7 @@ def _correct_deprecated(found: MuscleTables, muscles: Sequence[Any]) -> MuscleTa
         "TendonPower",
         "MuscleActuatorPower",
     )
-    return dict.fromkeys(names, np.full_like(found["Length"], np.nan))
+    return dict.fromkeys(names, np.full_like(tables["Length"], np.nan))
 
 
 CORRECTIONS: dict[type[Muscle], Callable[[MuscleTables, Sequence[Any]], MuscleTables]] = {

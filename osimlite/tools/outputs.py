@@ -42,9 +42,9 @@ def find_reader(motion: Motion, component: Component, name: str) -> Reader | Non
         name: name of the output.
     """
     for cls in type(component).__mro__:
-        found = READERS.get(cls, {}).get(name)
-        if found is not None:
-            return found
+        reader = READERS.get(cls, {}).get(name)
+        if reader is not None:
+            return reader
     path = motion.model.tree().path_of(component) or ""
     known = name not in LAW_OUTPUTS or (
         isinstance(component, Muscle) and motion.system.knows(path, LAW_OUTPUTS[name])
@@ -272,15 +272,17 @@ def _read_muscle_output(
     ]
     known = motion.read_records([path], *LAW_RECORDS, *extra)
     with np.errstate(invalid="ignore", divide="ignore"):
-        found = known | compute_quantities(known, [muscle])
+        quantities = known | compute_quantities(known, [muscle])
         turning = (
-            found["FiberLength"]
-            * np.sin(found["PennationAngle"])
-            * found["PennationAngularVelocity"]
+            quantities["FiberLength"]
+            * np.sin(quantities["PennationAngle"])
+            * quantities["PennationAngularVelocity"]
         )
-        found["along"] = found["FiberVelocity"] * np.cos(found["PennationAngle"]) - turning
-        found["slack"] = np.full_like(found["along"], muscle.tendon_slack_length)
-        return of(found)
+        quantities["along"] = (
+            quantities["FiberVelocity"] * np.cos(quantities["PennationAngle"]) - turning
+        )
+        quantities["slack"] = np.full_like(quantities["along"], muscle.tendon_slack_length)
+        return of(quantities)
 
 
 MUSCLE_OUTPUTS: dict[str, Callable[[dict[str, Array]], Array]] = {

@@ -83,13 +83,13 @@ class _Search:
         """Return the sorted entries of a folder; none if it cannot be read."""
         try:
             with os.scandir(folder or ".") as entries:
-                found = sorted(entries, key=lambda entry: entry.name)
+                result = sorted(entries, key=lambda entry: entry.name)
         except OSError:
             return []
-        self.left -= len(found)
+        self.left -= len(result)
         if self.left < 0:
             raise OsimliteError(
                 f"the search for '{self.pattern}' reads more than {MAX_ENTRIES} files; name the "
                 "folders"
             )
-        return found
+        return result

@@ -254,11 +254,11 @@ class TrackingTasks:
         """Weights of all tasks."""
         return np.array([task.weight for task in self.tasks])
 
-    def compute_errors(self, wanted: Array, q: Array, u: Array) -> tuple[Array, Array]:
+    def compute_errors(self, desired: Array, q: Array, u: Array) -> tuple[Array, Array]:
         """Compute how far values and speeds are behind the desired motion.
 
         Args:
-            wanted: values, rates, speeds and accelerations of the desired motion (4, n).
+            desired: values, rates, speeds and accelerations of the desired motion (4, n).
             q: values (n,).
             u: speeds (n,).
 
@@ -267,7 +267,7 @@ class TrackingTasks:
         """
         own = self.coordinates
         other = [task.wanted for task in self.tasks]
-        return wanted[0, other] - q[own], wanted[2, other] - u[own]
+        return desired[0, other] - q[own], desired[2, other] - u[own]
 
     def compute_accelerations(self, errors: tuple[Array, Array], ahead: Array) -> Array:
         """Compute the accelerations (k,) that correct errors: ka u̇ + kv ėrr + kp err.
@@ -339,7 +339,7 @@ class ForceDistribution:
         t: float,
         q: Array,
         u: Array,
-        wanted: Array,
+        requested: Array,
         errors: Array,
         bounds: tuple[Array, Array],
     ) -> tuple[Array, str]:
@@ -349,7 +349,7 @@ class ForceDistribution:
             t: time, s.
             q: values (n,).
             u: speeds (n,).
-            wanted: requested accelerations (k,).
+            requested: requested accelerations (k,).
             errors: errors of the tasks (k,).
             bounds: lower and upper bounds of the forces (a,).
 
@@ -359,7 +359,7 @@ class ForceDistribution:
         still, each, lightness = self.compute_responses(t, q, u)
         own = self.tasks.coordinates
         columns = each[own]
-        rest = wanted - still[own]
+        rest = requested - still[own]
         if self.exact:
             return self._compute_exact_forces(
                 t, q, u, columns, rest, lightness[np.ix_(own, own)], bounds

@@ -145,8 +145,12 @@ def _compute_average_residuals(job: Job, model: Model, desired: DesiredMotion) -
         max(0, int(np.searchsorted(desired.times, time, side="right")) - 1)
         for time in (first, last)
     ]
-    chosen = slice(rows[0], rows[1] + 1)
-    times, values, speeds = desired.times[chosen], desired.values[chosen], desired.speeds[chosen]
+    selected = slice(rows[0], rows[1] + 1)
+    times, values, speeds = (
+        desired.times[selected],
+        desired.values[selected],
+        desired.speeds[selected],
+    )
     (wanted,) = derivatives_of_samples(desired.times, desired.speeds, times, (1,))
     forces = sharing.balanced(times, values, speeds, wanted)
     return _average_residual_columns(times, sharing.names, forces)
@@ -313,16 +317,16 @@ def _report_errors(job: Job, outcome: Outcome, motion: Motion, followed: Tracked
     infos = motion.mechanism.coordinates
     turning = [info.name for info in infos if info.motion_type == "rotational"]
     table = outcome.tables[f"{job.setup.name}_pErr.sto"]
-    for what, unit, factor, chosen in (
+    for what, unit, factor, selected in (
         ("angle", "deg", np.degrees(1.0), [k for k, n in enumerate(table.columns) if n in turning]),
         ("translation", "m", 1.0, [k for k, n in enumerate(table.columns) if n not in turning]),
     ):
-        if chosen:
-            worst = int(np.argmax(errors[:, chosen].max(axis=0)))
-            largest = factor * float(errors[:, chosen].max())
+        if selected:
+            worst = int(np.argmax(errors[:, selected].max(axis=0)))
+            largest = factor * float(errors[:, selected].max())
             outcome.summary[f"worst_{what}"] = largest
             outcome.add_message(
-                f"worst {what}", f"{largest:.3g} {unit} off, {table.columns[chosen[worst]]}"
+                f"worst {what}", f"{largest:.3g} {unit} off, {table.columns[selected[worst]]}"
             )
 
 

@@ -69,7 +69,7 @@ def test_a_trial_is_fitted(lab: Path) -> None:
         (("ik", "box.osim", "walk.trc", "--keep", "knee=1"), "no coordinate 'knee'"),
         (("ik", "box.osim", "walk.trc", "--from", "7"), "no frame of 'walk.trc' lies between"),
         (("ik", "box.osim", "none.trc"), "none.trc: cannot read the file"),
-        (("ik", "box.osim", "box.osim"), "it is no marker file"),
+        (("ik", "box.osim", "box.osim"), "this is not a marker file"),
         (("scale", "box.osim", "--distance", "b=one:two"), "need markers of the standing subject"),
         (
             ("scale", "box.osim", "walk.trc", "--distance", "b=one"),

@@ -177,7 +177,7 @@ def test_weights_count() -> None:
 @pytest.mark.parametrize(
     ("change", "sentence"),
     [
-        (lambda t: t.replace("PathFileType", "Path"), "it is no marker file"),
+        (lambda t: t.replace("PathFileType", "Path"), "this is not a marker file"),
         (
             lambda t: t.replace("\tm\t", "\tfeet\t"),
             r":3: the markers are in 'feet'; Units is one of m, mm",

@@ -89,19 +89,19 @@ def test_steps_keep_their_bounds(setup: Path) -> None:
         (
             "<integrator_error",
             "<maximum_integrator_step_size>0</maximum_integrator_step_size><integrator_error",
-            "none",
+            "are invalid",
         ),
-        ("states.sto", "degrees.sto", "in degrees, which OpenSim refuses"),
+        ("states.sto", "degrees.sto", "OpenSim rejects states in degrees"),
         ("states.sto", "others.sto", "no column with a state of the model"),
         (
             "</objects></AnalysisSet>",
             "<StaticOptimization name='so'/></objects></AnalysisSet>",
-            "cannot be computed",
+            "needs a measured motion",
         ),
         (
             "<states_file>",
             "<ControllerSet><objects><CorrectionController name='cc'/></objects></ControllerSet><states_file>",
-            "'cc', a CorrectionController, .*<enabled>false",
+            "CorrectionController 'cc' yet; set <enabled>false",
         ),
     ],
 )

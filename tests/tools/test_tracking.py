@@ -116,7 +116,7 @@ def test_who_is_too_weak_is_told(folder: Path) -> None:
     written(folder, pendulum(1.0, **bounds), "CMCTool")
     outcome = osimlite.run(folder / "setup.xml")
     told = dict(outcome.told)
-    assert not outcome.done and "lack" in told["ended early"] and "at angle" in told["ended early"]
+    assert not outcome.done and "missing: " in told["ended early"] and "at angle" in told["ended early"]
 
 
 @pytest.mark.parametrize(
@@ -125,7 +125,7 @@ def test_who_is_too_weak_is_told(folder: Path) -> None:
         ({"name": "angel"}, "has no coordinate 'angel'"),
         ({"active": "false true true"}, "no task of .* is active"),
         ({"active": ""}, "has an empty 'active'"),
-        ({"final": 0.0005}, "give a later final_time"),
+        ({"final": 0.0005}, "set a later final_time"),
         (
             {"more": "<adjust_com_to_reduce_residuals>true</adjust_com_to_reduce_residuals>"},
             "adjusted_com_body",

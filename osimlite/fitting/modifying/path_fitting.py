@@ -131,23 +131,23 @@ def _fit_path(
     own = [k for k in free if np.nanmax(np.abs(arms[:, k])) > MIN_MOMENT_ARM_M] or free[:1]
     good = np.isfinite(lengths) & np.isfinite(arms[:, own]).all(axis=1)
     x = q[good][:, own]
-    wanted = lengths[good]
+    targets = lengths[good]
     pulls = arms[good][:, own]
     best: PathFit | None = None
     for order in ORDERS:
         powers = np.array(
             [item for item in product(range(order + 1), repeat=len(own)) if sum(item) <= order]
         )
-        if len(powers) > 0.5 * len(wanted) * (1 + len(own)):
+        if len(powers) > 0.5 * len(targets) * (1 + len(own)):
             break
         values, slopes = _compute_monomials(x, powers)
         matrix = np.vstack([values, *(-slope for slope in slopes)])
-        right = np.concatenate([wanted, *pulls.T])
+        right = np.concatenate([targets, *pulls.T])
         sizes = np.linalg.norm(matrix, axis=0)
         coefficients = np.linalg.lstsq(matrix / sizes, right, 1e-12)[0] / sizes
         off = matrix @ coefficients - right
-        length = off[: len(wanted)]
-        arm = off[len(wanted) :]
+        length = off[: len(targets)]
+        arm = off[len(targets) :]
         polynomial = MultivariatePolynomialFunction(
             dimension=len(own), order=order, coefficients=tuple(coefficients.tolist())
         )

@@ -52,12 +52,12 @@ def write_joint_reactions(analysis: JointReaction, motion: Motion, tables: Analy
     loads = JointWrenches.compute_along(*_override_forces(analysis, motion, tables))
     columns: list[str] = []
     rows: list[Array] = []
-    for joint, word, asked in zip(joints, sides, frames, strict=True):
+    for joint, word, requested in zip(joints, sides, frames, strict=True):
         side = word.lower()
         if side not in ("child", "parent"):
             raise tables.job.create_error(f"apply_on_bodies has '{side}'; expected child or parent")
         bases = {end: _find_base_path(model, joint, end) for end in ("child", "parent")}
-        frame = _find_frame_path(motion, asked, bases, tables)
+        frame = _find_frame_path(motion, requested, bases, tables)
         force, moment, point = loads.get_reaction(joint, side)
         rotation, origin = loads.moved.placed(*mechanism.placement(frame))
         back = rotation.transpose(0, 2, 1)
@@ -113,21 +113,24 @@ def _find_base_path(model: Model, joint: Joint, end: str) -> str:
 
 
 def _find_frame_path(
-    motion: Motion, asked: str, bases: dict[str, str], tables: AnalysisTables
+    motion: Motion, requested: str, bases: dict[str, str], tables: AnalysisTables
 ) -> str:
     """Return the path of a frame that a setup names, by a word or as OpenSim searches for it.
 
     Args:
         motion: the motion.
-        asked: ``"child"``, ``"parent"``, or name of a frame.
+        requested: ``"child"``, ``"parent"``, or name of a frame.
         bases: paths of the joint's bodies by these words.
         tables: writer of the tables.
     """
-    result = motion.find_frame_path(asked, "Frame", "/bodyset", "/jointset") or bases.get(
-        asked.lower()
+    result = motion.find_frame_path(requested, "Frame", "/bodyset", "/jointset") or bases.get(
+        requested.lower()
     )
     if result is None:
-        message = f"express_in_frame has '{asked}', which is not a frame of the model; write child, parent or the name of a frame"
+        message = (
+            f"express_in_frame has '{requested}', which is not a frame of the model; "
+            "write child, parent or the name of a frame"
+        )
         raise tables.job.create_error(message)
     return result
 

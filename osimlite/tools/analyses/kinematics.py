@@ -29,12 +29,12 @@ def write_kinematics(analysis: Kinematics, motion: Motion, tables: AnalysisTable
         ("u", "Speeds", motion.speeds),
         ("dudt", "Accelerations", motion.accelerations),
     ):
-        chosen = rows[:, indices]
+        selected = rows[:, indices]
         tables.add_table(
             suffix,
             name,
             [names[index] for index in indices],
-            np.where(turns, np.degrees(chosen), chosen),
+            np.where(turns, np.degrees(selected), selected),
             in_degrees=analysis.in_degrees,
             description=f"\n{UNITS}",
         )
@@ -74,15 +74,15 @@ def write_body_kinematics(analysis: BodyKinematics, motion: Motion, tables: Anal
             rows[:, :, 1] = np.degrees(rows[:, :, 1])
         result.append(rows.reshape(3, -1, 6))
     names = [body.name for body in bodies]
-    chosen = motion.find_indices(
+    selected = motion.find_indices(
         analysis.bodies, [*names, CENTER_OF_MASS], f"bodies of '{analysis.name}'"
     )
-    own = [index for index in chosen if index < len(names)]
+    own = [index for index in selected if index < len(names)]
     columns = [
         f"{names[index]}_{what}" for index in own for what in ("X", "Y", "Z", "Ox", "Oy", "Oz")
     ]
     parts = [np.empty((3, len(motion.times), 0)), *(result[index] for index in own)]
-    if len(names) in chosen:
+    if len(names) in selected:
         parts.append(whole)
         columns += [f"{CENTER_OF_MASS}_{axis}" for axis in "XYZ"]
     frame = "bodyLocal" if local else "global"

@@ -38,10 +38,10 @@ def write_muscle_analysis(analysis: MuscleAnalysis, motion: Motion, tables: Anal
         tables: writer of the tables.
     """
     every = list(motion.model.components(Muscle))
-    chosen = motion.find_indices(
+    selected = motion.find_indices(
         analysis.muscle_list, [muscle.name for muscle in every], f"muscles of '{analysis.name}'"
     )
-    muscles = [every[index] for index in chosen]
+    muscles = [every[index] for index in selected]
     for muscle in muscles:
         why = "which osimlite cannot analyse yet" if type(muscle) not in CORRECTIONS else ""
         why = why or ("" if muscle.appliesForce else "which applies no force")
@@ -89,12 +89,12 @@ def _add_moments(
     paths = Paths(motion.model)
     rows = [paths.names.index(tree.path_of(muscle) or "") for muscle in muscles]
     arms = paths.all_moment_arms(motion.values)[:, rows]
-    asked = [
+    requested = [
         "all" if str(name).lower() == "all" else name
         for name in analysis.moment_arm_coordinate_list
     ]
     for index in motion.find_indices(
-        asked, [info.name for info in infos], f"coordinates of '{analysis.name}'"
+        requested, [info.name for info in infos], f"coordinates of '{analysis.name}'"
     ):
         names = [muscle.name for muscle in muscles]
         own = arms[:, :, index]

@@ -45,11 +45,11 @@ def write_outputs(analysis: OutputReporter, motion: Motion, tables: AnalysisTabl
     columns = {kind: list[str]() for kind in OUTPUT_FILES}
     rows = {kind: [np.empty((len(motion.times), 0))] for kind in OUTPUT_FILES}
     left_out = []
-    for asked in map(str, analysis.output_paths):
-        parts = OUTPUT_PATTERN.fullmatch(asked.strip())
+    for requested in map(str, analysis.output_paths):
+        parts = OUTPUT_PATTERN.fullmatch(requested.strip())
         if parts is None:
             raise tables.job.create_error(
-                f"'{analysis.name}' requests '{asked}', which is not an output; write path|output"
+                f"'{analysis.name}' requests '{requested}', which is not an output; write path|output"
             )
         path = "/" + parts["path"].strip("/")
         component = tree.walk(path, "", "Component").target if path != "/" else motion.model
@@ -61,7 +61,7 @@ def write_outputs(analysis: OutputReporter, motion: Motion, tables: AnalysisTabl
         reader = find_reader(motion, component, parts["output"])
         kind = outputs[parts["output"]].type if parts["output"] in outputs else "double"
         if kind not in OUTPUT_FILES:
-            left_out.append(asked)
+            left_out.append(requested)
             continue
         if parts["output"] not in outputs and reader is None:
             near = suggest_name(parts["output"], outputs)
@@ -70,7 +70,7 @@ def write_outputs(analysis: OutputReporter, motion: Motion, tables: AnalysisTabl
             )
         if reader is None or parts["channel"]:
             raise tables.job.create_unsupported_error(
-                f"'{analysis.name}' requests '{asked}' of a {type(component).__name__}, which "
+                f"'{analysis.name}' requests '{requested}' of a {type(component).__name__}, which "
                 "osimlite cannot compute yet"
             )
         columns[kind].append(parts["alias"] or f"{path}|{parts['output']}")

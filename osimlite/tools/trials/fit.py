@@ -57,13 +57,13 @@ def measure_scale_errors(tool: TrialTool) -> Numbers:
     weights = {task.name: float(task.weight) for task in tasks}
     most = max(weights.values(), default=0.0)
     pose = result.pose
-    chosen = [
+    selected = [
         index for index, name in enumerate(pose.markers) if weights.get(name, 1.0) > 0.1 * most
     ]
-    errors = pose.marker_errors[:, chosen]
+    errors = pose.marker_errors[:, selected]
     if not np.isfinite(errors).any():
         raise MissingInput(f"{tool} fits no marker")
-    name = pose.markers[chosen[int(np.nanargmax(np.nanmax(errors, axis=0)))]]
+    name = pose.markers[selected[int(np.nanargmax(np.nanmax(errors, axis=0)))]]
     of = "the errors of the markers in the static pose"
     for kind, value in (("rms", np.sqrt(np.nanmean(errors**2))), ("peak", np.nanmax(errors))):
         where = name if kind == "peak" else ""

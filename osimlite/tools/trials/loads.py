@@ -96,8 +96,8 @@ def compute_scale(tool: TrialTool) -> LoadScale:
         up = _find_up(tool)
     except OsimliteError:
         return LoadScale(force)
-    chosen = np.unique(np.linspace(0, len(motion.times) - 1, TIME_COUNT).astype(int))
-    height = np.mean([motion.mechanism.center_of_mass(motion.values[row]) @ up for row in chosen])
+    selected = np.unique(np.linspace(0, len(motion.times) - 1, TIME_COUNT).astype(int))
+    height = np.mean([motion.mechanism.center_of_mass(motion.values[row]) @ up for row in selected])
     floor = [float(np.median(load.point[own] @ up)) for load in loads if load.point is not None]
     return LoadScale(force, force * float(height - (min(floor) if floor else 0.0)))
 
