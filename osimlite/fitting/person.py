@@ -196,8 +196,8 @@ def fit(
             _, frame = placements.resolve_frame(
                 placements.follow_socket(marker, "socket_parent_frame")
             )
-            own = frame[:3, :3].T @ offsets[marker.name]
-            marker.location = tuple((np.array(marker.location) + own).tolist())
+            local_offset = frame[:3, :3].T @ offsets[marker.name]
+            marker.location = tuple((np.array(marker.location) + local_offset).tolist())
     return Person(
         scaled,
         factors,
@@ -234,7 +234,9 @@ def _read_trials(
 def _report_extreme_factors(factors: Mapping[str, Sequence[float]]) -> Iterator[str]:
     """Yield a message about factors at the end of their range."""
     ends = [
-        body for body, own in factors.items() if min(own) <= MIN_FACTOR or max(own) >= MAX_FACTOR
+        body
+        for body, body_factors in factors.items()
+        if min(body_factors) <= MIN_FACTOR or max(body_factors) >= MAX_FACTOR
     ]
     if ends:
         yield f"{join_words(ends)}: scale factors at a limit; check the names and units of the markers"
@@ -362,15 +364,15 @@ class _PersonFit:
         np.fill_diagonal(matrix[self._sizes :, self._sizes :], pull)
         slope[self._sizes :] = pull * far.ravel()
         for frame, moves in enumerate(here.posed.compute_free_motions(values)):
-            own = seen[frame]
-            scaled = roots[own, None, None]
-            rows = (scaled * by[frame, own]).reshape(-1, size)
+            is_seen = seen[frame]
+            scaled = roots[is_seen, None, None]
+            rows = (scaled * by[frame, is_seen]).reshape(-1, size)
             # Errors that a change of the pose removes do not count: project them out.
-            moved = (scaled * moves[own]).reshape(len(rows), moves.shape[-1])
+            moved = (scaled * moves[is_seen]).reshape(len(rows), moves.shape[-1])
             squares, axes = np.linalg.eigh(moved.T @ moved)
             certain = squares > 1e-12 * squares.max(initial=1e-300)
             directions = moved @ (axes[:, certain] / np.sqrt(squares[certain]))
             across = rows - directions @ (directions.T @ rows)
             matrix += across.T @ across
-            slope += rows.T @ (roots[own, None] * errors[frame][own]).ravel()
+            slope += rows.T @ (roots[is_seen, None] * errors[frame][is_seen]).ravel()
         return matrix, slope

@@ -132,7 +132,9 @@ def format_pose(model: Model, placed: MarkerPlacement) -> str:
     named = [item.path for item in layout.variables if item.is_named]
     for info, value in zip(mechanism.coordinates, values, strict=True):
         columns[f"{info.path}/value"], columns[f"{info.path}/speed"] = value, 0.0
-    own = [f"{info.path}/{what}" for info in mechanism.coordinates for what in ("value", "speed")]
-    paths = in_model_order(model, [*own, *named])
+    coordinate_paths = [
+        f"{info.path}/{what}" for info in mechanism.coordinates for what in ("value", "speed")
+    ]
+    paths = in_model_order(model, [*coordinate_paths, *named])
     row = np.array([[columns[path] for path in paths]])
     return "".join(format_old_table(StoTable("static pose", motion.times, tuple(paths), row)))

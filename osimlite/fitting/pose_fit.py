@@ -219,8 +219,8 @@ class _System(System):
     def bind_arrays(self, *arrays: Floats | Ints) -> Callable[[int], int]:
         """Return a function that fits a number of frames; the caller keeps the arrays alive."""
         flat = [array.reshape(-1) for array in arrays]
-        own = self.program.ints, self.numbers, self._w, self._y, self._f
-        return self.program.code.bound("fit_frames", *own, *flat)
+        arguments = self.program.ints, self.numbers, self._w, self._y, self._f
+        return self.program.code.bound("fit_frames", *arguments, *flat)
 
 
 class SingleFrameFit:

@@ -197,8 +197,8 @@ class FitLayout:
     ) -> Iterator[int]:
         """Yield the link of each sensor; append its rotation and weight to the numbers."""
         for sensor in sensors:
-            link, own = places.placement(sensor.frame.body)
-            numbers += [*(own @ sensor.frame.transform)[:3, :3].ravel().tolist(), sensor.weight]
+            link, in_link = places.placement(sensor.frame.body)
+            numbers += [*(in_link @ sensor.frame.transform)[:3, :3].ravel().tolist(), sensor.weight]
             yield link
 
     @staticmethod

@@ -74,9 +74,9 @@ def scale_model(
         if not scaler.tree.is_internal(component):
             scaler.scale_component(component)
     for body in model.components(Body):
-        own = scaler.get_base_factors(body)
-        if own is not None:
-            scale_inertia(body, own, scales_mass=not preserve_mass_distribution)
+        body_factors = scaler.get_base_factors(body)
+        if body_factors is not None:
+            scale_inertia(body, body_factors, scales_mass=not preserve_mass_distribution)
     if mass > 0.0:
         total = sum(body.mass for body in model.components(Body))
         if total > 0.0:

@@ -60,7 +60,8 @@ class Segments(NamedTuple):
                 first[body] = first[carrier]
         if symmetric:
             first = {
-                body: min(own, get_opposite_name(own, carriers)) for body, own in first.items()
+                body: min(first_body, get_opposite_name(first_body, carriers))
+                for body, first_body in first.items()
             }
         groups = {
             name: tuple(body for body in carriers if first[body] == name) for name in first.values()
@@ -75,7 +76,9 @@ class Segments(NamedTuple):
             (first[body], first[carrier]) for body, carrier in carriers.items() if carrier in first
         }
         alike = tuple((numbers[one], numbers[two]) for one, two in sorted(pairs) if one != two)
-        sides = tuple((k, own) for own in numbers.values() for k in own if len(own) > 1)
+        sides = tuple(
+            (k, segment) for segment in numbers.values() for k in segment if len(segment) > 1
+        )
         return cls(tuple(parts), alike, sides)
 
     def expand_factors(self, sizes: Sequence[float] | Array) -> dict[str, list[float]]:
@@ -105,17 +108,17 @@ class Segments(NamedTuple):
         Returns:
             Matrix (r, k), and expected values of its product with the parameters (r,).
         """
-        own = [k for k, part in enumerate(self.parts) if part.bodies == self.parts[0].bodies]
+        segment = [k for k, part in enumerate(self.parts) if part.bodies == self.parts[0].bodies]
         rows = [
-            self._create_mean_row(own, first),
+            self._create_mean_row(segment, first),
             *(
                 (self._create_mean_row(one, apart) - self._create_mean_row(two, apart))
                 for one, two in self.alike
             ),
         ]
         rows += [
-            self._create_mean_row((k,), across) - self._create_mean_row(own, across)
-            for k, own in self.sides
+            self._create_mean_row((k,), across) - self._create_mean_row(segment, across)
+            for k, segment in self.sides
         ]
         wanted = np.zeros(len(rows))
         wanted[0] = 1.0 / first

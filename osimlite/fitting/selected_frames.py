@@ -106,8 +106,8 @@ class SelectedFrames:
         with np.errstate(all="ignore"):
             usual = np.array(
                 [
-                    np.median(own[np.isfinite(own)]) if np.isfinite(own).any() else 0.0
-                    for own in distances.T
+                    np.median(column[np.isfinite(column)]) if np.isfinite(column).any() else 0.0
+                    for column in distances.T
                 ]
             )
         # A swapped marker pulls its neighbours along; only the worst ones of a frame are outliers.

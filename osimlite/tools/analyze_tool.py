@@ -175,7 +175,7 @@ def _read_coordinate_motion(
     if given is None:
         speeds = recorded.rates[0]
     else:
-        own, speeds, others = _read_speeds(job, given, recorded, simulation)
+        record, speeds, others = _read_speeds(job, given, recorded, simulation)
     rows = zip(
         recorded.times.tolist(),
         *satisfy_constraints(recorded, speeds, simulation, model),
@@ -190,7 +190,7 @@ def _read_coordinate_motion(
             yield t, y
 
     first = int(np.searchsorted(before.times, recorded.times[0]))
-    return first, states(), lambda: (before.times, before.rates[0]) if given is None else own
+    return first, states(), lambda: (before.times, before.rates[0]) if given is None else record
 
 
 def _read_speeds(

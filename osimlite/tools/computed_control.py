@@ -77,13 +77,13 @@ class ActuatorControl:
             actuator: actuator of the model.
             given: bounds from a document, by the name of the actuator; None without a document.
         """
-        own = (
+        controls = (
             []
             if given is None
             else [item for item in given.objects if isinstance(item, ControlLinear)]
         )
         for name in (actuator.name + EXCITATION, actuator.name):
-            bounds = next((item for item in own if item.name == name), None)
+            bounds = next((item for item in controls if item.name == name), None)
             if bounds is not None:
                 return cls._create_from_bounds(bounds)
         low = (

@@ -100,14 +100,18 @@ def build_model(job: Job) -> Model:
     model = job.read_model()
     add_forces(model, paths, replace=setup.replace_force_set)
     for controller in setup.controller_set.objects:
-        own = _resolve_files(job, controller.copy_deep())
+        controller_copy = _resolve_files(job, controller.copy_deep())
         actuators = list(model.components(Actuator))
         # Older setups request all actuators by one word; their names are known from the model
         # only.
-        functions = own.ControlFunctions.objects if isinstance(own, PrescribedController) else []
-        if functions and not own.socket_actuators and len(functions) == len(actuators):
-            own.socket_actuators = tuple(actuators)
-        model.controller_set.objects.append(own)
+        functions = (
+            controller_copy.ControlFunctions.objects
+            if isinstance(controller_copy, PrescribedController)
+            else []
+        )
+        if functions and not controller_copy.socket_actuators and len(functions) == len(actuators):
+            controller_copy.socket_actuators = tuple(actuators)
+        model.controller_set.objects.append(controller_copy)
     for controller in model.components(CorrectionController):
         if controller.enabled:
             raise job.create_unsupported_error(
@@ -247,16 +251,16 @@ class StateRows(NamedTuple):
             simulation: simulation of the model.
             row: number of the row.
         """
-        given = {path: float(self.table.rows[row, index]) for path, index in self.columns.items()}
-        own = [path for path in simulation.state.paths if path in given]
-        moving = {path: value for path, value in given.items() if path not in own}
+        known = {path: float(self.table.rows[row, index]) for path, index in self.columns.items()}
+        auxiliary = [path for path in simulation.state.paths if path in known]
+        moving = {path: value for path, value in known.items() if path not in auxiliary}
         q, u, _ = starting(simulation.mechanism, moving, {})
         if simulation.constraints:
             q = simulation.mechanism.assemble(q, float(self.table.times[row])).tolist()
         y = simulation.state.pack(q, u)
         first = 2 * len(simulation.state.order)
-        for path in own:
-            y[first + simulation.state.paths.index(path)] = given[path]
+        for path in auxiliary:
+            y[first + simulation.state.paths.index(path)] = known[path]
         return y
 
     def read_speeds(self, simulation: Simulation) -> Array:

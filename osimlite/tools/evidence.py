@@ -152,7 +152,7 @@ def find_root_coordinates(mechanism: Mechanism) -> tuple[int, ...]:
         only one has fewer than three coordinates.
     """
     roots = [body.mobilizer.coordinates for body in mechanism.bodies if body.parent == GROUND]
-    moving = [own for own in roots if own]
+    moving = [coordinates for coordinates in roots if coordinates]
     return moving[0] if len(moving) == 1 and len(moving[0]) >= 3 else ()
 
 

@@ -95,11 +95,11 @@ def _report_residuals(outcome: Outcome, mechanism: Mechanism, table: StoTable) -
     names = [mechanism.coordinates[index].name for index in find_root_coordinates(mechanism)]
     weight = mechanism.total_mass * float(np.linalg.norm(mechanism.gravity))
     for what, unit in (("force", "N"), ("moment", "N m")):
-        own = [
+        columns = [
             table[label] for label in (f"{name}_{what}" for name in names) if label in table.columns
         ]
-        if own:
-            sizes = np.linalg.norm(own, axis=0)
+        if columns:
+            sizes = np.linalg.norm(columns, axis=0)
             rms = float(np.sqrt(np.mean(sizes**2)))
             most = float(sizes.max())
             outcome.summary |= {f"rms_residual_{what}": rms, f"largest_residual_{what}": most}
@@ -173,10 +173,10 @@ def compute_joint_loads(
         for joint, bodies in requested
     ]
     rows = np.zeros((len(recorded.times), len(joints), 2, 3))
-    for row, q, own in zip(rows, recorded.values, forces, strict=True):
+    for row, q, row_forces in zip(rows, recorded.values, forces, strict=True):
         state = mechanism.at(q)
         for number, each in enumerate(hinges):
-            row[number] = sum(_compute_joint_load(state, *hinge, own) for hinge in each)
+            row[number] = sum(_compute_joint_load(state, *hinge, row_forces) for hinge in each)
     title = "Inverse Dynamics Body Forces at Specified Joints"
     return StoTable(title, recorded.times, tuple(labels), rows.reshape(len(rows), -1))
 

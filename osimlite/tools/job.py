@@ -115,8 +115,10 @@ class Job:
         """
         folder = self.setup.results_directory.strip()
         last = Path(name).name
-        own = Path(last if "." in last else f"{last}.sto")
-        return self._join_output(own, self.file.parent / ("" if folder in NO_FILE else folder))
+        file_name = Path(last if "." in last else f"{last}.sto")
+        return self._join_output(
+            file_name, self.file.parent / ("" if folder in NO_FILE else folder)
+        )
 
     def _join_output(self, name: Path, folder: Path) -> Path:
         """Return a path in the requested output folder, or else in a default folder."""

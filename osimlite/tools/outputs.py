@@ -157,10 +157,10 @@ def _compute_com_acceleration(mechanism: Any, q: Array, u: Array, udot: Array) -
     for index, body in enumerate(mechanism.bodies):
         arm = state.rotations[index] @ body.mass_properties.center
         w = state.velocities[index][:3]
-        own = accelerations[index]
+        acceleration = accelerations[index]
         rows.append(
             body.mass_properties.mass
-            * (own[3:] + np.cross(own[:3], arm) + np.cross(w, np.cross(w, arm)))
+            * (acceleration[3:] + np.cross(acceleration[:3], arm) + np.cross(w, np.cross(w, arm)))
         )
     return np.asarray(np.sum(rows, axis=0) / (mechanism.total_mass or 1.0))
 

@@ -202,10 +202,15 @@ def _render_viewer(evidence: Evidence) -> str:
     mechanism = build_mechanism(evidence.model)
     measured = None
     if evidence.measured is not None:
-        own = {path.rpartition("/")[2]: station for path, station in mechanism.stations.items()}
-        known = [index for index, name in enumerate(evidence.markers) if name in own]
+        stations_by_name = {
+            path.rpartition("/")[2]: station for path, station in mechanism.stations.items()
+        }
+        known = [index for index, name in enumerate(evidence.markers) if name in stations_by_name]
         names = [evidence.markers[index] for index in known]
-        stations = [(own[name].body, np.asarray(own[name].location)) for name in names]
+        stations = [
+            (stations_by_name[name].body, np.asarray(stations_by_name[name].location))
+            for name in names
+        ]
         measured = MeasuredMarkers(names, stations, evidence.measured[:, known])
     motion = _create_recording(evidence, mechanism, measured)
     shown = Shown.of(evidence.model, mechanism, file=evidence.file, motion=motion)

@@ -184,8 +184,10 @@ def substitute_inputs(top: Object, folder: Path, substitutes: Mapping[str, str])
 
 def _is_about_any(error: Finding, names: Sequence[str]) -> bool:
     """Return whether an error is about a replaced input, and therefore does not matter."""
-    own = os.path.basename(error.file or "")
-    return any(f"'{name}'" in error.message or own == os.path.basename(name) for name in names)
+    file_name = os.path.basename(error.file or "")
+    return any(
+        f"'{name}'" in error.message or file_name == os.path.basename(name) for name in names
+    )
 
 
 def _is_run_by_opensim(error: Finding) -> bool:

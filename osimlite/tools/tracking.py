@@ -235,9 +235,9 @@ class TrackingTasks:
             weight, kp, kv, ka = (
                 float(getattr(item, tag)[0]) for tag in ("weight", "kp", "kv", "ka")
             )
-            own = names.index(str(item.coordinate))
+            index = names.index(str(item.coordinate))
             wanted = names.index(item.name)
-            result.append(TrackingTask(item.name, own, wanted, weight, kp, kv, ka, item.limit))
+            result.append(TrackingTask(item.name, index, wanted, weight, kp, kv, ka, item.limit))
         if not result:
             raise job.create_error(
                 f"no task of '{path}' is active; set the first of its 'active' to true"
@@ -265,9 +265,9 @@ class TrackingTasks:
         Returns:
             Errors of the values and of the speeds, each (k,) for k tasks.
         """
-        own = self.coordinates
+        followers = self.coordinates
         other = [task.wanted for task in self.tasks]
-        return desired[0, other] - q[own], desired[2, other] - u[own]
+        return desired[0, other] - q[followers], desired[2, other] - u[followers]
 
     def compute_accelerations(self, errors: tuple[Array, Array], ahead: Array) -> Array:
         """Compute the accelerations (k,) that correct errors: ka u̇ + kv ėrr + kp err.
@@ -357,18 +357,18 @@ class ForceDistribution:
             Forces (a,), and the missing accelerations in words; "" if none is missing.
         """
         still, each, lightness = self.compute_responses(t, q, u)
-        own = self.tasks.coordinates
-        columns = each[own]
-        rest = requested - still[own]
+        followers = self.tasks.coordinates
+        columns = each[followers]
+        rest = requested - still[followers]
         if self.exact:
             return self._compute_exact_forces(
-                t, q, u, columns, rest, lightness[np.ix_(own, own)], bounds
+                t, q, u, columns, rest, lightness[np.ix_(followers, followers)], bounds
             )
         weights = np.sqrt(self.tasks.weights)
         share = math.sqrt(self.tasks.compute_force_weight(errors))
         # The acceleration errors are unknowns as well, and their squares are minimized together with
         # those of the forces.
-        size = len(own)
+        size = len(followers)
         scale = self.optimal / max(share, MIN_FORCE_WEIGHT)
         given = np.hstack([weights[:, None] * columns * scale, np.eye(size)])
         free = np.full(size, np.inf)

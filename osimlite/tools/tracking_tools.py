@@ -139,8 +139,8 @@ def _compute_average_residuals(job: Job, model: Model, desired: DesiredMotion) -
     mechanism: Mechanism = build_mechanism(model, opensim_derivatives=True)
     sharing = build_static_optimization(job, model, mechanism, muscles="isometric")
     given = setup.initial_time_for_com_adjustment, setup.final_time_for_com_adjustment
-    own = max(setup.initial_time, desired.start), min(setup.final_time, desired.end)
-    first, last = own if given == (-1.0, -1.0) else given
+    desired_range = max(setup.initial_time, desired.start), min(setup.final_time, desired.end)
+    first, last = desired_range if given == (-1.0, -1.0) else given
     rows = [
         max(0, int(np.searchsorted(desired.times, time, side="right")) - 1)
         for time in (first, last)

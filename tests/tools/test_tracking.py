@@ -116,7 +116,11 @@ def test_who_is_too_weak_is_told(folder: Path) -> None:
     written(folder, pendulum(1.0, **bounds), "CMCTool")
     outcome = osimlite.run(folder / "setup.xml")
     told = dict(outcome.told)
-    assert not outcome.done and "missing: " in told["ended early"] and "at angle" in told["ended early"]
+    assert (
+        not outcome.done
+        and "missing: " in told["ended early"]
+        and "at angle" in told["ended early"]
+    )
 
 
 @pytest.mark.parametrize(

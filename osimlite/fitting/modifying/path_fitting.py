@@ -128,17 +128,17 @@ def _fit_path(
     tolerance: float,
 ) -> PathFit:
     """Fit the polynomial of one path."""
-    own = [k for k in free if np.nanmax(np.abs(arms[:, k])) > MIN_MOMENT_ARM_M] or free[:1]
-    good = np.isfinite(lengths) & np.isfinite(arms[:, own]).all(axis=1)
-    x = q[good][:, own]
+    varied = [k for k in free if np.nanmax(np.abs(arms[:, k])) > MIN_MOMENT_ARM_M] or free[:1]
+    good = np.isfinite(lengths) & np.isfinite(arms[:, varied]).all(axis=1)
+    x = q[good][:, varied]
     targets = lengths[good]
-    pulls = arms[good][:, own]
+    pulls = arms[good][:, varied]
     best: PathFit | None = None
     for order in ORDERS:
         powers = np.array(
-            [item for item in product(range(order + 1), repeat=len(own)) if sum(item) <= order]
+            [item for item in product(range(order + 1), repeat=len(varied)) if sum(item) <= order]
         )
-        if len(powers) > 0.5 * len(targets) * (1 + len(own)):
+        if len(powers) > 0.5 * len(targets) * (1 + len(varied)):
             break
         values, slopes = _compute_monomials(x, powers)
         matrix = np.vstack([values, *(-slope for slope in slopes)])
@@ -149,9 +149,9 @@ def _fit_path(
         length = off[: len(targets)]
         arm = off[len(targets) :]
         polynomial = MultivariatePolynomialFunction(
-            dimension=len(own), order=order, coefficients=tuple(coefficients.tolist())
+            dimension=len(varied), order=order, coefficients=tuple(coefficients.tolist())
         )
-        coordinate_paths = tuple(mechanism.coordinates[k].path for k in own)
+        coordinate_paths = tuple(mechanism.coordinates[k].path for k in varied)
         path = FunctionBasedPath(
             name=name, coordinate_paths=coordinate_paths, length_function=polynomial
         )

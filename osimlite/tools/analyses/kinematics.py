@@ -77,11 +77,13 @@ def write_body_kinematics(analysis: BodyKinematics, motion: Motion, tables: Anal
     selected = motion.find_indices(
         analysis.bodies, [*names, CENTER_OF_MASS], f"bodies of '{analysis.name}'"
     )
-    own = [index for index in selected if index < len(names)]
+    body_indices = [index for index in selected if index < len(names)]
     columns = [
-        f"{names[index]}_{what}" for index in own for what in ("X", "Y", "Z", "Ox", "Oy", "Oz")
+        f"{names[index]}_{what}"
+        for index in body_indices
+        for what in ("X", "Y", "Z", "Ox", "Oy", "Oz")
     ]
-    parts = [np.empty((3, len(motion.times), 0)), *(result[index] for index in own)]
+    parts = [np.empty((3, len(motion.times), 0)), *(result[index] for index in body_indices)]
     if len(names) in selected:
         parts.append(whole)
         columns += [f"{CENTER_OF_MASS}_{axis}" for axis in "XYZ"]
@@ -128,9 +130,11 @@ def write_point_kinematics(
         tables: writer of the tables.
     """
     mechanism = motion.mechanism
-    own = str(analysis.body_name)
+    body_name = str(analysis.body_name)
     beside = str(analysis.relative_to_body_name)
-    body, placed = mechanism.placement(motion.find_frame_path(own, *FRAME_SEARCH) or own)
+    body, placed = mechanism.placement(
+        motion.find_frame_path(body_name, *FRAME_SEARCH) or body_name
+    )
     result = np.array(
         motion.links.point(body, placed[:3, :3] @ np.array(analysis.point) + placed[:3, 3])
     )

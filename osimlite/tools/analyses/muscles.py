@@ -64,15 +64,17 @@ def _compute_tables(motion: Motion, muscles: list[Muscle]) -> dict[str, Array]:
     result: dict[str, Array] = {}
     tree = motion.model.tree()
     for cls in dict.fromkeys(map(type, muscles)):
-        own = [index for index, muscle in enumerate(muscles) if type(muscle) is cls]
-        paths = [tree.path_of(muscles[index]) or "" for index in own]
+        indices = [index for index, muscle in enumerate(muscles) if type(muscle) is cls]
+        paths = [tree.path_of(muscles[index]) or "" for index in indices]
         names = LAW_RECORDS if not motion.system.knows(paths[0], SPRING) else (*LAW_RECORDS, SPRING)
         with np.errstate(invalid="ignore", divide="ignore"):
             of_class = compute_quantities(
-                motion.read_records(paths, *names), [muscles[index] for index in own]
+                motion.read_records(paths, *names), [muscles[index] for index in indices]
             )
         for suffix, rows in of_class.items():
-            result.setdefault(suffix, np.empty((len(motion.times), len(muscles))))[:, own] = rows
+            result.setdefault(suffix, np.empty((len(motion.times), len(muscles))))[:, indices] = (
+                rows
+            )
     return result
 
 
@@ -97,8 +99,8 @@ def _add_moments(
         requested, [info.name for info in infos], f"coordinates of '{analysis.name}'"
     ):
         names = [muscle.name for muscle in muscles]
-        own = arms[:, :, index]
-        for what, result in (("MomentArm", own), ("Moment", own * tension)):
+        coordinate_arms = arms[:, :, index]
+        for what, result in (("MomentArm", coordinate_arms), ("Moment", coordinate_arms * tension)):
             title = f"{what}_{infos[index].name}"
             tables.add_table(title, title, names, result, description=MUSCLE_DESCRIPTION)
 

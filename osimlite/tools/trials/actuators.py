@@ -165,17 +165,19 @@ def measure_reserves(
         others: all tools of the trial.
     """
     table = tool.folder.read_table(file)
-    own = {name: column for column, name in actuators.reserves.items() if column in table.columns}
+    columns = {
+        name: column for column, name in actuators.reserves.items() if column in table.columns
+    }
     crossed = tool.folder.compute_once(
         ("crossed", tool.model_file), lambda: _find_crossed_coordinates(tool)
     )
-    wanted = [name for name in own if name in crossed]
+    wanted = [name for name in columns if name in crossed]
     if not actuators.muscles or not wanted:
         raise MissingInput(f"{tool} has no reserve actuators besides muscles")
     moments = _find_joint_moments(tool, table, others)
     judged = 0
     for name in wanted:
-        reserve = np.abs(table[own[name]])
+        reserve = np.abs(table[columns[name]])
         moment = moments.get(name)
         row = int(np.argmax(reserve))
         if moment is None or reserve[row] < MIN_RESERVE_NM:

@@ -137,12 +137,12 @@ def check_trial(
         )
     report = TrialReport(texts=SourceTexts(), unchecked=[*unchecked])
     findings: list[Finding] = []
-    for file, own in numbers.items():
+    for file, file_numbers in numbers.items():
         looked[str(file)] = None
         trial = Trial(
             str(file),
             Source.of_file(file).data,
-            own,
+            file_numbers,
             find_settings(str(file)).config_for(file, given),
         )
         findings += run_rules(trial).findings

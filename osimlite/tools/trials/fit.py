@@ -230,14 +230,14 @@ def _find_swapped_markers(
         )
 
     frames = np.unique(np.linspace(0, len(motion.times) - 1, SWAP_FRAMES).astype(int))
-    own = {frame: cost(frame) for frame in (worst, *frames.tolist())}
+    costs_in_order = {frame: cost(frame) for frame in (worst, *frames.tolist())}
     costs = {pair: cost(worst, pair) for pair in combinations(range(len(motion.markers)), 2)}
     one, other = min(costs, key=lambda pair: costs[pair])
-    if costs[one, other] < MAX_COST_RATIO * own[worst]:
+    if costs[one, other] < MAX_COST_RATIO * costs_in_order[worst]:
         better = [
             frame
             for frame in frames.tolist()
-            if cost(frame, (one, other)) < MAX_COST_RATIO * own[frame]
+            if cost(frame, (one, other)) < MAX_COST_RATIO * costs_in_order[frame]
         ]
         yield motion.markers[one], motion.markers[other], np.array(better or [worst])
 
@@ -328,12 +328,12 @@ def measure_filter(tool: TrialTool) -> Numbers:
     first, last = (min(max(time, motion.times[0]), motion.times[-1]) for time in tool.span)
     if tool.cutoff > 0.0:
         filtered = motion.lowpassed(tool.cutoff)
-        own = (motion.times >= first) & (motion.times <= last)
+        in_span = (motion.times >= first) & (motion.times <= last)
         worst, size, unit = "", 0.0, "deg"
         for index, info in enumerate(motion.mechanism.coordinates):
-            column = np.interp(motion.times[own], filtered.times, filtered.values[:, index])
+            column = np.interp(motion.times[in_span], filtered.times, filtered.values[:, index])
             lost = _to_display_unit(
-                info, float(np.sqrt(np.mean((column - motion.values[own, index]) ** 2)))
+                info, float(np.sqrt(np.mean((column - motion.values[in_span, index]) ** 2)))
             )
             if lost > size:
                 worst = info.name
@@ -368,12 +368,12 @@ def _measure_noise(motion: RecordedMotion, first: float, last: float) -> float |
         first: first time, s.
         last: last time, s.
     """
-    own = (motion.times >= first) & (motion.times <= last)
-    times = motion.times[own]
+    in_span = (motion.times >= first) & (motion.times <= last)
+    times = motion.times[in_span]
     if len(times) < 8 or times[-1] - times[0] < MIN_PERIODS / MAX_MOVEMENT_HZ:
         return None
     step = (times[-1] - times[0]) / (len(times) - 1)
-    values = motion.values[own]
+    values = motion.values[in_span]
     even = np.linspace(times[0], times[-1], len(times))
     if step > 0.5 / (1.5 * MAX_MOVEMENT_HZ):
         return None
@@ -382,7 +382,7 @@ def _measure_noise(motion: RecordedMotion, first: float, last: float) -> float |
     for index, info in enumerate(motion.mechanism.coordinates):
         if np.ptp(values[:, index]) < MIN_CHANGE[info.motion_type != "rotational"]:
             continue
-        acceleration = np.interp(even, times, motion.rates[1][own, index])
+        acceleration = np.interp(even, times, motion.rates[1][in_span, index])
         power = (
             np.abs(np.fft.rfft((acceleration - acceleration.mean()) * np.hanning(len(times)))) ** 2
         )

@@ -87,10 +87,10 @@ def compute_scale(tool: TrialTool) -> LoadScale:
         _, table, loads = read_loads(tool)
     except OsimliteError:
         return LoadScale()
-    own = (table.times >= tool.span[0]) & (table.times <= tool.span[1])
-    if not loads or not own.any():
+    in_span = (table.times >= tool.span[0]) & (table.times <= tool.span[1])
+    if not loads or not in_span.any():
         return LoadScale()
-    force = float(np.nanmax(np.linalg.norm(sum(load.force[own] for load in loads), axis=1)))
+    force = float(np.nanmax(np.linalg.norm(sum(load.force[in_span] for load in loads), axis=1)))
     try:
         motion = tool.motion
         up = _find_up(tool)
@@ -98,7 +98,7 @@ def compute_scale(tool: TrialTool) -> LoadScale:
         return LoadScale(force)
     selected = np.unique(np.linspace(0, len(motion.times) - 1, TIME_COUNT).astype(int))
     height = np.mean([motion.mechanism.center_of_mass(motion.values[row]) @ up for row in selected])
-    floor = [float(np.median(load.point[own] @ up)) for load in loads if load.point is not None]
+    floor = [float(np.median(load.point[in_span] @ up)) for load in loads if load.point is not None]
     return LoadScale(force, force * float(height - (min(floor) if floor else 0.0)))
 
 
@@ -116,18 +116,18 @@ def measure_feet(tool: TrialTool) -> Numbers:
     setup = load_subject(str(file), Config())
     bodies = [str(load.item.applied_to_body).rpartition("/")[2] for load in loads]
     known = {body.name.rpartition("/")[2] for body in motion.mechanism.bodies}
-    for load, own in zip(loads, bodies, strict=True):
-        others = {body for body in bodies if body != own} | {_mirror_name(own)}
+    for load, body_name in zip(loads, bodies, strict=True):
+        others = {body for body in bodies if body != body_name} | {_mirror_name(body_name)}
         others = {body for body in others if body in known}
-        if load.point is None or own not in known or not others:
+        if load.point is None or body_name not in known or not others:
             continue
-        away = _measure_distances(motion, table, load, [own, *sorted(others)])
+        away = _measure_distances(motion, table, load, [body_name, *sorted(others)])
         if away is None:
             continue
         wrong = away[:, 1:].min(axis=1) < away[:, 0]
         other = sorted(others)[int(np.argmin(away[:, 1:].mean(axis=0)))]
-        of = f"share of the time that the force '{load.item.name}' acts nearer to {other} than to {own}"
-        side = f"it acts {away[:, 0].mean():.2g} m from {own} and {away[:, 1:].min(axis=1).mean():.2g} m from {other}"
+        of = f"share of the time that the force '{load.item.name}' acts nearer to {other} than to {body_name}"
+        side = f"it acts {away[:, 0].mean():.2g} m from {body_name} and {away[:, 1:].min(axis=1).mean():.2g} m from {other}"
         at = None
         if isinstance(setup, Setup):
             item = next(
@@ -212,10 +212,10 @@ def measure_weight(tool: TrialTool) -> Numbers:
     )
     if len(inside) < 2 or times[inside[-1]] - times[inside[0]] < MIN_DURATION_S:
         raise MissingInput(f"no foot stands on a plate for {MIN_DURATION_S:g} s in {tool}")
-    own = slice(int(inside[0]), int(inside[-1]) + 1)
-    first = float(times[own][0])
-    last = float(times[own][-1])
-    mean = float(np.trapezoid(lift[own], times[own])) / (last - first)
+    in_span = slice(int(inside[0]), int(inside[-1]) + 1)
+    first = float(times[in_span][0])
+    last = float(times[in_span][-1])
+    mean = float(np.trapezoid(lift[in_span], times[in_span])) / (last - first)
     smooth = motion.lowpassed(tool.cutoff) if tool.cutoff > 0.0 else motion
     speeds = [_compute_rising_speed(smooth, time, up) for time in (first, last)]
     carried = mean / (gravity + (speeds[1] - speeds[0]) / (last - first))
