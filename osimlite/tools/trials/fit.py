@@ -137,7 +137,10 @@ def measure_written_errors(folder: TrialFolder, file: Path) -> Numbers:
     of = "the errors of the markers"
     rms = float(np.sqrt(np.mean(table["marker_error_RMS"] ** 2)))
     row = int(np.argmax(table["marker_error_max"]))
-    yield file, Measurement("marker-error", "rms", of, 100.0 * rms, "cm", at=folder.locate_row(file, 0))
+    yield (
+        file,
+        Measurement("marker-error", "rms", of, 100.0 * rms, "cm", at=folder.locate_row(file, 0)),
+    )
     peak = 100.0 * float(table["marker_error_max"][row])
     where = f"at {table.times[row]:g} s"
     yield (
@@ -318,7 +321,10 @@ def measure_tracking_errors(folder: TrialFolder, file: Path, tool: TrialTool | N
         )
         kind = "rms" if turning else "rms-translation"
         value = float(np.sqrt(np.mean(column**2)))
-        yield file, Measurement("tracking-error", kind, of, value, unit, at=folder.locate_row(file, 0))
+        yield (
+            file,
+            Measurement("tracking-error", kind, of, value, unit, at=folder.locate_row(file, 0)),
+        )
 
 
 def measure_filter(tool: TrialTool) -> Numbers:
