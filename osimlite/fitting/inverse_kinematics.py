@@ -154,6 +154,7 @@ def fit_motion(
             "different times; resample one of them"
         )
     if not data.names:
+        # Orientations say nothing about positions.
         mechanism = lock_translations(mechanism)
     names = tuple(weights)
     sensors = find_sensor_frames(model, mechanism, sensed) if sensed else {}

@@ -86,6 +86,7 @@ class ScaleFactorFinder:
             self.found.ratios[name] = ratio
             for body in measurement.body_scale_set.objects:
                 for axis in body.axes if self._is_known(body.name, f"measurement '{name}'") else ():
+                    # Other letters are ignored.
                     if axis.lower() in ("x", "y", "z"):
                         self.found.factors[body.name]["xyz".index(axis.lower())] = ratio
 

@@ -299,6 +299,7 @@ class _PersonFit:
         for _ in range(MAX_STEPS):
             matrix, slope = self._compute_normal_equations(here)
             while True:
+                # Levenberg-Marquardt: raise the damping until the cost falls.
                 step = -np.linalg.solve(matrix + damping * np.diag(np.diag(matrix)), slope)
                 sizes = np.clip(here.sizes + step[: self._sizes], MIN_FACTOR, MAX_FACTOR)
                 offsets = here.offsets.copy()
@@ -350,6 +351,7 @@ class _PersonFit:
         seen = np.asarray(np.isfinite(errors).all(axis=2))
         roots = np.sqrt(self._unit * self._chosen.weights)
         size = self._sizes + self._moved
+        # Derivatives of the marker positions: by sizes first, then by offsets.
         by = np.zeros((*errors.shape, size))
         by[..., : self._sizes] = columns
         for number, index in enumerate(self._free):
@@ -360,6 +362,7 @@ class _PersonFit:
         matrix[: self._sizes, : self._sizes] = self._prior.T @ self._prior
         slope[: self._sizes] = self._prior.T @ (self._prior @ here.sizes - self._wanted)
         far = here.offsets[self._free]
+        # Cauchy prior as iteratively reweighted least squares.
         pull = np.repeat(1.0 / (MARKER_OFFSET_M**2 + (far**2).sum(axis=1)), 3)
         np.fill_diagonal(matrix[self._sizes :, self._sizes :], pull)
         slope[self._sizes :] = pull * far.ravel()
@@ -369,6 +372,7 @@ class _PersonFit:
             rows = (scaled * by[frame, is_seen]).reshape(-1, size)
             # Errors that a change of the pose removes do not count: project them out.
             moved = (scaled * moves[is_seen]).reshape(len(rows), moves.shape[-1])
+            # Orthonormal directions in which a change of the pose moves the markers.
             squares, axes = np.linalg.eigh(moved.T @ moved)
             certain = squares > 1e-12 * squares.max(initial=1e-300)
             directions = moved @ (axes[:, certain] / np.sqrt(squares[certain]))

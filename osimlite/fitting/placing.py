@@ -84,6 +84,7 @@ def place_markers(
     averaged = data.positions[select_frames(data.times, first, last)]
     seen = np.asarray(np.isfinite(averaged).all(axis=2))
     selected = np.where(seen[..., None], averaged, 0.0)
+    # A marker that is never seen has NaN as its mean, and stays.
     with np.errstate(invalid="ignore"):
         target = dict(
             zip(data.names, selected.sum(axis=0) / seen.sum(axis=0)[:, None], strict=True)

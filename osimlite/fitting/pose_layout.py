@@ -274,6 +274,7 @@ def _find_allowed_interval(
         return ends
     result = []
     for end, side in zip(ends, (-1.0, 1.0), strict=True):
+        # Without a bound, look one turn (or 6.3 m) around the start.
         furthest = end if np.isfinite(end) else start + side * 2.0 * np.pi
         scan = np.linspace(start, furthest, SCAN_POINTS)
         outside = next((k for k, value in enumerate(scan.tolist()) if not is_inside(value)), None)
@@ -282,6 +283,7 @@ def _find_allowed_interval(
             continue
         inner = float(scan[outside - 1])
         outer = float(scan[outside])
+        # Bisect between the last value inside and the first outside.
         while abs(outer - inner) > 1e-15 * (1.0 + abs(inner)):
             middle = 0.5 * (inner + outer)
             if middle in (inner, outer):

@@ -154,6 +154,7 @@ def scale_inertia(body: Body, factors: Array, *, scales_mass: bool) -> None:
     elif _is_equal_factor(x, y) and _is_equal_factor(y, z):
         moments, products = moments * denser * (x * x), products * denser * (x * x)
     else:
+        # A cylinder of the same mass and moments: I_axis = m r²/2, I_side = m (l²/12 + r²/4).
         axis = int(np.argmin(moments))
         side = 1 if axis == 0 else 0
         radius = sqrt(max(2.0 * moments[axis] / mass, 0.0))

@@ -52,9 +52,11 @@ class Segments(NamedTuple):
         if symmetric:
             marked = {*marked, *(get_opposite_name(body, carriers) for body in marked)}
         first = {body: body for body in carriers}
+        # From the outermost bodies inwards: a body without markers joins the one that it carries.
         for body, carrier in reversed(list(carriers.items())):
             if carrier in first and carrier not in marked and first[carrier] == carrier:
                 first[carrier] = first[body] if first[body] in marked else carrier
+        # From the root outwards: the remaining bodies join their parents.
         for body, carrier in carriers.items():
             if first[body] not in marked and carrier in first:
                 first[body] = first[carrier]

@@ -104,6 +104,7 @@ class SelectedFrames:
         """
         distances = np.linalg.norm(positions - self.measured, axis=2)
         with np.errstate(all="ignore"):
+            # The median is robust against the outliers themselves.
             usual = np.array(
                 [
                     np.median(column[np.isfinite(column)]) if np.isfinite(column).any() else 0.0

@@ -142,6 +142,7 @@ def place_sensors(
         if isinstance(there, PhysicalOffsetFrame):
             there.orientation = angles
             continue
+        # OpenSim places the sensor of a body in its mass centre.
         centre = worn.mass_center if isinstance(worn, Body) else (0.0, 0.0, 0.0)
         frame = PhysicalOffsetFrame(
             name=name, socket_parent="..", translation=centre, orientation=angles

@@ -74,6 +74,7 @@ def find_undetermined(
         if constraints:
             rows += [item.acceleration_equations(state)[0] for item in mechanism.constraints]
         _, sizes, directions = np.linalg.svd(np.vstack(rows))
+        # The remaining right singular vectors span the motions that nothing measures.
         rank = int(np.sum(sizes > MIN_SINGULAR_VALUE))
         open_everywhere &= np.linalg.norm(directions[rank:], axis=0) > MIN_COMPONENT
     infos = zip(mechanism.coordinates, open_everywhere.tolist(), strict=True)

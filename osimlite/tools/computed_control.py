@@ -259,6 +259,7 @@ class ComputedControl:
                 return result
             stop = min(target, end)
             try:
+                # The integrator keeps its step size from window to window.
                 if stepper is None:
                     stepper = self.engine.stepper(t, list(y), settings, note)
                 stepper.table([stop])
@@ -301,6 +302,7 @@ class ComputedControl:
         state = self.engine.state
         q, u = np.array(state.values(y)), np.array(state.speeds(y))
         now, ahead = self.desired.evaluate(np.array([t, target]))
+        # The prediction adds the present deviation to the desired pose at the end of the window.
         self._corrections = np.stack([q - now[0], u - now[1]])
         errors = self.tasks.compute_errors(now, q, u)
         result.errors[t] = errors[0]
@@ -310,9 +312,11 @@ class ComputedControl:
         )
         z = np.array(y[self._first :])
         self._poses.clear()
+        # Forces that the actuators can reach by the end of the window.
         least = self._predict_forces(t, target, z, low)
         most = self._predict_forces(t, target, z, high)
         end = self._predict_state(target, z)
+        # A control that hardly changes its force has no unique value: keep the lower bound.
         high = np.where(most - least < MIN_FORCE_RANGE, low, high)
         q_end, u_end = np.array(state.values(end)), np.array(state.speeds(end))
         bounds = np.minimum(least, most), np.maximum(least, most)
@@ -332,6 +336,7 @@ class ComputedControl:
                 lambda x: self._predict_forces(t, target, z, x) - forces, low, high, TOLERANCE
             )
         else:
+            # Without states the forces are proportional to the controls.
             values = forces / self.sharing.optimal
         self._drive_window(t, target, values)
         for item, value in zip(self.controls, values.tolist(), strict=True):
@@ -435,6 +440,7 @@ class ComputedControl:
             h = min(step, target - time)
             if not held:
                 self._predict_poses((time, time + h / 3, time + h / 2, time + h), z)
+            # Stages of Kutta-Merson, with an error estimate from the embedded method.
             k1 = rate(time, z)
             k2 = rate(time + h / 3, z + h / 3 * k1)
             k3 = rate(time + h / 3, z + h / 6 * (k1 + k2))
@@ -443,6 +449,7 @@ class ComputedControl:
             new = z + h / 6 * (k1 + 4 * k4 + k5)
             off = h * np.abs(2 * k1 - 9 * k3 + 8 * k4 - k5) / 30
             error = float(np.sqrt(np.sum(off**2) / count))
+            # A step below 1 ns is accepted in any case, so that the prediction ends.
             if error <= PREDICTION_TOLERANCE or h < 1e-9:
                 time = target if h == target - time else time + h
                 z = new
@@ -469,6 +476,7 @@ class ComputedControl:
         self._corrections[:] = 0.0
         self._poses.clear()
         z = np.array(y[self._first :])
+        # Two rounds bring the states close to equilibrium at this control.
         small = np.full(len(self.controls), SETTLING_CONTROL)
         for _ in range(2):
             z = self._predict_auxiliary_states(start, start + SETTLING_TIME_S, z, small, held=True)

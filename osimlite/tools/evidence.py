@@ -115,6 +115,7 @@ def find_steps(loads: Path, up: int) -> dict[str, Steps]:
 
 def _detect_steps(times: Array, stands: Any) -> Steps:
     """Return strikes and toe-offs; merge phases that are shorter than `MIN_PHASE_S`."""
+    # Phases of stance and swing between the changes.
     changes = [0, *(np.flatnonzero(np.diff(stands)) + 1).tolist(), len(stands)]
     spans = [(first, last) for first, last in pairwise(changes) if last > first]
     kept: list[list[int]] = []
@@ -124,6 +125,7 @@ def _detect_steps(times: Array, stands: Any) -> Steps:
             kept[-1][1] = last
         else:
             kept.append([first, last])
+    # The first phase begins before the data, so it gives no event.
     strikes = tuple(float(times[first]) for first, _ in kept if stands[first] and first > 0)
     offs = tuple(float(times[first]) for first, _ in kept if not stands[first] and first > 0)
     return Steps(strikes, offs)

@@ -421,6 +421,7 @@ class _Schedule:
                 with open_process_pool(do, workers=workers, cluster=cluster) as pool:
                     while len(self.trials) < len(self.setups):
                         while (
+                            # Two setups for each worker: one runs while the other waits.
                             len(under_way) < 2 * pool.workers
                             and (setup := next(self.yield_ready(), None)) is not None
                         ):

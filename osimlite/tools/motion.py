@@ -50,7 +50,7 @@ class Motion:
     states: Array  # states (t, y), in the order of the simulation's engine
     # Start and ends of all steps, if the motion was integrated.
     steps: Sequence[Moment] = ()
-    # Returns the whole measured motion, of which this is a part.
+    # Returns the complete measured motion; this motion is a part of it.
     record: Callable[[], SpeedRecord] | None = None
     # By path of each muscle without an equilibrium at some times: mask of these times (t,), at
     # which its states are NaN.

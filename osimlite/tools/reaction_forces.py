@@ -56,6 +56,7 @@ class ConstraintForces:
             motion.times.tolist(), motion.values, motion.speeds, needed, strict=True
         ):
             state = mechanism.at(q, u, t)
+            # Rows of the constraint Jacobian G.
             blocks = [item.acceleration_equations(state)[0] for item in kept]
             rows = np.concatenate(blocks)[:, order].T
             # The mass matrix is singular if constraints drive massless bodies.
@@ -253,6 +254,7 @@ class JointWrenches:
             ):
                 force = wrench[3:]
                 here = forces.state.origins[body]
+                # All bodies between this one and ground carry the wrench as well.
                 while body != GROUND:
                     arm = here - links[body, LINK_WORK.ORIGIN : LINK_WORK.ORIGIN + 3]
                     about = np.concatenate([wrench[:3] + np.cross(arm, force), force])

@@ -117,6 +117,7 @@ def run(
     if check:
         away: dict[str, None] = {}
         report = merge_reports(_check_documents(str(file), away))
+        # OpenSim runs setups with some errors, and errors about replaced inputs do not matter.
         if errors := [
             e for e in report.errors if not (_is_run_by_opensim(e) or _is_about_any(e, replaced))
         ]:

@@ -364,6 +364,7 @@ class ForceDistribution:
             return self._compute_exact_forces(
                 t, q, u, columns, rest, lightness[np.ix_(followers, followers)], bounds
             )
+        # Squares of errors and of forces are minimized together, so weights enter by their roots.
         weights = np.sqrt(self.tasks.weights)
         share = math.sqrt(self.tasks.compute_force_weight(errors))
         # The acceleration errors are unknowns as well, and their squares are minimized together with

@@ -57,6 +57,7 @@ def _create_smooth_force(
     softness = [
         item.stiffness ** (-2.0 / 3.0) if item.stiffness else float("inf") for item in (one, other)
     ]
+    # The softer surface yields more, so its dissipation counts more.
     share = softness[0] / sum(softness)
 
     def mean(name: str) -> float:

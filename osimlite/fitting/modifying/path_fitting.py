@@ -138,11 +138,14 @@ def _fit_path(
         powers = np.array(
             [item for item in product(range(order + 1), repeat=len(varied)) if sum(item) <= order]
         )
+        # Twice as many equations as coefficients avoid overfitting.
         if len(powers) > 0.5 * len(targets) * (1 + len(varied)):
             break
         values, slopes = _compute_monomials(x, powers)
+        # Moment arms are the negative derivatives of the length.
         matrix = np.vstack([values, *(-slope for slope in slopes)])
         right = np.concatenate([targets, *pulls.T])
+        # Scaled columns make the least-squares problem well conditioned.
         sizes = np.linalg.norm(matrix, axis=0)
         coefficients = np.linalg.lstsq(matrix / sizes, right, 1e-12)[0] / sizes
         off = matrix @ coefficients - right

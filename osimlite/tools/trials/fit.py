@@ -172,6 +172,7 @@ def _read_fitted_motion(tool: TrialTool, file: Path) -> FittedMotion:
     names = data.find_shared_names(
         [*stations], {task.name: task.weight for task in tasks if task.weight > 0.0} or None
     )
+    # Find the frame of the markers that is nearest to each time of the motion.
     after = np.clip(np.searchsorted(data.times, recorded.times), 1, max(1, len(data.times) - 1))
     after = np.minimum(after, len(data.times) - 1)
     before = np.maximum(after - 1, 0)
@@ -388,6 +389,7 @@ def _measure_noise(motion: RecordedMotion, first: float, last: float) -> float |
     for index, info in enumerate(motion.mechanism.coordinates):
         if np.ptp(values[:, index]) < MIN_CHANGE[info.motion_type != "rotational"]:
             continue
+        # Resample evenly for the Fourier transform; a Hann window removes the ends.
         acceleration = np.interp(even, times, motion.rates[1][in_span, index])
         power = (
             np.abs(np.fft.rfft((acceleration - acceleration.mean()) * np.hanning(len(times)))) ** 2

@@ -218,6 +218,7 @@ def measure_weight(tool: TrialTool) -> Numbers:
     mean = float(np.trapezoid(lift[in_span], times[in_span])) / (last - first)
     smooth = motion.lowpassed(tool.cutoff) if tool.cutoff > 0.0 else motion
     speeds = [_compute_rising_speed(smooth, time, up) for time in (first, last)]
+    # Newton's second law over the interval: mean lift = m (g + change of speed / duration).
     carried = mean / (gravity + (speeds[1] - speeds[0]) / (last - first))
     of = f"the difference of the mass of the model, {mass:.4g} kg, from {carried:.4g} kg on the plates"
     where = f"mean from {first:.4g} to {last:.4g} s"
