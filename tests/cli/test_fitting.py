@@ -88,7 +88,7 @@ def test_a_trial_is_fitted(lab: Path) -> None:
         ),
         (
             ("scale", "box.osim", "walk.trc", "--distance", "b.XQ=one:two"),
-            "'XQ' of 'b' are no axes",
+            "'XQ' of 'b' are not axes",
         ),
     ],
 )
