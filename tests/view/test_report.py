@@ -168,5 +168,5 @@ def test_what_is_drawn_are_the_tables(trials: Path, loads: Path) -> None:
 
 
 def test_nothing_to_report_is_told(tmp_path: Path) -> None:
-    with pytest.raises(OsimliteError, match="none of the setups has a motion"):
+    with pytest.raises(OsimliteError, match="no setup has a motion"):
         report({"scale.xml": Outcome()}, tmp_path / "report.html")
