@@ -71,7 +71,7 @@ def run(
         say(f"Would apply {_count_fixes(count)}{_more(left)}.", err=True)
         return 2 if unread else int(count > 0)
     if fix or unsafe_fixes:
-        count, left, failed = _mend_all(files, given, unsafe=unsafe_fixes)
+        count, left, failed = _fix_files(files, given, unsafe=unsafe_fixes)
         say(f"Applied {_count_fixes(count)}{_more(left)}.", err=True)
     with progress_bar("checking", len(files)) as progress:
         report = check_files(files, given, cached=not no_cache, progress=progress)
@@ -123,7 +123,7 @@ def _check(source: Source, given: Config) -> Report:
     from osimlite.lint.engine import make_subject, run_rules
 
     assert source.file is not None
-    # No rule that is about measures mends anything.
+    # No rule about measures has a fix.
     return run_rules(
         make_subject(source, find_settings(source.file).config_for(source.file, given)),
         measure=False,
@@ -135,17 +135,17 @@ def _fail_on_of(files: list[str]) -> Severity:
     return find_settings(files[0]).fail_on or Severity.ERROR if files else Severity.ERROR
 
 
-def _fix_file(
+def _apply_fixes(
     source: Source, given: Config, unsafe: bool, put: Callable[[list[bytes | memoryview]], Source]
 ) -> tuple[Source, int, int]:
-    """A file once everything is mended, how many mends that took, and how many guesses are left.
+    """Return the fixed file, the number of fixes, and the number of remaining unsafe fixes.
 
-    `put` makes of the pieces of each round the source of the next.
+    `put` makes the source of the next round from the pieces of each round.
     """
     from osimlite.lint.fixes import apply_fixes_in_pieces
 
     total = left = 0
-    # A mend may bring another to light, as a misspelt set does with all that is in it.
+    # A fix can reveal further findings: a misspelt set hides the errors of its members.
     for _ in range(10):
         report = _check(source, given)
         pieces, count = apply_fixes_in_pieces(source, report, unsafe=unsafe)
@@ -157,13 +157,13 @@ def _fix_file(
     return source, total, left
 
 
-def _mend_all(files: list[str], given: Config, unsafe: bool) -> tuple[int, int, bool]:
-    """Mend files; how many mends that took, how many guesses are left, and whether it could not be done to some."""
+def _fix_files(files: list[str], given: Config, unsafe: bool) -> tuple[int, int, bool]:
+    """Fix files and return the number of fixes, the number of remaining unsafe fixes, and whether a file failed."""
     total = guesses = 0
     failed = False
     for path in files:
         try:
-            count, left = _mend(path, given, unsafe)
+            count, left = _fix_file(path, given, unsafe)
         except MissingFileError:
             continue  # The check that follows tells of it.
         except OsimliteError as error:
@@ -175,8 +175,8 @@ def _mend_all(files: list[str], given: Config, unsafe: bool) -> tuple[int, int, 
     return total, guesses, failed
 
 
-def _mend(path: str, given: Config, unsafe: bool) -> tuple[int, int]:
-    """Mend a file; how many mends that took, and how many guesses are left."""
+def _fix_file(path: str, given: Config, unsafe: bool) -> tuple[int, int]:
+    """Fix a file and return the number of fixes and of remaining unsafe fixes."""
     from osimlite.base.files import open_atomically
 
     def put(pieces: list[bytes | memoryview]) -> Source:
@@ -185,12 +185,12 @@ def _mend(path: str, given: Config, unsafe: bool) -> tuple[int, int]:
         pieces.clear()
         return _source(path)
 
-    _, count, left = _fix_file(_source(path), given, unsafe, put)
+    _, count, left = _apply_fixes(_source(path), given, unsafe, put)
     return count, left
 
 
 UNREADABLE = ("OSIM001", "OSIM801")
-"""Rules that find what is no XML, or no table: nothing else of such a file is checked or mended."""
+"""Rules for files that are not XML or not a table; nothing else of such a file is checked or fixed."""
 
 
 def _count_fixes(count: int) -> str:
@@ -202,11 +202,11 @@ def _more(left: int) -> str:
 
 
 def _show_diff(path: str, given: Config, unsafe: bool) -> tuple[int, int, bool]:
-    """Print what mending would change; how many mends that are, how many guesses are left, and if it cannot be read."""
+    """Print the changes of the fixes and return their number, that of unsafe ones, and whether the file is unreadable."""
     from osimlite.io.document.source import Source
 
     source = _source(path)
-    after, count, left = _fix_file(
+    after, count, left = _apply_fixes(
         source, given, unsafe, lambda pieces: Source(b"".join(pieces), source.file)
     )
     print_diff(source.text, after.text, path, path)

@@ -49,8 +49,8 @@ def upgrade(
     style = options.check_number_format(numbers)
     require_stated_version(Source.of_file(file))
     document = read_document(Source.of_file(file), of=Object)
-    mended = document.fault is not None
-    if document.version >= CURRENT_VERSION and output is None and not mended:
+    is_repaired = document.fault is not None
+    if document.version >= CURRENT_VERSION and output is None and not is_repaired:
         say(f"{file}: already version {document.version}, nothing to do")
         return
     target = output or file.with_name(f"{file.stem}_{CURRENT_VERSION}{file.suffix or '.osim'}")

@@ -1,4 +1,4 @@
-"""Findings of the linter as an editor shows them, with their mends."""
+"""Findings of the linter as an editor shows them, with their fixes."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def _offsets(analysis: Analysis, finding: Finding) -> tuple[int, int]:
 
 
 def actions(analysis: Analysis, uri: str, wanted: types.Range) -> list[types.CodeAction]:
-    """What can be done about the findings in a range: their mends, and to ignore them; and to mend all of the file."""
+    """Return the actions for the findings in a range: fix them, ignore them, or fix everything in the file."""
     result: list[types.CodeAction] = []
     if not analysis.is_checked:
         # The editor asks again when it is told of the findings.
