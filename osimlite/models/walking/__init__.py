@@ -50,7 +50,7 @@ def write_scenario(folder: Path) -> Path:
     """Write the human and the scenario into a folder, to be run and changed; the path of the scenario.
 
     Raises:
-        SettingError: one is there already, and not as it comes.
+        SettingError: a changed copy exists already.
         OsimliteError: they cannot be written.
     """
     make_folder(folder)
@@ -62,7 +62,7 @@ def write_scenario(folder: Path) -> Path:
     for path, content in files.items():
         if path.exists() and read_file(path) != content:
             raise SettingError(
-                f"'{path}' is there already, and changed: run '{folder / SCENARIO}.scone', or take another folder"
+                f"'{path}' exists already and has changes: run '{folder / SCENARIO}.scone', or name another folder"
             )
     for path, content in files.items():
         write_atomically(path, content)

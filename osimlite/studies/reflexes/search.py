@@ -84,7 +84,7 @@ def search_parameters(
     path = Path(folder) / BEST
     if not resume and path.exists():
         raise SettingError(
-            f"'{path}' is there already: go on with it (--resume), or take another folder"
+            f"'{path}' exists already: continue it with --resume, or name another folder"
         )
     best, least = np.array([each.mean for each in own]), np.inf
     if resume:

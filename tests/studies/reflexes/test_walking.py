@@ -85,7 +85,7 @@ def test_a_scenario_that_somebody_changed_is_kept(tmp_path) -> None:
         path = tmp_path / name
         before = path.read_bytes()
         path.write_bytes(before + b" ")
-        with pytest.raises(OsimliteError, match=f"{name}' is there already, and changed"):
+        with pytest.raises(OsimliteError, match=f"{name}' exists already and has changes"):
             write_scenario(tmp_path)
         assert path.read_bytes() == before + b" "
         path.write_bytes(before)
@@ -130,7 +130,7 @@ def test_an_arm_holds_a_weight(arm, tmp_path) -> None:
     assert {
         name: best for name, (best, _, _) in read_par(tmp_path / "out" / "best.par").items()
     } == found
-    with pytest.raises(OsimliteError, match=r"best\.par' is there already: go on with it"):
+    with pytest.raises(OsimliteError, match=r"best\.par' exists already: continue it"):
         search_parameters(Scenario(arm), tmp_path / "out", generations=1, population=8)
     text = (tmp_path / "out" / "best.par").read_text()
     (tmp_path / "out" / "best.par").write_text(text.replace("elbow.KP", "elbow.KQ"))
