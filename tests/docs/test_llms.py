@@ -37,7 +37,7 @@ def test_every_page_is_listed_with_its_first_sentence() -> None:
         > 30
     )
     assert {match[2] for match in result} == {page.file.src_uri for page in nav.pages}
-    assert "- [Rules](rules.md): What `osimlite validate` looks for.\n" in text
+    assert "- [Rules](rules.md): The rules of `osimlite validate`.\n" in text
     assert not [match[0] for match in result if len(match[3]) > 400 or "](" in match[3]]
     # A page begins with a sentence about itself, and not with what follows an example or a table.
     assert not [
