@@ -22,7 +22,7 @@ import numpy as np
 from scipy.optimize import least_squares  # type: ignore[import-untyped]
 
 import osimlite
-from osimlite.simulation.properties import places
+from osimlite.simulation.properties import find_properties
 
 MODEL = Path(__file__).resolve().parents[2] / "shared/corpus/models/m0001/arm26.osim"
 MUSCLES = "TRIlong", "BIClong", "BRA"
@@ -49,16 +49,18 @@ class Fit:
     def __init__(self, model: Any, tangents: Any, initial: Any, accuracy: float = ACCURACY) -> None:
         self.model, self.tangents = model.copy_deep(), tangents
         self._setters = [
-            place.setter(self.model) for name in NAMES for place in places(self.model, name)
+            place.make_setter(self.model)
+            for name in NAMES
+            for place in find_properties(self.model, name)
         ]
-        self._true = np.array([setter.get() for setter in self._setters])
+        self._true = np.array([setter.get_value() for setter in self._setters])
         self._choices = {"accuracy": accuracy, "controls": CONTROLS, "initial": initial}
         self.motions, self.measured = 0, np.zeros(0)
 
     def _put(self, factors: Any) -> None:
         self.motions += 1
         for setter, value in zip(self._setters, (factors * self._true).tolist(), strict=True):
-            setter.put(value)
+            setter.set_value(value)
 
     def angles(self, factors: Any) -> Any:
         """Residuals in standard deviations of the noise."""

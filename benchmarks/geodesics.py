@@ -110,7 +110,7 @@ def cost(paths: osimlite.simulation.paths.Paths, poses: list[Ends]) -> float:
     for _ in range(5):
         begin = time.process_time()
         for q in poses:
-            paths.system.measured(q, still, 0)
+            paths.system.measure_paths(q, still, 0)
         times.append((time.process_time() - begin) / len(poses))
     return 1e6 * min(times)
 

@@ -181,8 +181,8 @@ def our_motion(
     def motion() -> tuple[Any, float, int]:
         settings = Settings(accuracy=accuracy, integrator=integrator)
         began = time.process_time()
-        stepper = simulation.engine.stepper(0.0, start, settings, lambda t, y: None)
-        stepper.table([TO])
+        stepper = simulation.engine.make_stepper(0.0, start, settings, lambda t, y: None)
+        stepper.tabulate([TO])
         took = time.process_time() - began
         return (
             np.array(stepper.state if stepper.ended is None else [np.nan] * len(start)),

@@ -204,7 +204,7 @@ class Legs:
         swing = 1 - standing
         passed = 0.0
         # Both feet push until the one behind leaves the ground.
-        if self.engine.touching(0.0, y.tolist()) >> swing & 1:
+        if self.engine.find_touching_contacts(0.0, y.tolist()) >> swing & 1:
             runs = self._run(y, None, 0.5, [Watch("lift", contact=feet[swing], stops=-1)])
             y, passed = runs.states[0], float(runs.times[0])
         # The rate of the leg, as far as it moves the hip: its foot may slip a little.

@@ -144,7 +144,7 @@ def timed(model: Model, mechanism: Mechanism) -> dict[str, float | None]:
                 continue
             stack.callback(made.close)
             state = made.state.pack(q.tolist(), u.tolist())
-            calls[way] = partial(made.derivative, 0.0, state)
+            calls[way] = partial(made.compute_derivative, 0.0, state)
         calls["OpenSim"] = theirs(model, q, u)
         return medians(calls)
 

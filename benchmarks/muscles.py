@@ -223,7 +223,7 @@ def equilibria(simulation: Simulation) -> Callable[[], None]:
 
     def run() -> None:
         for y in states:
-            engine.equilibrated(0.0, y)
+            engine.equilibrate_muscles(0.0, y)
 
     return run
 

@@ -49,10 +49,10 @@ def measured(
         copies = Copies(scenario.model, len(start), scenario.step, accuracy, method)
         took = []
         for _ in range(TIMES if accuracy > 1e-10 else 1):
-            copies.put(slice(None), start)
+            copies.set_states(slice(None), start)
             before = time.process_time()
             for step in range(steps):
-                copies.step(rows[first + step])
+                copies.step_all(rows[first + step])
             took.append(time.process_time() - before)
         result = copies.states[:, : 2 * size].copy()
         copies.close()

@@ -295,7 +295,7 @@ def quantities(
     """
     from osimlite.base.text import suggest_name
     from osimlite.errors import ModelError, OsimliteError, SettingError
-    from osimlite.simulation.initial_state import in_units_of, suspect_value
+    from osimlite.simulation.initial_state import convert_value, describe_suspect_value
 
     result = {}
     form = "COORDINATE=VALUE with a number such as 0.5 or 30deg"
@@ -304,10 +304,10 @@ def quantities(
             if name in states:
                 result[name] = float(text)
                 continue
-            result[name] = in_units_of(mechanism, name, text)
+            result[name] = convert_value(mechanism, name, text)
             # A speed has no range.
             info = mechanism.coordinates[mechanism.coordinate_index(name)]
-            if option == "--set" and (odd := suspect_value(info, name, text)):
+            if option == "--set" and (odd := describe_suspect_value(info, name, text)):
                 raise SettingError(f"{option}: {odd} (if not, write {text.strip()}rad)")
         except ModelError as error:
             # The model is as it should be; it is the command that asks for what is not there.

@@ -97,7 +97,7 @@ def make_plan(
     import warnings
 
     from osimlite.errors import SettingError, UnitWarning
-    from osimlite.simulation.run_controls import words_to_controls
+    from osimlite.simulation.run_controls import parse_controls
     from osimlite.studies.sweep.variables import parse_ranges
 
     ranges = parse_ranges(vary or [])
@@ -111,7 +111,7 @@ def make_plan(
                 source,
                 ranges,
                 parameter,
-                controls=words_to_controls(controls or []),
+                controls=parse_controls(controls or []),
                 **levels,
                 **choices,
             )

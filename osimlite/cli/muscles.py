@@ -107,7 +107,7 @@ def muscles(
                 folder=path.parent,
                 progress=advance,
             )
-        result[str(path)] = curves if muscle else curves.of(curves.crossing)
+        result[str(path)] = curves if muscle else curves.select_muscles(curves.crossing)
     first, *others = result.values()
     if not first.muscles:
         raise ModelError(
@@ -136,7 +136,7 @@ def _sample_coordinates(
     from math import isfinite
 
     from osimlite.errors import ModelError, SettingError
-    from osimlite.simulation.initial_state import in_units_of, suspect_value
+    from osimlite.simulation.initial_state import convert_value, describe_suspect_value
 
     result = {}
     for word in words:
@@ -155,9 +155,9 @@ def _sample_coordinates(
                     f"--coordinate takes NAME=LOW:HIGH, such as {name}=-120deg:0, got '{word}'"
                 )
             for part in parts:
-                if odd := suspect_value(info, name, part):
+                if odd := describe_suspect_value(info, name, part):
                     raise SettingError(f"--coordinate: {odd} (if not, write {part.strip()}rad)")
-            low, high = (in_units_of(mechanism, name, part) for part in parts)
+            low, high = (convert_value(mechanism, name, part) for part in parts)
         if equals and low > high:
             raise SettingError(f"--coordinate takes the lower end of the range first, got '{word}'")
         if not (isfinite(low) and isfinite(high) and low < high):
@@ -182,7 +182,7 @@ def _common(first: MuscleCurves, second: MuscleCurves) -> tuple[MuscleCurves, Mu
     if alone:
         say(f"in one model only: {join_words(alone)}")
     one, other = (
-        curves.of([own.index(name) for name in both])
+        curves.select_muscles([own.index(name) for name in both])
         for curves, own in zip((first, second), names, strict=True)
     )
     return one, other
@@ -216,7 +216,7 @@ def _print(curves: Sequence[MuscleCurves], file: Path, compare: Path | None) -> 
             if label.endswith("(mm)")
             else (1.0, ".0f" if label.endswith("(N)") else ".3f")
         )
-        low, high = first.bounds(name)
+        low, high = first.get_bounds(name)
         if others:
             low = high = np.fmax.reduce(np.abs(others[0].columns[name] - first.columns[name]))
         columns.append(

@@ -73,7 +73,7 @@ def simulate(
         raise SettingError(f"'{results}' has the earlier simulation; name another folder with -o")
     model, feedback = read(file), options.feedback(controller, par)
     if controls:
-        from osimlite.simulation.run_controls import words_to_controls
+        from osimlite.simulation.run_controls import parse_controls
     from osimlite.simulation.run import Simulation
     from osimlite.simulation.trajectory import Interrupted
 
@@ -84,7 +84,7 @@ def simulate(
         show=gui,
         **chosen,
     ) as simulation:
-        initial = {} if states is None else simulation.state_in(states)
+        initial = {} if states is None else simulation.read_state(states)
         initial |= options.quantities(start, simulation.mechanism, "--set", simulation.state.paths)
         speeds = options.quantities(start_speed, simulation.mechanism, "--set-speed")
         try:
@@ -96,7 +96,7 @@ def simulate(
                     else chosen["fixed_step"],
                     initial=initial,
                     initial_speeds=speeds,
-                    controls=words_to_controls(controls) if controls else None,
+                    controls=parse_controls(controls) if controls else None,
                     controller=feedback,
                     progress=progress,
                 )

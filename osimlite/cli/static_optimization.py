@@ -77,6 +77,6 @@ def static_optimization(
     )
     assert found.motion is not None
     say_motion(found.motion, found.write(options.results_folder(file, output)))
-    if said := found.unsolved():
+    if said := found.describe_unsolved():
         complain(said)
         raise SystemExit(1)

@@ -19,9 +19,9 @@ from osimlite.mechanics.kernels.linear_algebra import REDUNDANT
 from osimlite.mechanics.kernels.pointers import Law
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.spatial import Array
-from osimlite.simulation.constrained import kept_state
-from osimlite.simulation.engines.linking import PYTHON, Program
-from osimlite.simulation.pack import Packed
+from osimlite.simulation.constrained import find_consistent_state
+from osimlite.simulation.engines.linking import PYTHON_CODE, Program
+from osimlite.simulation.pack import PackedModel
 from osimlite.simulation.states import StateLayout
 
 TESTED_POSES = 3
@@ -40,7 +40,7 @@ def list_position_equations(structure: Sequence[int]) -> list[int]:
 
 
 def find_independent_equations(
-    mechanism: Mechanism, packed: Packed, state: StateLayout
+    mechanism: Mechanism, packed: PackedModel, state: StateLayout
 ) -> list[int]:
     """Find the largest set of independent constraint equations, in poses that fulfil the constraints.
 
@@ -52,7 +52,7 @@ def find_independent_equations(
     Raises:
         SimulationError: no pose fulfils the constraints.
     """
-    ints = Program(packed, PYTHON).ints
+    ints = Program(packed, PYTHON_CODE).ints
     size = len(packed.order)
     ints[MODEL.CONTROLS] = 0
     count = int(ints[ints[MODEL.CONSTRAINED] + CONSTRAINED.EQUATIONS])
@@ -63,7 +63,7 @@ def find_independent_equations(
     start = np.array([info.default_value for info in infos])
     for number in range(TESTED_POSES):
         q = start + (0.05 * rng.normal(size=len(start)) if number else 0.0)
-        values, speeds = kept_state(mechanism, q.tolist(), [0.0] * len(infos), (), ())
+        values, speeds = find_consistent_state(mechanism, q.tolist(), [0.0] * len(infos), (), ())
         y = np.array(state.pack(values.tolist(), speeds.tolist()))
         w = np.zeros(int(ints[MODEL.WORK_SIZE]))
         f = np.zeros(len(y))

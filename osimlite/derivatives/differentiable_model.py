@@ -16,11 +16,11 @@ from osimlite.mechanics.multibody import build_mechanism
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.model import Model
-from osimlite.simulation.constrained import kept_state
+from osimlite.simulation.constrained import find_consistent_state
 from osimlite.simulation.elements import Forces, force_elements
 from osimlite.simulation.elements.probe_type import DeclaredProbe
-from osimlite.simulation.pack import Packed, pack
-from osimlite.simulation.states import StateLayout, in_model_order
+from osimlite.simulation.pack import PackedModel, pack
+from osimlite.simulation.states import StateLayout, sort_by_component
 
 
 class DifferentiableModel:
@@ -58,7 +58,7 @@ class DifferentiableModel:
         self.parameters = tuple(parameters)
         self.mechanism: Mechanism = build_mechanism(model)
         self.forces = self._collect_forces(model, self.mechanism)
-        self._packed: Packed = pack(self.mechanism, self.forces, apart=self._apart)
+        self._packed: PackedModel = pack(self.mechanism, self.forces, apart=self._apart)
         self._state = StateLayout(self.mechanism, self._packed.order, self.forces.elements)
         infos = self.mechanism.coordinates
         own = [
@@ -69,18 +69,18 @@ class DifferentiableModel:
         moving = len(own)
         paths = self._state.paths
         self.coordinates = tuple(
-            path.rpartition("/")[0] for path in in_model_order(model, own[: moving // 2])
+            path.rpartition("/")[0] for path in sort_by_component(model, own[: moving // 2])
         )
         values, speeds = (
             [f"{path}/{what}" for path in self.coordinates] for what in ("value", "speed")
         )
-        self.states = (*values, *speeds, *in_model_order(model, paths))
+        self.states = (*values, *speeds, *sort_by_component(model, paths))
         self.system_states = (*own, *paths)
         names = {name: place for place, name in enumerate(self.system_states)}
         self.state_indices = [names[name] for name in self.states]
         self.controls = self.forces.controls.names
         self.u = np.zeros(len(self.controls))
-        start, rates = kept_state(
+        start, rates = find_consistent_state(
             self.mechanism,
             [i.default_value for i in infos],
             [i.default_speed for i in infos],

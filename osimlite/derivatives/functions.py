@@ -23,8 +23,8 @@ from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.model import Model, expect_model
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.probe_type import DeclaredProbe
-from osimlite.simulation.pack import Packed, pack
-from osimlite.simulation.states import in_model_order
+from osimlite.simulation.pack import PackedModel, pack
+from osimlite.simulation.states import sort_by_component
 
 if TYPE_CHECKING:
     from osimlite.derivatives.symbolic_evaluator import SymbolicEvaluator, SymbolicWorkspace
@@ -119,7 +119,7 @@ class CasadiModel(DifferentiableModel):
 
         infos = mechanism.coordinates
         moving = [k for k, info in enumerate(infos) if not info.locked]
-        paths = in_model_order(model, [f"{infos[k].path}/value" for k in moving])
+        paths = sort_by_component(model, [f"{infos[k].path}/value" for k in moving])
         places = {f"{infos[k].path}/value": k for k in moving}
         return WrappedPaths(
             mechanism, super()._collect_forces(model, mechanism), [places[path] for path in paths]
@@ -567,7 +567,7 @@ class CasadiModel(DifferentiableModel):
         return [*written, folder / "model.c", folder / "model.h", folder / "model.json"]
 
 
-def _list_fixed_numbers(mechanism: Mechanism, packed: Packed) -> tuple[Array, Array]:
+def _list_fixed_numbers(mechanism: Mechanism, packed: PackedModel) -> tuple[Array, Array]:
     """Return the numbers of stations and frames that do not depend on the state.
 
     Returns:

@@ -27,8 +27,8 @@ from osimlite.simulation.elements.force_type import DeclaredForce
 from osimlite.simulation.elements.geometries.path import PATH
 from osimlite.simulation.elements.geometries.sphere_on_plane import SPHERE_ON_PLANE
 from osimlite.simulation.elements.probe_type import DeclaredProbe
-from osimlite.simulation.engines.dual_numbers import Carrying
-from osimlite.simulation.pack import Packed
+from osimlite.simulation.engines.dual_numbers import DualNumber
+from osimlite.simulation.pack import PackedModel
 
 if TYPE_CHECKING:
     from osimlite.derivatives.symbolic_evaluator import SymbolicWorkspace
@@ -41,7 +41,7 @@ AXES = "xyz"
 
 
 def locate_stations(
-    mechanism: Mechanism, packed: Packed
+    mechanism: Mechanism, packed: PackedModel
 ) -> list[tuple[str, int, tuple[float, ...]]]:
     """Return path, link and point in the link (3,) of each station."""
     places = Places(mechanism, {}, packed.placements)
@@ -51,7 +51,7 @@ def locate_stations(
     ]
 
 
-def locate_frames(mechanism: Mechanism, packed: Packed) -> dict[str, tuple[int, list[float]]]:
+def locate_frames(mechanism: Mechanism, packed: PackedModel) -> dict[str, tuple[int, list[float]]]:
     """Return link, and axes and origin in the link (12,), of each frame by its path."""
     places = Places(mechanism, {}, packed.placements)
     return {
@@ -60,7 +60,7 @@ def locate_frames(mechanism: Mechanism, packed: Packed) -> dict[str, tuple[int, 
     }
 
 
-def list_probe_items(packed: Packed, elements: Sequence[Any]) -> list[int]:
+def list_probe_items(packed: PackedModel, elements: Sequence[Any]) -> list[int]:
     """Return the items of all probes."""
     return [
         place
@@ -104,7 +104,7 @@ def compute_frame_columns(
 
 def compute_output_columns(
     mechanism: Mechanism,
-    packed: Packed,
+    packed: PackedModel,
     forces: Forces,
     workspace: Workspace,
     points: Sequence[Any],
@@ -168,7 +168,7 @@ def compute_output_columns(
 
 
 def _compute_mass_center(
-    mechanism: Mechanism, packed: Packed, workspace: Workspace
+    mechanism: Mechanism, packed: PackedModel, workspace: Workspace
 ) -> tuple[list[Any], list[Any]]:
     """Compute position and velocity of the mass centre of all bodies.
 
@@ -202,13 +202,13 @@ def _compute_mass_center(
         center = [a + mass * b for a, b in zip(center, place, strict=True)]
         rate = [a + mass * b for a, b in zip(rate, moves, strict=True)]
     # A symbolic mass is neither a float nor a dual number.
-    if isinstance(total, (float, Carrying)) and float(total) == 0.0:
+    if isinstance(total, (float, DualNumber)) and float(total) == 0.0:
         total = nan
     return [a / total for a in center], [a / total for a in rate]
 
 
 def _list_contact_values(
-    packed: Packed, forces: Forces, workspace: Workspace
+    packed: PackedModel, forces: Forces, workspace: Workspace
 ) -> list[tuple[str, Any]]:
     """Return labels and values of force and point of each contact, the first entries of its record."""
     pairs: list[tuple[str, int]] = []
@@ -234,7 +234,7 @@ def _list_contact_values(
 
 
 def compute_path_columns(
-    packed: Packed, forces: Forces, workspace: SymbolicWorkspace
+    packed: PackedModel, forces: Forces, workspace: SymbolicWorkspace
 ) -> tuple[list[str], Any, Any]:
     """Compute the geometry of all paths with a force.
 

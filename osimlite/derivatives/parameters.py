@@ -11,7 +11,7 @@ from osimlite.base.text import suggest_name
 from osimlite.errors import OsimliteError, SettingError, UnsupportedError
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.model import Model
-from osimlite.simulation.properties import Setter, places, spellings
+from osimlite.simulation.properties import PropertySetter, find_properties, list_property_paths
 
 LINEARITY_TOLERANCE = 1e-11
 """Largest deviation from a linear function, relative to the largest part of the number."""
@@ -113,7 +113,7 @@ class Parameters:
         """Set the values of all parameters in the model."""
         for setters, value in zip(self._setters, values.tolist(), strict=True):
             for setter in setters:
-                setter.put(value)
+                setter.set_value(value)
 
 
 def read_parameter(model: Model, name: str) -> float:
@@ -125,19 +125,19 @@ def read_parameter(model: Model, name: str) -> float:
     return _read_value(name, _find_setters(model, name))
 
 
-def _find_setters(model: Model, name: str) -> list[Setter]:
+def _find_setters(model: Model, name: str) -> list[PropertySetter]:
     """Return the setters of all numbers that a path stands for."""
-    setters = [place.setter(model) for place in places(model, name)]
+    setters = [place.make_setter(model) for place in find_properties(model, name)]
     if not setters:
         raise SettingError(
-            f"the model has no number '{name}'{suggest_name(name, spellings(model))}"
+            f"the model has no number '{name}'{suggest_name(name, list_property_paths(model))}"
         )
     return setters
 
 
-def _read_value(name: str, setters: Sequence[Setter]) -> float:
+def _read_value(name: str, setters: Sequence[PropertySetter]) -> float:
     """Return the common value of the numbers that a path stands for."""
-    values = {setter.get() for setter in setters}
+    values = {setter.get_value() for setter in setters}
     if len(values) > 1:
         raise SettingError(f"'{name}' stands for numbers that differ; name them one by one")
     return values.pop()

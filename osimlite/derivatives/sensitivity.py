@@ -26,13 +26,13 @@ from osimlite.io.tables.tabular import Tabular
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.model import Model, expect_model
 from osimlite.simulation.engines.protocol import Settings
-from osimlite.simulation.initial_state import starting
-from osimlite.simulation.options import PER_RUN
-from osimlite.simulation.properties import places
+from osimlite.simulation.initial_state import resolve_initial_values
+from osimlite.simulation.options import RUN_OPTIONS
+from osimlite.simulation.properties import find_properties
 from osimlite.simulation.run import Simulation
 from osimlite.simulation.trajectory import Trajectory
 
-OPTIONS = {*PER_RUN, "folder"} - {"fixed_step", "integrator", "controller", "resume"}
+OPTIONS = {*RUN_OPTIONS, "folder"} - {"fixed_step", "integrator", "controller", "resume"}
 """Options of `simulate` that keep the motion one of the model's rates, in steps of Merson's method."""
 DEFAULT_ACCURACY = 1e-6
 """Accuracy if the caller sets none."""
@@ -163,7 +163,7 @@ def sensitivity(
         trajectory = simulation.run(
             to, **{name: choices[name] for name in choices if name != "folder"}
         )
-        _, _, held = starting(
+        _, _, held = resolve_initial_values(
             simulation.mechanism,
             _select_coordinate_values(simulation, choices),
             choices.get("initial_speeds") or {},
@@ -219,7 +219,9 @@ class _SensitivityRun:
         own = [*moving, *simulation.state.paths]
         self._places = [own.index(name) for name in tangent_model.states]
         count = len(tangent_model.parameters)
-        self._steps = tangent_model.steps(engine.driving, np.eye(count, count + len(initial)))
+        self._steps = tangent_model.steps(
+            engine.current_controls, np.eye(count, count + len(initial))
+        )
 
     def sort_states(self, trajectory: Trajectory) -> Array:
         """Return the motion (n, x) in the order of the tangents."""
@@ -228,13 +230,13 @@ class _SensitivityRun:
     def _pack_rows(self, trajectory: Trajectory) -> Array:
         """Return the motion (n, x) in the order of the simulation."""
         auxiliary = trajectory.auxiliary
-        return self._simulation.state.rows(trajectory.values, trajectory.speeds, auxiliary)
+        return self._simulation.state.pack_rows(trajectory.values, trajectory.speeds, auxiliary)
 
     def compute_rows(self, trajectory: Trajectory, accuracy: float) -> Array:
         """Compute the derivatives (n, x, k) at the times of the motion."""
         start = self._pack_rows(trajectory)[0].tolist()
         wanted = trajectory.times.tolist()
-        times, states, ended = self._simulation.every_step(
+        times, states, ended = self._simulation.record_every_step(
             0.0, start, wanted[-1], Settings(accuracy)
         )
         if ended is not None:
@@ -287,10 +289,10 @@ class _SensitivityRun:
         Raises:
             SettingError: they differ.
         """
-        wanted = np.array(self._engine.derivative(t, y))[self._places]
+        wanted = np.array(self._engine.compute_derivative(t, y))[self._places]
         state = np.asarray(y)[self._places]
         found, _ = self._tangent_model.along(
-            t, state, self._engine.controls(), np.zeros((len(state), 0))
+            t, state, self._engine.read_controls(), np.zeros((len(state), 0))
         )
         off = np.abs(found - wanted)
         if not np.all(off <= RATE_TOLERANCE * max(1.0, np.abs(wanted).max(initial=0.0))):
@@ -371,7 +373,7 @@ def _check_not_initial(model: Model, tangent_model: TangentModel, name: str) -> 
     Raises:
         SettingError: it is one.
     """
-    for place in places(model, name):
+    for place in find_properties(model, name):
         what = str(place.steps[0])
         state = f"{place.component}/{what.removeprefix('default_').removesuffix('_value')}"
         if what.startswith("default_") and state in tangent_model.states:

@@ -21,8 +21,8 @@ from osimlite.mechanics.kernels.pointers import call, register_law
 from osimlite.mechanics.multibody.functions import Function
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.geometries.load import Load, evaluate_load
-from osimlite.simulation.engines.linking import PYTHON, Program
-from osimlite.simulation.pack import Packed
+from osimlite.simulation.engines.linking import PYTHON_CODE, Program
+from osimlite.simulation.pack import PackedModel
 
 WRAPPED_PATH_REASON = "its path runs around surfaces; replace it by a fitted FunctionBasedPath"
 """Reason and remedy for paths around surfaces."""
@@ -65,7 +65,7 @@ class SymbolicEvaluator:
 
     def __init__(
         self,
-        packed: Packed,
+        packed: PackedModel,
         forces: Forces,
         numbers: Sequence[Any],
         t: Any,
@@ -95,7 +95,7 @@ class SymbolicEvaluator:
                     else "it is computed in Python"
                 )
                 raise UnsupportedError(f"'{self._path(place)}' has no formula for CasADi: {reason}")
-        self.structure: list[int] = Program(packed, PYTHON).ints.tolist()
+        self.structure: list[int] = Program(packed, PYTHON_CODE).ints.tolist()
         for place, law_address in given.items():
             self.structure[place + ITEM.LAW] = law_address
         # The controls are arguments, so that the model's controllers are switched off.

@@ -29,10 +29,10 @@ from osimlite.schema.model import Model, expect_model
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.controls import Controls
 from osimlite.simulation.elements.laws import DIRECTIONS
-from osimlite.simulation.engines.dual_numbers import Carrying, DualVector, carried_by
+from osimlite.simulation.engines.dual_numbers import DualNumber, DualVector, make_dual
 from osimlite.simulation.engines.linking import Program, Tangents
 from osimlite.simulation.options import MERSON
-from osimlite.simulation.pack import Packed, pack
+from osimlite.simulation.pack import PackedModel, pack
 
 
 def tangents(
@@ -75,7 +75,7 @@ class DualMachine:
     """
 
     def __init__(
-        self, packed: Packed, forces: Forces, entries: Sequence[str], extra_size: int = 0
+        self, packed: PackedModel, forces: Forces, entries: Sequence[str], extra_size: int = 0
     ) -> None:
         for place, kernel in packed.kernels.items():
             if place in packed.owners and not isinstance(kernel, str):
@@ -98,7 +98,7 @@ class DualMachine:
             y: state.
             f: derivative of the state.
         """
-        return self.program.code.bound(name, self.program.ints, self.x, self.w, y, f)
+        return self.program.code.bind_entry(name, self.program.ints, self.x, self.w, y, f)
 
     def begin(self, t: float) -> None:
         """Set the time, and clear the derivatives of an earlier evaluation."""
@@ -231,7 +231,7 @@ class TangentModel(DifferentiableModel):
                 number = known[group][1][k]
                 y[row] = number
                 slopes[row, part] = (
-                    number.slopes[: own.stop - 1] if isinstance(number, Carrying) else 0.0
+                    number.slopes[: own.stop - 1] if isinstance(number, DualNumber) else 0.0
                 )
 
         self.along(t, x, u, both[:size], both[size:], look=look)
@@ -348,7 +348,7 @@ class DualWorkspace:
         data: work vector (k, 1 + DIRECTIONS).
     """
 
-    wrap = staticmethod(carried_by)
+    wrap = staticmethod(make_dual)
 
     def __init__(self, model: Any, reals: Array, data: Array) -> None:
         self.model = model
@@ -372,7 +372,7 @@ class TangentSteps:
         places: indices of the states in the packed order.
     """
 
-    def __init__(self, packed: Packed, forces: Forces, places: Sequence[int]) -> None:
+    def __init__(self, packed: PackedModel, forces: Forces, places: Sequence[int]) -> None:
         size = len(places)
         self.state_indices = places
         method = int(packed.structure[MODEL.WORK_SIZE])

@@ -121,7 +121,7 @@ class WrappedPaths:
             Forces(tuple(MeasuredPath(item.path, item.location) for item in owners)),
         )
         poses = self._sample_poses(mechanism)
-        arms = np.abs(self._system.pulled(poses)).max(axis=0)
+        arms = np.abs(self._system.compute_pulls(poses)).max(axis=0)
         moved = [[k for k in self._order if row[k] > 0.0] for row in arms]
         self.symbolic_paths = [SymbolicPath(coordinates) for coordinates in moved]
         self._groups = _group_coordinates(moved)
@@ -140,7 +140,7 @@ class WrappedPaths:
             moving = np.zeros(len(pose))
             moving[group] = 1.0
             # No path depends on two of these coordinates, so that one evaluation serves all.
-            result[:, group] = self._system.measured(pose, moving, SPEED)[:, None]
+            result[:, group] = self._system.measure_paths(pose, moving, SPEED)[:, None]
         return [
             row[[*item.coordinates]] for row, item in zip(result, self.symbolic_paths, strict=True)
         ]
@@ -166,8 +166,8 @@ class WrappedPaths:
         """Return lengths, moment arms and speeds (size,) at values (n,) of the coordinates."""
         pose = self._default.copy()
         pose[self._order] = q
-        lengths = self._system.measured(pose, self._still, LENGTH)
-        (arms,) = self._system.pulled(pose[None])
+        lengths = self._system.measure_paths(pose, self._still, LENGTH)
+        (arms,) = self._system.compute_pulls(pose[None])
         speeds = self._measure_speeds(pose)
         parts = zip(lengths, arms, speeds, self.symbolic_paths, strict=True)
         return np.concatenate(

@@ -21,7 +21,7 @@ from osimlite.schema.markers import Marker
 from osimlite.schema.model import Model
 from osimlite.schema.tools.inverse_kinematics import IKTask
 from osimlite.simulation.elements import force_elements
-from osimlite.simulation.states import StateLayout, in_model_order
+from osimlite.simulation.states import StateLayout, sort_by_component
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,6 +136,6 @@ def format_pose(model: Model, placed: MarkerPlacement) -> str:
     coordinate_paths = [
         f"{info.path}/{what}" for info in mechanism.coordinates for what in ("value", "speed")
     ]
-    paths = in_model_order(model, [*coordinate_paths, *named])
+    paths = sort_by_component(model, [*coordinate_paths, *named])
     row = np.array([[columns[path] for path in paths]])
     return "".join(format_old_table(StoTable("static pose", motion.times, tuple(paths), row)))

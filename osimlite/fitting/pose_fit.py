@@ -24,7 +24,7 @@ from osimlite.mechanics.multibody.functions import Function
 from osimlite.mechanics.multibody.links import Places
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.spatial import Array
-from osimlite.simulation.constrained import free_coordinates
+from osimlite.simulation.constrained import find_free_coordinates
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.engines.linking import Code
 from osimlite.simulation.system import System
@@ -90,7 +90,7 @@ class PoseFit:
         self.measured = 3 * len(markers) + 9 * len(sensors)
         infos = list(mechanism.coordinates)
         self._held: dict[int, Function | None] = {}
-        free = set(free_coordinates(mechanism))
+        free = set(find_free_coordinates(mechanism))
         for index, info in enumerate(infos):
             if index in free and (info.locked or info.prescribed is not None):
                 self._held[index] = None if info.locked else info.prescribed
@@ -220,7 +220,7 @@ class _System(System):
         """Return a function that fits a number of frames; the caller keeps the arrays alive."""
         flat = [array.reshape(-1) for array in arrays]
         arguments = self.program.ints, self.numbers, self._w, self._y, self._f
-        return self.program.code.bound("fit_frames", *arguments, *flat)
+        return self.program.code.bind_entry("fit_frames", *arguments, *flat)
 
 
 class SingleFrameFit:

@@ -21,7 +21,7 @@ from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.markers import Marker as ModelMarker
 from osimlite.schema.model import Model
 from osimlite.simulation.elements import Forces
-from osimlite.simulation.link_motion import moving
+from osimlite.simulation.link_motion import locate_points
 from osimlite.simulation.system import System
 
 RANGE_TOLERANCE = 1e-9
@@ -178,7 +178,7 @@ class _MarkerPoints:
             ]
         links = self._compute_link_motion(followed, np.zeros_like(followed))
         turned = links[..., :9].reshape(*links.shape[:2], 3, 3) @ self._turned
-        return moving(links, self._own)[..., :3], turned
+        return locate_points(links, self._own)[..., :3], turned
 
     def compute_free_motions(self, values: Array) -> list[Array]:
         """Return the free motions; see :meth:`ScaledPoseFit.compute_free_motions`."""
@@ -186,7 +186,7 @@ class _MarkerPoints:
         each = [
             self._compute_link_motion(values, np.tile(unit, (count, 1))) for unit in np.eye(size)
         ]
-        moves = np.stack([moving(links, self._own)[..., 3:] for links in each], axis=-1)
+        moves = np.stack([locate_points(links, self._own)[..., 3:] for links in each], axis=-1)
         return [
             rates @ self._compute_free_speeds(q) for rates, q in zip(moves, values, strict=True)
         ]
@@ -212,7 +212,7 @@ class _MarkerPoints:
         """Return the records of the markers' links (t, m, ...)."""
         order = list(self._system.order)
         still = np.zeros((len(values), 1))
-        result = self._system.links_of(
+        result = self._system.evaluate_links(
             np.hstack((still, values[:, order], speeds[:, order])), self._carrying.tolist()
         )
         return result[:, self._links]

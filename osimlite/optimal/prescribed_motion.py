@@ -36,7 +36,7 @@ from osimlite.schema.model import Model
 from osimlite.schema.motions import PositionMotion
 from osimlite.schema.muscles import Muscle
 from osimlite.schema.paths import GeometryPath, PathPoint
-from osimlite.simulation.static_optimization import StaticOptimization, ideal
+from osimlite.simulation.static_optimization import StaticOptimization, make_ideal_actuator
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -147,8 +147,10 @@ class PrescribedMotion:
         the generalized force (n) of each path with 1 N (m, n), and the Jacobian of the constraints.
         """
         values, speeds, accelerations = self._motion(times)
-        needed, *matrices = self._force_balance.balance(times, values, speeds, accelerations)
-        lengths, rates = self._path_geometry.path_lengths(times, values, speeds)
+        needed, *matrices = self._force_balance.compute_balance(
+            times, values, speeds, accelerations
+        )
+        lengths, rates = self._path_geometry.compute_path_lengths(times, values, speeds)
         return np.hstack(
             [lengths, rates, needed, *(item.reshape(len(times), -1) for item in matrices)]
         )
@@ -160,7 +162,7 @@ class PrescribedMotion:
         forces: Any = model.force_set.objects
         for index, item in enumerate(forces):
             if isinstance(item, ScalarActuator) and item.appliesForce:
-                forces[index] = ideal(item, 1.0) or item
+                forces[index] = make_ideal_actuator(item, 1.0) or item
         return make_casadi_model(model, folder=self._folder)
 
     def compute_linear_response(self, function: Callable[..., Any], times: Array) -> Array:

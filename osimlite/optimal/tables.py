@@ -29,7 +29,7 @@ from osimlite.schema.tools.processors import (
     TabOpLowPassFilter,
     TabOpUseAbsoluteStateNames,
 )
-from osimlite.simulation.lowpass import lowpassed
+from osimlite.simulation.lowpass import filter_lowpass
 
 if TYPE_CHECKING:
     from osimlite.optimal.problem import Problem
@@ -122,7 +122,7 @@ def _filter_lowpass(table: StoTable, operator: TabOpLowPassFilter) -> StoTable:
         even = times[0] + step * np.arange(int((times[-1] - times[0]) / step + 1e-9) + 1)
         (rows,) = SampledCurves(times, rows).derivatives(even, (0,))
         times = even
-    times, rows = lowpassed(times, rows, operator.cutoff_frequency)
+    times, rows = filter_lowpass(times, rows, operator.cutoff_frequency)
     if operator.trim_to_original_time_range:
         slack = 1e-6 * (times[1] - times[0])
         is_within = (times >= table.times[0] - slack) & (times <= table.times[-1] + slack)

@@ -1,11 +1,11 @@
-"""Many motions at once, on all cores: what is asked of an engine that computes them, and what comes of it.
+"""Many motions in one call: the interface of engines that compute batches, and their results.
 
-A batch has W runs of models of one structure. Each starts from a row of numbers, its state in the
-engine's order (:class:`osimlite.simulation.states.StateLayout`), and may have a row of the model's
-numbers of its own. Every run has its own steps, and comes out the same whatever runs beside it and
-on however many threads. It ends at a time, or where a watch stops it, or cannot go on (`ENDINGS`).
-On its way it leaves states at the report times, events (contacts that begin and end, levels that
-are passed) and the largest forces: `Runs`.
+A batch has W runs of models of one structure. Each run starts from a state in the engine's order
+(:class:`osimlite.simulation.states.StateLayout`), and may have its own numbers of the model. Every
+run takes its own steps, and its result depends neither on the other runs nor on the number of
+threads. It ends at its time, where a watch stops it, or where it cannot continue (`ENDINGS`). It
+records states at the report times, events (contacts that begin and end, levels that are passed) and
+the largest forces: `Runs`.
 """
 
 from __future__ import annotations
@@ -26,50 +26,56 @@ from osimlite.schema.model import Model
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.builder import OPENSIM
 from osimlite.simulation.engines.protocol import Engine
-from osimlite.simulation.options import DEFAULT_ACCURACY, MERSON, NO_BOUNDS, check_integrator
+from osimlite.simulation.options import DEFAULT_ACCURACY, MERSON, UNBOUNDED_STEPS, check_integrator
 
 if TYPE_CHECKING:
-    from osimlite.simulation.control_steps import Held
+    from osimlite.simulation.control_steps import KernelController
 
 
 __all__ = [
     "ENDINGS",
     "BatchEngine",
     "BatchOptions",
-    "Renewal",
-    "Renewed",
+    "ModelUpdater",
     "Runs",
+    "UpdatedModel",
     "Watch",
     "run_many",
 ]
 
-NO_LIMIT = 2**62
+UNLIMITED_TRIES = 2**62
+"""Number of attempted steps that no run reaches."""
 
 ENDINGS = {0: "done", 1: "failed", 3: "stopped", 4: "too many steps"}
-"""How a run ended, in words: at its time, at a state beyond which there is no step, at a watch,
-after as many tried steps as were allowed.
+"""Descriptions of how a run ended: at its time, without a possible next step, at a watch, or after
+the allowed number of attempted steps.
 """
 
 
 @dataclass(frozen=True, kw_only=True)
 class BatchOptions:
-    """How the runs of a batch go."""
+    """Options of a batch."""
 
-    to: float = 2.0  # when they end unless a watch stops them, s
-    accuracy: float = DEFAULT_ACCURACY  # of the integrator
+    to: float = 2.0  # end of the runs unless a watch stops them, s
+    accuracy: float = DEFAULT_ACCURACY  # accuracy of the integrator
     integrator: str = MERSON  # see `Options`
-    report_times: Sequence[float] = ()  # at which states are kept, increasing, s
-    watches: Sequence[Watch] = ()  # what else is an event, besides contacts that begin and end
-    most_events: int = 0  # room for the events of a run; those beyond it are lost
-    event_states: bool = False  # keep the states at the events
-    most_tries: int = NO_LIMIT  # steps that a run may try
-    threads: int | None = None  # how many work; by default one for each core
-    step_bounds: tuple[float, float] = NO_BOUNDS  # of the steps, see `Settings`
-    # of a controller of each run; the last function of each of its controls is a constant
-    held: Sequence[Held] = ()
+    report_times: Sequence[float] = ()  # increasing times at which states are recorded, s
+    watches: Sequence[Watch] = ()  # events besides the begin and end of contacts
+    most_events: int = 0  # largest number of recorded events of a run; later ones are dropped
+    event_states: bool = False  # whether states at events are recorded
+    most_tries: int = UNLIMITED_TRIES  # largest number of attempted steps of a run
+    threads: int | None = None  # number of threads; by default one for each core
+    # shortest and longest step (s), see `Settings`
+    step_bounds: tuple[float, float] = UNBOUNDED_STEPS
+    # controllers of the runs; the last function of each of their controls is a constant
+    held: Sequence[KernelController] = ()
 
     def check(self) -> None:
-        """SettingError for what has no meaning; machine code might go on with it forever."""
+        """Check the values, since machine code might never end with wrong ones.
+
+        Raises:
+            SettingError: a value has no meaning.
+        """
         if not 0.0 < self.accuracy < 1.0:
             raise SettingError(f"the accuracy must lie between 0 and 1; {self.accuracy} does not")
         check_integrator(self.integrator)
@@ -87,11 +93,11 @@ class BatchOptions:
 
 
 class BatchEngine(Engine, Protocol):
-    """An engine that computes many motions at once."""
+    """An engine that computes many motions in one call."""
 
-    mechanism: Mechanism  # of the model
-    forces: Forces  # of the model
-    # what is connected to what, integers; equal for models that differ in numbers only
+    mechanism: Mechanism  # mechanism of the model
+    forces: Forces  # forces of the model
+    # integers that describe topology; equal for models that differ in numbers only
     structure: Ints
     numbers: Floats  # all numbers of the model (m,)
 
@@ -100,54 +106,53 @@ class BatchEngine(Engine, Protocol):
     ) -> Runs:
         """Compute a batch; see :func:`run_many`."""
 
-    def contact_places(
+    def locate_contacts(
         self, states: ArrayLike, numbers: ArrayLike | None = None, rows: ArrayLike | None = None
     ) -> Floats:
-        """Where the surfaces of all contacts are: centre and normal of surface 1, centre of surface 2 (k, P, 9).
-
-        All are in ground.
+        """Return the surfaces of all contacts: centre and normal of surface 1, and centre of surface 2, in ground (k, P, 9), m.
 
         Args:
-            states: (k, y).
-            numbers: of models of the same structure (v, m); by default the engine's own.
-            rows: which of them each state goes with (k,); by default the first.
+            states: states (k, y).
+            numbers: numbers of models of the same structure (v, m); by default the engine's.
+            rows: row of `numbers` for each state (k,); by default the first.
         """
 
-    def contact_radii(self, numbers: ArrayLike | None = None) -> Floats:
-        """Radius of surface 2 of each contact for each row of numbers (v, P), m."""
+    def get_contact_radii(self, numbers: ArrayLike | None = None) -> Floats:
+        """Return the radius of surface 2 of each contact for each row of numbers (v, P), m."""
 
-    def renewal(self, model: Model, folder: Path, wrapping: str = OPENSIM) -> Renewal:
-        """What makes parts of the model anew, which is that of the engine.
+    def make_updater(self, model: Model, folder: Path, wrapping: str = OPENSIM) -> ModelUpdater:
+        """Return an object that updates the engine after numbers of its model have changed.
 
         Args:
-            model: of which numbers will be others.
-            folder: of its file.
-            wrapping: how its paths bend around surfaces, see :class:`osimlite.simulation.Options`.
+            model: the engine's model, whose numbers will change.
+            folder: folder of its file.
+            wrapping: how paths wrap, see :class:`osimlite.simulation.Options`.
         """
 
 
 @dataclass(frozen=True)
-class Renewed:
+class UpdatedModel:
     """A model of which only numbers have changed."""
 
-    mechanism: Mechanism  # of it
-    forces: Forces  # of it
-    numbers: Floats  # as `BatchEngine.numbers` (m,)
-    given: Any  # engine of the model before
+    mechanism: Mechanism  # mechanism of the model
+    forces: Forces  # forces of the model
+    numbers: Floats  # numbers of the model, see `BatchEngine.numbers` (m,)
+    given: Any  # engine of the model before the change
 
-    def engine(self) -> Any:
-        """The engine of this very model."""
-        return self.given.renumbered(self.mechanism, self.forces, self.numbers)
+    def make_engine(self) -> Any:
+        """Return an engine with these numbers."""
+        return self.given.copy_with_numbers(self.mechanism, self.forces, self.numbers)
 
 
-class Renewal(Protocol):
-    """Makes those parts of a model anew that its forces, masses and gravity have a part in."""
+class ModelUpdater(Protocol):
+    """Updater of the parts of a model that forces, masses and gravity affect."""
 
-    def renewed(self, owners: Sequence[Component]) -> Renewed | None:
-        """The model with what its forces and bodies are now; None if more has changed than numbers.
+    def update(self, owners: Sequence[Component]) -> UpdatedModel | None:
+        """Return the model with the present properties of its forces and bodies; None if more than numbers changed.
 
-        Args: owners: forces, controllers, bodies and the model itself, if a property of theirs has
-            changed.
+        Args:
+            owners: forces, controllers, bodies and the model itself, if one of their properties has
+                changed.
         """
 
 
@@ -161,15 +166,18 @@ def run_many(
 ) -> Runs:
     """Simulate from many states.
 
-    Args: engine: of the model. states: where the runs start (W, y), in the engine's order. to: when
-        they end unless a watch stops them, s. numbers: `engine.numbers` of models of the same
-        structure, one row for each run; by default the engine's own. choices: attributes of
-        :class:`BatchOptions`.
+    Args:
+        engine: engine of the model.
+        states: initial states (W, y) in the engine's order.
+        to: end of the runs unless a watch stops them, s.
+        numbers: `engine.numbers` of models of the same structure, one row for each run; by default
+            the engine's.
+        choices: attributes of :class:`BatchOptions`.
 
     Raises:
-        SettingError: a setting has no meaning.
-        OsimliteError: the shapes do not fit, or a watch names nothing or a locked coordinate.
-        ModelError: a watch names what does not exist.
+        SettingError: a value has no meaning.
+        OsimliteError: shapes do not fit, or a watch names nothing or a locked coordinate.
+        ModelError: a watch names something that does not exist.
     """
     return engine.run_many(states, BatchOptions(to=to, **choices), numbers)
 
@@ -179,40 +187,40 @@ Ints = NDArray[np.int64]
 
 
 class Watch(NamedTuple):
-    """A level that a run is watched for passing."""
+    """Event at which a coordinate, a point of a body or a contact passes a level."""
 
-    name: str  # what the event is called
-    coordinate: str = ""  # name or path of the coordinate that is watched, or
-    body: str = ""  # name or path of the body (or frame) of which a point is watched, with
-    station: tuple[float, float, float] = (0.0, 0.0, 0.0)  # the point in it (m), and
-    # along which in ground its position counts
+    name: str  # name of the event
+    # Exactly one of coordinate, body and contact is set.
+    coordinate: str = ""  # name or path of a coordinate
+    body: str = ""  # name or path of a body or frame with a point
+    station: tuple[float, float, float] = (0.0, 0.0, 0.0)  # the point in the frame, m
+    # direction in ground along which the position of the point is measured
     direction: tuple[float, float, float] = (0.0, 1.0, 0.0)
-    level: float = 0.0  # what is passed, rad or m
+    level: float = 0.0  # level, rad or m
     stops: int = 0  # -1 if falling below ends the run, 1 if rising above does, 0 if neither
-    # name of the contact (of the engine's `contacts`) that is, which is above its level while it
-    # pushes, or
+    # name of a contact, one of the engine's `contacts`; it is above its level while it touches
     contact: str = ""
 
 
 @dataclass(frozen=True)
 class Runs:
-    """W runs, whose states have y numbers."""
+    """Results of W runs whose states have y entries."""
 
-    times: Floats  # at which the runs ended (W,), s
-    states: Floats  # in which (W, y), in the engine's order
-    endings: Ints  # how, see `ENDINGS` (W,)
-    counts: Ints  # steps taken, steps tried, evaluations (W, 3)
-    reports: Floats  # states at the report times (W, r, y); not a number after the end of a run
-    # of each run its events in the order of time: time (s), name, whether it begins or rises
+    times: Floats  # times at which the runs ended (W,), s
+    states: Floats  # states at the end (W, y), in the engine's order
+    endings: Ints  # how each run ended, see `ENDINGS` (W,)
+    counts: Ints  # accepted steps, attempted steps, evaluations (W, 3)
+    reports: Floats  # states at the report times (W, r, y); NaN after the end of a run
+    # events of each run in order of time: time (s), name, whether it begins or rises
     events: list[list[tuple[float, str, bool]]]
     peaks: (
         Floats  # largest force (N) of each contact at the end of a step, and its time (s) (W, P, 2)
     )
-    # of each run the states at its events (as many as events, y), if they were asked for
+    # states at the events of each run (as many as events, y), if recorded
     event_states: list[Floats] = field(default_factory=list)
 
-    def of(self, places: Sequence[int] | Ints) -> Runs:
-        """Some of the runs."""
+    def select(self, places: Sequence[int] | Ints) -> Runs:
+        """Return some of the runs, by their indices."""
         chosen: dict[str, Any] = {}
         for name, rows in vars(self).items():
             chosen[name] = (

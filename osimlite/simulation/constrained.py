@@ -1,4 +1,4 @@
-"""The constraints of a motion: which coordinates are free, what is kept up, and a start that fulfils it."""
+"""Constraints of a motion: free coordinates, constraints on the state, and initial states that fulfil them."""
 
 from __future__ import annotations
 
@@ -12,11 +12,12 @@ from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.spatial import Array
 
 
-def free_coordinates(mechanism: Mechanism) -> list[int]:
-    """Places of the coordinates that are not simply at rest.
+def find_free_coordinates(mechanism: Mechanism) -> list[int]:
+    """Return the indices of the coordinates that belong to the state.
 
-    A locked angle of a ball joint whose other angles are free is one of them: the speeds of the
-    joint are not those of its angles, so that it takes a constraint to hold it.
+    Locked coordinates do not. Exception: a locked angle of a ball joint whose other angles are
+    free. The speeds of that joint are not the rates of its angles, so that a constraint has to hold
+    the angle.
     """
     turning = [
         set(motion_places)
@@ -32,11 +33,16 @@ def free_coordinates(mechanism: Mechanism) -> list[int]:
     ]
 
 
-def constraints_on(mechanism: Mechanism, order: Sequence[int]) -> tuple[list[Constraint], int]:
-    """What is kept up on the coordinates of a state, and how many coordinates are locked besides.
+def select_constraints(mechanism: Mechanism, order: Sequence[int]) -> tuple[list[Constraint], int]:
+    """Return the constraints on the coordinates of a state, and the number of coordinates that are locked besides.
 
-    Args: mechanism: whose constraints. order: place in the mechanism of each coordinate of the
-        state; the others are locked, and stay at their defaults.
+    Args:
+        mechanism: the mechanism.
+        order: index in the mechanism of each coordinate of the state; the others are locked and
+            stay at their defaults.
+
+    Returns:
+        The constraints, and the number of locked coordinates that are not in the state.
     """
     kept: list[Constraint] = []
     locks = 0
@@ -51,24 +57,27 @@ def constraints_on(mechanism: Mechanism, order: Sequence[int]) -> tuple[list[Con
     return kept, locks
 
 
-def kept_state(
+def find_consistent_state(
     mechanism: Mechanism,
     q: Sequence[float],
     u: Sequence[float],
     set_values: Sequence[int],
     set_speeds: Sequence[int],
 ) -> tuple[Array, Array]:
-    """The state at time 0 nearest to q (n,) and u (n,) in which the constraints hold.
+    """Return the state at time 0 that fulfils the constraints and is nearest to q and u.
 
     Args:
-        mechanism: whose state.
-        q: values of all coordinates.
-        u: generalized speeds of all coordinates.
-        set_values: places of the coordinates whose values stay.
-        set_speeds: places of those whose speeds do.
+        mechanism: the mechanism.
+        q: values of all coordinates (n,).
+        u: generalized speeds of all coordinates (n,).
+        set_values: indices of the coordinates whose values stay.
+        set_speeds: indices of those whose speeds stay.
+
+    Returns:
+        Values (n,) and generalized speeds (n,).
 
     Raises:
-        SimulationError: there is none.
+        SimulationError: no such state exists.
     """
     values = mechanism.assemble(np.array(q), kept=set_values)
     return values, mechanism.project_speeds(values, np.array(u), kept=set_speeds)

@@ -1,9 +1,8 @@
-"""Controls that are computed at control steps and held between: what a run is given of a controller, and keeps of it.
+"""Controllers that are evaluated at control steps and hold their controls in between.
 
-What a controller knows of what was (its sensors over as long as they are delayed, states of legs,
-the controls that are held, the step that the integrator would try next) is recorded at each control
-step, in a table: a run that goes on from the table and the state at a control step goes on to the
-last bit as if it had not ended.
+The memory of a controller (delayed sensors, states of the legs, the held controls, the next step of
+the integrator) is recorded at each control step in a table. A run that continues from this table
+and from the state at a control step gives the same bits as a run that was never interrupted.
 """
 
 from __future__ import annotations
@@ -24,67 +23,69 @@ from osimlite.mechanics.kernels.reflexes import EARLY_STANCE, REFLEXES, UNKNOWN
 from osimlite.mechanics.kernels.sensors import SENSES
 from osimlite.mechanics.kernels.walks import COUNTS, FRAMES, LEGS, STEPS
 from osimlite.mechanics.multibody.functions import Constant, Function, PiecewiseConstant
-from osimlite.simulation.options import INITIAL_STEP
-from osimlite.simulation.run_controls import places_of
+from osimlite.simulation.options import INITIAL_STEP_S
+from osimlite.simulation.run_controls import find_constant_offsets
 
 if TYPE_CHECKING:
     from osimlite.schema.model import Model
     from osimlite.simulation.elements.controls import Controls
 
-NEAR = 1e-9
-"""A time that is so near to the start of a control step, as part of one, is that."""
+TIME_TOLERANCE = 1e-9
+"""Largest distance of a time from a control step, as a fraction of the step, at which both count as equal."""
 
 
 class Gain(NamedTuple):
-    """A number of a controller that can be varied."""
+    """A number of a controller that sweeps and searches can vary."""
 
     name: str
     value: float
-    low: float  # bounds
+    low: float  # lower bound
     high: float
 
     @property
     def path(self) -> str:
-        """The name again: it is no part of a model."""
+        """The name again, because a gain is not part of a model."""
         return self.name
 
 
 class Controller(Protocol):
-    """What drives actuators by what it feels, such as :class:`osimlite.Feedback`."""
+    """Feedback controller such as :class:`osimlite.Feedback`."""
 
     @property
     def digest(self) -> str:
-        """Of all that it is."""
+        """Digest of everything that determines the controller."""
 
     def gains(self, model: Model, engine: Any) -> list[Gain]:
-        """What can be varied of it, for a model with its engine."""
+        """Return the gains that can be varied, for a model and its engine."""
 
     def with_values(self, values: Mapping[str, float]) -> Self:
-        """The same with other values of some gains."""
+        """Return the controller with other values of some gains."""
 
     def par(self) -> str:
-        """The values of gains that are given, as a file (.par)."""
+        """Return the values of the gains as the text of a .par file."""
 
-    def compile_for(self, model: Model, engine: Any) -> Held:
-        """What the kernels go by, for a model with its engine."""
+    def compile_for(self, model: Model, engine: Any) -> KernelController:
+        """Return the controller in the form of the kernels, for a model and its engine."""
 
 
 @dataclass(frozen=True, eq=False)
-class Held:
-    """A controller of a model, as the kernels have it (:mod:`osimlite.mechanics.kernels.walks`)."""
+class KernelController:
+    """A controller of a model in the form of the kernels (:mod:`osimlite.mechanics.kernels.walks`)."""
 
-    paths: tuple[str, ...]  # of the controls, in the order that it has them
-    step: float  # for which they are held, s
-    sensors: tuple[str, ...]  # what is remembered of a control step
+    paths: tuple[str, ...]  # paths of the controls, in the controller's order
+    step: float  # length of a control step, s
+    sensors: tuple[str, ...]  # labels of the recorded sensors
     senses: Ints  # see :mod:`osimlite.mechanics.kernels.sensors`
     known: Floats  # its numbers
     plan: Ints  # see :mod:`osimlite.mechanics.kernels.reflexes`
     numbers: Floats  # its numbers
-    gains: Mapping[str, float]  # what these are made of, by the names that it has for them
+    gains: Mapping[str, float]  # gains by name, from which the numbers follow
 
     @property
     def header(self) -> dict[str, str]:
-        """By what the table tells that it is of this very controller: gains, and a sum over all else that counts."""
+        """Header of the record, by which a continued run recognizes its controller: gains, and a
+        checksum of everything else.
+        """
         others = crc32(self.plan.tobytes() + self.numbers.tobytes())
         return {
             "gains": json.dumps({**self.gains, "fixed_control_step_size": self.step}),
@@ -93,24 +94,24 @@ class Held:
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """Of the table of what is recorded."""
+        """Labels of the record: sensors, states of the legs, controls, next step of the integrator."""
         legs = "leg_l.state", "leg_r.state"
         return (*self.sensors, *legs, *self.paths, "next_step")
 
-    def steps_in(self, time: float) -> int:
-        """How many control steps there are up to a time, s."""
-        return floor(time / self.step + NEAR)
+    def count_steps(self, time: float) -> int:
+        """Return the number of complete control steps before a time (s)."""
+        return floor(time / self.step + TIME_TOLERANCE)
 
-    def nearest(self, time: float) -> float:
-        """The very time of the control step that begins at a time, s, if one does."""
+    def snap_to_step(self, time: float) -> float:
+        """Return the exact time of a control step if a time (s) is within the tolerance of it, else the time itself."""
         nearest = round(time / self.step) * self.step
-        return nearest if abs(nearest - time) < NEAR * self.step else time
+        return nearest if abs(nearest - time) < TIME_TOLERANCE * self.step else time
 
-    def open_to(self, controls: Controls) -> Controls:
-        """Controls to which the controller adds.
+    def add_constants(self, controls: Controls) -> Controls:
+        """Return controls with one constant more for each control of the controller, which the kernels overwrite.
 
         Raises:
-            SettingError: one is a function of Python, beside which no machine code adds anything.
+            SettingError: a control is a Python function, to which machine code cannot add.
         """
         result = controls.add_functions({path: Constant(0.0) for path in self.paths})
         if not isinstance(result.make_record()[2], str):
@@ -119,11 +120,15 @@ class Held:
             )
         return result
 
-    def require_known(self, before: StoTable | None, end: float) -> None:
-        """Refuse what was recorded of another controller, or not up to the end of a run (s).
+    def require_same_controller(self, before: StoTable | None, end: float) -> None:
+        """Check that the record of an earlier run belongs to this controller and ends where that run ended.
+
+        Args:
+            before: record of the earlier run; None if it had no controller.
+            end: end of the earlier run, s.
 
         Raises:
-            SettingError: it is so.
+            SettingError: the record is missing, or belongs to another controller or another time.
         """
         if before is None:
             raise SettingError(
@@ -148,51 +153,56 @@ class Held:
             raise SettingError(
                 "the run that this one goes on from had other reflexes, states of legs or noise"
             )
-        if not 0.0 <= end - before.times[-1] < self.step * (1.0 + NEAR):
+        if not 0.0 <= end - before.times[-1] < self.step * (1.0 + TIME_TOLERANCE):
             raise SettingError(
                 f"what is known of the controller ends at {before.times[-1]:g} s, the states at {end:g} s"
             )
 
-    def runs(
+    def make_runs(
         self,
         engine: Any,
         controls: Controls,
         to: float = 0.0,
         before: StoTable | None = None,
-        others: Sequence[Held] = (),
-    ) -> HeldRuns:
-        """A run of the model, and of others; see `HeldRuns`."""
-        return HeldRuns((self, *others), engine, controls, to, before)
+        others: Sequence[KernelController] = (),
+    ) -> ControllerRuns:
+        """Return the workspace of a run of this model, and of further models; see :class:`ControllerRuns`."""
+        return ControllerRuns((self, *others), engine, controls, to, before)
 
 
-class HeldRuns:
-    """Runs by a controller.
+class ControllerRuns:
+    """Workspace and record of runs with a controller.
 
-    Args: helds: of the models of all runs, which differ in numbers only. engine: of one of the
-        models, which is driven by `controls`. controls: in which each of the controller's has a
-        number of its own, see :meth:`Held.open_to`. to: time at which a single run ends, which is
-        recorded, s. before: what was recorded of the run that a single one goes on from.
+    Args:
+        helds: controllers of the models of all runs, which differ in numbers only.
+        engine: engine of one of the models, driven by `controls`.
+        controls: controls that have a constant for each control of the controller, see
+            :meth:`KernelController.add_constants`.
+        to: end of a single run, which is recorded, s.
+        before: record of the earlier run that a single run continues.
 
     Attributes:
-        next_step: that the integrator tries first, s.
-        parts: what `run_by_reflexes` takes besides.
+        next_step: first step that the integrator tries, s.
+        parts: further arguments of the law `run_by_reflexes`.
     """
 
     def __init__(
         self,
-        helds: Sequence[Held],
+        helds: Sequence[KernelController],
         engine: Any,
         controls: Controls,
         to: float,
         before: StoTable | None,
     ) -> None:
         held, count = helds[0], len(helds)
-        self.held, self._before, self.next_step = held, before, INITIAL_STEP
+        self.controller, self._before, self.next_step = held, before, INITIAL_STEP_S
         plan, senses = held.plan.copy(), held.senses
-        # The longest delay of all tells what each has room for.
+        # All runs use the memory of the longest delay.
         plan[REFLEXES.KEPT] = max(each.plan[REFLEXES.KEPT] for each in helds)
         plan[REFLEXES.ROOM] = max(each.plan[REFLEXES.ROOM] for each in helds)
-        driven = places_of(engine, controls)[[controls.names.index(path) for path in held.paths]]
+        driven = find_constant_offsets(engine, controls)[
+            [controls.names.index(path) for path in held.paths]
+        ]
         self._room, rows = (
             np.zeros((count, plan[REFLEXES.ROOM])),
             np.zeros((count, senses[SENSES.SIZE])),
@@ -201,9 +211,9 @@ class HeldRuns:
         self._excitations = np.zeros((count, len(held.paths)))
         self._progress: Ints = np.zeros((count, COUNTS), dtype=np.int64)
         if before is not None:
-            self._go_on(plan, before)
+            self._resume(plan, before)
         if to > 0.0:
-            plan[REFLEXES.ROWS] = held.steps_in(to) + 2 - plan[REFLEXES.FIRST]
+            plan[REFLEXES.ROWS] = held.count_steps(to) + 2 - plan[REFLEXES.FIRST]
         self._record, self._plan = np.empty((plan[REFLEXES.ROWS], len(held.columns))), plan
         known, numbers = (
             np.stack([each.known for each in helds]),
@@ -214,10 +224,10 @@ class HeldRuns:
             *(self._room, rows, self._excitations, self._record, self._progress),
         )
 
-    def _go_on(self, plan: Ints, before: StoTable) -> None:
-        """Know what was."""
-        frames = self.held.steps_in(before.times[-1]) + 1
-        kept, sensors = int(plan[REFLEXES.KEPT]), len(self.held.sensors)
+    def _resume(self, plan: Ints, before: StoTable) -> None:
+        """Restore the memory of the controller from the record of an earlier run."""
+        frames = self.controller.count_steps(before.times[-1]) + 1
+        kept, sensors = int(plan[REFLEXES.KEPT]), len(self.controller.sensors)
         history = self._room[0, LEGS : LEGS + kept * sensors].reshape(kept, sensors)
         for back, row in enumerate(before.rows[: -1 - kept : -1]):
             history[(frames - 1 - back) % kept] = row[:sensors]
@@ -230,13 +240,13 @@ class HeldRuns:
         self._progress[0, [STEPS, FRAMES]] = plan[REFLEXES.FIRST] = frames
 
     def table(self, end: float = inf) -> StoTable:
-        """What was recorded of a single run, after the last rows of the one before that a further one would need.
+        """Return the record of a single run, after the last rows of the earlier run that a later continuation needs.
 
-        Args: end: of the motion, s; that of one which was interrupted may lie before the last
-            control steps.
+        Args:
+            end: end of the motion, s; an interrupted motion may end before the last control steps.
         """
         new = int(self._progress[0, STEPS] - self._plan[REFLEXES.FIRST])
-        times = self.held.step * np.arange(
+        times = self.controller.step * np.arange(
             self._progress[0, STEPS] - new, self._progress[0, STEPS], dtype=np.float64
         )
         rows = self._record[:new].copy()
@@ -244,16 +254,23 @@ class HeldRuns:
             kept = int(self._plan[REFLEXES.KEPT])
             times = np.concatenate([self._before.times[-kept:], times])
             rows = np.concatenate([self._before.rows[-kept:], rows])
-        count = int(np.searchsorted(times, end + NEAR * self.held.step, side="right"))
+        count = int(
+            np.searchsorted(times, end + TIME_TOLERANCE * self.controller.step, side="right")
+        )
         return StoTable(
-            "controller", times[:count], self.held.columns, rows[:count], header=self.held.header
+            "controller",
+            times[:count],
+            self.controller.columns,
+            rows[:count],
+            header=self.controller.header,
         )
 
-    def added_to(self, controls: Controls) -> Controls:
-        """Controls with what the controller has added in a single run, as functions of time."""
+    def add_record(self, controls: Controls) -> Controls:
+        """Return controls with those of the controller in a single run added, as functions of time."""
         table = self.table()
         times = tuple(table.times.tolist())
         added: Mapping[str, Function] = {
-            path: PiecewiseConstant(times, tuple(table[path].tolist())) for path in self.held.paths
+            path: PiecewiseConstant(times, tuple(table[path].tolist()))
+            for path in self.controller.paths
         }
         return controls.add_functions(added)

@@ -1,4 +1,4 @@
-"""Several copies of a model that are stepped together, by machine code on all cores."""
+"""Copies of a model that are stepped together by machine code on all cores."""
 
 from __future__ import annotations
 
@@ -18,29 +18,29 @@ from osimlite.schema.model import Model
 from osimlite.simulation.batches import BatchOptions
 from osimlite.simulation.engines.batch import Batch
 from osimlite.simulation.run import Simulation
-from osimlite.simulation.run_controls import places_of
+from osimlite.simulation.run_controls import find_constant_offsets
 
-AT_ONCE = 4
-"""So many copies a thread takes at a time."""
+COPIES_PER_TASK = 4
+"""Number of copies that a thread computes before it takes the next ones."""
 
 
 class Copies:
-    """Copies of a model, each in a state of its own, driven by controls that are held for a step.
+    """Copies of a model, each with its own state, whose controls are held constant for a step.
 
-    A copy comes out the same whatever is beside it, and on however many threads.
+    The result of a copy depends neither on the other copies nor on the number of threads.
 
     Args:
-        model: that is copied; its own controllers add to the controls.
-        count: of the copies.
-        step: length of a step, s.
-        accuracy: of the integrator.
-        integrator: which.
-        longest: of the integrator's own steps, s.
+        model: the model; its controllers add to the controls.
+        count: number of copies.
+        step: length of a control step, s.
+        accuracy: accuracy of the integrator.
+        integrator: name of the integrator.
+        longest: longest step of the integrator, s.
 
     Attributes:
-        states: of all copies (w, y), in the order of the engine; they are changed in place.
-        controls: names of the actuators, in the order in which controls are given.
-        places: where the numbers of the model have them (c,).
+        states: states of all copies (w, y) in the engine's order; they are changed in place.
+        controls: names of the actuators, in the order of the controls.
+        places: offsets of the controls in the numbers of the model (c,).
     """
 
     def __init__(
@@ -58,36 +58,40 @@ class Copies:
         own = simulation.forces.controls
         self.controls = own.names
         driven = own.add_functions({name: Constant(0.0) for name in own.names})
-        self.engine.drive(driven)
+        self.engine.set_controls(driven)
         self.start = np.array(simulation.initial_state({}, {}, equilibrate=True))
-        self.places = places_of(engine, driven)
+        self.places = find_constant_offsets(engine, driven)
         options = BatchOptions(
             to=step, accuracy=accuracy, integrator=integrator, step_bounds=(0.0, longest)
         )
         options.check()
         self.batch = Batch(engine, np.tile(self.start, (count, 1)), options, start_holds=True)
         self._first_step = float(self.batch.clocks[0, 1])
-        self._parts = [(first, min(first + AT_ONCE, count)) for first in range(0, count, AT_ONCE)]
-        # Each core works on numbers of the model of its own, which are few enough to be near.
+        self._parts = [
+            (first, min(first + COPIES_PER_TASK, count))
+            for first in range(0, count, COPIES_PER_TASK)
+        ]
+        # Each core has its own copy of the model's numbers, which fits into its cache.
         self._rooms = [
-            (self.batch.room(), engine.numbers.copy()) for _ in range(min(count_cores(), count))
+            (self.batch.make_workspace(), engine.numbers.copy())
+            for _ in range(min(count_cores(), count))
         ]
         self._pool = ThreadPoolExecutor(len(self._rooms) - 1) if len(self._rooms) > 1 else None
 
     @property
     def states(self) -> Array:
-        """Of all copies (w, y)."""
+        """States of all copies (w, y)."""
         return self.batch.states
 
-    def put(self, which: Any, states: Array) -> None:
-        """Have copies be in other states."""
+    def set_states(self, which: Any, states: Array) -> None:
+        """Set the states of some copies."""
         self.batch.states[which] = states
         self.batch.clocks[which, 1] = self._first_step
 
-    def step(self, controls: Array) -> NDArray[np.bool_]:
-        """Hold controls (w, c) for a step; which of the copies (w,) could go on to its end."""
+    def step_all(self, controls: Array) -> NDArray[np.bool_]:
+        """Hold controls (w, c) for one step; return which copies (w,) reached its end."""
         going = np.zeros(len(self.states), dtype=np.int64)
-        self._together(
+        self._run_on_all_cores(
             "hold_several",
             self._parts,
             self.places,
@@ -97,18 +101,18 @@ class Copies:
         )
         return going > 0
 
-    def walk(self, which: Sequence[int], *parts: Any) -> int:
-        """Have copies walk by :func:`osimlite.mechanics.kernels.walks.walk_several`; returns what that says last."""
-        return self._together("walk_several", [(k, k + 1) for k in which], *parts)
+    def walk_some(self, which: Sequence[int], *parts: Any) -> int:
+        """Let some copies walk by :func:`osimlite.mechanics.kernels.walks.walk_several`, and return its largest result."""
+        return self._run_on_all_cores("walk_several", [(k, k + 1) for k in which], *parts)
 
-    def _together(self, law: str, parts: Sequence[tuple[int, int]], *given: Any) -> int:
-        """Have all cores compute parts of the copies, from the first to before the last."""
+    def _run_on_all_cores(self, law: str, parts: Sequence[tuple[int, int]], *given: Any) -> int:
+        """Run a law for parts of the copies, given as (first, end), on all cores; return its largest result."""
         self.engine.program.code.make_ready((law,))
         left, said = iter(parts), [0]
 
         def share(room: Floats, numbers: Floats) -> None:
             for first, last in left:
-                said.append(self.batch.hold(law, room, numbers, *given, first, last))
+                said.append(self.batch.run_walk_law(law, room, numbers, *given, first, last))
 
         others = (
             []
@@ -118,7 +122,7 @@ class Copies:
         try:
             share(*self._rooms[0])
         finally:
-            # Also after Ctrl-C nobody else works in the rooms.
+            # Wait also after Ctrl-C, so that no other thread still uses the workspaces.
             for other in others:
                 other.result()
         return max(said)

@@ -1,4 +1,4 @@
-"""Semi-implicit Euler with a fixed step."""
+"""Semi-implicit Euler steps of fixed length."""
 
 from __future__ import annotations
 
@@ -12,16 +12,17 @@ from osimlite.simulation.stepper import (
     IntegrationError,
     Observer,
     Stepper,
-    straight_line,
+    interpolate_linearly,
 )
 
-Projected = Callable[[float, list[float], float], list[float] | None]
+Projection = Callable[[float, list[float], float], list[float] | None]
+"""Function of time, state and tolerance that returns the nearest state that fulfils the constraints, or None."""
 FIXED_STEP_TOLERANCE = 1e-9
-"""What constraints may be off after a fixed step, before they are mended."""
+"""Largest error of the constraints after a fixed step before the state is projected onto them."""
 
 
-def burst(t: float, h: float) -> IntegrationError:
-    """Why fixed steps of length h (s) cannot go on at time t (s)."""
+def make_divergence_error(t: float, h: float) -> IntegrationError:
+    """Return the error for fixed steps of length h (s) that diverge at time t (s)."""
     return IntegrationError(
         f"the motion bursts at t = {t:.9g} s; take a shorter fixed step than {h:g} s, "
         "or control the error (--accuracy)",
@@ -32,14 +33,19 @@ def burst(t: float, h: float) -> IntegrationError:
 class SemiImplicitEuler(Stepper):
     """Fixed steps u1 = u0 + h udot(t0, y0), q1 = q0 + h qdot(q0, u1), z1 = z0 + h zdot(t0, y0), with y = (q, u, z).
 
-    That is of first order; PyBullet steps like that.
+    The method is of first order; PyBullet uses it too.
 
-    Args: f: derivative of the state; the part of q is not used. t: initial time, s. y: initial
-        state. nq: number of coordinates in it, and of speeds after them; the rest are auxiliary
-        states. h: step, s. Only a step that would pass the limit is shortened. rates: qdot as a
-        function of (q, u); by default qdot = u. observe: called with (time, state) after each step
-        taken. names: what the entries of y are called in messages. projected: gives the state
-        nearest to one where the constraints hold to a tolerance, if there is one.
+    Args:
+        f: derivative of the state; its part qdot is not used.
+        t: initial time, s.
+        y: initial state.
+        nq: number of coordinates in the state, which as many speeds follow; the rest are auxiliary
+            states.
+        h: step, s. Only a step that would pass the limit is shortened.
+        rates: qdot as a function of (q, u); by default qdot = u.
+        observe: called with time and state after each step.
+        names: names of the entries of y in messages.
+        projected: projection onto the constraints, if there are any.
     """
 
     def __init__(
@@ -53,7 +59,7 @@ class SemiImplicitEuler(Stepper):
         rates: Callable[[list[float], list[float]], Sequence[float]] | None = None,
         observe: Observer | None = None,
         names: Sequence[str] | None = None,
-        projected: Projected | None = None,
+        projected: Projection | None = None,
     ) -> None:
         if not 0.0 < h < inf:
             raise SettingError(f"The fixed step must be positive and finite; {h} s is not.")
@@ -69,10 +75,10 @@ class SemiImplicitEuler(Stepper):
         self._origin, self._since = t, 0
 
     def step(self, limit: float = inf) -> None:
-        """Take one step of the fixed size, or up to the limit if that comes first."""
-        self._require_room(limit)
+        """Take one step of the fixed length, or up to the limit if that comes first."""
+        self._require_later(limit)
         h = self._h
-        # Counted from an origin, so that rounding does not pile up in the time.
+        # Steps are counted from an origin, so that rounding errors of the time do not accumulate.
         self._since += 1
         t = self._origin + h * self._since
         if t > limit - 1e-9 * h:
@@ -80,7 +86,7 @@ class SemiImplicitEuler(Stepper):
                 h = limit - self.time
             t = limit
             self._origin, self._since = limit, 0
-        y = self._moved(h)
+        y = self._take_step(h)
         if self._projected is not None:
             result = self._projected(t, y, FIXED_STEP_TOLERANCE)
             if result is None:
@@ -91,9 +97,9 @@ class SemiImplicitEuler(Stepper):
                 )
             y = result
         if not isfinite(sum(y)):
-            raise burst(t, self._h)
+            raise make_divergence_error(t, self._h)
         try:
-            self._advance(t, y)
+            self._accept_step(t, y)
         except IntegrationError as error:
             raise IntegrationError(
                 f"{error} If they are right, take a shorter fixed step than {self._h:g} s, or control the error "
@@ -102,8 +108,8 @@ class SemiImplicitEuler(Stepper):
                 error.index,
             ) from error
 
-    def _moved(self, h: float) -> list[float]:
-        """The state after a step of length h (s), wherever constraints hold."""
+    def _take_step(self, h: float) -> list[float]:
+        """Return the state after a step of length h (s), before constraints are enforced."""
         q = self.state[: self._nq]
         rest = [
             x + h * a
@@ -113,6 +119,6 @@ class SemiImplicitEuler(Stepper):
         rates = u if self._rates is None else self._rates(q, u)
         return [x + h * v for x, v in zip(q, rates, strict=True)] + rest
 
-    def interpolant(self) -> Callable[[float], list[float]]:
-        """The straight line between the ends of the last step."""
-        return partial(straight_line, *self.previous[:2], self.time, self.state)
+    def make_interpolant(self) -> Callable[[float], list[float]]:
+        """Return the linear interpolation between the ends of the last step."""
+        return partial(interpolate_linearly, *self.previous[:2], self.time, self.state)

@@ -1,4 +1,4 @@
-"""Where a simulation starts: values and speeds of coordinates as people give them."""
+"""Initial states of simulations: values and speeds as users write them, states in files, earlier runs."""
 
 from __future__ import annotations
 
@@ -19,12 +19,17 @@ if TYPE_CHECKING:
     from osimlite.simulation.trajectory import Trajectory
 
 
-def in_units_of(mechanism: Mechanism, name: str, given: float | str) -> float:
-    """A value or speed of a coordinate in rad or m (per second); a text such as ``"30deg"`` may carry a unit.
+def convert_value(mechanism: Mechanism, name: str, given: float | str) -> float:
+    """Convert a value or speed of a coordinate to rad or m (per second).
+
+    Args:
+        mechanism: the mechanism.
+        name: name or path of the coordinate.
+        given: a number in rad or m, or a text such as ``"30deg"`` with or without a unit.
 
     Raises:
         ModelError: there is no such coordinate.
-        SettingError: the text is no quantity, or its unit does not fit the coordinate.
+        SettingError: the text is not a quantity, or its unit does not fit the coordinate.
     """
     kind = mechanism.coordinates[mechanism.coordinate_index(name)].motion_type
     if not isinstance(given, str):
@@ -40,16 +45,16 @@ def in_units_of(mechanism: Mechanism, name: str, given: float | str) -> float:
     return read.value
 
 
-def suspect_value(info: CoordinateInfo, name: str, given: float | str) -> str:
-    """What is odd about a value as people give it: degrees that are taken for radians.
+def describe_suspect_value(info: CoordinateInfo, name: str, given: float | str) -> str:
+    """Return a warning if a value in radians was probably meant in degrees.
 
     Args:
-        info: of the coordinate.
-        name: what it was called.
+        info: the coordinate.
+        name: its name in the message.
         given: rad or m, or a text with a unit.
 
     Returns:
-        A sentence, or "" if there is nothing odd.
+        A sentence, or "" if the value is plausible.
     """
     if info.motion_type == "translational":
         return ""
@@ -60,20 +65,25 @@ def suspect_value(info: CoordinateInfo, name: str, given: float | str) -> str:
     )
 
 
-def starting(
+def resolve_initial_values(
     mechanism: Mechanism, initial: Mapping[str, float], speeds: Mapping[str, float]
 ) -> tuple[list[float], list[float], list[list[int]]]:
-    """Where the coordinates start.
+    """Return the initial values and speeds of all coordinates, before constraints are enforced.
 
-    Args: mechanism: whose coordinates. initial: values (rad, m) by name or path; a path with
-        ``/value`` or ``/speed`` behind it says where the coordinate starts as far as constraints
-        let it. speeds: generalized speeds by name or path.
+    Args:
+        mechanism: the mechanism.
+        initial: values (rad, m) by name or path. Constraints may change a value whose key is a path
+            with ``/value`` or ``/speed``; the others stay.
+        speeds: generalized speeds by name or path.
 
-    Returns: Values and speeds of all coordinates, the places of those whose values stay as they
-        are, and of those whose speeds do.
+    Returns:
+        Values (n,) and speeds (n,) of all coordinates, and two lists of indices: of the coordinates
+            whose values stay, and of those whose speeds stay.
 
-    Raises: ModelError: there is no such coordinate. SimulationError: a coordinate is locked or
-        prescribed, or set twice, or a number is not finite.
+    Raises:
+        ModelError: there is no such coordinate.
+        SettingError: a coordinate is set twice, or a number is not finite.
+        SimulationError: a coordinate is locked or prescribed.
     """
     infos = mechanism.coordinates
     q, u = [info.default_value for info in infos], [info.default_speed for info in infos]
@@ -82,7 +92,7 @@ def starting(
         for row, what in ((q, "value"), (u, "speed")):
             given = named.pop(f"{info.path}/{what}", None)
             if given is not None:
-                row[place] = _number(given, what, info.path)
+                row[place] = _check_finite(given, what, info.path)
     places: list[list[int]] = []
     for numbers, row, what in ((named, q, "value"), (speeds, u, "speed")):
         places.append([])
@@ -102,29 +112,30 @@ def starting(
                     f"coordinate '{name}' is prescribed, so that its {what} cannot be set; "
                     "set its prescribed to false in the model"
                 )
-            row[place] = _number(value, what, name)
+            row[place] = _check_finite(value, what, name)
             places[-1].append(place)
     return q, u, places
 
 
-def _number(value: float, what: str, name: str) -> float:
+def _check_finite(value: float, what: str, name: str) -> float:
+    """Return a number as a float; raise SettingError if it is not finite."""
     if not isfinite(value):
         raise SettingError(f"the {what} of coordinate '{name}' is {value}; give a number")
     return float(value)
 
 
-def columns_of_states(labels: Sequence[str], paths: Iterable[str]) -> dict[str, int]:
-    """Which column has which state, as OpenSim's TableUtilities find it.
+def match_state_columns(labels: Sequence[str], paths: Iterable[str]) -> dict[str, int]:
+    """Find the column of each state, as OpenSim's TableUtilities does.
 
-    A label is the path of the state, the end of it, or what it was called before OpenSim 4:
-    ``knee``, ``knee_u``, ``soleus.activation``.
+    A label is the path of the state, the end of that path, or the name before OpenSim 4: ``knee``,
+    ``knee_u``, ``soleus.activation``.
 
     Args:
-        labels: of the columns.
-        paths: of the states.
+        labels: labels of the columns.
+        paths: paths of the states.
 
     Returns:
-        The places of the columns by the paths of those states that have one.
+        Indices of columns by the paths of the states that have one.
     """
     places: dict[str, int] = {}
     for index, label in enumerate(labels):
@@ -141,28 +152,41 @@ def columns_of_states(labels: Sequence[str], paths: Iterable[str]) -> dict[str, 
     return result
 
 
-def state_in(
+def read_state(
     path: str | Path, mechanism: Mechanism, names: Collection[str], time: float | None = None
 ) -> dict[str, float]:
-    """A state of a file, by the paths of its columns; columns that are no states are left out.
+    """Return one state of a file by the paths of the states; columns that are not states are ignored.
 
     Args:
-        path: of a table of states.
-        mechanism: whose states they are.
-        names: paths of all states, see :func:`columns_of_states`.
-        time: of the row that is taken, the nearest in the file, s; the last one if left out.
+        path: file with a table of states.
+        mechanism: the mechanism to which the states belong.
+        names: paths of all states, see :func:`match_state_columns`.
+        time: time of the state, s; the nearest row is used. The last row if None.
 
     Raises:
-        DocumentError: it is no table, has no states of the mechanism, or no rows.
+        DocumentError: the file is not a table, has no states of the mechanism, or no rows.
     """
-    return state_at(read_sto(path), mechanism, names, time)
+    return extract_state(read_sto(path), mechanism, names, time)
 
 
-def state_at(
+def extract_state(
     table: StoTable, mechanism: Mechanism, names: Collection[str], time: float | None = None
 ) -> dict[str, float]:
-    """A state of a table; see `state_in`."""
-    columns = columns_of_states(table.columns, names)
+    """Return one state of a table by the paths of the states; see :func:`read_state`.
+
+    Args:
+        table: the table of states.
+        mechanism: the mechanism to which the states belong.
+        names: paths of all states.
+        time: time of the state, s; the nearest row is used. The last row if None.
+
+    Returns:
+        Values in SI units (rad, m) by path.
+
+    Raises:
+        DocumentError: the table has no states of the mechanism, or no rows.
+    """
+    columns = match_state_columns(table.columns, names)
     if not columns or not len(table.times):
         what = (
             f"column is a state of '{mechanism.name}', such as '{next(iter(names), '')}'"
@@ -180,11 +204,14 @@ def state_at(
     }
 
 
-def ended(given: str | Path | Trajectory) -> tuple[StoTable, StoTable | None]:
-    """The states of a run, and what was recorded of its controller, from its folder or itself.
+def read_earlier_run(given: str | Path | Trajectory) -> tuple[StoTable, StoTable | None]:
+    """Return the states of an earlier run and the record of its controller, from its folder or its trajectory.
+
+    Returns:
+        The table of states, and the table of the controller (None without one).
 
     Raises:
-        OsimliteError: there are no states.
+        OsimliteError: the folder has no states.
     """
     if not isinstance(given, str | Path):
         return given.states, given.controller

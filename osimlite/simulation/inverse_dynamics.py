@@ -1,4 +1,4 @@
-"""What follows from a recorded motion, in one call: where bodies and markers are, and the forces that it takes."""
+"""Kinematics and inverse dynamics of recorded motions, in one call each."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from osimlite.schema.forces import Force, ForceSet
 from osimlite.schema.model import Model
 from osimlite.simulation.elements import force_elements
 from osimlite.simulation.recorded_motion import (
-    Recorded,
+    MotionSource,
     RecordedMotion,
     exclude_forces,
-    excluded_forces,
+    find_excluded_forces,
 )
 
 if TYPE_CHECKING:
@@ -30,14 +30,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class GeneralizedForces(StoTable):
-    """A column (N or N·m) for each coordinate, and the motion that takes these forces."""
+    """Generalized forces: a column (N or N·m) for each coordinate, and the motion that requires them."""
 
     motion: RecordedMotion | None = field(default=None, repr=False)
 
 
 def kinematics(
     model: Model,
-    motion: Recorded,
+    motion: MotionSource,
     *,
     times: ArrayLike | None = None,
     assemble: bool = False,
@@ -45,24 +45,33 @@ def kinematics(
     start: float = -np.inf,
     end: float = np.inf,
 ) -> RecordedMotion:
-    """Follow a motion: its ``bodies()`` and ``markers()`` are tables of where these are, itself of the coordinates.
+    """Read a motion of a model; its ``bodies()`` and ``markers()`` are tables of positions.
 
-    Args: model: that moves. motion: a .mot or .sto file; a motion, such as a fitted one or a
-        trajectory; or arrays (t,) in rad and m by the names or paths of coordinates. times: of
-        arrays (t,), s. assemble: whether each pose is changed as little as the model's constraints
-        demand first. lowpass: Hz of OpenSim's filter of the coordinates, if there is to be one.
-        start: first time, s. end: last time, s.
+    Args:
+        model: the model.
+        motion: a .mot or .sto file; a motion, such as a fitted one or a trajectory; or arrays (t,)
+            in rad and m by the names or paths of coordinates.
+        times: times of arrays (t,), s.
+        assemble: whether each pose is first moved to the nearest one that fulfils the constraints.
+        lowpass: frequency (Hz) of OpenSim's filter of the coordinates; None for no filter.
+        start: first time, s.
+        end: last time, s.
 
-    Raises: OsimliteError: it is no motion of the model. SettingError: no time lies between the
-        first and the last, or the filter does not fit the times. SimulationError: a pose is too far
-        from fulfilling the constraints.
+    Returns:
+        The motion, as a table of coordinates.
+
+    Raises:
+        OsimliteError: the source is not a motion of the model.
+        SettingError: no time lies between the first and the last, or the filter does not fit the
+            times.
+        SimulationError: a pose is too far from fulfilling the constraints.
     """
-    return followed(build_mechanism(model), motion, times, assemble, lowpass, start, end)
+    return prepare_motion(build_mechanism(model), motion, times, assemble, lowpass, start, end)
 
 
 def inverse_dynamics(
     model: Model,
-    motion: Recorded,
+    motion: MotionSource,
     external_loads: str | Path | ExternalLoads | None = None,
     *,
     times: ArrayLike | None = None,
@@ -75,33 +84,44 @@ def inverse_dynamics(
     opensim_derivatives: bool = False,
     folder: str | Path | None = None,
 ) -> GeneralizedForces:
-    """The generalized forces (N, N·m) that a motion takes beyond gravity, measured loads and the forces of the model.
+    """Return the generalized forces (N, N·m) that a motion requires beyond gravity, measured loads and the forces of the model.
 
-    Args: model: that moves. motion: as of :func:`kinematics`. external_loads: measured loads or
-        their file; with `applied_to` a table (.mot, .sto, .c3d) in the axes of ground. times: of
-        arrays (t,), s. applied_to: of such a table, by the names of bodies, for each load on one
-        what the labels of its force, point and moment begin with: ``{"calcn_r": [("f1_", "p1_",
-        "m1_")]}``. exclude: what does not push: names of forces or groups, "All", "Actuators" or
-        "Muscles". lowpass: Hz of OpenSim's filter of the coordinates, if there is to be one. start:
-        first time, s. end: last time, s. wrapping: how paths bend around surfaces, see
-        :class:`osimlite.simulation.Options`. opensim_derivatives: whether the mistakes of OpenSim's
-        CustomJoints are repeated. folder: where the model's file is, for the files that it names;
-        the folder that the program runs in if None.
+    Args:
+        model: the model.
+        motion: the motion, see :func:`kinematics`.
+        external_loads: measured loads or their file; with `applied_to` a table (.mot, .sto, .c3d)
+            in the axes of ground.
+        times: times of arrays (t,), s.
+        applied_to: for a table of loads, by the names of bodies: for each load the beginnings of
+            the labels of its force, point and moment, such as ``{"calcn_r": [("f1_", "p1_",
+            "m1_")]}``.
+        exclude: forces that are ignored: names of forces or groups, "All", "Actuators" or
+            "Muscles".
+        lowpass: frequency (Hz) of OpenSim's filter of the coordinates; None for no filter.
+        start: first time, s.
+        end: last time, s.
+        wrapping: how paths wrap, see :class:`osimlite.simulation.Options`.
+        opensim_derivatives: whether the errors of OpenSim's CustomJoints are reproduced.
+        folder: folder of the model's file, in which named files are searched; the current folder if
+            None.
 
-    Returns: A column for each coordinate; those of ball and free joints are moments about axes of
-        the parent frame.
+    Returns:
+        A column for each coordinate; those of ball and free joints are moments about axes of the
+            parent frame.
 
-    Raises: OsimliteError: it is no motion of the model, or loads cannot be read. SettingError: no
-        time lies between the first and the last, there are too few, or a name is none.
-        UnsupportedError: a force of the model cannot be computed.
+    Raises:
+        OsimliteError: the source is not a motion of the model, or loads cannot be read.
+        SettingError: no time lies between the first and the last, there are too few, or a name does
+            not exist.
+        UnsupportedError: osimlite cannot compute a force of the model.
     """
-    external_loads = loads_of(external_loads, applied_to)
+    external_loads = resolve_loads(external_loads, applied_to)
     excluded, pushed = [*exclude], model
-    if excluded_forces(model, excluded):
+    if find_excluded_forces(model, excluded):
         pushed = model.copy_deep()
         exclude_forces(pushed, excluded)
     mechanism = build_mechanism(pushed, opensim_derivatives=opensim_derivatives)
-    recorded = followed(mechanism, motion, times, False, lowpass, start, end)
+    recorded = prepare_motion(mechanism, motion, times, False, lowpass, start, end)
     forces = force_elements(
         pushed, mechanism, wrapping=wrapping, external_loads=external_loads, folder=folder
     )
@@ -109,14 +129,14 @@ def inverse_dynamics(
     return GeneralizedForces(table.name, table.times, table.columns, table.rows, motion=recorded)
 
 
-def loads_of(
+def resolve_loads(
     external_loads: str | Path | ExternalLoads | None,
     applied_to: Mapping[str, Sequence[Sequence[str]]] | None,
 ) -> str | Path | ExternalLoads | None:
-    """The loads, also where they are a table of which `applied_to` says what it pushes; see :func:`inverse_dynamics`.
+    """Return the external loads, made of a table if `applied_to` assigns its columns; see :func:`inverse_dynamics`.
 
     Raises:
-        SettingError: there is no table.
+        SettingError: `applied_to` is given without a table.
     """
     if not applied_to:
         return external_loads
@@ -132,10 +152,15 @@ def loads_of(
 def add_forces(
     model: Model, forces: Iterable[str | Path | Force], *, replace: bool = False
 ) -> None:
-    """Give a model more forces, from files of ForceSets, or others in the place of its own.
+    """Add forces to a model, from files of ForceSets or as objects.
+
+    Args:
+        model: the model, which is changed.
+        forces: files, or forces, which are copied.
+        replace: whether the model's own forces are removed first.
 
     Raises:
-        DocumentError: a file is missing, or no ForceSet.
+        DocumentError: a file is missing or not a ForceSet.
     """
     from osimlite.io.document.reader import read_document
     from osimlite.io.document.source import Source
@@ -152,17 +177,17 @@ def add_forces(
             model.force_set.objects.append(force)
 
 
-def followed(
+def prepare_motion(
     mechanism: Mechanism,
-    motion: Recorded,
+    motion: MotionSource,
     times: ArrayLike | None,
     assemble: bool,
     lowpass: float | None,
     start: float,
     end: float,
 ) -> RecordedMotion:
-    """The part of a motion that counts, filtered and assembled if it is to be; see :func:`kinematics`."""
-    recorded = RecordedMotion.of(mechanism, motion, times)
+    """Return the selected part of a motion, filtered and assembled as requested; see :func:`kinematics`."""
+    recorded = RecordedMotion.from_source(mechanism, motion, times)
     if lowpass is not None:
         recorded = recorded.lowpassed(lowpass)
     if not (start <= recorded.times[-1] and end >= recorded.times[0]):

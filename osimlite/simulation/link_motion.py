@@ -1,6 +1,6 @@
-"""Where points of bodies are at many states, and how fast they move.
+"""Motion of points and frames of bodies at many states.
 
-It is computed of what the kernels find for the links, to which bodies are fixed.
+It follows from the link records of the kernels, because each body is fixed to a link.
 """
 
 from __future__ import annotations
@@ -22,11 +22,16 @@ Floats = NDArray[np.float64]
 
 
 Moments = Sequence[tuple[float, Sequence[float]]]
-"""Times (s), and the states then."""
+"""Times (s) with the states at these times."""
 
 
-def moving(links: Floats, points: Floats) -> Floats:
-    """Places (m) and velocities (m/s) in ground (..., 6) of points (..., 3) of links, as the kernels know these."""
+def locate_points(links: Floats, points: Floats) -> Floats:
+    """Return positions (m) and velocities (m/s) in ground (..., 6) of points of links.
+
+    Args:
+        links: link records of the kernels (..., n).
+        points: points in the frames of the links (..., 3), m.
+    """
     origin, turning = (
         links[..., LINK_WORK.ORIGIN : LINK_WORK.ORIGIN + 3],
         links[..., LINK_WORK.VELOCITY : LINK_WORK.VELOCITY + 3],
@@ -43,42 +48,63 @@ def moving(links: Floats, points: Floats) -> Floats:
     return np.concatenate([arms + origin, velocities], axis=-1)
 
 
-def centers_of_mass(system: System, moments: Moments) -> Floats:
-    """Place (m) and velocity (m/s) in ground of the mass centre of all bodies at some moments (k, 6)."""
+def locate_mass_centers(system: System, moments: Moments) -> Floats:
+    """Return position (m) and velocity (m/s) in ground of the mass centre of all bodies (k, 6)."""
     inertia, fixed = system.inertia, system.masses_in_ground
-    total = inertia[:, 0] @ moving(system.links_at(moments), inertia[:, 1:4])
+    total = inertia[:, 0] @ locate_points(system.evaluate_all_links(moments), inertia[:, 1:4])
     total[:, :3] += sum((mass * center for mass, center in fixed), np.zeros(3))
     return total / (inertia[:, 0].sum() + sum(mass for mass, _ in fixed) or 1.0)
 
 
-def stations(system: System, moments: Moments, body: int, location: Floats) -> Floats:
-    """Place (m) and velocity (m/s) in ground of a point of a body (-1 for ground) at some moments (k, 6)."""
+def locate_station(system: System, moments: Moments, body: int, location: Floats) -> Floats:
+    """Return position (m) and velocity (m/s) in ground of a station (k, 6).
+
+    Args:
+        system: the evaluated system.
+        moments: times with states.
+        body: index of the body, -1 for ground.
+        location: the station in the body's frame (3,), m.
+    """
     link, frame = system.placements[body] if body != GROUND else (GROUND, np.eye(4))
     point = frame[:3, :3] @ location + frame[:3, 3]
     if link == GROUND:
         return np.tile(np.append(point, np.zeros(3)), (len(moments), 1))
-    return moving(system.links_at(moments)[:, link], point)
+    return locate_points(system.evaluate_all_links(moments)[:, link], point)
 
 
 @dataclass(frozen=True, eq=False)
 class LinkMotion:
-    """The motion of links at t moments, and of the bodies that are fixed to them; all along the axes of ground."""
+    """Motion of links at t states, and of the bodies that are fixed to them, along the axes of ground."""
 
-    system: System  # whose links
-    links: Floats  # what the kernels find of them in motion (t, l, n)
+    system: System  # the system with the links
+    links: Floats  # link records of the kernels (t, l, n)
 
     @classmethod
-    def of(cls, system: System, moments: Floats, accelerations: Floats) -> LinkMotion:
-        """The motion of the links of a system at some times with their states (t, 1 + y), and rates (t, n) of speeds.
+    def compute(cls, system: System, moments: Floats, accelerations: Floats) -> LinkMotion:
+        """Compute the motion of the links of a system.
 
-        Raises: SimulationError: the rates of coordinates are not defined there, or a force cannot
-            be computed.
+        Args:
+            system: the system.
+            moments: times (s) and states (t, 1 + y).
+            accelerations: derivatives of the generalized speeds (t, n).
+
+        Raises:
+            SimulationError: the rates of coordinates are not defined at a state, or a force cannot
+                be computed.
         """
-        return cls(system, system.links_in_motion(moments, accelerations))
+        return cls(system, system.compute_accelerated_links(moments, accelerations))
 
-    def placed(self, body: int, frame: Floats) -> tuple[Floats, Floats]:
-        """Rotation (t, 3, 3) and origin (t, 3), m, of a frame (4, 4) of a body (-1 for ground)."""
-        link, placed = self._own(body)
+    def locate_frame(self, body: int, frame: Floats) -> tuple[Floats, Floats]:
+        """Return the motion of a frame of a body.
+
+        Args:
+            body: index of the body, -1 for ground.
+            frame: transform of the frame in the body (4, 4).
+
+        Returns:
+            Rotations (t, 3, 3) and origins (t, 3), m, in ground.
+        """
+        link, placed = self._get_link(body)
         frame = placed @ frame
         if link is None:
             count = len(self.links)
@@ -88,9 +114,13 @@ class LinkMotion:
             :, LINK_WORK.POSITION : LINK_WORK.POSITION + 3
         ] + rotation @ frame[:3, 3]
 
-    def turning(self, body: int) -> tuple[Floats, Floats]:
-        """Angular velocity (rad/s) and acceleration (rad/s²) of a body, (t, 3) each."""
-        link, _ = self._own(body)
+    def get_angular_motion(self, body: int) -> tuple[Floats, Floats]:
+        """Return the angular motion of a body.
+
+        Returns:
+            Angular velocities (rad/s) and accelerations (rad/s²), (t, 3) each.
+        """
+        link, _ = self._get_link(body)
         if link is None:
             return np.zeros((len(self.links), 3)), np.zeros((len(self.links), 3))
         w, alpha = (
@@ -98,16 +128,24 @@ class LinkMotion:
         )
         return w, alpha
 
-    def point(self, body: int, location: Floats) -> tuple[Floats, Floats, Floats]:
-        """Place (m), velocity (m/s) and acceleration (m/s²) of a point (3,) of a body, (t, 3) each."""
-        link, frame = self._own(body)
+    def compute_point_motion(self, body: int, location: Floats) -> tuple[Floats, Floats, Floats]:
+        """Compute the motion of a point of a body.
+
+        Args:
+            body: index of the body, -1 for ground.
+            location: the point in the body's frame (3,), m.
+
+        Returns:
+            Positions (m), velocities (m/s) and accelerations (m/s²), (t, 3) each.
+        """
+        link, frame = self._get_link(body)
         point = frame[:3, :3] @ location + frame[:3, 3]
         if link is None:
             still = np.zeros((len(self.links), 3))
             return still + point, still, still
-        place, velocity = np.split(moving(link, point), 2, axis=-1)
-        w, alpha = self.turning(body)
-        # The kernels accelerate everything upwards in place of gravity, about an origin that stays.
+        place, velocity = np.split(locate_points(link, point), 2, axis=-1)
+        w, alpha = self.get_angular_motion(body)
+        # The kernels represent gravity by an upward acceleration of the base, about a fixed origin.
         free = (
             link[:, LINK_WORK.ACCELERATION + 3 : LINK_WORK.ACCELERATION + 6]
             + self.system.mechanism.gravity
@@ -115,7 +153,7 @@ class LinkMotion:
         arm = place - link[:, LINK_WORK.ORIGIN : LINK_WORK.ORIGIN + 3]
         return place, velocity, free + np.cross(alpha, arm) + np.cross(w, velocity)
 
-    def _own(self, body: int) -> tuple[Floats | None, Floats]:
-        """The link (t, n) of a body, None for ground, and the body's frame in it."""
+    def _get_link(self, body: int) -> tuple[Floats | None, Floats]:
+        """Return the link record (t, n) of a body, None for ground, and the body's frame in the link."""
         link, frame = self.system.placements[body] if body != GROUND else (GROUND, np.eye(4))
         return None if link == GROUND else self.links[:, link], frame

@@ -1,4 +1,4 @@
-"""Muscles over coordinates: lengths, moment arms, and the forces of muscles at rest and in equilibrium."""
+"""Muscle curves over coordinates: lengths, moment arms, and forces at rest in equilibrium."""
 
 from __future__ import annotations
 
@@ -30,6 +30,7 @@ from osimlite.simulation.paths import Paths
 from osimlite.simulation.system import System
 
 Progress = Callable[[int, int], None]
+"""Function that is called with the number of finished poses and the total."""
 
 QUANTITIES = {
     "length": "m",
@@ -40,17 +41,18 @@ QUANTITIES = {
     "active_fiber_force": "N",
     "passive_fiber_force": "N",
 }
-"""What is told of a muscle besides its moment arms, with units; forces of fibers are those along the tendon."""
+"""Units of the quantities of a muscle besides moment arms; fiber forces are components along the tendon."""
 
 
 @dataclass(frozen=True, eq=False)
 class MuscleCurves(Tabular):
-    """Muscles in p poses, at rest.
+    """Muscles in p poses at rest.
 
-    Attributes: muscles: paths of the m muscles, in the order of the model. values: of the k
-        coordinates that are swept by their names, as they were given, rad or m. columns: numbers
-        (p, m) by the names of :data:`QUANTITIES`, and ``moment_arm_<coordinate>`` for each of the
-        coordinates (m); NaN where a muscle has no equilibrium.
+    Attributes:
+        muscles: paths of the m muscles, in the order of the model.
+        values: values of the k swept coordinates by their names, as given, rad or m.
+        columns: numbers (p, m) by the names of :data:`QUANTITIES`, and ``moment_arm_<coordinate>``
+            for each swept coordinate (m); NaN where a muscle has no equilibrium.
     """
 
     muscles: tuple[str, ...]
@@ -61,17 +63,17 @@ class MuscleCurves(Tabular):
 
     @property
     def coordinates(self) -> tuple[str, ...]:
-        """Names of the coordinates that are swept."""
+        """Names of the swept coordinates."""
         return tuple(self.values)
 
     @property
     def poses(self) -> Array:
-        """Their values (p, k): all combinations, the last coordinate changing first."""
+        """Values of the swept coordinates (p, k): all combinations, the last coordinate varies fastest."""
         rows = list(product(*self.values.values()))
         return np.array(rows, dtype=float).reshape(len(rows), len(self.values))
 
-    def of(self, places: Sequence[int]) -> MuscleCurves:
-        """The same of some of the muscles, by their places."""
+    def select_muscles(self, places: Sequence[int]) -> MuscleCurves:
+        """Return the curves of some of the muscles, by their indices."""
         columns = {name: rows[:, list(places)] for name, rows in self.columns.items()}
         return MuscleCurves(tuple(self.muscles[k] for k in places), self.values, columns)
 
@@ -84,7 +86,7 @@ class MuscleCurves(Tabular):
         return rows, {name: column.ravel() for name, column in self.columns.items()}
 
     def to_xarray(self) -> Any:
-        """The `columns` as an xarray Dataset over the coordinates and ``muscle``.
+        """Return the `columns` as an xarray Dataset over the coordinates and ``muscle``.
 
         Raises:
             MissingDependency: xarray is not installed.
@@ -98,13 +100,17 @@ class MuscleCurves(Tabular):
             {name: (list(over), rows.reshape(shape)) for name, rows in self.columns.items()}, over
         )
 
-    def bounds(self, name: str) -> tuple[Array, Array]:
-        """What is least and greatest (m,) of a column; NaN where a muscle has no number."""
+    def get_bounds(self, name: str) -> tuple[Array, Array]:
+        """Return the bounds of a column for each muscle, ignoring NaN.
+
+        Returns:
+            Smallest and largest values (m,).
+        """
         return np.fmin.reduce(self.columns[name]), np.fmax.reduce(self.columns[name])
 
     @property
     def crossing(self) -> list[int]:
-        """Places of the muscles that have a moment arm about a coordinate anywhere; all if none is swept."""
+        """Indices of the muscles with a moment arm about a swept coordinate in some pose; all if none is swept."""
         arms = [self.columns[f"moment_arm_{name}"] for name in self.coordinates]
         return [
             k
@@ -124,21 +130,30 @@ def muscle_curves(
     folder: str | Path | None = None,
     progress: Progress | None = None,
 ) -> MuscleCurves:
-    """Lengths, moment arms and forces of muscles while coordinates are swept, as OpenSim's plotter has them.
+    """Compute lengths, moment arms and forces of muscles while coordinates are swept, as OpenSim's plotter does.
 
-    The other coordinates have their default values, but for those that constraints move along.
-    Fibers are in equilibrium with their tendons at an activation, the model is at rest.
+    The other coordinates have their default values, except those that constraints couple. The model
+    is at rest, and fibers are in equilibrium with their tendons at the given activation.
 
-    Args: model: whose muscles. values: of coordinates by name or path, rad or m; of several all
-        combinations, the last one changing first. muscles: names or paths; all if there are none.
-        activation: of all muscles, 0 to 1. wrapping: how paths bend around surfaces, see
-        :class:`osimlite.simulation.Options`. folder: where the model's file is, and those that it
-        names. progress: called with the number of poses done and of all.
+    Args:
+        model: the model.
+        values: values of coordinates by name or path, rad or m. Several coordinates are combined;
+            the last varies fastest.
+        muscles: names or paths; all if empty.
+        activation: activation of all muscles, 0 to 1.
+        wrapping: how paths wrap, see :class:`osimlite.simulation.Options`.
+        folder: folder of the model's file, in which named files are searched.
+        progress: called with the number of finished poses and the total.
 
-    Raises: ModelError: there is no such coordinate, or the model is no mechanism. UnsupportedError:
-        a muscle, a joint or a constraint of an unknown class. SimulationError: no pose fulfils the
-        constraints. SettingError: the activation is not from 0 to 1, there is no such muscle or
-        wrapping, or a coordinate is swept twice.
+    Returns:
+        The curves of the selected muscles.
+
+    Raises:
+        ModelError: there is no such coordinate, or the model is not a mechanism.
+        UnsupportedError: osimlite does not support a muscle, joint or constraint.
+        SimulationError: no pose fulfils the constraints.
+        SettingError: the activation is not from 0 to 1, there is no such muscle or wrapping, or a
+            coordinate is swept twice.
     """
     if not 0.0 <= activation <= 1.0:
         raise SettingError(f"an activation is a number from 0 to 1, not {activation:g}")
@@ -153,13 +168,13 @@ def muscle_curves(
     optimal = {
         tree.path_of(item) or "": item.optimal_fiber_length for item in model.components(Muscle)
     }
-    named = _chosen(list(optimal), muscles)
+    named = _select_muscles(list(optimal), muscles)
     result = {
         element.path: element for element in forces.elements if isinstance(element, DeclaredForce)
     }
     missing = [path for path in named if path not in result]
     if missing:
-        # Says of which class it is, and why it cannot be computed.
+        # Raises an error that explains why the class is not supported.
         force_elements(model, mechanism, folder=folder)
     controls = Controls(
         forces.controls.names, ((Constant(activation),),) * len(forces.controls.names)
@@ -186,7 +201,7 @@ def muscle_curves(
         q = mechanism.assemble(q, kept=places)
         arms = paths.moment_arms(q)
         for index, (path, muscle) in enumerate(zip(named, alone, strict=True)):
-            for name, value in muscle.at(q).items():
+            for name, value in muscle.evaluate(q).items():
                 columns[name][number, index] = value
             for name, coordinate in zip(values, places, strict=True):
                 arm = arms[path].get(mechanism.coordinates[coordinate].path, 0.0)
@@ -196,8 +211,8 @@ def muscle_curves(
     return replace(curves, columns=columns)
 
 
-def _chosen(paths: list[str], names: Sequence[str]) -> list[str]:
-    """The paths that are named, in the order of the model."""
+def _select_muscles(paths: list[str], names: Sequence[str]) -> list[str]:
+    """Return the named paths in the order of the model; all without names."""
     known = {key: path for path in reversed(paths) for key in (path.rpartition("/")[2], path)}
     for name in names:
         if name not in known:
@@ -207,27 +222,27 @@ def _chosen(paths: list[str], names: Sequence[str]) -> list[str]:
 
 
 class _Muscle(NamedTuple):
-    """A muscle with the mechanism alone: one without an equilibrium hides no other."""
+    """A muscle in a system of its own, so that one without an equilibrium does not affect others."""
 
     element: DeclaredForce
     system: System
     activation: float
     optimal: float
 
-    def at(self, q: Array) -> dict[str, float]:
-        """Numbers of :data:`QUANTITIES`, as far as there are any, at values q (n,) of the coordinates."""
+    def evaluate(self, q: Array) -> dict[str, float]:
+        """Return the :data:`QUANTITIES` that exist at values q (n,) of the coordinates."""
         element, system = self.element, self.system
         y = system.state.pack(q.tolist(), [0.0] * len(q))
         for place, path in enumerate(system.state.paths, 2 * len(system.order)):
             if path.endswith("/activation"):
                 y[place] = self.activation
         try:
-            y = system.equilibrated(0.0, y)
+            y = system.equilibrate_muscles(0.0, y)
             is_settled = system.realize(0.0, y, STAGE.FORCE) == OUTCOME.OK
         except SimulationError:
             is_settled = False
         known = {
-            name: system.recorded(element.path, place)
+            name: system.read_record(element.path, place)
             for name, place in element.force_type.record_offsets.items()
         }
         result = {"length": known["length"]}

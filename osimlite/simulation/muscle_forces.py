@@ -1,4 +1,4 @@
-"""Muscle forces of a recorded motion in one call: static optimization, and its results as tables and files."""
+"""Static optimization of a recorded motion in one call, with its results as tables and files."""
 
 from __future__ import annotations
 
@@ -19,49 +19,51 @@ from osimlite.mechanics.multibody.smoothing_spline import derivatives_of_samples
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.forces import Force
 from osimlite.schema.model import Model
-from osimlite.simulation.inverse_dynamics import add_forces, followed, loads_of
-from osimlite.simulation.recorded_motion import Recorded, RecordedMotion
-from osimlite.simulation.static_optimization import TITLE, Shared, StaticOptimization
+from osimlite.simulation.inverse_dynamics import add_forces, prepare_motion, resolve_loads
+from osimlite.simulation.recorded_motion import MotionSource, RecordedMotion
+from osimlite.simulation.static_optimization import TITLE, SharedForces, StaticOptimization
 
 if TYPE_CHECKING:
     from osimlite.schema.prescribed import ExternalLoads
 
-_HALF_ORDER = 3
-"""OpenSim differentiates speeds by splines of fifth degree."""
+_HALF_SPLINE_ORDER = 3
+"""Half of the order of OpenSim's splines of fifth degree, with which speeds are differentiated."""
 
 
 @dataclass(frozen=True, eq=False)
 class MuscleForces(StoTable):
-    """Activations of all actuators: a column for each, which is its control too; NaN at times without a solution.
+    """Activations of all actuators: one column each, equal to its control; NaN at times without a solution.
 
-    Attributes: forces: what the forces of the model and the loads push with (N, N m), labelled as
-        by OpenSim's ForceReporter. shared: which times have a solution, and what is missing at the
-        others. motion: that takes these forces.
+    Attributes:
+        forces: forces of the model and of the loads (N, N m), labelled as by OpenSim's
+            ForceReporter.
+        shared: times that have a solution, and what is missing at the others.
+        motion: the motion.
     """
 
     forces: StoTable | None = field(default=None, repr=False)
-    shared: Shared | None = field(default=None, repr=False)
+    shared: SharedForces | None = field(default=None, repr=False)
     motion: RecordedMotion | None = field(default=None, repr=False)
 
     @property
     def solved(self) -> NDArray[np.bool_]:
-        """Which of the times (t,) have a solution."""
+        """Flags of the times (t,) that have a solution."""
         assert self.shared is not None
         return self.shared.solved
 
-    def unsolved(self) -> str:
-        """The times without a solution in words, with the coordinates that lack strength; empty if there are none."""
+    def describe_unsolved(self) -> str:
+        """Describe the times without a solution and the coordinates that lack force; empty if there are none."""
         assert self.shared is not None
-        return self.shared.unsolved()
+        return self.shared.describe_unsolved()
 
     def write(self, folder: str | Path) -> list[Path]:
-        """Write activations, forces and controls into a folder, under the names of OpenSim's analysis.
+        """Write activations, forces and controls into a folder, with the file names of OpenSim's analysis.
 
         Returns:
-            The files.
+            Paths of the files.
 
         Raises:
-            OsimliteError: one cannot be written.
+            OsimliteError: a file cannot be written.
         """
         assert self.forces is not None
         folder = Path(folder)
@@ -86,7 +88,7 @@ class MuscleForces(StoTable):
 
 def static_optimization(
     model: Model,
-    motion: Recorded,
+    motion: MotionSource,
     external_loads: str | Path | ExternalLoads | None = None,
     *,
     times: ArrayLike | None = None,
@@ -102,32 +104,41 @@ def static_optimization(
     opensim_derivatives: bool = False,
     folder: str | Path | None = None,
 ) -> MuscleForces:
-    """How muscles and other actuators share what a motion takes: the activations with the least sum of |x|ᵖ.
+    """Distribute what a motion requires over muscles and other actuators: the activations with the least sum of |x|ᵖ.
 
-    Each time is solved for itself, exactly: there is one solution or none. The speeds are the rates
-    of the coordinates by splines of fifth degree, and their rates those of such splines through the
-    speeds, as in OpenSim.
+    Each time is solved by itself, exactly: it has one solution or none. As in OpenSim, the speeds
+    are rates of the coordinates by splines of fifth degree, and the accelerations are rates of such
+    splines through the speeds.
 
-    Args: model: whose actuators push within their min_control and max_control. motion: as of
-        :func:`kinematics`. external_loads: as of :func:`inverse_dynamics`. times: of arrays (t,),
-        s. applied_to: as of :func:`inverse_dynamics`. forces: what pushes besides, such as reserve
-        actuators: files of ForceSets, or forces. replace_forces: whether these take the place of
-        the model's own. exponent: p, more than 1. muscles: "active", as in OpenSim: its fibers,
-        along a tendon taken for rigid, without passive forces; "isometric": its
-        max_isometric_force. lowpass: Hz of OpenSim's filter of the coordinates, if there is to be
-        one. start: first time, s. end: last time, s. wrapping: how paths bend around surfaces, see
-        :class:`osimlite.simulation.Options`. opensim_derivatives: whether the mistakes of OpenSim's
-        CustomJoints are repeated. folder: where the model's file is, for the files that it names;
-        the folder that the program runs in if None.
+    Args:
+        model: the model; its actuators act within their min_control and max_control.
+        motion: the motion, see :func:`kinematics`.
+        external_loads: measured loads, see :func:`inverse_dynamics`.
+        times: times of arrays (t,), s.
+        applied_to: assignment of the columns of loads, see :func:`inverse_dynamics`.
+        forces: further forces such as reserve actuators: files of ForceSets, or forces.
+        replace_forces: whether these replace the model's own forces.
+        exponent: p, greater than 1.
+        muscles: "active", as in OpenSim: force of the fibers along a rigid tendon, without passive
+            force; "isometric": max_isometric_force.
+        lowpass: frequency (Hz) of OpenSim's filter of the coordinates; None for no filter.
+        start: first time, s.
+        end: last time, s.
+        wrapping: how paths wrap, see :class:`osimlite.simulation.Options`.
+        opensim_derivatives: whether the errors of OpenSim's CustomJoints are reproduced.
+        folder: folder of the model's file, in which named files are searched; the current folder if
+            None.
 
-    Returns: A column for each actuator; a time without a solution has no numbers, and `unsolved`
-        says what is missing.
+    Returns:
+        A column for each actuator. Times without a solution are NaN, and `describe_unsolved` says
+            what is missing there.
 
-    Raises: OsimliteError: it is no motion of the model, or forces or loads cannot be read.
-        SettingError: no time lies between the first and the last, there are too few, or a choice is
-        none. ModelError: there are no actuators, or fewer than coordinates that they are to
-        accelerate. UnsupportedError: a force cannot be computed, or is not proportional to its
-        control.
+    Raises:
+        OsimliteError: the source is not a motion of the model, or forces or loads cannot be read.
+        SettingError: no time lies between the first and the last, there are too few, or an option
+            has no such value.
+        ModelError: there are no actuators, or fewer than coordinates to accelerate.
+        UnsupportedError: osimlite cannot compute a force, or it is not proportional to its control.
     """
     model = model.copy_deep()
     add_forces(model, forces, replace=replace_forces)
@@ -138,13 +149,13 @@ def static_optimization(
         exponent=exponent,
         muscles=muscles,
         wrapping=wrapping,
-        external_loads=loads_of(external_loads, applied_to),
+        external_loads=resolve_loads(external_loads, applied_to),
         folder=folder,
     )
-    recorded = followed(mechanism, motion, times, False, lowpass, start, end)
-    values, speeds, accelerations = _moving(model, mechanism, recorded)
-    shared = problem.share(recorded.times, values, speeds, accelerations)
-    all_forces = problem.records(shared, values, speeds)
+    recorded = prepare_motion(mechanism, motion, times, False, lowpass, start, end)
+    values, speeds, accelerations = _compute_states(model, mechanism, recorded)
+    shared = problem.solve_motion(recorded.times, values, speeds, accelerations)
+    all_forces = problem.report_forces(shared, values, speeds)
     return MuscleForces(
         TITLE,
         shared.times,
@@ -156,23 +167,29 @@ def static_optimization(
     )
 
 
-def _moving(
+def _compute_states(
     model: Model, mechanism: Mechanism, recorded: RecordedMotion
 ) -> tuple[Array, Array, Array]:
-    """Values, speeds and accelerations (t, n) of a motion, of which the constraints hold."""
+    """Compute the states of a motion that fulfil the constraints.
+
+    Returns:
+        Values, speeds and accelerations (t, n).
+    """
     times, values = recorded.around or (recorded.times, recorded.values)
     around = RecordedMotion(mechanism, times, values)
     all_speeds = around.rates[0].copy()
     if mechanism.turning:
         for q, u in zip(values, all_speeds, strict=True):
             u[:] = mechanism.speeds_from_rates(q, u)
-    (accelerations,) = derivatives_of_samples(times, all_speeds, recorded.times, (1,), _HALF_ORDER)
+    (accelerations,) = derivatives_of_samples(
+        times, all_speeds, recorded.times, (1,), _HALF_SPLINE_ORDER
+    )
     speeds = all_speeds[np.searchsorted(times, recorded.times)]
     if not mechanism.constraints:
         return recorded.values, speeds, accelerations
     assembled = recorded.assembled().values
     if model.constraint_set.objects and not recorded.missing:
-        # As OpenSim has it: what was recorded of all coordinates has speeds that agree.
+        # OpenSim uses the recorded speeds if all coordinates were recorded.
         return assembled, speeds, accelerations
     moments = zip(recorded.times.tolist(), assembled, speeds, strict=True)
     return (

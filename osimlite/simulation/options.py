@@ -1,4 +1,8 @@
-"""What can be chosen about a simulation."""
+"""Options of a simulation, their defaults, and the checks of their values.
+
+An option is declared once, as an attribute of :class:`Options`: the library, the commands and the
+manual read it there.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +24,7 @@ if TYPE_CHECKING:
     from osimlite.simulation.trajectory import Trajectory
 
 
-PER_RUN = (
+RUN_OPTIONS = (
     "accuracy",
     "integrator",
     "fixed_step",
@@ -33,15 +37,15 @@ PER_RUN = (
     "resume",
     "progress",
 )
-"""The options of a run; the others are chosen when a model is made ready."""
+"""Options that may differ between the runs of one `Simulation`; the others belong to the prepared model."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Options:
-    """What can be chosen about a simulation, by keyword arguments of :func:`osimlite.simulate` and `Simulation`.
+    """Options of :func:`osimlite.simulate` and :class:`Simulation`, given as keyword arguments.
 
-    Those in `PER_RUN` can be chosen for every run of a `Simulation`. What has a help is an option
-    of ``osimlite simulate`` too.
+    Those in `RUN_OPTIONS` may differ between the runs of a `Simulation`. An attribute with a help
+    text is an option of ``osimlite simulate`` too.
     """
 
     accuracy: float | None = define_option(
@@ -155,16 +159,20 @@ class Options:
     )
 
     @classmethod
-    def of(cls, choices: Mapping[str, Any]) -> Options:
-        """Of the keyword arguments that somebody gave.
+    def parse(cls, choices: Mapping[str, Any]) -> Options:
+        """Return the options that keyword arguments set, with defaults for the others.
 
         Raises:
-            SettingError: there is no such option.
+            SettingError: a keyword is not an option.
         """
         return cls().changed(choices)
 
     def changed(self, choices: Mapping[str, Any]) -> Options:
-        """With other choices; errors as those of `of`."""
+        """Return a copy in which keyword arguments replace some options.
+
+        Raises:
+            SettingError: a keyword is not an option.
+        """
         if not choices:
             return self
         known = [*vars(self)]
@@ -175,15 +183,15 @@ class Options:
                 )
         return replace(self, **choices)
 
-    def for_run(self, choices: Mapping[str, Any]) -> Options:
-        """With other choices for one run.
+    def override_for_run(self, choices: Mapping[str, Any]) -> Options:
+        """Return a copy in which keyword arguments replace options for one run.
 
         Raises:
-            SettingError: there is no such option, or it is chosen when the model is made ready.
+            SettingError: a keyword is not an option, or it belongs to the prepared model.
         """
         made = self.changed(choices)
         for name in choices:
-            if name not in PER_RUN:
+            if name not in RUN_OPTIONS:
                 raise SettingError(
                     f"'{name}' is chosen when a model is made ready: Simulation(model, engine, {name}=...)"
                 )
@@ -193,38 +201,53 @@ class Options:
 Options.__doc__ = f"{Options.__doc__}\n    Attributes:\n{describe_options(Options)}\n    "
 
 
-MOST_STEPS = 1_000_000_000
-"""Of a fixed length, which take hours to days."""
+MAX_FIXED_STEPS = 1_000_000_000
+"""Largest number of fixed steps of a run; so many take hours to days."""
 
-LONGEST_STEP = 0.1
-"""A longer fixed step (s) follows no motion of bodies: a thousandth is usual, and MuJoCo takes 0.002 by itself."""
+MAX_FIXED_STEP_S = 0.1
+"""Longest fixed step, s. Motions of bodies need about 0.001 s; MuJoCo's default is 0.002 s."""
 
 
 def _is_number(value: object) -> bool:
-    """Whether it is a number: not every caller checks types."""
+    """Return whether a value is a real number; callers without a type checker may pass anything."""
     return isinstance(value, Real)
 
 
-def check_step(h: float, to: float) -> None:
-    """SettingError for a fixed step h that means nothing for a motion up to a time, both in s."""
+def check_fixed_step(h: float, to: float) -> None:
+    """Check the length of fixed steps.
+
+    Args:
+        h: step, s.
+        to: end of the motion, s.
+
+    Raises:
+        SettingError: the step is not positive and finite, is longer than `MAX_FIXED_STEP_S`, or
+            there are too many steps.
+    """
     if not (_is_number(h) and isfinite(h) and h > 0.0):
         raise SettingError(f"the fixed step is a positive and finite number of seconds, not {h!r}")
-    if h > LONGEST_STEP:
+    if h > MAX_FIXED_STEP_S:
         raise SettingError(
-            f"a fixed step of {h:g} s is too long for any motion of bodies; take at most {LONGEST_STEP:g} s, with "
+            f"a fixed step of {h:g} s is too long for any motion of bodies; take at most {MAX_FIXED_STEP_S:g} s, with "
             "contacts about 0.001 s"
         )
-    if h * MOST_STEPS < to:
+    if h * MAX_FIXED_STEPS < to:
         raise SettingError(
             f"{to:g} s in fixed steps of {h:g} s are more than a thousand million; take longer steps"
         )
 
 
-def report_times(to: float, interval: float, start: float = 0.0) -> list[float]:
-    """`start`, those of interval, 2 interval ... after it, and `to` (s).
+def compute_report_times(to: float, interval: float, start: float = 0.0) -> list[float]:
+    """Return the times of the rows of the results, s: the start, the multiples of the interval after it, and the end.
+
+    Args:
+        to: end of the motion, s.
+        interval: time between rows, s.
+        start: start of the motion, s.
 
     Raises:
-        SimulationError: a number has no meaning.
+        SettingError: a time is not a number, the motion does not end after its start, or there are
+            too many rows.
     """
     for number in (to, interval):
         if not _is_number(number):
@@ -239,7 +262,7 @@ def report_times(to: float, interval: float, start: float = 0.0) -> list[float]:
             f"a report every {interval:g} s makes more than ten million rows; take a longer interval"
         )
     times = [number * interval for number in range(floor(to / interval) + 1)]
-    # A last moment that differs from `to` only by rounding is `to`.
+    # A last time that differs from `to` by rounding only is `to`.
     if to - times[-1] <= 1e-9 * interval:
         times.pop()
     if start > 0.0:
@@ -248,6 +271,7 @@ def report_times(to: float, interval: float, start: float = 0.0) -> list[float]:
 
 
 MERSON = "merson"
+"""Name of the default integrator."""
 INTEGRATORS = {
     MERSON: "RungeKuttaMerson",
     "euler2": "SemiExplicitEuler2",
@@ -255,26 +279,32 @@ INTEGRATORS = {
     "bdf": "BDF",
     "rosenbrock": "Rosenbrock",
 }
-"""The integrators with error control by the names that users give, which their kernels have, with
-their own names: two of Simbody's, of which OpenSim takes the first, and those for stiff motion.
+"""Integrators with error control: the method's class name by the option's value, which is also the name of the kernel.
+
+The first two are Simbody's (OpenSim uses RungeKuttaMerson), the other three are for stiff or smooth
+motions.
 """
 
 DEFAULT_ACCURACY = 1e-3
-LOOSE = 1e-2
-"""The loosest accuracy that keeps motions near the model's own.
+"""Accuracy of OpenSim's Manager where none is set."""
+LOOSEST_SOUND_ACCURACY = 1e-2
+"""Loosest accuracy at which motions stay near the exact solution; looser ones cause a warning.
 
-The walker ends within 0.01 rad of it after a second, by every integrator; at 0.1 it is 0.05 rad off
-by Rosenbrock's method and 0.07 by Merson's.
+At this accuracy the walker ends within 0.01 rad of the exact motion after one second, with every
+integrator. At 0.1 it is 0.05 rad off with Rosenbrock's method and 0.07 rad with Merson's.
 """
-"""What OpenSim's Manager uses where no accuracy was set."""
 
-INITIAL_STEP = 0.01
-"""First step tried, s: a tenth of Simbody's default time scale."""
-NO_BOUNDS = 0.0, inf
-"""Of the lengths of steps, s."""
+INITIAL_STEP_S = 0.01
+"""First step that an integrator tries, s: a tenth of Simbody's default time scale."""
+UNBOUNDED_STEPS = 0.0, inf
+"""Shortest and longest step (s) where the options set none."""
 
 
 def check_integrator(name: str) -> None:
-    """SettingError if there is no such integrator."""
+    """Check the name of an integrator.
+
+    Raises:
+        SettingError: there is no integrator of that name.
+    """
     if name not in INTEGRATORS:
         raise SettingError(f"there is no integrator '{name}'{suggest_or_list(name, INTEGRATORS)}")

@@ -1,4 +1,4 @@
-"""From a mechanism and its forces to the vectors that the kernels work on."""
+"""Packing of a mechanism and its forces into the vectors of the kernels."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from osimlite.mechanics.kernels.pointers import Floats, Ints
 from osimlite.mechanics.kernels.record import STATES
 from osimlite.mechanics.multibody.links import LinkPacker, Placement, Tree, tree_of
 from osimlite.mechanics.multibody.mechanism import Mechanism
-from osimlite.simulation.constrained import constraints_on, free_coordinates
+from osimlite.simulation.constrained import find_free_coordinates, select_constraints
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.force_records import CONTROLS, ForceElement, Response
 from osimlite.simulation.states import StateLayout
@@ -22,52 +22,55 @@ from osimlite.simulation.states import StateLayout
 if TYPE_CHECKING:
     from osimlite.simulation.pack_chain import Chain
 
-FEWEST = 8
-"""Items that follow one another and are worth a kernel of their own."""
+MIN_BATCHED_ITEMS = 8
+"""Number of consecutive items of one type from which a batched kernel is faster."""
 
 
 @dataclass
-class Packed:
-    """A mechanism with its forces, packed."""
+class PackedModel:
+    """A mechanism with its forces as vectors, without addresses."""
 
-    structure: Ints  # the integers, with no addresses in them
-    numbers: Floats  # the numbers
-    laws: tuple[str, ...]  # names of the engine's own functions that must be there
-    # by place in the structure what computes an item: a name, or a function of Python
+    structure: Ints  # integers without addresses
+    numbers: Floats  # numbers of the model
+    laws: tuple[str, ...]  # names of laws that the engine calls itself
+    # kernel of each item by its offset in the structure: a name, or a Python function
     kernels: dict[int, str | Callable[..., None]]
-    # by place in the structure the name of what brings an item into equilibrium
+    # kernel that equilibrates an item, by its offset in the structure
     equilibria: dict[int, str]
-    # by place in the structure the name of what finds the derivatives of an item
+    # kernel of an item's derivatives, by its offset in the structure
     responses: dict[int, str]
-    # by place in the structure the name of what computes several items at once
+    # kernel of several items, by the offset of their record in the structure
     runs: dict[int, str]
-    owners: dict[int, int]  # by place in the structure of an item the number of its force element
-    order: tuple[int, ...]  # place in the mechanism of the coordinate of each degree of freedom
-    placements: list[Placement]  # of every body its link (-1 for ground) and its frame in that
-    # of every force element the records of its items in the work vector, as place and length
+    # index of the force element of each item, by the item's offset in the structure
+    owners: dict[int, int]
+    order: tuple[int, ...]  # index in the mechanism of the coordinate of each degree of freedom
+    placements: list[Placement]  # link of every body (-1 for ground), and its frame in the link
+    # records of the items of every force element in the work vector, as (offset, length)
     items: list[list[tuple[int, int]]]
 
 
 def pack(
     mechanism: Mechanism, forces: Forces, chain: Chain | None = None, *, apart: bool = False
-) -> Packed:
+) -> PackedModel:
     """Pack a mechanism and its forces.
 
     Args:
-        mechanism: what moves.
-        forces: what pushes it, besides gravity.
-        chain: of joints whose mass matrix another program computes; the kernels do without one.
-        apart: whether bodies that never move in one another are links of their own.
+        mechanism: the mechanism.
+        forces: forces on it besides gravity.
+        chain: joints whose mass matrix another program computes; None if the kernels compute it.
+        apart: whether a body that never moves in its parent is a link of its own.
 
     Raises:
-        UnsupportedError: a joint, a function, a constraint or a force that the kernels do not know.
+        UnsupportedError: the kernels do not support a joint, function, constraint or force.
     """
-    tree = tree_of(mechanism, free_coordinates(mechanism), apart=apart)
-    return Packer(tree, forces, StateLayout(mechanism, tree.order, forces.elements), chain).packed()
+    tree = tree_of(mechanism, find_free_coordinates(mechanism), apart=apart)
+    return Packer(
+        tree, forces, StateLayout(mechanism, tree.order, forces.elements), chain
+    ).pack_model()
 
 
 class Packer(LinkPacker):
-    """Puts everything at its place in the vectors."""
+    """Writer of the kernel vectors of one model."""
 
     def __init__(self, tree: Tree, forces: Forces, state: StateLayout, chain: Chain | None) -> None:
         super().__init__(tree)
@@ -81,17 +84,17 @@ class Packer(LinkPacker):
         self.owners: dict[int, int] = {}
         self.runs: dict[int, str] = {}
 
-    def packed(self) -> Packed:
-        """Everything."""
+    def pack_model(self) -> PackedModel:
+        """Write all records of the model, and return the packed model."""
         ints = self.ints
-        self.mechanism_records(*constraints_on(self.places.mechanism, self.order))
+        self.mechanism_records(*select_constraints(self.places.mechanism, self.order))
         if self.chain is not None:
             from osimlite.simulation.pack_chain import pack_chain
 
             pack_chain(self, self.chain)
         ints[MODEL.WORK_CONTROL] = self.reserve_work(len(self.controls.names))
-        result = self.item_records()
-        self.control_record()
+        result = self.write_items()
+        self.write_controls()
         ints[MODEL.STATE_SIZE] = self.state.size
         ints[MODEL.WORK_STATE] = self.reserve_work(ints[MODEL.STATE_SIZE] * STATES)
         ints[MODEL.WORK_SIZE] = self.work
@@ -101,10 +104,16 @@ class Packer(LinkPacker):
         )
         laws = tuple(dict.fromkeys(self.laws))
         asked = self.kernels, self.equilibria, self.responses, self.runs, self.owners
-        return Packed(structure, numbers, laws, *asked, self.order, self.places.placements, result)
+        return PackedModel(
+            structure, numbers, laws, *asked, self.order, self.places.placements, result
+        )
 
-    def item_records(self) -> list[list[tuple[int, int]]]:
-        """Write the items; the records of the contacts come first, in their order."""
+    def write_items(self) -> list[list[tuple[int, int]]]:
+        """Write the items of all force elements; the records of contacts come first, in their order.
+
+        Returns:
+            For each element the records of its items in the work vector, as (offset, length).
+        """
         groups = [element.make_records(self.places) for element in self.elements]
         self.ints[MODEL.CONTACTS] = sum(item.is_contact for group in groups for item in group)
         contact = self.ints[MODEL.WORK_CONTACT] = self.reserve_work(
@@ -145,11 +154,11 @@ class Packer(LinkPacker):
                     responding[len(self.ints)] = item.response
                 own = list(item.ints)
                 for number, at_state in enumerate(item.states):
-                    own[at_state] = self.state.first_of(element) + number
+                    own[at_state] = self.state.find_first_state(element) + number
                 for number, path in item.record_references:
                     own[number] += places[path]
                 places[element.path] = place
-                self.ints += [*self.item_head(place, first), *own]
+                self.ints += [*self.make_item_head(place, first), *own]
                 self.numbers += item.numbers
         self.ints[MODEL.ITEMS], self.ints[MODEL.ITEM_AT] = len(records), len(self.ints)
         self.ints += records
@@ -175,22 +184,22 @@ class Packer(LinkPacker):
         for (kernel, first), end in zip(
             runs, [*(run[1] for run in runs[1:]), len(records)], strict=False
         ):
-            if end - first >= FEWEST and kernel:
+            if end - first >= MIN_BATCHED_ITEMS and kernel:
                 self.runs[len(self.ints)] = kernel
             self.ints += RUN.record(LAW=0, FIRST=first, END=end, ROOM=room)
         return result
 
-    def item_head(self, place: int, first_contact: int) -> list[int]:
-        """What stands before an item's own integers, its law not known yet."""
+    def make_item_head(self, place: int, first_contact: int) -> list[int]:
+        """Return the head of an item's record, without the address of its law."""
         return ITEM.record(
             LAW=0, NUMBERS=len(self.numbers), RECORD=place, FIRST_CONTACT=first_contact
         )
 
-    def control_record(self) -> None:
-        """Write the controls, if there are any, behind all else: some motions have others there."""
+    def write_controls(self) -> None:
+        """Write the record of the controls at the end, where :meth:`System.set_controls` can replace it."""
         if not self.controls.names:
             return
         self.ints[MODEL.CONTROLS] = len(self.ints)
         own, numbers, self.kernels[len(self.ints)] = self.controls.make_record()
-        self.ints += [*self.item_head(self.ints[MODEL.WORK_CONTROL], 0), *own]
+        self.ints += [*self.make_item_head(self.ints[MODEL.WORK_CONTROL], 0), *own]
         self.numbers += numbers

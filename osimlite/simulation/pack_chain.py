@@ -1,4 +1,4 @@
-"""The joints of another program, packed: what each of them follows."""
+"""Packing of a robot chain whose mass matrix another program computes."""
 
 from __future__ import annotations
 
@@ -29,17 +29,17 @@ if TYPE_CHECKING:
 class Chain(NamedTuple):
     """A robot whose mass matrix and bias another program computes."""
 
-    joints: Sequence[RobotJoint]  # that move, in the order of that program
-    # body, and what its principal moments of inertia are larger by there than in the model (kg·m²)
+    joints: Sequence[RobotJoint]  # moving joints, in the order of that program
+    # bodies, and what is added to their principal moments of inertia there (kg·m²)
     excess: Sequence[tuple[int, float]]
-    # kernel in Python. In the work vector it finds values, rates and accelerations of the joints,
-    # and writes the forces behind them that these accelerations take against gravity, and the mass
-    # matrix.
+    # kernel in Python. It reads values, rates and accelerations of the joints from the work vector,
+    # and writes after them the joint forces that these accelerations require against gravity, and
+    # the mass matrix.
     supply: Callable[..., None]
 
 
 def pack_chain(packer: Packer, chain: Chain) -> None:
-    """Write what the kernels need to know of a chain, if it has any joints."""
+    """Write the records of a chain, if it has any joints."""
     ints, count = packer.ints, len(chain.joints)
     if not count:
         return
@@ -49,14 +49,14 @@ def pack_chain(packer: Packer, chain: Chain) -> None:
     records: list[int] = []
     shares: list[tuple[int, int]] = []
     for number, joint in enumerate(chain.joints):
-        kind, source, part, freedoms = _followed(packer, joint)
+        kind, source, part, freedoms = _encode_joint(packer, joint)
         records += JOINT.record(KIND=kind, SOURCE=source, PART=part, FIRST_SHARE=len(shares))
         shares += [(number, freedom) for freedom in freedoms]
     parts = [item for joint, freedom in shares for item in SHARE.record(JOINT=joint, DOF=freedom)]
     lists = {
         ("JOINTS", "JOINT_AT"): (JOINT.SIZE, records),
         ("SHARES", "SHARE_AT"): (SHARE.SIZE, parts),
-        ("PRODUCTS", "PRODUCT_AT"): (PRODUCT.SIZE, _products(packer, shares, count)),
+        ("PRODUCTS", "PRODUCT_AT"): (PRODUCT.SIZE, _list_products(packer, shares, count)),
         ("EXCESSES", "EXCESS_AT"): (EXCESS.SIZE, list_excesses(packer, chain.excess)),
     }
     places: dict[str, int] = {}
@@ -75,8 +75,8 @@ def pack_chain(packer: Packer, chain: Chain) -> None:
     )
 
 
-def _followed(packer: Packer, joint: RobotJoint) -> tuple[int, int, int, list[int]]:
-    """Kind, source and part of a joint, and the degrees of freedom that move it."""
+def _encode_joint(packer: Packer, joint: RobotJoint) -> tuple[int, int, int, list[int]]:
+    """Return kind, source and part of a joint, and the degrees of freedom that move it."""
     function, places = joint.function, list(joint.coordinates)
     freedoms = [packer.places.freedom(place) for place in places]
     for number, operation in enumerate(packer.operations):
@@ -100,8 +100,10 @@ def _followed(packer: Packer, joint: RobotJoint) -> tuple[int, int, int, list[in
     return JOINT_KIND.LINE, freedoms[0], len(packer.numbers) - 1, freedoms
 
 
-def _products(packer: Packer, shares: Sequence[tuple[int, int]], count: int) -> list[int]:
-    """Of each entry of our mass matrix the pairs of shares, the entry of the other one, and the place of the sum."""
+def _list_products(packer: Packer, shares: Sequence[tuple[int, int]], count: int) -> list[int]:
+    """Return the records of products: for each entry of the mass matrix, pairs of shares, the entry
+    of the other program's matrix, and the offset of the sum.
+    """
     of_freedom: dict[int, list[tuple[int, int]]] = defaultdict(list)
     for number, (joint, freedom) in enumerate(shares):
         of_freedom[freedom].append((number, joint))
@@ -118,7 +120,7 @@ def _products(packer: Packer, shares: Sequence[tuple[int, int]], count: int) -> 
 
 
 def list_excesses(packer: Packer, excess: Sequence[tuple[int, float]]) -> list[int]:
-    """Link, last degree of freedom on the way to it, and place of the number."""
+    """Return records of added inertia: link, last degree of freedom on the path to it, and offset of the added moment."""
     result: list[int] = []
     for body, moment in excess:
         link = carrier = packer.places.placements[body].link

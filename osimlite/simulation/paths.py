@@ -27,25 +27,25 @@ from osimlite.simulation.elements.geometries.path import PATH
 from osimlite.simulation.elements.geometries.paths.geometry_path import ThroughPoints
 from osimlite.simulation.engines.linking import Code
 from osimlite.simulation.path_system import MeasuredPath, PathSystem
-from osimlite.simulation.polylines import Course, Polylines
+from osimlite.simulation.polylines import Polylines, TraceablePath
 
-ROUNDING = 1e-12
-"""What is left of a moment arm, or a speed, of 0."""
+ARM_ROUNDING = 1e-12
+"""Moment arms and speeds up to this size are rounding errors of 0."""
 
 
 @any_numbers
 def paths(model: Model, wrapping: str = OPENSIM, mechanism: Mechanism | None = None) -> Paths:
-    """The paths of a model: of its muscles, ligaments, springs and actuators, whether these act or not.
+    """Return the paths of a model: of its muscles, ligaments, springs and actuators, whether they act or not.
 
     Args:
-        model: whose paths.
-        wrapping: "opensim", or "geodesic": see :class:`osimlite.simulation.Options`.
-        mechanism: of the model, if somebody has it.
+        model: the model.
+        wrapping: "opensim" or "geodesic", see :class:`osimlite.simulation.Options`.
+        mechanism: mechanism of the model; built if None.
 
     Raises:
         SettingError: there is no such wrapping.
-        UnsupportedError: a path, a joint or a constraint of an unknown class.
-        ModelError: something makes no sense.
+        UnsupportedError: osimlite does not support a path, joint or constraint.
+        ModelError: the model is not a mechanism.
     """
     return Paths(model, wrapping, mechanism=mechanism)
 
@@ -54,21 +54,21 @@ def paths(model: Model, wrapping: str = OPENSIM, mechanism: Mechanism | None = N
 class Paths:
     """The paths of a model, see :func:`paths`.
 
-    Values of coordinates are an array (n,) in the order of the mechanism, or numbers by name or
-    path; those that are left out have their defaults.
+    Methods take values of coordinates as an array (n,) in the order of the mechanism, or as numbers
+    by name or path; missing ones have their defaults.
 
     Args:
-        model: whose paths.
-        wrapping: how they bend around surfaces.
-        code: what runs the kernels; the best that is installed if left out.
-        left_out: paths of owners whose paths are not wanted.
-        mechanism: of the model; made if left out.
+        model: the model.
+        wrapping: how paths wrap.
+        code: what runs the kernels; by default the fastest that is installed.
+        left_out: paths of owners that are ignored.
+        mechanism: mechanism of the model; built if None.
 
     Attributes:
-        system: that computes them.
-        names: component paths of their owners, in the order of the model.
-        routes: what each runs through, in terms of the mechanism, by these names.
-        mechanism: of the model.
+        system: system that computes the paths.
+        names: component paths of the owners, in the order of the model.
+        routes: points and surfaces of each path in the mechanism, by these names.
+        mechanism: mechanism of the model.
     """
 
     _repr_html_ = make_notebook_repr("paths")
@@ -84,11 +84,11 @@ class Paths:
         mechanism = build_mechanism(model) if mechanism is None else mechanism
         builder = ElementBuilder(model, mechanism, Path(), wrapping=wrapping)
         owners = filter(_has_path, builder.tree.components)
-        self._gather(
+        self._build_system(
             builder, [owner for owner in owners if builder.path(owner) not in left_out], code
         )
 
-    def _gather(
+    def _build_system(
         self, builder: ElementBuilder, owners: Sequence[Component], code: Code | None
     ) -> None:
         self.mechanism = builder.mechanism
@@ -97,20 +97,19 @@ class Paths:
         pairs = zip(self.names, owners, strict=True)
         elements = [MeasuredPath(name, PATH.read(builder, owner)) for name, owner in pairs]
         self._coupled = np.array([element.along.coupled for element in elements], dtype=bool)
-        # A locked coordinate has a moment arm too, which is that of the coordinate once it is not
-        # locked.
+        # OpenSim gives a locked coordinate the moment arm that it has when it is unlocked.
         self.routes = {element.path: element.along for element in elements}
         self.system = PathSystem(
             self.mechanism.without_constraints(), Forces(tuple(elements)), code=code
         )
 
-    def around_surfaces(self, model: Model, wrapping: str, code: Code | None = None) -> Paths:
-        """Those of the paths that have surfaces to wrap around, wrapped otherwise; the mechanism is shared.
+    def rewrap_paths(self, model: Model, wrapping: str, code: Code | None = None) -> Paths:
+        """Return those paths that have wrap surfaces, with another wrapping; the mechanism is shared.
 
         Args:
-            model: whose paths these are.
-            wrapping: how they bend around surfaces.
-            code: what runs the kernels; the best that is installed if left out.
+            model: the model of the paths.
+            wrapping: how paths wrap.
+            code: what runs the kernels; by default the fastest that is installed.
         """
         builder = ElementBuilder(model, self.mechanism, Path(), wrapping=wrapping)
         routes = self.routes.items()
@@ -118,70 +117,112 @@ class Paths:
             name for name, route in routes if isinstance(route, ThroughPoints) and route.surfaces
         ]
         other = object.__new__(Paths)
-        other._gather(builder, [builder.tree.at(name) for name in names], code)
+        other._build_system(builder, [builder.tree.at(name) for name in names], code)
         return other
 
     def lengths(self, q: Values) -> dict[str, float]:
-        """Length of each path (m)."""
-        lengths = self.system.measured(
+        """Return the length of each path.
+
+        Args:
+            q: values of coordinates.
+
+        Returns:
+            Lengths (m) by owner.
+        """
+        lengths = self.system.measure_paths(
             self.mechanism.values(q), np.zeros(len(self._coordinates)), LENGTH
         )
         return dict(zip(self.names, lengths.tolist(), strict=True))
 
     def speeds(self, q: Values, u: Values) -> dict[str, float]:
-        """Lengthening speed of each path (m/s) for generalized speeds u, given as the values are.
+        """Return the lengthening speed of each path.
 
-        As in OpenSim it is the sum over all pairs of neighbouring points, tangent points moving
-        with their bodies: the rate of the length only where no point comes or goes, and where the
-        path on a surface is the shortest. Along geodesics it is.
+        As in OpenSim it is the sum over all pairs of neighbouring points, and tangent points move
+        with their bodies. It equals the rate of the length only where no point appears or
+        disappears, and where the path on a surface is the shortest one. Geodesic paths fulfil that.
+
+        Args:
+            q: values of coordinates.
+            u: generalized speeds, in the same form.
+
+        Returns:
+            Speeds (m/s) by owner.
         """
-        speeds = self.system.measured(self.mechanism.values(q), self.mechanism.speeds(u), SPEED)
+        speeds = self.system.measure_paths(
+            self.mechanism.values(q), self.mechanism.speeds(u), SPEED
+        )
         return dict(zip(self.names, speeds.tolist(), strict=True))
 
     def points(self, q: Values) -> dict[str, list[tuple[int, Array]]]:
-        """What each path through points runs through, from end to end: numbers, and places (3,) in ground (m).
+        """Return the nodes of each path through points, from end to end.
 
-        Of n points the i-th has number i; the two tangent points of its k-th PathWrap have n + 2 k
-        and n + 2 k + 1. Along geodesics k counts the surfaces of its route, of which there is one
-        for each piece that may be bent.
+        Of n points the i-th has index i; the two tangent points of its k-th PathWrap have the
+        indices n + 2 k and n + 2 k + 1. For geodesic wrapping, k counts the surfaces of the route:
+        one for each segment that may wrap.
+
+        Args:
+            q: values of coordinates.
+
+        Returns:
+            For each owner the index and the position (3,) in ground (m) of each node.
         """
-        return self.system.nodes(self.mechanism.values(q), self.routes)
+        return self.system.locate_nodes(self.mechanism.values(q), self.routes)
 
     def lengths_on_surfaces(self, q: Values) -> dict[str, dict[str, float]]:
-        """Length of each path through points on each of its surfaces, by their names (m); 0 where it passes by.
+        """Return the length of each path through points on each of its surfaces; 0 where it does not touch.
 
-        NaN where OpenSim has the path wrap, finds no points for it, and goes straight through the
-        surface.
+        NaN stands for a path that OpenSim wraps, finds no tangent points for, and leads straight
+        through the surface.
+
+        Args:
+            q: values of coordinates.
+
+        Returns:
+            Lengths (m) by owner and surface.
         """
-        return self.system.on_surfaces(self.mechanism.values(q), self.routes)
+        return self.system.measure_on_surfaces(self.mechanism.values(q), self.routes)
 
     def polylines(self, q: Values) -> dict[str, Array]:
-        """Corners (k, 3) in ground (m) of each path, from end to end, round its surfaces.
+        """Return the corners of each path around its surfaces, from end to end, for drawing.
 
-        A path that is a function of coordinates has none. With OpenSim's wrapping there are a helix
-        on a cylinder, a great circle on a sphere, the section of a plane with an ellipsoid, a helix
-        about the tube of a torus; corners there are 0.15 rad apart.
+        A path that is a function of coordinates has none. With OpenSim's wrapping a path follows a
+        helix on a cylinder, a great circle on a sphere, a plane section of an ellipsoid, and a
+        helix about the tube of a torus; corners there are 0.15 rad apart.
+
+        Args:
+            q: values of coordinates.
+
+        Returns:
+            Corners (k, 3) in ground (m) by owner.
         """
         state = self.mechanism.at(self.mechanism.values(q))
-        corners = self._polylines.at(state.q, state.rotations[:-1], state.origins[:-1])
+        corners = self._polylines.trace(state.q, state.rotations[:-1], state.origins[:-1])
         return dict(zip(self._traced, corners, strict=True))
 
     @cached_property
-    def _traced(self) -> dict[str, Course]:
-        return {name: route for name, route in self.routes.items() if isinstance(route, Course)}
+    def _traced(self) -> dict[str, TraceablePath]:
+        return {
+            name: route for name, route in self.routes.items() if isinstance(route, TraceablePath)
+        }
 
     @cached_property
     def _polylines(self) -> Polylines:
         return Polylines(self.mechanism, list(self._traced.values()))
 
     def moment_arms(self, q: Values) -> dict[str, dict[str, float]]:
-        """Moment arms of each path about the coordinates by their paths (m, or 1 for a coordinate in m), but for zeros.
+        """Return the moment arms of each path, without zeros, by the paths of the coordinates.
 
-        As OpenSim's computeMomentArm has them: what a tension of 1 N does at the coordinate, and at
-        those that must move with it; NaN at one that cannot move. That is the derivative of the
-        length times -1 only where the speed is its rate.
+        They are defined as in OpenSim's computeMomentArm: the generalized force of a tension of 1 N
+        at the coordinate and at those that move with it; NaN at a coordinate that cannot move. They
+        equal minus the derivative of the length only where the speed is the rate of the length.
+
+        Args:
+            q: values of coordinates.
+
+        Returns:
+            Moment arms (m, or 1 for a coordinate in m) by owner and coordinate.
         """
-        (arms,) = self.all_moment_arms(self.mechanism.values(q)[None])
+        (arms,) = self.compute_moment_arms(self.mechanism.values(q)[None])
         return {
             name: {
                 path: arm for path, arm in zip(self._coordinates, row, strict=True) if arm != 0.0
@@ -189,40 +230,44 @@ class Paths:
             for name, row in zip(self.names, arms.tolist(), strict=True)
         }
 
-    def all_moment_arms(self, poses: Array, couplings: Iterable[Array] | None = None) -> Array:
-        """The same (k, p, n) of all paths about all coordinates, in poses (k, n) in the order of the mechanism.
+    def compute_moment_arms(self, poses: Array, couplings: Iterable[Array] | None = None) -> Array:
+        """Return the moment arms (k, p, n) of all paths about all coordinates in many poses.
 
-        `couplings` are the :meth:`coupling` (n, n) of each pose, where they are known.
+        Args:
+            poses: values of all coordinates (k, n).
+            couplings: result of :meth:`compute_coupling` (n, n) for each pose, if known.
         """
-        arms = self.system.pulled(poses)
+        arms = self.system.compute_pulls(poses)
         if not all(isinstance(item, Lock) for item in self.mechanism.constraints):
-            each = map(self.coupling, poses) if couplings is None else couplings
+            each = map(self.compute_coupling, poses) if couplings is None else couplings
             for row, coupling in zip(arms, each, strict=True):
                 row[self._coupled] = row[self._coupled] @ coupling
-        arms[np.abs(arms) <= ROUNDING] = 0.0
+        arms[np.abs(arms) <= ARM_ROUNDING] = 0.0
         return arms
 
-    def coupling(self, q: Values) -> Array:
-        """The generalized speeds (n, n) that go with a speed of 1 of each coordinate, in its column.
+    def compute_coupling(self, q: Values) -> Array:
+        """Return the generalized speeds (n, n) that go with a speed of 1 of each coordinate, in its column.
 
-        NaN where a coordinate cannot move.
+        Columns of coordinates that cannot move are NaN.
         """
         q = self.mechanism.values(q)
         constraints = self.mechanism.constraints
         if all(isinstance(item, Lock) for item in constraints):
             return np.eye(len(q))
         state = self.mechanism.at(q)
-        coupling = self.coupling_of_free(state)
+        coupling = self.compute_free_coupling(state)
         for place, lock in self._locks.items():
             others = [item for item in constraints if item is not lock]
-            coupling[:, [place]] = _coupled(others, state, [place])[:, [place]]
+            coupling[:, [place]] = _compute_coupled_speeds(others, state, [place])[:, [place]]
         return coupling
 
-    def coupling_of_free(self, state: Kinematics) -> Array:
-        """The same (n, n) in a pose at rest; a locked coordinate has the column of one that nothing goes with."""
+    def compute_free_coupling(self, state: Kinematics) -> Array:
+        """Return the coupling (n, n) in a pose at rest; columns of locked coordinates have a single 1."""
         constraints = self.mechanism.constraints
         free = [index for index in range(len(state.q)) if index not in self._locks]
-        return _coupled(constraints, state, free if len(constraints) > len(self._locks) else [])
+        return _compute_coupled_speeds(
+            constraints, state, free if len(constraints) > len(self._locks) else []
+        )
 
     @cached_property
     def _locks(self) -> dict[int, Lock]:
@@ -231,8 +276,12 @@ class Paths:
         }
 
 
-def _coupled(constraints: Sequence[Constraint], state: Kinematics, places: Sequence[int]) -> Array:
-    """The speeds nearest to 1 for a coordinate and 0 for all others, divided by its own, in the columns of `places`."""
+def _compute_coupled_speeds(
+    constraints: Sequence[Constraint], state: Kinematics, places: Sequence[int]
+) -> Array:
+    """Return, in the columns of `places`, the admissible speeds nearest to 1 for a coordinate and 0
+    for all others, divided by its own speed.
+    """
     coupling = np.eye(len(state.q))
     if constraints and places:
         rows, wanted = stack_equations([item.velocity_equations(state) for item in constraints])
@@ -240,12 +289,12 @@ def _coupled(constraints: Sequence[Constraint], state: Kinematics, places: Seque
             rows, rows[:, places] - wanted[:, None], REDUNDANT * len(rows)
         )
         own = speeds[places, range(len(places))]
-        coupling[:, places] = speeds / np.where(np.abs(own) > ROUNDING, own, np.nan)
+        coupling[:, places] = speeds / np.where(np.abs(own) > ARM_ROUNDING, own, np.nan)
     return coupling
 
 
 def _has_path(owner: Component) -> bool:
-    # To ask an object for what it does not have is dear: the answer says what it has.
+    # Accessing a missing attribute is slow, because the error message lists all properties.
     return "geometry_path" in type(owner).model_fields and isinstance(
         owner.geometry_path, AbstractGeometryPath
     )

@@ -1,4 +1,4 @@
-"""Where paths run, from where the bodies are: what the viewer draws."""
+"""Polylines of paths around their surfaces, for drawing."""
 
 from __future__ import annotations
 
@@ -16,60 +16,60 @@ from osimlite.mechanics.multibody.links import Places
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.simulation.elements.force_records import ForceRecord
-from osimlite.simulation.engines.linking import Code, best
+from osimlite.simulation.engines.linking import Code, select_code
 
-OF_MOTIONS = "evaluate", "constrained_dynamics", "project"
-OF_SPEEDS = "move_ball", "move_drift"
-OF_CONSTRAINTS = "prescribe", "bind_bodies", "factorise_law", "minimum_norm_law"
-"""Laws that nobody calls here: those that move a mechanism on, and those that only moment arms are
-found with, about any coordinate and about one with which others must move.
-"""
+MOTION_LAWS = "evaluate", "constrained_dynamics", "project"
+"""Laws that advance a mechanism; polylines do not use them."""
+SPEED_LAWS = "move_ball", "move_drift"
+"""Laws of speeds that only moment arms use."""
+CONSTRAINT_LAWS = "prescribe", "bind_bodies", "factorise_law", "minimum_norm_law"
+"""Laws of constraints that only moment arms use."""
 
 
 @runtime_checkable
-class Course(Protocol):
+class TraceablePath(Protocol):
     """A path that can be traced."""
 
     @property
     def trace(self) -> str:
-        """Name of the law that traces it."""
+        """Name of the law that traces the path."""
 
     @property
     def curves(self) -> tuple[str, ...]:
-        """Names of the laws that it calls, whose addresses stand behind the item of the path."""
+        """Names of the laws that the tracing law calls; their addresses follow the item of the path."""
 
     @property
     def corners(self) -> int:
-        """The most corners that it is traced with."""
+        """Largest number of corners of the polyline."""
 
     @property
     def start(self) -> tuple[int, Array]:
-        """The body that it starts in, and where there (3,)."""
+        """Body in which the path starts, and the position there (3,), m."""
 
     def make_records(self, places: Places) -> list[ForceRecord]:
-        """Parts, of which the last is the path's own."""
+        """Return the items of the path, the last of which is the path itself."""
 
 
 class Polylines:
-    """A mechanism with paths, laid out for the kernels.
+    """A mechanism with paths, packed for the kernels that trace them.
 
     Args:
-        mechanism: whose bodies and coordinates they depend on.
-        routes: what each runs through.
+        mechanism: mechanism on which the paths depend.
+        routes: the paths.
 
     Attributes:
-        program: the mechanism by itself.
-        bound: whether moment arms take in coordinates that must move with others.
-        structure: integers, with numbers of laws in the place of addresses.
-        laws: names of the laws by this number, of which 0 is none.
-        numbers: of the mechanism, and of the paths.
-        items: places of the paths in the structure.
-        traces: numbers of the laws that trace them.
-        room: the most corners that a path can have.
+        program: the packed mechanism.
+        bound: whether moment arms include coupled coordinates.
+        structure: integers, with indices of laws in place of addresses.
+        laws: names of the laws by index; index 0 is no law.
+        numbers: numbers of the mechanism and of the paths.
+        items: offsets of the paths in the structure.
+        traces: indices of the laws that trace them.
+        room: largest number of corners of a path.
         work: length of the work vector.
     """
 
-    def __init__(self, mechanism: Mechanism, routes: Sequence[Course]) -> None:
+    def __init__(self, mechanism: Mechanism, routes: Sequence[TraceablePath]) -> None:
         program = self.program = mechanism.program
         self.laws, self.items, self.traces = [""], list[int](), list[int]()
         ints, numbers, self.work, self.room = (
@@ -82,24 +82,30 @@ class Polylines:
             isinstance(item, Lock) for item in mechanism.constraints
         )
         unused = {
-            *OF_MOTIONS,
-            *(() if routes else OF_SPEEDS),
-            *(() if self.bound else OF_CONSTRAINTS),
+            *MOTION_LAWS,
+            *(() if routes else SPEED_LAWS),
+            *(() if self.bound else CONSTRAINT_LAWS),
         }
         for name in program.laws:
-            ints[MODEL.LAWS + LAW_NUMBERS[name]] = 0 if name in unused else self._law(name)
+            ints[MODEL.LAWS + LAW_NUMBERS[name]] = 0 if name in unused else self._number_law(name)
         self._calls: list[int] = []
         for route in routes:
             place = len(ints)
             for item in route.make_records(program.tree.places):
                 place = len(ints)
-                ints += [self._law(item.kernel, place), len(numbers), self.work, 0, *item.ints]
+                ints += [
+                    self._number_law(item.kernel, place),
+                    len(numbers),
+                    self.work,
+                    0,
+                    *item.ints,
+                ]
                 numbers += item.numbers
                 self.work += item.record_size
             self.items.append(place)
-            self.traces.append(self._law(route.trace))
+            self.traces.append(self._number_law(route.trace))
             for curve in route.curves:
-                ints.append(self._law(curve, len(ints)))
+                ints.append(self._number_law(curve, len(ints)))
             self.room = max(self.room, route.corners)
         self.structure, self.numbers = np.array(ints, dtype=np.int64), np.array(numbers)
         self._w, self._y, self._f = (
@@ -111,8 +117,8 @@ class Polylines:
         links, bodies = np.unique(program.links[:-1], return_index=True)
         self._bodies = bodies[links >= 0]
 
-    def _law(self, name: str, place: int | None = None) -> int:
-        """Number of a law, which may be called from a place in the structure."""
+    def _number_law(self, name: str, place: int | None = None) -> int:
+        """Return the index of a law, and note the place in the structure that needs its address."""
         if name not in self.laws:
             self.laws.append(name)
         if name and place is not None:
@@ -121,24 +127,24 @@ class Polylines:
 
     @cached_property
     def _linked(self) -> tuple[Code, Ints]:
-        """What runs the laws of the paths, and the structure with their addresses."""
-        code, ints = best(), self.structure.copy()
+        """Code that runs the laws, and the structure with their addresses."""
+        code, ints = select_code(), self.structure.copy()
         code.make_ready(
             [self.laws[k] for k in dict.fromkeys((*ints[self._calls].tolist(), *self.traces))]
         )
         for place in self._calls:
-            ints[place] = code.address(self.laws[ints[place]])
+            ints[place] = code.get_address(self.laws[ints[place]])
         return code, ints
 
-    def at(self, q: Array, rotations: Array, origins: Array) -> list[Array]:
-        """The corners (k, 3) of each path in ground, from end to end, m.
+    def trace(self, q: Array, rotations: Array, origins: Array) -> list[Array]:
+        """Return the corners (k, 3) of each path in ground, from end to end, m.
 
-        Where a path runs on a surface, corners are 0.15 rad apart.
+        On a surface, corners are 0.15 rad apart.
 
         Args:
             q: coordinate values (n,).
-            rotations: of the bodies in ground, (b, 3, 3).
-            origins: of the bodies in ground, (b, 3), m.
+            rotations: rotations of the bodies in ground (b, 3, 3).
+            origins: origins of the bodies in ground (b, 3), m.
         """
         code, ints = self._linked
         s, (bodies, order) = self.structure, (self._bodies, self.program.order)
@@ -155,7 +161,7 @@ class Polylines:
         given = ints, self.numbers, self._w, self._y, self._f
         result = []
         for item, trace in zip(self.items, self.traces, strict=True):
-            code.entry(self.laws[self.structure[item + ITEM.LAW]])(*given, item)
-            count = code.entry(self.laws[trace])(*given, item)
+            code.get_entry(self.laws[self.structure[item + ITEM.LAW]])(*given, item)
+            count = code.get_entry(self.laws[trace])(*given, item)
             result.append(self._f[: 3 * count].reshape(-1, 3).copy())
         return result

@@ -1,4 +1,4 @@
-"""Assembly of the poses of a whole motion by the kernels, in one call."""
+"""Assembly of all poses of a motion in one call of the kernels."""
 
 from __future__ import annotations
 
@@ -13,21 +13,25 @@ from osimlite.mechanics.multibody.assembly import tolerance_of
 from osimlite.mechanics.multibody.constraints import Coupler, Lock
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.spatial import Array
-from osimlite.simulation.engines.linking import AT_HAND, Code, best
+from osimlite.simulation.engines.linking import READY_CODE, Code, select_code
 
-ENTRY = "assemble_poses"
-FEW_POSES = 20
-"""So many poses are sooner assembled by Python than the kernel is compiled."""
+ASSEMBLY_KERNEL = "assemble_poses"
+"""Name of the kernel that assembles poses."""
+MAX_PYTHON_POSES = 20
+"""Number of poses up to which Python is faster than compiling the kernel."""
 
 
 def assemble_motion(
     mechanism: Mechanism, times: Array, values: Array, code: Code | None = None
 ) -> Array:
-    """Return the poses nearest to given ones that fulfil the constraints, by the rules of `Mechanism.assemble`.
+    """Return the poses nearest to those of a motion that fulfil the constraints, as `Mechanism.assemble` does.
 
-    Args: mechanism: what moves. times: of the poses (t,), s. values: of all coordinates (t, n), rad
-        and m. code: what runs the kernels; by default machine code, for a few poses only where it
-        is compiled already.
+    Args:
+        mechanism: the mechanism.
+        times: times of the poses (t,), s.
+        values: values of all coordinates (t, n), rad and m.
+        code: what runs the kernels; by default machine code, for a few poses only if it is compiled
+            already.
 
     Returns:
         The assembled values (t, n).
@@ -38,26 +42,26 @@ def assemble_motion(
     if all(isinstance(item, Lock) for item in mechanism.constraints):
         return values.copy()
     if code is None:
-        code = best() if len(times) > FEW_POSES else AT_HAND
+        code = select_code() if len(times) > MAX_PYTHON_POSES else READY_CODE
     program = mechanism.program
     order = program.order
     size = len(order)
-    functions = (ENTRY, *program.laws)
-    code = code.chosen_for(functions)
+    functions = (ASSEMBLY_KERNEL, *program.laws)
+    code = code.select_for(functions)
     code.make_ready(functions)
     ints = np.array(program.model, dtype=np.int64)
     for name in program.laws:
-        ints[MODEL.LAWS + LAW_NUMBERS[name]] = code.address(name)
+        ints[MODEL.LAWS + LAW_NUMBERS[name]] = code.get_address(name)
     equations = int(ints[ints[MODEL.CONSTRAINED] + CONSTRAINED.POSITIONS])
     frames, found = np.column_stack([times, values[:, order]]), np.empty((len(times), size + 1))
-    code.entry(ENTRY)(
+    code.get_entry(ASSEMBLY_KERNEL)(
         ints,
         np.array(program.reals, dtype=np.float64),
         np.zeros(int(ints[MODEL.WORK_SIZE])),
         np.zeros(2 * size),
         np.zeros(2 * size),
-        np.array(_integers(mechanism, order), dtype=np.int64),
-        np.array(_numbers(mechanism, order)),
+        np.array(_list_integers(mechanism, order), dtype=np.int64),
+        np.array(_list_numbers(mechanism, order)),
         np.zeros(assembly.assembly_work_size(equations, size)),
         np.ascontiguousarray(frames),
         found,
@@ -66,13 +70,13 @@ def assemble_motion(
     result: Array = np.empty_like(values)
     result[:, order] = found[:, :size]
     for row in np.flatnonzero(found[:, size] != assembly.ASSEMBLED).tolist():
-        # The search in Python has the words for what is wrong.
+        # The search in Python raises an error with an explanation.
         result[row] = mechanism.assemble(values[row], float(times[row]))
     return result
 
 
-def _integers(mechanism: Mechanism, order: Sequence[int]) -> list[int]:
-    """Integers of the assembly, see `kernels.assembly`."""
+def _list_integers(mechanism: Mechanism, order: Sequence[int]) -> list[int]:
+    """Return the integers of the assembly, see `kernels.assembly`."""
     program, infos = mechanism.program, [mechanism.coordinates[place] for place in order]
     turning = any(not program.bound.isdisjoint(item.coordinates) for item in mechanism.turning)
     couplers = [item for item in mechanism.constraints if isinstance(item, Coupler)]
@@ -86,8 +90,8 @@ def _integers(mechanism: Mechanism, order: Sequence[int]) -> list[int]:
     return result
 
 
-def _numbers(mechanism: Mechanism, order: Sequence[int]) -> list[float]:
-    """Numbers of the assembly, see `kernels.assembly`."""
+def _list_numbers(mechanism: Mechanism, order: Sequence[int]) -> list[float]:
+    """Return the numbers of the assembly, see `kernels.assembly`."""
     result = [tolerance_of(mechanism)]
     for place in order:
         result += mechanism.coordinates[place].range

@@ -1,4 +1,4 @@
-"""The numbers of a model by path: ``/forceset/RFootForce/contact_parameters/stiffness``."""
+"""Numbers of a model by path, such as ``/forceset/RFootForce/contact_parameters/stiffness``."""
 
 from __future__ import annotations
 
@@ -15,47 +15,47 @@ from osimlite.schema.fields import Value
 from osimlite.schema.model import Model
 
 
-class Named(Protocol):
-    """What has a name and a path."""
+class NamedItem(Protocol):
+    """An object with a name and a path."""
 
     @property
     def name(self) -> str:
-        """Without what it is in."""
+        """Name without the parent."""
 
     @property
     def path(self) -> str:
-        """With it."""
+        """Path from the model."""
 
 
-N = TypeVar("N", bound=Named)
+NamedItemType = TypeVar("NamedItemType", bound=NamedItem)
 
 Step = str | int
-"""Name of a property, or place in the list that the step before led to."""
+"""Name of a property, or index in the list to which the previous step led."""
 
 
 @dataclass(frozen=True)
-class Place:
-    """One number of a component."""
+class PropertyPath:
+    """The way to one number of a component."""
 
-    component: str  # path
-    steps: tuple[Step, ...]  # from the component to the number
-    unit: str  # in the words of the schema, empty if it has none
+    component: str  # path of the component
+    steps: tuple[Step, ...]  # steps from the component to the number
+    unit: str  # unit in the schema's notation, or ""
 
-    def setter(self, model: Model) -> Setter:
-        """What puts numbers there.
+    def make_setter(self, model: Model) -> PropertySetter:
+        """Return the setter of this number in a model.
 
         Raises:
-            SettingError: this model has no such number.
+            SettingError: the model has no such number.
         """
         holder: object = model.tree().by_path.get(self.component)
         try:
             for step in self.steps[:-2]:
-                holder = _at(holder, step)
+                holder = _get_step(holder, step)
             *_, last = self.steps
             if isinstance(last, str):
-                holder = holder if len(self.steps) == 1 else _at(holder, self.steps[-2])
-                return Setter(_object(holder), last, None)
-            return Setter(_object(holder), str(self.steps[-2]), last)
+                holder = holder if len(self.steps) == 1 else _get_step(holder, self.steps[-2])
+                return PropertySetter(_expect_object(holder), last, None)
+            return PropertySetter(_expect_object(holder), str(self.steps[-2]), last)
         except (AttributeError, LookupError, TypeError):
             words = "/".join(str(step) for step in self.steps)
             raise SettingError(
@@ -64,23 +64,23 @@ class Place:
 
 
 @dataclass(frozen=True)
-class Setter:
-    """Puts numbers into one property, or one entry of it; of one with a `factor` those times it."""
+class PropertySetter:
+    """Setter of one property, or of one entry of it; values are multiplied by `factor`."""
 
     holder: Object
     name: str
     entry: int | None
     factor: float = 1.0
 
-    def scaling(self) -> Setter:
-        """The same with what is there now as the factor."""
-        return replace(self, factor=self.get())
+    def as_factor(self) -> PropertySetter:
+        """Return a setter whose factor is the present value."""
+        return replace(self, factor=self.get_value())
 
-    def put(self, value: float) -> None:
+    def set_value(self, value: float) -> None:
         """Set the number.
 
         Raises:
-            ModelError: the property does not take it.
+            ModelError: the property does not accept it.
         """
         value *= self.factor
         if self.entry is None:
@@ -90,24 +90,27 @@ class Setter:
             numbers[self.entry] = value
             setattr(self.holder, self.name, tuple(numbers))
 
-    def get(self) -> float:
-        """The number that is there."""
+    def get_value(self) -> float:
+        """Return the present number."""
         result = getattr(self.holder, self.name)
         return float(result if self.entry is None else result[self.entry])
 
 
-def named(pattern: str, components: Iterable[N]) -> list[N]:
-    """Components by name or path, or by several with commas; ``*``, ``?`` and ``[lr]`` stand for parts of a name.
+def match_components(pattern: str, components: Iterable[NamedItemType]) -> list[NamedItemType]:
+    """Return the components that a pattern selects; none if a part of it selects nothing.
 
-    None if one of several means nothing.
+    Args:
+        pattern: a name or path, or several with commas; ``*``, ``?`` and ``[lr]`` stand for parts
+            of a name.
+        components: the candidates.
     """
     known = list(components)
-    result: dict[int, N] = {}
+    result: dict[int, NamedItemType] = {}
     for part in pattern.split(","):
         own = [
             item
             for item in known
-            if _is_meant(part, item.path if part.startswith("/") else item.name)
+            if _matches(part, item.path if part.startswith("/") else item.name)
         ]
         if not own:
             return []
@@ -115,17 +118,19 @@ def named(pattern: str, components: Iterable[N]) -> list[N]:
     return [item for item in known if id(item) in result]
 
 
-def each(name: str, model: Model) -> list[str]:
-    """A name for each different text that stands for what is in braces in the name or path of a component.
+def expand_braces(name: str, model: Model) -> list[str]:
+    """Return one name for each different text that the pattern in braces stands for, in the names or paths of the components.
 
-    ``{*}_?/control`` is ``soleus_?/control``, ``vasti_?/control`` and so on.
+    ``{*}_?/control`` becomes ``soleus_?/control``, ``vasti_?/control`` and so on.
     """
     head, brace, rest = name.partition("{")
     if not brace:
         return [name]
     inner, _, tail = rest.partition("}")
     end = re.split("[/@]", tail)[0]
-    form = re.compile(f"{_regular(head)}({_regular(inner)}){_regular(end)}")
+    form = re.compile(
+        f"{_to_regular_expression(head)}({_to_regular_expression(inner)}){_to_regular_expression(end)}"
+    )
     components = model.components(
         Actuator if re.match("/control(@|$)", tail[len(end) :]) else Component
     )
@@ -136,49 +141,49 @@ def each(name: str, model: Model) -> list[str]:
     ]
 
 
-def _regular(pattern: str) -> str:
-    """A part of a name as a regular expression."""
+def _to_regular_expression(pattern: str) -> str:
+    """Return a part of a pattern as a regular expression."""
     return "".join(
         {"*": "[^/]*", "?": "[^/]", "[": "[", "]": "]"}.get(letter, re.escape(letter))
         for letter in pattern
     )
 
 
-def _is_meant(pattern: str, name: str) -> bool:
+def _matches(pattern: str, name: str) -> bool:
     return name.count("/") == pattern.count("/") and fnmatchcase(name, pattern)
 
 
-def places(model: Model, path: str) -> tuple[Place, ...]:
-    """The numbers that a path means, as of `named` components; none if there are no such.
+def find_properties(model: Model, path: str) -> tuple[PropertyPath, ...]:
+    """Return the numbers that a path selects; none if there are no such numbers.
 
-    A path is that of a component, or its name, and then the names of properties, with ``/``;
-    entries of lists are counted from 0 (``/bodyset/Pelvis/mass_center/1``). What stands alone in a
-    list needs no number.
+    A path consists of the path or name of a component (see :func:`match_components`), and the names
+    of properties, separated by ``/``. Entries of lists are counted from 0
+    (``/bodyset/Pelvis/mass_center/1``); the only entry of a list needs no index.
 
     Args:
-        model: whose.
-        path: as above.
+        model: the model.
+        path: the path.
     """
     words = path.split("/")
     for count in range(len(words) - 1, 0, -1):
         pattern, route = "/".join(words[:count]) or "/", "/".join(words[count:])
-        matching = named(pattern, model.components())
+        matching = match_components(pattern, model.components())
         if matching:
-            every = [(item, dict(_numbers(item)).get(route)) for item in matching]
-            return tuple(Place(item.path, *numbers) for item, numbers in every if numbers)
+            every = [(item, dict(_iterate_numbers(item)).get(route)) for item in matching]
+            return tuple(PropertyPath(item.path, *numbers) for item, numbers in every if numbers)
     return ()
 
 
-def spellings(model: Model) -> list[str]:
-    """Paths of all numbers, and what they are called by the names of their components."""
-    routes = [(item, route) for item in model.components() for route, _ in _numbers(item)]
+def list_property_paths(model: Model) -> list[str]:
+    """Return the paths of all numbers, and their short forms with names of components."""
+    routes = [(item, route) for item in model.components() for route, _ in _iterate_numbers(item)]
     return [
         f"{front.rstrip('/')}/{route}" for item, route in routes for front in (item.path, item.name)
     ]
 
 
-def _numbers(holder: Object) -> Iterator[tuple[str, tuple[tuple[Step, ...], str]]]:
-    """Every number below an object that is not below another component: how it is called, steps, unit."""
+def _iterate_numbers(holder: Object) -> Iterator[tuple[str, tuple[tuple[Step, ...], str]]]:
+    """Yield the name, the steps and the unit of every number below an object, except those of other components."""
     for spec in type(holder).field_specs().values():
         kind = spec.kind
         if isinstance(kind, Value) and kind.scalar == "double":
@@ -192,13 +197,13 @@ def _numbers(holder: Object) -> Iterator[tuple[str, tuple[tuple[Step, ...], str]
         if isinstance(item, Component) and item.is_component:
             continue
         held = getattr(holder, spec.name)
-        rest = list(_numbers(item))
+        rest = list(_iterate_numbers(item))
         if not isinstance(held, list):
             for route, (steps, unit) in rest:
                 yield f"{spec.tag}/{route}", ((spec.name, *steps), unit)
             continue
         place = next(number for number, other in enumerate(held) if other is item)
-        # The list of a set is all that there is to it, so that its name says nothing.
+        # A set consists of its list only, so the name of the list is omitted.
         front = "" if spec.tag == "objects" else f"{spec.tag}/"
         names = [str(place), *([item.name] if item.name else []), *([""] if len(held) == 1 else [])]
         for route, (steps, unit) in rest:
@@ -209,11 +214,11 @@ def _numbers(holder: Object) -> Iterator[tuple[str, tuple[tuple[Step, ...], str]
                 )
 
 
-def _at(holder: object, step: Step) -> object:
+def _get_step(holder: object, step: Step) -> object:
     return getattr(holder, step) if isinstance(step, str) else holder[step]  # type: ignore[index]
 
 
-def _object(holder: object) -> Object:
+def _expect_object(holder: object) -> Object:
     if not isinstance(holder, Object):
         raise TypeError
     return holder

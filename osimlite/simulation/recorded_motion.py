@@ -1,4 +1,4 @@
-"""Motions that were recorded: coordinate values from a file, what follows for bodies and markers, and inverse dynamics.
+"""Recorded motions: coordinates from files or arrays, kinematics of bodies and markers, and inverse dynamics.
 
 The quantities, their names and their order are those of OpenSim's BodyKinematics analysis and
 InverseDynamicsTool.
@@ -26,46 +26,46 @@ from osimlite.schema.forces import Force
 from osimlite.schema.model import Model
 from osimlite.schema.tree import is_a
 from osimlite.simulation.elements import Forces
-from osimlite.simulation.initial_state import columns_of_states
-from osimlite.simulation.lowpass import lowpassed
+from osimlite.simulation.initial_state import match_state_columns
+from osimlite.simulation.lowpass import filter_lowpass
 from osimlite.simulation.system import System
 from osimlite.simulation.trajectory import Movement
 
 if TYPE_CHECKING:
     from osimlite.simulation.trajectory import Trajectory
 
-LARGEST = 1e25
-"""No coordinate (rad or m) is larger: what follows of such numbers is none."""
-ALIKE = 1e-6
+MAX_COORDINATE = 1e25
+"""Largest accepted coordinate (rad or m); larger numbers overflow in what is computed from them."""
+SAME_VALUE_TOLERANCE = 1e-6
 """Values (rad or m) at one time that differ by less are the same."""
-_HALF_ORDER = 3
-"""OpenSim differentiates coordinates by splines of fifth degree."""
+_HALF_SPLINE_ORDER = 3
+"""Half of the order of OpenSim's splines of fifth degree, with which coordinates are differentiated."""
 
-KINDS = {"all": "Force", "actuators": "Actuator", "muscles": "Muscle"}
-"""What a list of forces can name besides forces and their groups, in any case, with the classes."""
+FORCE_KEYWORDS = {"all": "Force", "actuators": "Actuator", "muscles": "Muscle"}
+"""Words (in any case) that stand for all forces of a class in a list of forces, with the class."""
 
 
 def exclude_forces(model: Model, names: Iterable[str]) -> None:
-    """Switch forces of a model off, as OpenSim's tools do with `forces_to_exclude`; as `excluded_forces`."""
-    for force in excluded_forces(model, names):
+    """Switch forces of a model off, as OpenSim's tools do with `forces_to_exclude`; see :func:`find_excluded_forces`."""
+    for force in find_excluded_forces(model, names):
         force.appliesForce = False
 
 
-def excluded_forces(model: Model, names: Iterable[str]) -> list[Force]:
-    """The forces that OpenSim's tools switch off by `forces_to_exclude`.
+def find_excluded_forces(model: Model, names: Iterable[str]) -> list[Force]:
+    """Return the forces that OpenSim's tools switch off for `forces_to_exclude`.
 
     Args:
-        model: whose forces.
-        names: of forces or of groups of them; "All", "Actuators" or "Muscles".
+        model: the model.
+        names: names of forces or of groups, or "All", "Actuators" or "Muscles".
 
     Raises:
-        SettingError: there is no such force, nor such a group.
+        SettingError: there is no such force or group.
     """
     forces = {force.name: force for force in model.components(Force)}
     groups = {group.name: group.members for group in model.force_set.groups}
     result: list[Force] = []
     for name in names:
-        kind = KINDS.get(name.lower())
+        kind = FORCE_KEYWORDS.get(name.lower())
         members = [force for force in forces.values() if is_a(force, kind)] if kind else []
         if not kind:
             if name not in groups and name not in forces:
@@ -83,15 +83,17 @@ def excluded_forces(model: Model, names: Iterable[str]) -> list[Force]:
 class RecordedMotion(Movement):
     """Values of all coordinates of a mechanism at t times.
 
-    As a table it is these values; :meth:`bodies`, :meth:`markers` and :meth:`inverse_dynamics` are
-    others.
+    As a table it has these values; :meth:`bodies`, :meth:`markers` and :meth:`inverse_dynamics`
+    return other tables.
 
-    Attributes: mechanism: whose coordinates they are. times: (t,), s. values: (t, n) in the order
-        of the mechanism's coordinates, rad and m. missing: coordinates that the record does not
-        have; they keep their default values. ignored: columns of the record that name no
-        coordinate. named_by_path: coordinates whose columns have no plain names, but paths as in
-        files of states. around: times (s,) and values (s, n) that are differentiated, where these
-        go on beyond `times`.
+    Attributes:
+        mechanism: the mechanism.
+        times: times (t,), s.
+        values: values (t, n) in the order of the mechanism's coordinates, rad and m.
+        missing: coordinates that the record lacks; they keep their default values.
+        ignored: columns of the record that are not coordinates.
+        around: times (s,) and values (s, n) that are differentiated, if they extend beyond `times`.
+        named_by_path: coordinates whose columns are named by paths, as in files of states.
     """
 
     mechanism: Mechanism
@@ -103,17 +105,20 @@ class RecordedMotion(Movement):
     named_by_path: tuple[str, ...] = ()
 
     @classmethod
-    def of(
-        cls, mechanism: Mechanism, source: Recorded, times: ArrayLike | None = None
+    def from_source(
+        cls, mechanism: Mechanism, source: MotionSource, times: ArrayLike | None = None
     ) -> RecordedMotion:
-        """A motion from a file, from arrays, or one that was found, which may be of another model.
+        """Return a motion from a file, from arrays, or from another motion, which may be of another model.
 
-        Args: mechanism: that follows it. source: a .mot or .sto file; a motion, such as a fitted
-            one or a trajectory; or arrays (t,) in rad and m by the names or paths of coordinates.
-            times: of arrays (t,), s.
+        Args:
+            mechanism: the mechanism.
+            source: a .mot or .sto file; a motion, such as a fitted one or a trajectory; or arrays
+                (t,) in rad and m by the names or paths of coordinates.
+            times: times of arrays (t,), s.
 
-        Raises: SettingError: the arrays are not as many numbers as there are times, or these are
-            not given. OsimliteError: it is no motion; as of `read`.
+        Raises:
+            SettingError: times of arrays are missing, or the lengths differ.
+            OsimliteError: the source is not a motion, see :meth:`read`.
         """
         if isinstance(source, str | Path):
             return cls.read(mechanism, source)
@@ -129,35 +134,36 @@ class RecordedMotion(Movement):
                         f"'{name}' has {had} values for {format_count(len(moments), 'time')}; give one each"
                     )
             rows = np.column_stack([np.empty((len(moments), 0)), *columns])
-            return cls.of_table(mechanism, StoTable("arrays", moments, tuple(source), rows))
+            return cls.from_table(mechanism, StoTable("arrays", moments, tuple(source), rows))
         result = source.mechanism.coordinates
-        return cls.of_table(
+        return cls.from_table(
             mechanism,
             StoTable("motion", source.times, tuple(info.path for info in result), source.values),
         )
 
     @classmethod
     def read(cls, mechanism: Mechanism, path: str | Path) -> RecordedMotion:
-        """The motion in a .mot or .sto file.
+        """Read a motion from a .mot or .sto file.
 
-        A column is named as the coordinate, or as its value in a file of states of any age
+        A column is named like the coordinate, or like its value in a file of states of any version
         (``/jointset/knee/ knee_angle/value``, ``knee/knee_angle/value``). If the file is in
-        degrees, rotational coordinates are converted, coupled ones are not, as in OpenSim.
+        degrees, rotational coordinates are converted and coupled ones are not, as in OpenSim.
 
-        Raises: DocumentError: it is not a storage file, has no rows, its times do not increase, a
-            coordinate is no number, or no column names one of the mechanism. ModelError: the
-            mechanism has no coordinates.
+        Raises:
+            DocumentError: the file is not a table, has no rows, its times do not increase, a
+                coordinate is not a number, or no column is a coordinate of the mechanism.
+            ModelError: the mechanism has no coordinates.
         """
-        return cls.of_table(mechanism, read_sto(path))
+        return cls.from_table(mechanism, read_sto(path))
 
     @classmethod
-    def of_table(cls, mechanism: Mechanism, table: StoTable) -> RecordedMotion:
-        """The motion in a table; as of :meth:`read`."""
+    def from_table(cls, mechanism: Mechanism, table: StoTable) -> RecordedMotion:
+        """Return the motion in a table; see :meth:`read`."""
         if not len(table.times):
             raise DocumentError("the motion has no rows", file=table.file)
         values = np.tile(mechanism.values({}), (len(table.times), 1))
         places = {label: place for place, label in reversed([*enumerate(table.columns)])}
-        states = columns_of_states(
+        states = match_state_columns(
             table.columns,
             [
                 f"{info.path}/{what}"
@@ -181,8 +187,8 @@ class RecordedMotion(Movement):
                 values[:, place] = (
                     np.radians(table.rows[:, column]) if turned else table.rows[:, column]
                 )
-        # Speeds in a file of states follow from the values, and states of forces are no part of a
-        # pose.
+        # Speeds in a file of states are recomputed from the values, and states of forces do not
+        # belong to a pose.
         used = {*result.values(), *states.values()}
         ignored = [
             label
@@ -199,9 +205,9 @@ class RecordedMotion(Movement):
                 f"{join_words(mechanism.coordinate_names)}",
                 file=table.file,
             )
-        close = (np.abs(np.diff(values, axis=0)) < ALIKE).all(axis=1)
+        close = (np.abs(np.diff(values, axis=0)) < SAME_VALUE_TOLERANCE).all(axis=1)
         if len(again := np.flatnonzero((np.diff(table.times) == 0.0) & close)):
-            # OpenSim's tools end a motion with two rows that are at one time once they are printed.
+            # OpenSim's tools write the last time twice, with values that differ by rounding.
             table = replace(
                 table,
                 times=np.delete(table.times, again),
@@ -214,7 +220,7 @@ class RecordedMotion(Movement):
                 f"the time {table.times[late[0] + 1]:g} does not come after {table.times[late[0]]:g}; sort the rows",
                 file=table.file,
             )
-        gaps = np.argwhere(~(np.abs(values) < LARGEST))
+        gaps = np.argwhere(~(np.abs(values) < MAX_COORDINATE))
         if len(gaps):
             row, place = gaps[0]
             name = mechanism.coordinates[place].name
@@ -238,33 +244,36 @@ class RecordedMotion(Movement):
         Raises:
             SettingError: there are fewer than six times.
         """
-        self._require_times("accelerations need")
+        self._require_time_count("accelerations need")
         first, second = derivatives_of_samples(
-            *(self.around or (self.times, self.values)), self.times, (1, 2), _HALF_ORDER
+            *(self.around or (self.times, self.values)), self.times, (1, 2), _HALF_SPLINE_ORDER
         )
         return first, second
 
     def lowpassed(self, cutoff: float, *, continued: bool = False) -> RecordedMotion:
-        """The motion through OpenSim's low-pass filter of `cutoff` Hz, at even times.
+        """Return the motion after OpenSim's low-pass filter, at evenly spaced times.
 
-        Args: cutoff: frequency, Hz. continued: whether what the filter adds at both ends, half the
-            length of the motion each, is part of it, and a frequency that is too high gives way, as
-            in OpenSim's tools.
+        Args:
+            cutoff: frequency, Hz.
+            continued: whether the motion includes the extensions that the filter adds at both ends,
+                half the length of the motion each, and a frequency that is too high is reduced, as
+                in OpenSim's tools.
 
-        Raises: SettingError: the frequency is not positive, or too high for the times, or there are
-            fewer than six.
+        Raises:
+            SettingError: the frequency is not positive, or too high for the times, or there are
+                fewer than six times.
         """
-        self._require_times("a filter needs")
-        times, values = lowpassed(self.times, self.values, cutoff, limited=continued)
+        self._require_time_count("a filter needs")
+        times, values = filter_lowpass(self.times, self.values, cutoff, limited=continued)
         if continued:
             return replace(self, times=times, values=values, around=None)
-        # What the filter adds at the ends nobody has recorded.
+        # The extensions of the filter at both ends are not recorded data.
         slack = 1e-6 * (times[1] - times[0])
         own = (times >= self.times[0] - slack) & (times <= self.times[-1] + slack)
         return replace(self, times=times[own], values=values[own], around=(times, values))
 
     def between(self, first: float, last: float) -> RecordedMotion:
-        """The motion from the time (s) at or before `first` to that at or before `last`, of which it has one at least.
+        """Return the motion from the row at or before `first` (s) to the row at or before `last` (s), at least one row.
 
         Raises:
             SettingError: `last` is before `first`.
@@ -285,15 +294,16 @@ class RecordedMotion(Movement):
             around=around,
         )
 
-    def _require_times(self, what: str) -> None:
+    def _require_time_count(self, what: str) -> None:
+        """Raise SettingError if there are fewer times than splines of fifth degree need."""
         count = len(self.around[0] if self.around else self.times)
-        if count < 2 * _HALF_ORDER:
+        if count < 2 * _HALF_SPLINE_ORDER:
             raise SettingError(
-                f"the motion has {format_count(count, 'time')}; {what} at least {2 * _HALF_ORDER}"
+                f"the motion has {format_count(count, 'time')}; {what} at least {2 * _HALF_SPLINE_ORDER}"
             )
 
     def assembled(self) -> RecordedMotion:
-        """The motion with every pose changed as little as the constraints demand.
+        """Return the motion with every pose moved to the nearest one that fulfils the constraints.
 
         Raises:
             SimulationError: a pose is too far from fulfilling them.
@@ -304,7 +314,9 @@ class RecordedMotion(Movement):
         return RecordedMotion(self.mechanism, self.times, poses, self.missing, self.ignored)
 
     def bodies(self) -> StoTable:
-        """Mass centre of each body (m) and its body-fixed X-Y-Z angles (degrees) in ground, then the mass centre."""
+        """Return position (m) and body-fixed X-Y-Z angles (degrees) of each body's mass centre in
+        ground, then the model's mass centre.
+        """
         mechanism = self.mechanism
         columns = [
             f"{body.name}_{what}"
@@ -322,7 +334,7 @@ class RecordedMotion(Movement):
         return StoTable("Positions", self.times, labels, rows, in_degrees=True)
 
     def markers(self) -> StoTable:
-        """Position (m) in ground of every marker."""
+        """Return the position (m) in ground of every marker."""
         mechanism = self.mechanism
         places = {
             path: place
@@ -337,18 +349,20 @@ class RecordedMotion(Movement):
         return StoTable("MarkerPositions", self.times, tuple(columns), rows)
 
     def inverse_dynamics(self, forces: Forces | None = None) -> StoTable:
-        """Generalized forces (N, N·m) that make the bodies move so, beyond gravity and what else pushes them.
+        """Return the generalized forces (N, N·m) that the motion requires beyond gravity and the given forces.
 
-        Locks and other constraints are left aside, as in OpenSim. The forces belong to the
-        generalized speeds: for ball and free joints a moment about an axis of the joint's parent
-        frame. There OpenSim's tool takes the rates of the angles for the speeds, which is wrong
-        unless the angles are small.
+        Locks and other constraints are ignored, as in OpenSim. The forces belong to the generalized
+        speeds: for ball and free joints they are moments about axes of the joint's parent frame.
+        OpenSim's tool uses the rates of the angles as speeds there, which is wrong unless the
+        angles are small.
 
-        Args: forces: of the mechanism: springs, contacts, measured loads; their own states are
-            where they start.
+        Args:
+            forces: forces on the mechanism, such as springs, contacts and measured loads; their
+                states have initial values.
 
-        Raises: SimulationError: a force cannot be computed at one of the states, or a result is NaN
-            or infinite.
+        Raises:
+            SimulationError: a force cannot be computed at one of the states, or a result is NaN or
+                infinite.
         """
         mechanism = self.mechanism
         system = System(mechanism.without_constraints(), forces or Forces(()))
@@ -358,9 +372,9 @@ class RecordedMotion(Movement):
             for q, u, udot in zip(self.values, speeds, accelerations, strict=True):
                 u[:] = mechanism.speeds_from_rates(q, u)
                 udot[:] = mechanism.speeds_from_rates(q, udot - mechanism.rate_bias(q, u))
-        states = system.state.rows(self.values, speeds)
+        states = system.state.pack_rows(self.values, speeds)
         rows = np.empty_like(self.values)
-        rows[:, order] = system.missing(
+        rows[:, order] = system.compute_required_forces(
             np.column_stack([self.times, states]), accelerations[:, order]
         )
         order = [place for body in mechanism.bodies for place in body.mobilizer.coordinates]
@@ -374,5 +388,5 @@ class RecordedMotion(Movement):
         return StoTable(name, self.times, tuple(labels), rows[:, order])
 
 
-Recorded: TypeAlias = "str | Path | Mapping[str, ArrayLike] | Movement | Trajectory"
+MotionSource: TypeAlias = "str | Path | Mapping[str, ArrayLike] | Movement | Trajectory"
 """A motion in any form."""

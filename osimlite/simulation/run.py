@@ -1,4 +1,4 @@
-"""Simulating a model: initial state, engine, steps, report."""
+"""Forward simulation of a model: options, initial state, engine, steps and report."""
 
 from __future__ import annotations
 
@@ -21,38 +21,38 @@ from osimlite.mechanics.multibody.extremes import any_numbers
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.schema.model import Model, expect_model
 from osimlite.schema.tree import Snapshot
-from osimlite.simulation.constrained import constraints_on, kept_state
+from osimlite.simulation.constrained import find_consistent_state, select_constraints
 from osimlite.simulation.elements import force_elements
 from osimlite.simulation.elements.controls import Controls
 from osimlite.simulation.engines import engine_factory, engine_name
 from osimlite.simulation.engines.protocol import Engine, Settings
 from osimlite.simulation.initial_state import (
-    ended,
-    in_units_of,
-    starting,
-    state_at,
-    state_in,
-    suspect_value,
+    convert_value,
+    describe_suspect_value,
+    extract_state,
+    read_earlier_run,
+    read_state,
+    resolve_initial_values,
 )
 from osimlite.simulation.options import (
     DEFAULT_ACCURACY,
-    LOOSE,
+    LOOSEST_SOUND_ACCURACY,
     MERSON,
-    PER_RUN,
+    RUN_OPTIONS,
     Options,
+    check_fixed_step,
     check_integrator,
-    check_step,
 )
-from osimlite.simulation.options import report_times as report_times
+from osimlite.simulation.options import compute_report_times as report_times
 from osimlite.simulation.run_report import (
     Recorder,
-    integration_summary,
-    probe_labels,
-    probe_rows,
-    result_summary,
-    versions,
+    collect_versions,
+    compute_probe_rows,
+    list_probe_labels,
+    summarize_integration,
+    summarize_result,
 )
-from osimlite.simulation.states import in_model_order
+from osimlite.simulation.states import sort_by_component
 from osimlite.simulation.stepper import Observer, Progress, Stepper
 from osimlite.simulation.trajectory import Interrupted, Report, Trajectory
 
@@ -64,82 +64,94 @@ if TYPE_CHECKING:
 def simulate(
     model: Model, to: float = 2.0, engine: str | None = None, **choices: Any
 ) -> Trajectory:
-    """Simulate a model forward in time, from its default pose and speeds.
+    """Simulate a model forward in time, by default from its default pose and speeds.
 
-    Constraints, prescribed coordinates and loops are kept up to a tenth of the accuracy. Where the
-    start does not fulfil them, it is changed as little as they demand; what `initial` and
-    `initial_speeds` say stays.
+    Constraints, prescribed coordinates and loops hold to a tenth of the accuracy. If the start
+    violates them, it is moved to the nearest state that fulfils them; values in `initial` and
+    `initial_speeds` stay.
 
-    Args: model: what moves. to: how long, s. engine: what computes the accelerations: "compiled"
-        (the default) or "bullet"; a window (`show`) needs "bullet", which is the default there.
+    Args:
+        model: the model.
+        to: end of the motion, s.
+        engine: what computes the accelerations: "compiled" (the default) or "bullet". A window
+            (`show`) needs "bullet", which is the default there.
         choices: attributes of :class:`osimlite.simulation.Options`: `accuracy`, `integrator`,
-        `fixed_step`, `report_interval`, `initial`, `initial_speeds`, `skip_unsupported` and the
-        others.
+            `fixed_step`, `report_interval`, `initial`, `initial_speeds`, `skip_unsupported` and
+            others.
 
-    Raises: Interrupted: Ctrl-C ended the motion; it has the trajectory up to there. ModelError: the
-        model is not a mechanism, or a name does not exist. UnsupportedError: the model has a joint,
-        constraint or force that cannot be computed. SimulationError: the motion cannot be computed
-        any further (`trajectory` is what was recorded up to there), no pose or speeds fulfil the
-        constraints with what was set, or a coordinate that was set is locked or prescribed.
-        SettingError: there is no such option, or a setting has no meaning. MissingDependency: what
-        the engine works with is not installed.
+    Returns:
+        The motion with its forces, energies and summary.
 
-    What depends on the model alone is computed once and kept until the model changes, so that calls
-    in a loop cost a run each; what reads other files is read every time. Threads may call it with
-    the same model.
+    Raises:
+        Interrupted: Ctrl-C ended the motion; the exception has the trajectory up to there.
+        ModelError: the model is not a mechanism, or a name does not exist.
+        UnsupportedError: the model has a joint, constraint or force that osimlite cannot compute.
+        SimulationError: the motion cannot continue (`trajectory` is the recorded part), no pose or
+            speeds fulfil the constraints with the values that were set, or a coordinate that was
+            set is locked or prescribed.
+        SettingError: there is no such option, or a value has no meaning.
+        MissingDependency: a package that the engine needs is not installed.
+
+    What depends on the model alone is computed once and cached until the model changes, so that
+    calls in a loop cost one run each. Files that the model names are read again for every call.
+    Several threads may simulate the same model.
     """
-    with _ready(model, engine, choices) as simulation:
+    with _borrow_simulation(model, engine, choices) as simulation:
         trajectory = simulation.run(
-            to, **{name: choices[name] for name in PER_RUN if name in choices}
+            to, **{name: choices[name] for name in RUN_OPTIONS if name in choices}
         )
         simulation.hold()
         return trajectory
 
 
-KEPT = 8
-"""So many models that were simulated last stay ready."""
+CACHED_SIMULATIONS = 8
+"""Number of models whose simulations stay in the cache."""
 
-_READY: list[weakref.ref[Tree]] = []
-"""Their trees, the last one last."""
+_RECENT_TREES: list[weakref.ref[Tree]] = []
+"""Model trees in the cache, most recently used last (least recently used are dropped first)."""
 
 
 @contextmanager
-def _ready(model: Model, engine: str | None, choices: Mapping[str, Any]) -> Iterator[Simulation]:
-    """A simulation of a model as it is, which stays ready until the model changes.
+def _borrow_simulation(
+    model: Model, engine: str | None, choices: Mapping[str, Any]
+) -> Iterator[Simulation]:
+    """Take the simulation of an unchanged model out of the cache, or prepare one; put it back afterwards.
 
-    While it runs nobody else has it, so that threads do not meet in it; whose run fails is not
-    kept.
+    While a thread uses a simulation, no other thread can take it. A simulation whose run failed is
+    closed, not cached.
     """
     expect_model(model)
-    tree, chosen = model.tree(), Options.of(choices)
+    tree, chosen = model.tree(), Options.parse(choices)
     engine = None if engine is None else engine_name(engine)
-    key = (engine_name(engine), *(getattr(chosen, name) for name in TOLD), chosen.route)
+    key = (engine_name(engine), *(getattr(chosen, name) for name in SUMMARY_OPTIONS), chosen.route)
     is_plain = chosen.external_loads is None and not chosen.show
     simulation = tree.kept.pop(key, None) if is_plain else None
     if simulation is None:
         simulation = Simulation(
-            model, engine, **{name: choices[name] for name in choices if name not in PER_RUN}
+            model, engine, **{name: choices[name] for name in choices if name not in RUN_OPTIONS}
         )
     elif chosen.initial or chosen.initial_speeds:
-        simulation.look_again()
+        simulation.reset_inertia_check()
     try:
         yield simulation
     except BaseException:
         simulation.close()
         raise
-    # Files may change without a word.
+    # Files that the model names may change unnoticed.
     if not is_plain or simulation.forces.reads_files or not tree.is_current:
         simulation.close()
         return
     tree.kept[key] = simulation
-    _READY[:] = [known for known in _READY if known() not in (None, tree)] + [weakref.ref(tree)]
-    if len(_READY) > KEPT:
-        longest_ago = _READY.pop(0)()
+    _RECENT_TREES[:] = [known for known in _RECENT_TREES if known() not in (None, tree)] + [
+        weakref.ref(tree)
+    ]
+    if len(_RECENT_TREES) > CACHED_SIMULATIONS:
+        longest_ago = _RECENT_TREES.pop(0)()
         if longest_ago is not None:
             longest_ago.kept.clear()
 
 
-TOLD = (
+SUMMARY_OPTIONS = (
     "skip_unsupported",
     "simbody_early_return",
     "own_activation_times",
@@ -147,39 +159,41 @@ TOLD = (
     "opensim_derivatives",
     "rolling",
 )
-"""What the summary says besides the settings of the run."""
+"""Options of the prepared model that `Trajectory.summary` repeats."""
 
 
-def kept_constraints(mechanism: Mechanism) -> list[str]:
-    """Names of what holds besides joints and locks, which not every engine can keep up."""
+def list_constraints(mechanism: Mechanism) -> list[str]:
+    """Return the names of the constraints besides joints and locks, which not every engine supports."""
     return [item.name for item in mechanism.constraints if not isinstance(item, Lock)]
 
 
 class Simulation:
-    """A model made ready to be simulated, any number of times. Close it after use, or use it in a ``with`` statement.
+    """A model that is prepared once and simulated any number of times.
 
-    Args: model: what moves. engine: what computes the accelerations: "compiled" (the default) or
-        "bullet"; a window (`show`) needs "bullet", which is the default there. choices: attributes
-        of :class:`osimlite.simulation.Options`; those of a run hold where a run does not change
-        them.
+    Close it after use, or use it in a ``with`` statement. It raises the errors of :func:`simulate`.
 
-    Errors are those of :func:`simulate`.
+    Args:
+        model: the model.
+        engine: what computes the accelerations: "compiled" (the default) or "bullet". A window
+            (`show`) needs "bullet", which is the default there.
+        choices: attributes of :class:`osimlite.simulation.Options`. Those in `RUN_OPTIONS` are
+            defaults, which each run may override.
 
     Attributes:
-        options: that were chosen.
-        constraints: names of what the coordinates of the state must fulfil.
-        paths: of all states, in the order of OpenSim.
+        options: the options.
+        constraints: names of the constraints on the coordinates of the state.
+        paths: paths of all states, in OpenSim's order.
     """
 
     @any_numbers
     def __init__(self, model: Model, engine: str | None = None, **choices: Any) -> None:
-        self.options = chosen = Options.of(choices)
+        self.options = chosen = Options.parse(choices)
         # Only Bullet has a window.
         make = engine_factory("bullet" if chosen.show and engine is None else engine)
         self.mechanism: Mechanism = build_mechanism(
             model, opensim_derivatives=chosen.opensim_derivatives, rolling=chosen.rolling
         )
-        # What becomes of the model later changes neither runs nor what is shown of them.
+        # Later changes of the model affect neither runs nor their display.
         self._snapshot = Snapshot(model.tree())
         self._lock = RLock()
         _require_finite_start(self.mechanism)
@@ -208,7 +222,7 @@ class Simulation:
         )
         self.state = self.engine.state
         self.constraints = [
-            item.name for item in constraints_on(self.mechanism, self.engine.order)[0]
+            item.name for item in select_constraints(self.mechanism, self.engine.order)[0]
         ]
         paths = [
             f"{info.path}/{what}"
@@ -216,25 +230,27 @@ class Simulation:
             for what in ("value", "speed")
         ]
         named = [variable.path for variable in self.state.variables if variable.is_named]
-        self.paths = in_model_order(model, paths + named)
+        self.paths = sort_by_component(model, paths + named)
         self._start: tuple[Any, tuple[list[float], list[float]]] | None = None
         self._has_inertia = False
 
     @property
     def model(self) -> Model:
-        """A copy of what moves."""
+        """Copy of the model as it was when the simulation was prepared."""
         return self._snapshot.model
 
     def run(self, to: float = 2.0, **choices: Any) -> Trajectory:
-        """Simulate once.
+        """Simulate the model once.
 
-        Args: to: how long, s. choices: attributes of :class:`osimlite.simulation.Options` that can
-            be chosen for every run.
+        Args:
+            to: end of the motion, s.
+            choices: attributes of :class:`osimlite.simulation.Options` that are in `RUN_OPTIONS`.
 
-        Errors are those of :func:`simulate`.
+        Returns:
+            The motion. Errors are those of :func:`simulate`.
         """
         with self._lock:
-            return self._run(to, self.options.for_run(choices))
+            return self._run(to, self.options.override_for_run(choices))
 
     def _run(self, to: float, chosen: Options) -> Trajectory:
         started = time.perf_counter()
@@ -245,9 +261,9 @@ class Simulation:
                 raise SettingError(
                     "a simulation that goes on starts where the other one ended; say no other start"
                 )
-            earlier, before = ended(chosen.resume)
+            earlier, before = read_earlier_run(chosen.resume)
             start = float(earlier.times[-1]) if len(earlier.times) else 0.0
-            initial = self.state_of(earlier)
+            initial = self.get_last_state(earlier)
         held = None
         if chosen.controller is not None:
             if fixed_step is not None:
@@ -258,14 +274,14 @@ class Simulation:
                 such = f"osimlite.Feedback({chosen.controller!r})"
                 raise SettingError(f"a controller is an osimlite.Feedback, such as {such}")
             held = chosen.controller.compile_for(self.model, self.engine)
-            to = held.nearest(to)
+            to = held.snap_to_step(to)
             if chosen.resume is not None:
-                held.require_known(before, start)
+                held.require_same_controller(before, start)
         elif before is not None:
             raise SettingError("the run that this one goes on from had a controller; give it, too")
         times = report_times(to, chosen.report_interval, start)
         if fixed_step is not None:
-            check_step(fixed_step, to)
+            check_fixed_step(fixed_step, to)
             for name in ("accuracy", "integrator"):
                 if getattr(chosen, name) is not None:
                     raise SettingError(
@@ -274,52 +290,54 @@ class Simulation:
         accuracy = DEFAULT_ACCURACY if chosen.accuracy is None else chosen.accuracy
         integrator = MERSON if chosen.integrator is None else chosen.integrator
         check_integrator(integrator)
-        if fixed_step is None and LOOSE < accuracy < 1.0:
+        if fixed_step is None and LOOSEST_SOUND_ACCURACY < accuracy < 1.0:
             warn_caller(
                 f"an accuracy of {accuracy:g} is so loose that a motion may end far from the model's own; "
-                f"take {LOOSE:g} or less"
+                f"take {LOOSEST_SOUND_ACCURACY:g} or less"
             )
         if chosen.show and fixed_step is None:
             raise SettingError("showing the motion needs a fixed step, for instance 0.001 s")
         if isinstance(initial, str | Path):
-            initial = self.state_in(initial)
+            initial = self.read_state(initial)
         for name, value in (initial or {}).items():
             if name not in self.paths:
                 info = self.mechanism.coordinates[self.mechanism.coordinate_index(name)]
-                warn_of_unit(suspect_value(info, name, value))
+                warn_of_unit(describe_suspect_value(info, name, value))
         initial, initial_speeds = (
             {
                 name: float(value)
                 if name in self.paths
-                else in_units_of(self.mechanism, name, value)
+                else convert_value(self.mechanism, name, value)
                 for name, value in (given or {}).items()
             }
             for given in (initial, chosen.initial_speeds)
         )
         controls, given = self.forces.controls, {}
         if chosen.controls is not None or any(controls.functions):
-            from osimlite.simulation.run_controls import driven, told
+            from osimlite.simulation.run_controls import add_controls, describe_controls
 
-            controls = driven(controls, chosen.controls, to)
-            given = {} if chosen.controls is None else {"controls": told(chosen.controls)}
+            controls = add_controls(controls, chosen.controls, to)
+            given = (
+                {} if chosen.controls is None else {"controls": describe_controls(chosen.controls)}
+            )
         if chosen.controller is not None:
             given["controller"] = str(chosen.controller)
         if chosen.resume is not None:
             given["resume"] = str(chosen.resume)
-        opened = controls if held is None else held.open_to(controls)
-        self.engine.drive(opened)
+        opened = controls if held is None else held.add_constants(controls)
+        self.engine.set_controls(opened)
         y = self.initial_state(initial, initial_speeds, equilibrate=chosen.equilibrate)
         self._require_inertia(y)
         settings = Settings(accuracy, integrator, fixed_step, self.engine.route, chosen.show)
-        runs = None if held is None else held.runs(self.engine, opened, to, before)
-        recorder, stepper, states = self._moved(
+        runs = None if held is None else held.make_runs(self.engine, opened, to, before)
+        recorder, stepper, states = self._integrate(
             y, replace(settings, held=runs), times, chosen.progress
         )
         if runs is not None:
-            controls = runs.added_to(controls)
+            controls = runs.add_record(controls)
         times = times[: len(states)]
         if times[-1] < stepper.time:
-            # Where it was ended, which somebody may want to go on from.
+            # The last time that was reached, so that another run can continue there.
             times, states = [*times, stepper.time], [*states, stepper.state]
         table = None if runs is None else runs.table(times[-1])
         if not isfinite(sum(states[-1])):
@@ -337,14 +355,14 @@ class Simulation:
             "initial_speeds": initial_speeds,
             **({"equilibrate": True} if chosen.equilibrate else {}),
             **given,
-            **{name: getattr(chosen, name) for name in TOLD},
+            **{name: getattr(chosen, name) for name in SUMMARY_OPTIONS},
             **(
                 {}
                 if chosen.external_loads is None
                 else {"external_loads": str(chosen.external_loads)}
             ),
         }
-        trajectory = self._trajectory(
+        trajectory = self._make_trajectory(
             times, states, stepper, recorder, wanted, wall, controls, table
         )
         if isinstance(stepper.ended, SimulationError):
@@ -354,24 +372,25 @@ class Simulation:
             raise Interrupted(trajectory)
         return trajectory
 
-    def every_step(
+    def record_every_step(
         self, start: float, y: Sequence[float], to: float, settings: Settings
     ) -> tuple[list[float], list[list[float]], SimulationError | None]:
-        """Follow a motion from a time other than 0, and keep all steps.
+        """Integrate from any time and state, and record the end of every step.
 
         Args:
-            start: time at which it begins, s.
-            y: the state then, in the engine's order, where the constraints hold.
+            start: start time, s.
+            y: initial state in the engine's order; it must fulfil the constraints.
             to: end of the motion, s.
             settings: how to step.
 
-        Returns: Times (s) and states of the start and of the ends of all steps, and what ended the
-            motion before its end.
+        Returns:
+            Times (s), the states at the start and at the end of each step, and the error that ended
+                the motion early, if any.
 
         Raises:
-            SimulationError: it cannot begin.
+            SimulationError: the motion cannot begin.
         """
-        from osimlite.simulation.run_controls import require_tables
+        from osimlite.simulation.run_controls import require_table_span
 
         times, states = [start], [list(y)]
 
@@ -380,27 +399,27 @@ class Simulation:
             states.append(y)
 
         with self._lock:
-            require_tables(self.forces.controls, start, to)
+            require_table_span(self.forces.controls, start, to)
             self._require_inertia(y)
-            stepper = self._stepper(start, y, settings, note)
-            stepper.table([to])
+            stepper = self._make_stepper(start, y, settings, note)
+            stepper.tabulate([to])
             stepper.catch_up()
         if isinstance(stepper.ended, KeyboardInterrupt):
             raise stepper.ended
         return times, states, stepper.ended
 
-    def look_again(self) -> None:
-        """Have the next start checked, too, for motions without inertia."""
+    def reset_inertia_check(self) -> None:
+        """Check the next initial state again for motions without inertia."""
         self._has_inertia = False
 
     def hold(self) -> None:
-        """Keep the last pose in the window until somebody closes it; nothing without a window."""
+        """Keep the window with the last pose open until the user closes it; do nothing without a window."""
         if self.options.show:
             with suppress(KeyboardInterrupt):
-                self.engine.hold()
+                self.engine.hold_window()
 
     def close(self) -> None:
-        """Free what the engine holds; trajectories stay good."""
+        """Free the engine; trajectories stay valid."""
         self.engine.close()
 
     def __enter__(self) -> Simulation:
@@ -411,24 +430,24 @@ class Simulation:
 
     # --------------------------------------------------------------------------------------------- helpers
     @any_numbers
-    def _moved(
+    def _integrate(
         self, y: list[float], settings: Settings, times: Sequence[float], progress: Progress | None
     ) -> tuple[Recorder, Stepper, Sequence[Any]]:
-        """What was recorded and integrated from a state, and the states at times (s)."""
+        """Integrate from a state; return the recorder, the stepper, and the states at the times (s)."""
         recorder = Recorder(self.engine)
-        stepper = self._stepper(times[0], y, settings, recorder.observe)
-        recorder.begin(stepper)
-        return recorder, stepper, stepper.table(times, progress)
+        stepper = self._make_stepper(times[0], y, settings, recorder.observe_step)
+        recorder.start(stepper)
+        return recorder, stepper, stepper.tabulate(times, progress)
 
     @any_numbers
-    def _stepper(
+    def _make_stepper(
         self, start: float, y: Sequence[float], settings: Settings, observe: Observer
     ) -> Stepper:
-        return self.engine.stepper(start, list(y), settings, observe)
+        return self.engine.make_stepper(start, list(y), settings, observe)
 
     @any_numbers
     def _require_inertia(self, y: Sequence[float]) -> None:
-        """SimulationError, the same for all engines, if the first start is one where a motion has no inertia."""
+        """Raise SimulationError if the first initial state allows a motion without inertia; all engines give the same error."""
         if not self._has_inertia:
             self.mechanism.acceleration(self.state.values(y), self.state.speeds(y))
             self._has_inertia = True
@@ -441,27 +460,29 @@ class Simulation:
         *,
         equilibrate: bool = False,
     ) -> list[float]:
-        """State in the engine's order (y,): default values and speeds, and what follows from them, but for those given.
+        """Return an initial state (y,) in the engine's order: the given values, and default values for the others.
 
-        Args: initial: values (rad, m) of coordinates by name or path, and any states by their paths
-            in ``states.sto``. speeds: generalized speeds of coordinates by name or path.
-            equilibrate: whether states that are not given start in equilibrium where they have one.
+        Args:
+            initial: values (rad, m) of coordinates by name or path, and any states by their paths
+                in ``states.sto``.
+            speeds: generalized speeds of coordinates by name or path.
+            equilibrate: whether muscle states that `initial` does not name start in equilibrium.
 
-        Raises: ModelError: there is no such coordinate. SimulationError: a coordinate is locked or
-            prescribed, a number is not finite, no pose or speeds fulfil the constraints, or a
-            muscle has no equilibrium.
+        Raises:
+            ModelError: there is no such coordinate.
+            SimulationError: a coordinate is locked or prescribed, a number is not finite, no pose
+                or speeds fulfil the constraints, or a muscle has no equilibrium.
         """
         own = {path: initial[path] for path in self.state.paths if path in initial}
-        q, u, places = starting(
+        q, u, places = resolve_initial_values(
             self.mechanism, {name: initial[name] for name in initial if name not in own}, speeds
         )
         given = u
         if self.constraints:
-            # To find the nearest pose can take as long as the motion: the same start is not looked
-            # for again.
+            # Assembly can take as long as the motion, so the result is cached for the same start.
             start = (q, u, places)
             if self._start is None or self._start[0] != start:
-                values, rates = kept_state(self.mechanism, q, u, *places)
+                values, rates = find_consistent_state(self.mechanism, q, u, *places)
                 self._start = start, (values.tolist(), rates.tolist())
             q, u = self._start[1]
         y = self.state.pack(q, u)
@@ -472,29 +493,29 @@ class Simulation:
             if not isfinite(y[number]):
                 raise SettingError(f"the state '{path}' starts at {y[number]}; give a number")
         if equilibrate:
-            # OpenSim does so in the assembled pose, before it makes the speeds fulfil the
+            # OpenSim equilibrates in the assembled pose, before it projects the speeds onto the
             # constraints.
             infos = self.mechanism.coordinates
             given = [
                 u[k] if info.locked or info.prescribed is not None else given[k]
                 for k, info in enumerate(infos)
             ]
-            y[moving:] = self.engine.equilibrated(
+            y[moving:] = self.engine.equilibrate_muscles(
                 0.0, [*self.state.pack(q, given)[:moving], *y[moving:]]
             )[moving:]
             for path, value in own.items():
                 y[numbers[path]] = float(value)
         return y
 
-    def state_in(self, path: str | Path, time: float | None = None) -> dict[str, float]:
-        """A state of a file such as ``states.sto``, as `run` takes it for `initial`; see :func:`state_in`."""
-        return state_in(path, self.mechanism, self.paths, time)
+    def read_state(self, path: str | Path, time: float | None = None) -> dict[str, float]:
+        """Return a state of a file such as ``states.sto`` in the form of `initial`; see :func:`initial_state.read_state`."""
+        return read_state(path, self.mechanism, self.paths, time)
 
-    def state_of(self, table: StoTable) -> dict[str, float]:
-        """The last state of a table in SI units, likewise."""
-        return state_at(table, self.mechanism, self.paths)
+    def get_last_state(self, table: StoTable) -> dict[str, float]:
+        """Return the last state of a table in SI units, in the form of `initial`."""
+        return extract_state(table, self.mechanism, self.paths)
 
-    def _trajectory(
+    def _make_trajectory(
         self,
         times: list[float],
         states: Sequence[Any],
@@ -506,9 +527,9 @@ class Simulation:
         controller: StoTable | None,
     ) -> Trajectory:
         def asked(what: Callable[[Engine], Any]) -> Any:
-            """What the engine says, as it was in this run: since then there may have been others."""
+            """Evaluate a function of the engine with the controls of this run; later runs may have set others."""
             with self._lock:
-                self.engine.drive(controls)
+                self.engine.set_controls(controls)
                 return what(self.engine)
 
         def summary(engine: Engine) -> dict[str, Any]:
@@ -516,28 +537,32 @@ class Simulation:
                 "model": self.mechanism.name,
                 "engine": engine.name,
                 "route": engine.route,
-                **integration_summary(stepper, settings, wall),
-                **result_summary(engine, recorder, (times[0], states[0]), (times[-1], states[-1])),
+                **summarize_integration(stepper, settings, wall),
+                **summarize_result(
+                    engine, recorder, (times[0], states[0]), (times[-1], states[-1])
+                ),
                 "skipped_forces": list(self.forces.skipped),
                 "constraints": self.constraints,
-                "versions": versions(engine),
+                "versions": collect_versions(engine),
             }
 
         report = Report(
             lambda: asked(lambda engine: (engine.columns, engine.force_table(times, states))),
-            lambda: asked(lambda engine: list(map(engine.energies, times, states))),
+            lambda: asked(lambda engine: list(map(engine.compute_energies, times, states))),
             lambda: asked(
                 lambda engine: (
-                    probe_labels(engine.probes),
+                    list_probe_labels(engine.probes),
                     list(
-                        probe_rows(engine, list(zip(times, states, strict=True)), recorder.steps())
+                        compute_probe_rows(
+                            engine, list(zip(times, states, strict=True)), recorder.get_steps()
+                        )
                     ),
                 )
             ),
             lambda: asked(summary),
         )
-        values, speeds = self.state.histories(states)
-        auxiliary = self.state.auxiliary_histories(states)
+        values, speeds = self.state.extract_histories(states)
+        auxiliary = self.state.extract_auxiliary(states)
         return Trajectory(
             self.mechanism,
             times,
@@ -553,7 +578,7 @@ class Simulation:
 
 @any_numbers
 def _require_finite_start(mechanism: Mechanism) -> None:
-    """SimulationError if no engine can compute with the numbers of a mechanism."""
+    """Raise SimulationError if default values, default speeds or the mass matrix are not finite numbers."""
     for what in ("value", "speed"):
         for info in mechanism.coordinates:
             number = getattr(info, f"default_{what}")

@@ -1,4 +1,4 @@
-"""Controls as people give them to a run: numbers, functions of time, tables, files."""
+"""Controls of a run as users give them: numbers, functions of time, tables, files."""
 
 from __future__ import annotations
 
@@ -32,19 +32,19 @@ from osimlite.simulation.elements.control_tables import read_controls
 from osimlite.simulation.elements.controls import Controls
 from osimlite.simulation.elements.synergies import TableColumn
 
-PRINTED_S = 1e-6
-"""Tolerance of the ends of a table, s: its times were printed with few digits, those of the motion were not."""
+PRINTED_TIME_TOLERANCE_S = 1e-6
+"""Tolerance at the ends of a table, s, because its times are printed with few digits."""
 
 
 @dataclass(frozen=True)
-class Called(Function):
-    """A function of Python that gives a control for a time (s)."""
+class PythonFunction(Function):
+    """A Python function that returns a control for a time (s)."""
 
-    function: Callable[[float], float]  # it
-    name: str  # of the control, for messages
+    function: Callable[[float], float]  # the function
+    name: str  # name of the control, for messages
 
     def evaluate(self, arguments: Arguments) -> Evaluated:
-        """The value, and zeros."""
+        """Return the value at a time, with zero derivatives."""
         x = float(arguments[0])
         value = float(self.function(x))
         if not isfinite(value):
@@ -52,7 +52,7 @@ class Called(Function):
         return make_zero_derivatives(1, value)
 
 
-def driven(
+def add_controls(
     controls: Controls,
     given: Mapping[str, Any] | StoTable | str | Path | None,
     to: float,
@@ -60,28 +60,34 @@ def driven(
     start: float = 0.0,
     what: str = "controls",
 ) -> Controls:
-    """What a run adds to the controls of a model, as a PrescribedController more would add it.
+    """Add the controls of a run to those of a model, as another PrescribedController would.
 
-    Between the rows of a table are straight lines; before and after, its first and last values
-    hold.
+    Values between the rows of a table are interpolated linearly; its first and last values hold
+    before and after it.
 
-    Args: controls: of the model. given: by the name or path of an actuator a number, a function of
-        time (s) or ``(times, values)``; or a table of such columns, or the file of one or of a
-        ControlSet. to: end of the motion, s, up to which tables should go. start: of the motion, s.
-        what: what is given, for messages.
+    Args:
+        controls: controls of the model.
+        given: a number, a function of time (s) or ``(times, values)`` by the name or path of an
+            actuator; or a table with such columns; or the file of a table or of a ControlSet.
+        to: end of the motion, s.
+        start: start of the motion, s.
+        what: what is added, for messages.
+
+    Returns:
+        The combined controls.
 
     Raises:
-        OsimliteError: an actuator is not there, or driven twice; or a file cannot be read.
-        SettingError: a control is no number, or times do not increase.
-        SimulationError: a TableSource of the model does not go as far as the motion.
+        OsimliteError: an actuator does not exist or is given twice, or a file cannot be read.
+        SettingError: a control is not a number, or times do not increase.
+        SimulationError: a TableSource of the model ends before the motion.
     """
-    require_tables(controls, start, to)
+    require_table_span(controls, start, to)
     if given is None:
         return controls
     known = {key: name for name in controls.names for key in (name.rpartition("/")[2], name)}
     functions: dict[str, Function] = {}
     begin, end = -inf, inf
-    for key, value in _by_name(given).items():
+    for key, value in _map_by_name(given).items():
         if key not in known:
             raise SettingError(
                 f"the model has no actuator '{key}' to control{suggest_name(key, known)}"
@@ -96,11 +102,11 @@ def driven(
                 f"'{known[key]}' is controlled twice, by its name and by its path; leave one out"
             )
         if isinstance(value, tuple):
-            functions[known[key]], first, last = _lines(key, *value)
+            functions[known[key]], first, last = _interpolate(key, *value)
             begin, end = max(begin, first), min(end, last)
         else:
-            functions[known[key]] = _function(key, value)
-    if begin > start + PRINTED_S or end < to - PRINTED_S:
+            functions[known[key]] = _make_function(key, value)
+    if begin > start + PRINTED_TIME_TOLERANCE_S or end < to - PRINTED_TIME_TOLERANCE_S:
         warn_caller(
             f"the {what} are given from {max(begin, start):g} to {min(end, to):g} s of a motion from {start:g} to "
             f"{to:g} s; their first and last values hold before and after"
@@ -108,8 +114,8 @@ def driven(
     return controls.add_functions(functions)
 
 
-def told(given: Mapping[str, Any] | StoTable | str | Path) -> Any:
-    """What is said of such controls in a summary: a file, or numbers by name and other things by what they are."""
+def describe_controls(given: Mapping[str, Any] | StoTable | str | Path) -> Any:
+    """Return controls for a summary: the name of a file, or numbers and descriptions by actuator."""
     if not isinstance(given, Mapping):
         return "a table" if isinstance(given, StoTable) else str(given)
     kinds = {
@@ -122,11 +128,14 @@ def told(given: Mapping[str, Any] | StoTable | str | Path) -> Any:
     }
 
 
-def words_to_controls(words: Iterable[str]) -> dict[str, Any]:
-    """Controls from words that are files, or ``NAME=VALUE``.
+def parse_controls(words: Iterable[str]) -> dict[str, Any]:
+    """Parse words of the command line: files, or ``NAME=VALUE``.
+
+    Returns:
+        Controls by the name of the actuator.
 
     Raises:
-        OsimliteError: a word is neither, or two of them give the same control.
+        OsimliteError: a word is neither, or two of them set the same control.
     """
     result: dict[str, Any] = {}
     for word in words:
@@ -139,15 +148,19 @@ def words_to_controls(words: Iterable[str]) -> dict[str, Any]:
                     f"--controls takes a file, or NAME=VALUE with a number; got '{word}'"
                 ) from None
         else:
-            more = _by_name(word)
+            more = _map_by_name(word)
         for key in more.keys() & result.keys():
             raise SettingError(f"'{key}' is controlled twice; leave one out")
         result |= more
     return result
 
 
-def require_tables(controls: Controls, start: float, to: float) -> None:
-    """SimulationError if a TableSource, outside of whose times there is nothing, does not go as far as the motion."""
+def require_table_span(controls: Controls, start: float, to: float) -> None:
+    """Check that every TableSource covers the motion, because OpenSim stops outside its times.
+
+    Raises:
+        SimulationError: a table does not cover the motion.
+    """
     for function in (function for functions in controls.functions for function in functions):
         column = function.function if isinstance(function, Scaled) else function
         if isinstance(column, TableColumn) and not column.x[0] <= start < to <= column.x[-1]:
@@ -157,7 +170,8 @@ def require_tables(controls: Controls, start: float, to: float) -> None:
             )
 
 
-def _by_name(given: Mapping[str, Any] | StoTable | str | Path) -> Mapping[str, Any]:
+def _map_by_name(given: Mapping[str, Any] | StoTable | str | Path) -> Mapping[str, Any]:
+    """Return controls by actuator from a mapping, a table or a file."""
     if isinstance(given, Mapping):
         return given
     if isinstance(given, str | Path) and Path(given).suffix == ".xml":
@@ -172,14 +186,14 @@ def _by_name(given: Mapping[str, Any] | StoTable | str | Path) -> Mapping[str, A
     return {label: (table.times, table.rows[:, index]) for index, label in enumerate(table.columns)}
 
 
-def _function(name: str, value: Any) -> Function:
-    """What somebody gave as the control of an actuator."""
+def _make_function(name: str, value: Any) -> Function:
+    """Return the control of an actuator as a function of time."""
     if isinstance(value, Function):
         return value
     if isinstance(value, Object):
         return convert_function(value, 1, f"the control of '{name}'")
     if callable(value):
-        return Called(value, name)
+        return PythonFunction(value, name)
     try:
         number = float(value)
     except (TypeError, ValueError):
@@ -191,8 +205,8 @@ def _function(name: str, value: Any) -> Function:
     return Constant(number)
 
 
-def _lines(name: str, times: Any, values: Any) -> tuple[Function, float, float]:
-    """Straight lines through values at times, and the first and last of these."""
+def _interpolate(name: str, times: Any, values: Any) -> tuple[Function, float, float]:
+    """Return the linear interpolation of values at times, and the first and last time."""
     x, y = np.asarray(times, dtype=float), np.asarray(values, dtype=float)
     if x.ndim != 1 or x.shape != y.shape or not len(x):
         raise SettingError(
@@ -206,8 +220,8 @@ def _lines(name: str, times: Any, values: Any) -> tuple[Function, float, float]:
     return line, float(x[0]), float(x[-1])
 
 
-def places_of(engine: Any, driven: Controls) -> Ints:
-    """Where the numbers of the model have the last function of each control, a constant."""
+def find_constant_offsets(engine: Any, driven: Controls) -> Ints:
+    """Return the offsets of the last function of each control, a constant, in the numbers of a model."""
     own, numbers, _ = driven.make_record()
     tables = [*own[1 + len(driven.names) :], len(numbers)]
     last = [own[1 + k] for k in range(len(driven.names))]

@@ -1,4 +1,4 @@
-"""What is noted during a motion: contacts that begin and end, the largest forces, counts."""
+"""Reports of a run: contact events, largest forces, probes and the summary."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from osimlite.simulation.stepper import Stepper
 Moment = tuple[float, Sequence[float]]
 """Time (s) and state in the engine's order."""
 
-TIME_OF_EVENT = 1e-9
-"""How exactly the time of an event is found on the interpolated motion, s."""
+EVENT_TIME_TOLERANCE_S = 1e-9
+"""Accuracy of the times of events on the interpolated motion, s."""
 
 
 class ContactEvent(NamedTuple):
-    """A contact that begins or ends at a time (s)."""
+    """Begin or end of a contact at a time (s)."""
 
     time: float
     contact: str
@@ -38,10 +38,11 @@ class _Change(NamedTuple):
 
 
 class Recorder:
-    """Watches the steps of one motion.
+    """Observer of the steps of one motion.
 
-    Contacts are those that exert a force. What begins and ends within one step is not seen. The
-    largest force of a contact is that at the end of a step (or at the start of the motion).
+    A contact touches while it exerts a force. Contacts that begin and end within one step are
+    missed. The largest force of a contact is taken from the ends of the steps and the start of the
+    motion.
     """
 
     def __init__(self, engine: Engine) -> None:
@@ -53,11 +54,11 @@ class Recorder:
         self._numbers: dict[int, tuple[int, ...]] = {0: ()}
         self._largest = [(0.0, 0.0)] * len(engine.contacts)
         self._stepper: Stepper | None = None
-        self._keeps_steps = has_memory(engine.probes)
+        self._keeps_steps = need_steps(engine.probes)
         self._steps: list[Moment] = []
 
-    def begin(self, stepper: Stepper) -> None:
-        """Note the state that the stepper starts from, just after it was made."""
+    def start(self, stepper: Stepper) -> None:
+        """Record the initial state, directly after the stepper was made."""
         self._stepper = stepper
         self._start = self._last = stepper.time
         self._touching = self._loads[-1]
@@ -65,12 +66,14 @@ class Recorder:
         self._steps = [(stepper.time, stepper.state)]
         self._note_forces(stepper.time)
 
-    def observe(self, t: float, y: list[float]) -> None:
-        """Note a step that was taken."""
+    def observe_step(self, t: float, y: list[float]) -> None:
+        """Record an accepted step."""
         touching = self._loads[-1]
         if touching != self._touching:
             assert self._stepper is not None
-            change = _Change(self._last, t, self._stepper.interpolant(), self._touching, touching)
+            change = _Change(
+                self._last, t, self._stepper.make_interpolant(), self._touching, touching
+            )
             self._changes.append(change)
             self._touching = touching
         self._last = t
@@ -79,13 +82,17 @@ class Recorder:
         if self._keeps_steps:
             self._steps.append((t, y))
 
-    def steps(self) -> list[Moment]:
-        """The start and the ends of all steps, if a probe must know them; the start if not."""
+    def get_steps(self) -> list[Moment]:
+        """Return the start and the ends of all steps if a probe needs them, else the start alone."""
         self._catch_up()
         return self._steps
 
-    def largest_forces(self) -> dict[str, tuple[float, float]]:
-        """By contact that ever touched, its largest force (N) and when that was (s)."""
+    def get_largest_forces(self) -> dict[str, tuple[float, float]]:
+        """Return the largest contact forces.
+
+        Returns:
+            Force (N) and its time (s) by contact, for contacts that touched.
+        """
         self._catch_up()
         return {
             name: largest
@@ -93,22 +100,27 @@ class Recorder:
             if largest[0] > 0.0
         }
 
-    def events(self) -> list[ContactEvent]:
-        """All beginnings and ends in the order of their times; those at the start are the contacts there were."""
+    def locate_events(self) -> list[ContactEvent]:
+        """Return all begins and ends in order of time; contacts that touch at the start begin there."""
         self._catch_up()
-        result = [ContactEvent(self._start, name, True) for name in self._named(self.initially)]
+        result = [
+            ContactEvent(self._start, name, True)
+            for name in self._get_contact_names(self.initially)
+        ]
         for change in self._changes:
-            result += sorted(self._times(change))
+            result += sorted(self._locate_changes(change))
         return result
 
-    def _times(self, change: _Change) -> Iterator[ContactEvent]:
-        """Bisect for every contact that changed within a step."""
-        for number in self._bits(change.before ^ change.after):
+    def _locate_changes(self, change: _Change) -> Iterator[ContactEvent]:
+        """Yield the events of a step in which contacts changed, located by bisection."""
+        for number in self._get_set_bits(change.before ^ change.after):
             bit = 1 << number
             low, high = change.start, change.end
-            while high - low > TIME_OF_EVENT:
+            while high - low > EVENT_TIME_TOLERANCE_S:
                 middle = 0.5 * (low + high)
-                if (self._engine.touching(middle, change.state(middle)) ^ change.after) & bit:
+                if (
+                    self._engine.find_touching_contacts(middle, change.state(middle)) ^ change.after
+                ) & bit:
                     low = middle
                 else:
                     high = middle
@@ -121,17 +133,17 @@ class Recorder:
             self._stepper.catch_up()
 
     def _note_forces(self, t: float) -> None:
-        for number in self._bits(self._touching):
+        for number in self._get_set_bits(self._touching):
             x, y, z = self._loads[number]
             size = sqrt(x * x + y * y + z * z)
             if size > self._largest[number][0]:
                 self._largest[number] = size, t
 
-    def _named(self, bits: int) -> list[str]:
-        return [self._engine.contacts[number] for number in self._bits(bits)]
+    def _get_contact_names(self, bits: int) -> list[str]:
+        return [self._engine.contacts[number] for number in self._get_set_bits(bits)]
 
-    def _bits(self, bits: int) -> tuple[int, ...]:
-        """The numbers of the bits that are set."""
+    def _get_set_bits(self, bits: int) -> tuple[int, ...]:
+        """Return the indices of the bits that are set."""
         known = self._numbers.get(bits)
         if known is None:
             known = tuple(number for number in range(bits.bit_length()) if bits >> number & 1)
@@ -139,91 +151,100 @@ class Recorder:
         return known
 
 
-EXTREMES: dict[str, tuple[float, Callable[[float, float], bool]]] = {
+EXTREME_RULES: dict[str, tuple[float, Callable[[float, float], bool]]] = {
     "minimum": (inf, lambda new, old: new < old),
     "maximum": (-inf, lambda new, old: new > old),
     "minabs": (inf, lambda new, old: abs(new) < abs(old)),
     "maxabs": (0.0, lambda new, old: abs(new) > abs(old)),
 }
-"""By operation, what an extreme begins with, and whether a number is a new one."""
+"""Initial value of the extreme of each operation, and the comparison by which a number replaces it."""
 
 
 class Extreme:
-    """The least or greatest value so far, with its sign; where nothing was integrated, OpenSim takes 0 for one."""
+    """Smallest or largest value so far, with its sign.
+
+    Without integration (a prescribed motion) OpenSim starts at 0.
+    """
 
     def __init__(self, operation: str, *, is_known: bool = False) -> None:
-        self._extreme, self._is_new = EXTREMES[operation]
+        self._extreme, self._is_new = EXTREME_RULES[operation]
         if is_known:
             self._extreme = 0.0
 
-    def at(self, t: float, value: float) -> float:
-        """It at a time (s)."""
+    def evaluate(self, t: float, value: float) -> float:
+        """Return the extreme at a time (s)."""
         return value if self._is_new(value, self._extreme) else self._extreme
 
-    def take(self, t: float, value: float) -> None:
-        """Note the end of a step."""
-        self._extreme = self.at(t, value)
+    def accept(self, t: float, value: float) -> None:
+        """Record the value at the end of a step."""
+        self._extreme = self.evaluate(t, value)
 
 
 @dataclass
 class Rate:
-    """The rate of change since the last step: of first order in the first one, of second order from then on."""
+    """Rate of change since the last step: of first order in the first step, of second order in later ones."""
 
     time: float = -inf
     value: float = 0.0
     rate: float = 0.0
     is_good: bool = False
 
-    def at(self, t: float, value: float) -> float:
-        """It at a time (s)."""
+    def evaluate(self, t: float, value: float) -> float:
+        """Return the rate at a time (s)."""
         if t == self.time or self.time == -inf:
             return self.rate
         line = (value - self.value) / (t - self.time)
         return 2.0 * line - self.rate if self.is_good else line
 
-    def take(self, t: float, value: float) -> None:
-        """Note the end of a step."""
-        rate, self.is_good = self.at(t, value), self.time != -inf
+    def accept(self, t: float, value: float) -> None:
+        """Record the value at the end of a step."""
+        rate, self.is_good = self.evaluate(t, value), self.time != -inf
         self.time, self.value, self.rate = t, value, rate
 
 
-def has_memory(probes: Sequence[DeclaredProbe]) -> bool:
-    """Whether what some probes report depends on the steps before."""
+def need_steps(probes: Sequence[DeclaredProbe]) -> bool:
+    """Return whether a result of some probes depends on earlier steps."""
     return any(probe.operation not in ("value", INTEGRATE) for probe in probes)
 
 
-def probe_labels(probes: Sequence[DeclaredProbe]) -> list[str]:
-    """Labels of what they report, as OpenSim's ProbeReporter has them."""
+def list_probe_labels(probes: Sequence[DeclaredProbe]) -> list[str]:
+    """Return the labels of the probes' results as OpenSim's ProbeReporter has them."""
     return [label for probe in probes for label in probe.reading.labels]
 
 
-def probe_rows(
+def compute_probe_rows(
     engine: Engine, moments: Sequence[Moment], steps: Sequence[Moment]
 ) -> Iterator[list[float]]:
-    """What the probes of an engine report.
+    """Yield the results of the engine's probes at times.
 
-    Args: engine: that computed the motion. moments: of the rows. steps: the start of the motion and
-        the ends of its steps; none of a motion that is known from elsewhere.
+    Integrals are states. Rates and extremes are those of Simbody's measures: they follow from the
+    ends of the accepted steps and from the present state.
+
+    Args:
+        engine: engine that computed the motion.
+        moments: times (s) and states of the rows.
+        steps: start of the motion and ends of its steps; empty for a motion that was not
+            integrated.
     """
 
     def memory_of(operation: str) -> Rate | Extreme:
         return Rate() if operation == "differentiate" else Extreme(operation, is_known=not steps)
 
     memories = [
-        [memory_of(probe.operation) for _ in probe.reading.labels] if has_memory([probe]) else []
+        [memory_of(probe.operation) for _ in probe.reading.labels] if need_steps([probe]) else []
         for probe in engine.probes
     ]
-    waiting = list(reversed(steps)) if has_memory(engine.probes) else []
+    waiting = list(reversed(steps)) if need_steps(engine.probes) else []
     for t, y in moments:
         while waiting and waiting[-1][0] <= t:
             time, state = waiting.pop()
-            for memory, values in zip(memories, engine.probe_results(time, state), strict=True):
+            for memory, values in zip(memories, engine.evaluate_probes(time, state), strict=True):
                 for item, value in zip(memory, values, strict=False):
-                    item.take(time, value)
+                    item.accept(time, value)
         integrals = dict(zip(engine.state.paths, engine.state.auxiliary(y), strict=True))
         row: list[float] = []
         for probe, memory, values in zip(
-            engine.probes, memories, engine.probe_results(t, y), strict=True
+            engine.probes, memories, engine.evaluate_probes(t, y), strict=True
         ):
             if probe.operation == INTEGRATE:
                 paths = [variable.path for variable in probe.states]
@@ -232,20 +253,25 @@ def probe_rows(
                     for path, start in zip(paths, probe.initial, strict=True)
                 ]
             elif memory:
-                values = [item.at(t, value) for item, value in zip(memory, values, strict=True)]
+                values = [
+                    item.evaluate(t, value) for item, value in zip(memory, values, strict=True)
+                ]
             row += [probe.gain * value for value in values]
         yield row
 
 
-def integration_summary(
+def summarize_integration(
     stepper: Stepper, settings: Mapping[str, Any], wall: float
 ) -> dict[str, Any]:
-    """How a motion was followed.
+    """Return the summary of an integration as JSON-ready data.
 
     Args:
-        stepper: at the end of it.
-        settings: what was asked for.
-        wall: how long it took, s.
+        stepper: the stepper at the end of the motion.
+        settings: the requested options.
+        wall: computing time, s.
+
+    Returns:
+        Integrator, settings and counts.
     """
     return {
         "integrator": stepper.name,
@@ -259,37 +285,47 @@ def integration_summary(
     }
 
 
-def result_summary(
+def summarize_result(
     engine: Engine, recorder: Recorder, start: Moment, end: Moment
 ) -> dict[str, Any]:
-    """What became of a motion: its energies at both ends, when contacts began and ended, and how hard they pushed.
+    """Return the summary of a motion as JSON-ready data.
 
     Args:
-        engine: that computed it.
-        recorder: that watched it.
-        start: its first moment.
-        end: its last one.
+        engine: engine that computed the motion.
+        recorder: recorder of the motion.
+        start: first time and state.
+        end: last time and state.
+
+    Returns:
+        Energies at both ends, contact events, and the largest contact forces.
     """
     return {
-        "energy_J": {"start": energies(engine, *start), "end": energies(engine, *end)},
+        "energy_J": {
+            "start": compute_energies(engine, *start),
+            "end": compute_energies(engine, *end),
+        },
         "contact_events": [
             {
                 "time_s": event.time,
                 "contact": event.contact,
                 "event": "begin" if event.begins else "end",
             }
-            for event in recorder.events()
+            for event in recorder.locate_events()
         ],
         "largest_contact_forces": {
             name: {"force_N": size, "time_s": t}
-            for name, (size, t) in recorder.largest_forces().items()
+            for name, (size, t) in recorder.get_largest_forces().items()
         },
     }
 
 
-def energies(engine: Engine, t: float, y: Sequence[float]) -> dict[str, float]:
-    """Energies at a time (s) in a state, J."""
-    kinetic, gravity, stored = engine.energies(t, y)
+def compute_energies(engine: Engine, t: float, y: Sequence[float]) -> dict[str, float]:
+    """Compute the energies at a time (s) in a state.
+
+    Returns:
+        Energies (J) by name.
+    """
+    kinetic, gravity, stored = engine.compute_energies(t, y)
     return {
         "kinetic": kinetic,
         "potential": gravity + stored,
@@ -299,8 +335,12 @@ def energies(engine: Engine, t: float, y: Sequence[float]) -> dict[str, float]:
     }
 
 
-def versions(engine: Engine) -> dict[str, str]:
-    """Versions of what computed a motion."""
+def collect_versions(engine: Engine) -> dict[str, str]:
+    """Return the versions of the programs that computed a motion.
+
+    Returns:
+        Versions of osimlite, the engine and Python.
+    """
     from osimlite import __version__
 
     return {"osimlite": __version__, "engine": engine.version, "python": sys.version.split()[0]}

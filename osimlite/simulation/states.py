@@ -1,7 +1,7 @@
-"""What the numbers of a state are: y = (q, u, z), in the order of an engine.
+"""Layout of the state of an engine: y = (q, u, z).
 
-First come the values of the coordinates that are free to move, then their generalized speeds, then
-the auxiliary states of the force elements.
+First come the values q of the coordinates that are free to move, then their generalized speeds u,
+then the auxiliary states z of the force elements (such as activations and fiber lengths).
 """
 
 from __future__ import annotations
@@ -21,24 +21,24 @@ from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.model import Model
 
 Start = float | Callable[[Sequence[float], Sequence[float]], float]
-"""A number, or what gives it for the values and the speeds of all coordinates of the mechanism."""
+"""Initial value of an auxiliary state: a number, or a function of the values and speeds of all coordinates."""
 
 
 @dataclass(frozen=True)
 class StateVariable:
     """An auxiliary state of a force element."""
 
-    path: str  # as OpenSim has it
-    start: Start = 0.0  # where it starts
-    # whether Simbody keeps it, in OpenSim: such states stand behind all others
+    path: str  # path in OpenSim
+    start: Start = 0.0  # initial value
+    # whether Simbody itself holds the state; such states come last
     is_simbody: bool = False
-    is_named: bool = True  # whether OpenSim has a name for it, so that it is in files of states
+    is_named: bool = True  # whether OpenSim names it and writes it to files of states
 
 
-def in_model_order(model: Model, paths: Sequence[str]) -> list[str]:
-    """Paths of states in the order of their components, as OpenSim names them all.
+def sort_by_component(model: Model, paths: Sequence[str]) -> list[str]:
+    """Sort paths of states by their components, in OpenSim's order.
 
-    Those of one component stay as they are, and so do the coordinates of one joint.
+    States of one component keep their order, and so do the coordinates of one joint.
     """
     components = model.tree().by_path
     rank = {path: number for number, path in enumerate(components)}
@@ -53,20 +53,21 @@ def in_model_order(model: Model, paths: Sequence[str]) -> list[str]:
 
 
 class StateLayout:
-    """What a state of an engine consists of.
+    """Layout of the states of an engine.
 
-    The order of the auxiliary states is that in which Simbody holds them: the norm of their errors
-    is a sum.
+    The auxiliary states are in Simbody's order, because the norm of their errors is a sum whose
+    rounding depends on the order.
 
     Args:
-        mechanism: whose state.
-        order: place in the mechanism of each coordinate that is free to move.
+        mechanism: the mechanism.
+        order: index in the mechanism of each coordinate that is free to move.
         elements: the force elements.
 
     Attributes:
-        order: as given.
+        mechanism: the mechanism.
+        order: index in the mechanism of each coordinate of the state.
         variables: the auxiliary states.
-        size: how many numbers a state has.
+        size: number of entries of a state.
     """
 
     def __init__(
@@ -82,39 +83,39 @@ class StateLayout:
     # ------------------------------------------------------------------------------------------------ names
     @property
     def names(self) -> list[str]:
-        """What the entries are called in messages."""
+        """Names of the entries in messages."""
         names = [self.mechanism.coordinates[place].name for place in self.order]
         return names + [f"the speed of {name}" for name in names] + self.paths
 
     @property
     def paths(self) -> list[str]:
-        """Of the auxiliary states."""
+        """Paths of the auxiliary states."""
         return [variable.path for variable in self.variables]
 
-    def first_of(self, element: Any) -> int:
-        """Place in y of the first state of an element, which the others of the element follow; -1 if it has none."""
+    def find_first_state(self, element: Any) -> int:
+        """Return the index in y of the first state of an element, whose other states follow; -1 if it has none."""
         own = element.states
         return 2 * len(self.order) + self.variables.index(own[0]) if own else -1
 
     # ------------------------------------------------------------------------------------------ whole states
-    def require(self, y: Sequence[float]) -> None:
-        """Refuse a state of another length; OsimliteError."""
+    def require_length(self, y: Sequence[float]) -> None:
+        """Raise an OsimliteError if a state has another length."""
         if len(y) != self.size:
-            raise self.wrong_length(len(y))
+            raise self.make_length_error(len(y))
 
-    def wrong_length(self, count: int) -> OsimliteError:
-        """The error for a state of `count` numbers."""
+    def make_length_error(self, count: int) -> OsimliteError:
+        """Return the error for a state with `count` entries."""
         n, more = len(self.order), len(self.variables)
         parts = f"{n} values, {n} speeds" + (f", {more} auxiliary states" if more else "")
         return OsimliteError(
             f"a state of '{self.mechanism.name}' has {self.size} numbers ({parts}), not {count}"
         )
 
-    def table(self, states: ArrayLike) -> Array:
-        """States as an array of their own (k, y).
+    def as_table(self, states: ArrayLike) -> Array:
+        """Return a copy of states as a contiguous array (k, y).
 
         Raises:
-            OsimliteError: they are no rows of states.
+            OsimliteError: the states are not rows of this layout.
         """
         rows = np.array(states, dtype=np.float64, order="C")
         if rows.ndim != 2 or rows.shape[1] != self.size:
@@ -123,8 +124,8 @@ class StateLayout:
             )
         return rows
 
-    def default(self) -> list[float]:
-        """The state at the default values and speeds."""
+    def pack_defaults(self) -> list[float]:
+        """Return the state with default values and speeds."""
         infos = self.mechanism.coordinates
         return self.pack(
             [info.default_value for info in infos], [info.default_speed for info in infos]
@@ -133,34 +134,34 @@ class StateLayout:
     def pack(
         self, q: Sequence[float], u: Sequence[float], z: Sequence[float] | None = None
     ) -> list[float]:
-        """The state from the values and speeds of all coordinates.
+        """Pack values and speeds of all coordinates into a state.
 
         Args:
-            q: values in the order of the mechanism.
-            u: generalized speeds in the order of the mechanism.
-            z: the auxiliary states; by default where they start.
+            q: values (n,) in the order of the mechanism.
+            u: generalized speeds (n,) in the order of the mechanism.
+            z: auxiliary states; by default their initial values.
         """
         y = [float(row[place]) for row in (q, u) for place in self.order]
-        y += self._starts(y) if z is None else map(float, z)
-        self.require(y)
+        y += self._compute_starts(y) if z is None else map(float, z)
+        self.require_length(y)
         return y
 
-    def started(self, states: Array) -> Array:
-        """States (k, y) with the auxiliary ones where they start from the values and speeds there."""
+    def restart_auxiliary(self, states: Array) -> Array:
+        """Return states (k, y) with the auxiliary states at their initial values for the values and speeds there."""
         if not self.variables:
             return states.copy()
         result = np.empty((len(states), self.size))
         first = 2 * len(self.order)
         result[:, :first] = states[:, :first]
         if any(callable(item.start) for item in self.variables):
-            starts = [self._starts(y) for y in states.tolist()]
+            starts = [self._compute_starts(y) for y in states.tolist()]
             result[:, first:] = np.reshape(starts, (len(states), len(self.variables)))
         else:
             result[:, first:] = [item.start for item in self.variables]
         return result
 
-    def _starts(self, y: Sequence[float]) -> list[float]:
-        """Where the auxiliary states start from values and speeds."""
+    def _compute_starts(self, y: Sequence[float]) -> list[float]:
+        """Return the initial values of the auxiliary states for the values and speeds in a state."""
         q, u = self.values(y), self.speeds(y)
         return [
             float(item.start(q, u)) if callable(item.start) else item.start
@@ -168,28 +169,32 @@ class StateLayout:
         ]
 
     # ------------------------------------------------------------------------------------------------ parts
-    def spread(self, values: Sequence[float], still: Sequence[float]) -> list[float]:
-        """Numbers of the free coordinates put at their places among those of all, the rest from `still`."""
+    def spread_to_all(self, values: Sequence[float], still: Sequence[float]) -> list[float]:
+        """Return numbers of all coordinates: those of the state's coordinates from `values`, the rest from `still`."""
         row = list(still)
         for place, value in zip(self.order, values, strict=True):
             row[place] = value
         return row
 
     def values(self, y: Sequence[float]) -> list[float]:
-        """Values of all coordinates, in the mechanism's order."""
-        return self.spread(y[: len(self.order)], self._still)
+        """Return the values of all coordinates in the mechanism's order."""
+        return self.spread_to_all(y[: len(self.order)], self._still)
 
     def speeds(self, y: Sequence[float]) -> list[float]:
-        """Generalized speeds of all coordinates, in the mechanism's order."""
+        """Return the generalized speeds of all coordinates in the mechanism's order."""
         count = len(self.order)
-        return self.spread(y[count : 2 * count], [0.0] * len(self._still))
+        return self.spread_to_all(y[count : 2 * count], [0.0] * len(self._still))
 
     def auxiliary(self, y: Sequence[float]) -> Sequence[float]:
-        """The auxiliary states."""
+        """Return the auxiliary states."""
         return y[2 * len(self.order) :]
 
-    def histories(self, states: Sequence[Sequence[float]]) -> tuple[Array, Array]:
-        """Values and speeds (k, n) of all coordinates at k states."""
+    def extract_histories(self, states: Sequence[Sequence[float]]) -> tuple[Array, Array]:
+        """Return the coordinates at k states.
+
+        Returns:
+            Values (k, n) and generalized speeds (k, n) of all coordinates.
+        """
         rows, count = np.array(states, dtype=float).reshape(len(states), self.size), len(self.order)
         values, speeds = (
             np.empty((len(states), len(self._still))),
@@ -199,16 +204,27 @@ class StateLayout:
         values[:, self.order], speeds[:, self.order] = rows[:, :count], rows[:, count : 2 * count]
         return values, speeds
 
-    def auxiliary_histories(self, states: ArrayLike) -> dict[str, Array]:
-        """The auxiliary states (k,) by their paths at k states."""
+    def extract_auxiliary(self, states: ArrayLike) -> dict[str, Array]:
+        """Return the auxiliary states at k states.
+
+        Returns:
+            Columns (k,) by the paths of the states.
+        """
         return dict(zip(self.paths, np.asarray(states)[:, 2 * len(self.order) :].T, strict=True))
 
-    def rows(
+    def pack_rows(
         self, values: Array, speeds: Array, auxiliary: Mapping[str, Array] | None = None
     ) -> Array:
-        """States (k, y) from what the histories give; the auxiliary ones by default where they start."""
+        """Pack histories into states (k, y), the inverse of `extract_histories`.
+
+        Args:
+            values: values of all coordinates (k, n).
+            speeds: generalized speeds (k, n).
+            auxiliary: columns (k,) by path; by default the initial values for these values and
+                speeds.
+        """
         places = list(self.order)
         moving = np.column_stack([values[:, places], speeds[:, places]])
         if auxiliary is None:
-            return self.started(moving)
+            return self.restart_auxiliary(moving)
         return np.column_stack([moving, *(auxiliary[path] for path in self.paths)])

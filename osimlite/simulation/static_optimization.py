@@ -1,10 +1,10 @@
-"""How muscles and other actuators share the generalized forces of a motion, moment by moment for itself.
+"""Static optimization: distribution of the generalized forces of a motion over muscles and other actuators.
 
-As OpenSim's StaticOptimization computes: of all activations x that give the accelerations of the
-motion, those with the least sum of |x|ᵖ. A muscle pulls with x times the force of its fully active
-fibers, its tendon taken for rigid, and without the force of passive fibers; other actuators push
-with x times their optimal force. Locked, prescribed and dependent coordinates move as the
-constraints let them.
+As in OpenSim's StaticOptimization, each time is solved by itself: of all activations x that give
+the accelerations of the motion, those with the least sum of |x|ᵖ. A muscle pulls with x times the
+force of its fully active fibers, with a rigid tendon and without passive force; other actuators
+push with x times their optimal force. Locked, prescribed and dependent coordinates move as the
+constraints prescribe.
 """
 
 from __future__ import annotations
@@ -38,22 +38,31 @@ from osimlite.schema.model import Model
 from osimlite.schema.muscles import Muscle, PathActuator
 from osimlite.simulation.elements import Forces, force_elements
 from osimlite.simulation.elements.builder import OPENSIM
-from osimlite.simulation.engines.linking import best
+from osimlite.simulation.engines.linking import select_code
 from osimlite.simulation.system import System
 from osimlite.simulation.trajectory import label_as_opensim
 
 if TYPE_CHECKING:
     from osimlite.schema.prescribed import ExternalLoads
 
-ALIKE = 1e-9
-"""Rates of coordinates that differ by no more are the same."""
+RATE_TOLERANCE = 1e-9
+"""Rates of coordinates that differ by no more are equal."""
 MUSCLES = ("active", "isometric")
-"""What muscles can pull with: their fully active fibers along a rigid tendon, or their max_isometric_force."""
-TITLE, FORCES_TITLE = "Static Optimization", "ModelForces"
+"""Models of muscle force: fully active fibers along a rigid tendon, or max_isometric_force."""
+TITLE = "Static Optimization"
+"""OpenSim's name of the table of activations."""
+
+FORCES_TITLE = "ModelForces"
+"""OpenSim's name of the table of forces."""
 
 
-def ideal(actuator: ScalarActuator, optimal_force: float) -> ScalarActuator | None:
-    """An actuator in the place of another one that pushes with its control times a force; None for an unusual one."""
+def make_ideal_actuator(actuator: ScalarActuator, optimal_force: float) -> ScalarActuator | None:
+    """Return an actuator whose force is its control times a constant, in place of another one; None for an unsupported class.
+
+    Args:
+        actuator: the actuator to replace.
+        optimal_force: the constant, N or N m.
+    """
     if isinstance(actuator, PathActuator):
         path = actuator.geometry_path.copy_deep()
         result: ScalarActuator = PathActuator(name=actuator.name, geometry_path=path)
@@ -70,65 +79,66 @@ def ideal(actuator: ScalarActuator, optimal_force: float) -> ScalarActuator | No
 
 
 @dataclass(frozen=True, eq=False)
-class Shared:
-    """How the generalized forces of a motion are shared."""
+class SharedForces:
+    """Distribution of the generalized forces of a motion over the actuators."""
 
     times: Array  # (t,), s
-    names: tuple[str, ...]  # of the actuators (a,)
-    activations: Array  # of all actuators (t, a); NaN at a time at which there is no solution
-    strengths: Array  # what each pushes with at an activation of 1 (t, a), N or N m
-    coordinates: tuple[str, ...]  # that the actuators are to accelerate (m,)
-    # generalized forces that cannot be given (t, m), N or N m; the least ones, at times without a
-    # solution
+    names: tuple[str, ...]  # names of the actuators (a,)
+    activations: Array  # activations (t, a); NaN at times without a solution
+    strengths: Array  # force of each actuator at an activation of 1 (t, a), N or N m
+    coordinates: tuple[str, ...]  # names of the coordinates to accelerate (m,)
+    # generalized forces (t, m) that the actuators cannot supply, N or N m; the smallest possible
+    # ones at times without a solution
     lacking: Array
-    solved: NDArray[np.bool_]  # at which times there is a solution (t,)
+    solved: NDArray[np.bool_]  # whether each time has a solution (t,)
 
     @property
     def forces(self) -> Array:
-        """Of all actuators (t, a), N or N m."""
+        """Forces of all actuators (t, a), N or N m."""
         return self.activations * self.strengths
 
-    def table(self) -> StoTable:
-        """The activations."""
+    def to_table(self) -> StoTable:
+        """Return the activations as a table."""
         return StoTable(TITLE, self.times, self.names, self.activations)
 
-    def lacks(self, row: int) -> str:
-        """What is missing at a time without a solution, the worst coordinate first."""
+    def describe_lack(self, row: int) -> str:
+        """Describe what is missing at a time without a solution, the largest first."""
         sizes = np.abs(self.lacking[row])
         worst = [place for place in np.argsort(-sizes) if sizes[place] > 0.1 * sizes.max()]
         return join_words(
             [f"{self.lacking[row, k]:.4g} at {self.coordinates[k]}" for k in worst], most=3
         )
 
-    def unsolved(self) -> str:
-        """The times without a solution in words, with the coordinates that lack strength; empty if there are none."""
+    def describe_unsolved(self) -> str:
+        """Describe the times without a solution and the coordinates that lack force; empty if there are none."""
         failed = np.flatnonzero(~self.solved)
         if not len(failed):
             return ""
         worst = failed[np.argmax(np.abs(self.lacking[failed]).max(axis=1))]
         return (
             f"no solution at {len(failed)} of {format_count(len(self.times), 'time')}, from {self.times[failed[0]]:g} s "
-            f"on, where nothing is written; at {self.times[worst]:g} s the actuators lack {self.lacks(worst)}"
+            f"on, where nothing is written; at {self.times[worst]:g} s the actuators lack {self.describe_lack(worst)}"
         )
 
 
 class StaticOptimization:
-    """Shares the generalized forces of motions among the actuators of a model.
+    """Solver that distributes the generalized forces of motions over the actuators of a model.
 
     Args:
-        model: whose actuators.
-        mechanism: of it.
-        exponent: p, more than 1.
-        muscles: what one pulls with by an activation of 1, one of `MUSCLES`.
-        wrapping: how paths bend around surfaces.
+        model: the model.
+        mechanism: its mechanism.
+        exponent: p, greater than 1.
+        muscles: force of a muscle at an activation of 1, one of `MUSCLES`.
+        wrapping: how paths wrap.
         external_loads: measured loads or their file.
-        folder: where the model's file is.
-        early_return: whether Simbody's defect in contact of several surfaces is reproduced.
+        folder: folder of the model's file.
+        early_return: whether Simbody's defect in contacts of several surfaces is reproduced.
 
-    Raises: SettingError: the exponent is not more than 1, or muscles have no such force.
-        ModelError: there are no actuators, or fewer than coordinates that they are to accelerate.
-        UnsupportedError: one has no force that is proportional to its control, or cannot be
-        computed.
+    Raises:
+        SettingError: the exponent is not greater than 1, or there is no such muscle force.
+        ModelError: there are no actuators, or fewer than coordinates to accelerate.
+        UnsupportedError: an actuator's force is not proportional to its control, or cannot be
+            computed.
     """
 
     def __init__(
@@ -154,10 +164,10 @@ class StaticOptimization:
         self.mechanism, self._exponent = mechanism, exponent
         model = model.copy_deep()
         model.controller_set.objects.clear()
-        # No probe is reported here, and those of muscles would miss the muscles that are replaced
-        # below.
+        # Probes are not reported here, and those of muscles would refer to muscles that are
+        # replaced below.
         model.probe_set.objects.clear()
-        self._actuators = _idealised(model, muscles != "isometric")
+        self._actuators = _replace_by_ideal_actuators(model, muscles != "isometric")
         tree = model.tree()
         self._paths = [tree.path_of(item) or "" for item in self._actuators]
         self._forces = force_elements(
@@ -200,23 +210,25 @@ class StaticOptimization:
     def _system(self) -> System:
         return System(self.mechanism, self._forces)
 
-    def share(self, times: Array, values: Array, speeds: Array, accelerations: Array) -> Shared:
-        """How the actuators share what a motion takes.
+    def solve_motion(
+        self, times: Array, values: Array, speeds: Array, accelerations: Array
+    ) -> SharedForces:
+        """Distribute what a motion requires over the actuators.
 
         Args:
-            times: (t,), s.
-            values: of all coordinates (t, n), rad and m.
+            times: times (t,), s.
+            values: values of all coordinates (t, n), rad and m.
             speeds: generalized speeds (t, n).
-            accelerations: their derivatives (t, n); those of constrained coordinates do not count.
+            accelerations: their derivatives (t, n); those of constrained coordinates are ignored.
 
         Raises:
             SimulationError: the forces cannot be computed at one of the states.
         """
-        allowed, ways = self._allowed(times, values, speeds, accelerations)
-        needed, pushes, strengths = self._asked(times, values, speeds, allowed, ways)
-        result, lacking, solved = self._least(pushes, needed)
+        allowed, ways = self._project_accelerations(times, values, speeds, accelerations)
+        needed, pushes, strengths = self._compute_requirements(times, values, speeds, allowed, ways)
+        result, lacking, solved = self._minimize_effort(pushes, needed)
         result[~solved] = np.nan
-        return Shared(
+        return SharedForces(
             times,
             self.names,
             result,
@@ -226,27 +238,31 @@ class StaticOptimization:
             solved,
         )
 
-    def _asked(
+    def _compute_requirements(
         self, times: Array, values: Array, speeds: Array, accelerations: Array, ways: Array
     ) -> tuple[Array, Array, Array]:
-        """What the coordinates of `coordinates` need (t, m), what a control of 1 of each actuator
-        gives them (t, a, m), and the forces of muscles (t, a), 1 of others; `ways` is what moves
-        with each of these coordinates.
+        """Compute the linear equations of the distribution, along the directions `ways` (t, n, m) of the free coordinates.
+
+        Returns:
+            Required generalized forces (t, m), contributions of each actuator at a control of 1 (t,
+                a, m), and forces of muscles (t, a), which are 1 for other actuators.
         """
         system, order = self._system, list(self._system.order)
-        moments = np.column_stack([times, system.state.rows(values, speeds)])
-        needed, pushes, strengths = system.pushed(
+        moments = np.column_stack([times, system.state.pack_rows(values, speeds)])
+        needed, pushes, strengths = system.compute_unit_forces(
             moments, np.ascontiguousarray(accelerations[:, order]), self._paths
         )
         turned = ways[:, order]
         return (needed[:, None, :] @ turned)[:, 0], pushes @ turned, strengths
 
-    def _least(self, columns: Array, needed: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
-        return least_effort(columns, needed, self._exponent, self._bounds)
+    def _minimize_effort(
+        self, columns: Array, needed: Array
+    ) -> tuple[Array, Array, NDArray[np.bool_]]:
+        return minimize_effort(columns, needed, self._exponent, self._bounds)
 
     @property
     def optimal_forces(self) -> Array:
-        """What each actuator pushes with by a control of 1 (a,), N or N m; of muscles with fibers 1."""
+        """Force of each actuator at a control of 1 (a,), N or N m; 1 for muscles with fibers."""
         fibers = [isinstance(item, Muscle) for item in self._actuators]
         return np.array(
             [
@@ -255,35 +271,38 @@ class StaticOptimization:
             ]
         )
 
-    def strengths(self, times: Array, values: Array, speeds: Array) -> Array:
-        """What each actuator pushes with by a control of 1 in one pose (a,), N or N m."""
-        moments = np.column_stack([times, self._system.state.rows(values, speeds)])
+    def compute_strengths(self, times: Array, values: Array, speeds: Array) -> Array:
+        """Return the force of each actuator at a control of 1 in one pose (a,), N or N m."""
+        moments = np.column_stack([times, self._system.state.pack_rows(values, speeds)])
         at_rest = np.zeros((len(times), len(self._system.order)))
-        _, _, strengths = self._system.pushed(moments, at_rest, self._paths)
+        _, _, strengths = self._system.compute_unit_forces(moments, at_rest, self._paths)
         return (strengths * self.optimal_forces)[0]
 
-    def balanced(self, times: Array, values: Array, speeds: Array, accelerations: Array) -> Array:
-        """Forces (t, a), within no bounds, that give accelerations (t, n) with the least squares of controls."""
-        allowed, ways = self._allowed(times, values, speeds, accelerations)
-        needed, pushes, _ = self._asked(times, values, speeds, allowed, ways)
+    def balance_accelerations(
+        self, times: Array, values: Array, speeds: Array, accelerations: Array
+    ) -> Array:
+        """Return forces (t, a) that give accelerations (t, n) with the least squares of controls, without bounds."""
+        allowed, ways = self._project_accelerations(times, values, speeds, accelerations)
+        needed, pushes, _ = self._compute_requirements(times, values, speeds, allowed, ways)
         shared = np.linalg.pinv(pushes.transpose(0, 2, 1)) @ needed[:, :, None]
         result: Array = shared[..., 0] * self.optimal_forces
         return result
 
-    def balance(
+    def compute_balance(
         self, times: Array, values: Array, speeds: Array, accelerations: Array
     ) -> tuple[Array, Array, Array]:
-        """What a motion takes, whether the constraints allow it or not, of each of the f coordinates that can move.
+        """Compute the force balance of a motion for the f coordinates that can move, ignoring whether the constraints allow it.
 
-        Returns: What they need (t, f), what each actuator gives them by 1 N (t, f, a), and the rows
-            of the constraints' equations (t, c, f): multipliers λ push with -Gᵀ λ.
+        Returns:
+            Required generalized forces (t, f), contributions of each actuator per 1 N (t, f, a),
+                and rows G of the constraint equations (t, c, f); multipliers λ push with -Gᵀ λ.
         """
         order = list(self._system.order)
         ways = np.broadcast_to(
             np.eye(values.shape[1])[:, order], (len(times), values.shape[1], len(order))
         )
-        needed, pushes, _ = self._asked(times, values, speeds, accelerations, ways)
-        equations, _ = self._equations(times, values, speeds)
+        needed, pushes, _ = self._compute_requirements(times, values, speeds, accelerations, ways)
+        equations, _ = self._compute_equations(times, values, speeds)
         return (
             needed,
             (pushes / self.optimal_forces[:, None]).transpose(0, 2, 1),
@@ -292,59 +311,69 @@ class StaticOptimization:
 
     @cached_property
     def equation_count(self) -> int:
-        """How many equations the constraints make."""
+        """Number of equations of the constraints."""
         head = int(self._system.structure[MODEL.CONSTRAINED])
         return int(self._system.structure[head + CONSTRAINED.EQUATIONS]) if head else 0
 
     @property
     def moving(self) -> list[str]:
-        """Names of the coordinates that can move, in the order of `balance`."""
+        """Names of the coordinates that can move, in the order of `compute_balance`."""
         return [self.mechanism.coordinates[place].name for place in self._system.order]
 
-    def path_lengths(self, times: Array, values: Array, speeds: Array) -> tuple[Array, Array]:
-        """Lengths (m) and lengthening speeds (m/s) of the muscles' paths (t, a); 1 and 0 of other actuators."""
+    def compute_path_lengths(
+        self, times: Array, values: Array, speeds: Array
+    ) -> tuple[Array, Array]:
+        """Compute the paths of the muscles.
+
+        Returns:
+            Lengths (m) and lengthening speeds (m/s), (t, a) each; 1 and 0 for other actuators.
+        """
         system = self._system
-        moments = np.column_stack([times, system.state.rows(values, speeds)])
+        moments = np.column_stack([times, system.state.pack_rows(values, speeds)])
         result = np.ones((len(times), len(self._paths))), np.zeros((len(times), len(self._paths)))
         own = [k for k, item in enumerate(self._actuators) if isinstance(item, Muscle)]
         for rows, name in zip(result, ("length", "rate"), strict=True):
-            places = [place for k in own for place in system.places_of(self._paths[k], (name,))]
-            rows[:, own] = system.looked(moments, places)
+            places = [place for k in own for place in system.find_offsets(self._paths[k], (name,))]
+            rows[:, own] = system.evaluate_moments(moments, places)
         return result
 
-    def responses(self, times: Array, values: Array, speeds: Array) -> tuple[Array, Array, Array]:
-        """Accelerations of all coordinates in one pose.
+    def compute_responses(
+        self, times: Array, values: Array, speeds: Array
+    ) -> tuple[Array, Array, Array]:
+        """Compute the accelerations of all coordinates in one pose as a linear function of forces.
 
-        Returns: Without actuators (n,), by each actuator's force of 1 (n, a), and by each
-            generalized force of 1 (n, n).
+        Returns:
+            Accelerations without actuators (n,), by a force of 1 of each actuator (n, a), and by a
+                generalized force of 1 of each coordinate (n, n).
         """
         system, order = self._system, list(self._system.order)
-        udot, ways = self._allowed(times, values, speeds, np.zeros_like(values))
-        moments = np.column_stack([times, system.state.rows(values, speeds)])
-        needed, pushes, _ = system.pushed(
+        udot, ways = self._project_accelerations(times, values, speeds, np.zeros_like(values))
+        moments = np.column_stack([times, system.state.pack_rows(values, speeds)])
+        needed, pushes, _ = system.compute_unit_forces(
             moments, np.ascontiguousarray(udot[:, order]), self._paths
         )
         size = len(order)
-        # What accelerations of one coordinate take beyond those of none: the mass matrix.
+        # The forces for a unit acceleration of one coordinate, less those for none, are a column of
+        # the mass matrix.
         tried = np.vstack([np.zeros(size), np.eye(size)])
-        taken = system.missing(np.repeat(moments, size + 1, axis=0), tried)
-        # Where constraints close loops, the columns of `ways` are more than the freedoms: an
-        # orthonormal basis of what they span has the same motions, and a mass matrix that can be
-        # inverted.
-        turned = span(ways[0])
+        taken = system.compute_required_forces(np.repeat(moments, size + 1, axis=0), tried)
+        # With kinematic loops, `ways` has more columns than there are degrees of freedom. An
+        # orthonormal basis of their span has the same motions and an invertible mass matrix.
+        turned = find_column_basis(ways[0])
         mass = turned[order].T @ (taken[1:] - taken[0]).T @ turned[order]
         right = np.column_stack([-needed[0], (pushes[0] / self.optimal_forces[:, None]).T])
         found = turned @ np.linalg.solve(mass, np.hstack([turned[order].T @ right, turned.T]))
         count = 1 + len(self.names)
         return udot[0] + found[:, 0], found[:, 1:count], found[:, count:]
 
-    def _allowed(
+    def _project_accelerations(
         self, times: Array, values: Array, speeds: Array, wanted: Array
     ) -> tuple[Array, Array]:
-        """Accelerations (t, n) that the constraints allow, and what moves with each free coordinate (t, n, m).
+        """Return the accelerations (t, n) that the constraints allow, and the motion of all
+        coordinates with each free one (t, n, m).
 
-        Where the constraints do not allow the accelerations of free coordinates, the nearest ones
-        are taken.
+        Where the constraints do not allow the given accelerations of free coordinates, the nearest
+        ones are used.
         """
         size, free = len(self.mechanism.coordinates), self._free
         ways = np.zeros((len(times), size, len(free)))
@@ -352,8 +381,8 @@ class StaticOptimization:
         udot = wanted.copy()
         if not self.mechanism.constraints:
             return udot, ways
-        bound, drifts = self._equations(times, values, speeds)
-        # Locked coordinates are no part of the state, nor of the equations of the kernels.
+        bound, drifts = self._compute_equations(times, values, speeds)
+        # Locked coordinates belong neither to the state nor to the equations of the kernels.
         still = [place for place in range(size) if place not in self._system.order]
         unmoved = np.broadcast_to(np.eye(size)[still], (len(times), len(still), size))
         equations = np.concatenate([bound, unmoved], axis=1)
@@ -363,14 +392,14 @@ class StaticOptimization:
         ways[:, held] = -inverse @ equations[:, :, free]
         left_over = targets[..., None] - equations[:, :, free] @ wanted[:, free, None]
         udot[:, held] = (inverse @ left_over)[..., 0]
-        left = np.abs(equations @ ways).max(axis=(1, 2), initial=0.0) > ALIKE
+        left = np.abs(equations @ ways).max(axis=(1, 2), initial=0.0) > RATE_TOLERANCE
         is_fixed = np.linalg.matrix_rank(equations[:, :, held]) == len(held)
         for row in np.flatnonzero(left | ~is_fixed):
-            udot[row], ways[row] = self._nearest(equations[row], targets[row], wanted[row])
+            udot[row], ways[row] = self._project_one(equations[row], targets[row], wanted[row])
         return udot, ways
 
-    def _equations(self, times: Array, values: Array, speeds: Array) -> tuple[Array, Array]:
-        """Equations G (t, c, n) of the constraints, and what G times the accelerations is to be (t, c)."""
+    def _compute_equations(self, times: Array, values: Array, speeds: Array) -> tuple[Array, Array]:
+        """Return the constraint equations: rows G (t, c, n), and the required values of G times the accelerations (t, c)."""
         system, size = System(self.mechanism, Forces(())), values.shape[1]
         order, head = list(system.order), int(system.structure[MODEL.CONSTRAINED])
         count = self.equation_count
@@ -381,16 +410,16 @@ class StaticOptimization:
             int(system.structure[head + place])
             for place in (CONSTRAINED.WORK_ROWS, CONSTRAINED.WORK_DRIFTS)
         )
-        moments = np.column_stack([times, system.state.rows(values, speeds)])
+        moments = np.column_stack([times, system.state.pack_rows(values, speeds)])
         places = [*range(rows, rows + count * len(order)), *range(drifts, drifts + count)]
-        looked = system.looked(moments, places, STAGE.ACCELERATION)
+        looked = system.evaluate_moments(moments, places, STAGE.ACCELERATION)
         equations[:, :, order] = looked[:, :-count].reshape(len(times), count, -1)
         return equations, looked[:, -count:]
 
-    def _nearest(self, equations: Array, targets: Array, wanted: Array) -> tuple[Array, Array]:
-        """The same at one time, where the held coordinates do not follow from the free ones alone."""
+    def _project_one(self, equations: Array, targets: Array, wanted: Array) -> tuple[Array, Array]:
+        """Do the same at one time at which the constrained coordinates do not follow from the free ones alone."""
         _, sizes, turned = np.linalg.svd(equations)
-        rank = int(np.sum(sizes > ALIKE * sizes[0])) if len(sizes) else 0
+        rank = int(np.sum(sizes > RATE_TOLERANCE * sizes[0])) if len(sizes) else 0
         directions = turned[rank:].T
         free = directions[self._free]
         if np.linalg.matrix_rank(free) < directions.shape[1]:
@@ -406,54 +435,56 @@ class StaticOptimization:
         back = np.linalg.pinv(free)
         return start + directions @ (back @ (wanted - start)[self._free]), directions @ back
 
-    def records(self, shared: Shared, values: Array, speeds: Array) -> StoTable:
-        """What all forces report while actuators push so: the columns of OpenSim's ForceReporter."""
+    def report_forces(self, shared: SharedForces, values: Array, speeds: Array) -> StoTable:
+        """Return the force records with these actuator forces: the columns of OpenSim's ForceReporter."""
         elements, system = self._forces.elements, self._system
         labels = [label for item in elements for label in item.columns]
         owners = [item.path for item in elements for _ in item.columns]
         rows = np.zeros((len(shared.times), len(labels)))
         if not {*owners} <= {*self._paths}:
-            rows[:] = system.force_table(shared.times, system.state.rows(values, speeds))
+            rows[:] = system.force_table(shared.times, system.state.pack_rows(values, speeds))
         places = {path: k for k, path in enumerate(self._paths)}
         own = [column for column, path in enumerate(owners) if path in places]
         rows[:, own] = shared.forces[:, [places[owners[column]] for column in own]]
         return StoTable(FORCES_TITLE, shared.times, tuple(label_as_opensim(labels)), rows)
 
 
-def span(columns: Array) -> Array:
-    """Return an orthonormal basis (n, r) of what columns (n, m) span."""
+def find_column_basis(columns: Array) -> Array:
+    """Return an orthonormal basis (n, r) of the space that columns (n, m) span."""
     basis, sizes, _ = np.linalg.svd(columns, full_matrices=False)
-    result: Array = basis[:, sizes > ALIKE * sizes.max(initial=0.0)]
+    result: Array = basis[:, sizes > RATE_TOLERANCE * sizes.max(initial=0.0)]
     return result
 
 
-def least_effort(
+def minimize_effort(
     columns: Array, needed: Array, exponent: float, bounds: Array
 ) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """The least sum of |x|ᵖ that gives what is needed, frame by frame.
+    """Minimize the sum of |x|ᵖ subject to linear equations and bounds, for each frame.
 
     Args:
-        columns: of each frame what each entry of x gives (t, a, m).
-        needed: (t, m).
+        columns: contribution of each entry of x (t, a, m).
+        needed: required sums (t, m).
         exponent: p.
-        bounds: of x, lower and upper (2, a).
+        bounds: lower and upper bounds of x (2, a).
 
     Returns:
-        x (t, a), what is missing (t, m), and whether nothing is (t,).
+        x (t, a), missing amounts (t, m), and whether nothing is missing (t,).
     """
     frames, count, size = columns.shape
-    code = best()
+    code = select_code()
     code.make_ready(("least_effort",))
     sizes = np.array([frames, size, count, *[0] * (count * (size + 1))], dtype=np.int64)
     numbers = np.array([exponent, *bounds.ravel()])
     given = np.ascontiguousarray(np.hstack([columns.reshape(frames, -1), needed]))
     result = np.zeros((frames, count + size + 1))
-    code.entry("least_effort")(sizes, numbers, given, result, np.zeros(effort_size(size, count)))
+    code.get_entry("least_effort")(
+        sizes, numbers, given, result, np.zeros(effort_size(size, count))
+    )
     return result[:, :count], result[:, count:-1], result[:, -1] == 1.0
 
 
-def _idealised(model: Model, physiology: bool) -> list[ScalarActuator]:
-    """The actuators that push, once those of a model that are no muscles push by their controls alone."""
+def _replace_by_ideal_actuators(model: Model, physiology: bool) -> list[ScalarActuator]:
+    """Replace all actuators but muscles with fibers by ideal ones; return the actuators that act."""
     places = {id(force): number for number, force in enumerate(model.force_set.objects)}
     result: list[ScalarActuator] = []
     for item in list(model.components(Actuator)):
@@ -469,7 +500,7 @@ def _idealised(model: Model, physiology: bool) -> list[ScalarActuator]:
                 if isinstance(item, Muscle)
                 else getattr(item, "optimal_force", 0.0)
             )
-            other = ideal(item, force)
+            other = make_ideal_actuator(item, force)
             if other is None or id(item) not in places:
                 message = f"'{item.name}' ({type(item).__name__}) does not push in proportion to its control"
                 raise UnsupportedError(f"{message}; set its appliesForce to false")

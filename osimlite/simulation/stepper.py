@@ -1,8 +1,8 @@
-"""What follows a motion in steps: the present state, the step to the next one, and states at times in between.
+"""Time steppers: the present state, the step to the next one, and states at times in between.
 
 A state is one list y = (q, u, z): coordinates, generalized speeds, auxiliary states. Its derivative
-comes from a function f(t, y) that returns (qdot, udot, zdot) as a fresh sequence of Python floats
-and leaves y alone. Lists of floats are quicker than arrays here up to some 30 states.
+is a function f(t, y) that returns (qdot, udot, zdot) as a new sequence of Python floats and does
+not change y. Up to about 30 states, lists of floats are faster here than arrays.
 """
 
 from __future__ import annotations
@@ -16,21 +16,25 @@ from typing import Any
 from osimlite.errors import SimulationError
 
 Derivative = Callable[[float, list[float]], Sequence[float]]
+"""Function f(t, y) that returns the derivative of the state."""
 Observer = Callable[[float, list[float]], object]
+"""Function that is called with time (s) and state after each step."""
 Progress = Callable[[float, float], object]
-"""Called now and then with the simulated time reached and the present length of the steps, both in s."""
+"""Function that is called occasionally with the simulated time and the present step length, both in s."""
 
 
 class NoSolution(SimulationError, ArithmeticError):
-    """The law of a force has no solution at a state; within a step, a smaller one is tried, as in Simbody."""
+    """The equations of a force have no solution at a state; within a step the integrator then tries
+    a smaller step, as Simbody does.
+    """
 
 
 class IntegrationError(SimulationError):
-    """The integrator cannot go on.
+    """The integrator cannot continue.
 
     Attributes:
-        time: where, s.
-        index: the entry of the state that is to blame, if one is.
+        time: time at which it stopped, s.
+        index: index of the state that caused it, if one did.
     """
 
     def __init__(self, message: str, time: float, index: int | None = None) -> None:
@@ -40,19 +44,19 @@ class IntegrationError(SimulationError):
 
 
 class Stepper(ABC):
-    """Common face of the steppers: a present state, steps, and states at times in between.
+    """Base class of the steppers: a present state, steps, and states at times in between.
 
-    When `observe` is called for a step, the last call of f was the one at exactly that time and
-    state; whatever f kept of it (contact forces, say) belongs to the step. It is not called for the
+    When `observe` is called for a step, the last call of f was at exactly that time and state, so
+    that what f stored (contact forces, for example) belongs to the step. It is not called for the
     initial state.
 
     Attributes:
-        time: s.
-        state: y at that time; a new list after every step, not changed later.
+        time: present time, s.
+        state: y at that time; every step makes a new list.
         derivative: f(time, state).
         evaluations: calls of f so far.
-        taken: steps taken so far.
-        ended: what ended a table before its last time, Ctrl-C or an error of the motion.
+        taken: accepted steps so far.
+        ended: exception that ended a table before its last time: Ctrl-C, or an error of the motion.
     """
 
     ended: KeyboardInterrupt | SimulationError | None = None
@@ -81,41 +85,41 @@ class Stepper(ABC):
 
     @property
     def name(self) -> str:
-        """Of the method."""
+        """Name of the method."""
         return type(self).__name__
 
     @property
     def attempted(self) -> int:
-        """Steps tried so far: more than were taken if steps are repeated smaller."""
+        """Number of attempted steps: more than accepted ones if steps are repeated with a smaller length."""
         return self.taken
 
     def catch_up(self) -> None:  # noqa: B027
-        """Make the calls of `observe` that were put off, as a stepper may that computes many steps at once."""
+        """Make the outstanding calls of `observe`; a stepper that computes many steps in one call postpones them."""
 
     @abstractmethod
     def step(self, limit: float = inf) -> None:
-        """Take one step, which ends at `limit` (s) at the latest.
+        """Take one step that ends at `limit` (s) at the latest.
 
         Raises:
-            IntegrationError: a derivative is not a finite number, or no step is small enough.
+            IntegrationError: a derivative is not finite, or no step is small enough.
         """
 
     @abstractmethod
-    def interpolant(self) -> Callable[[float], list[float]]:
-        """The function that gives the state at any time within the last step, s; it stays good for that step."""
+    def make_interpolant(self) -> Callable[[float], list[float]]:
+        """Return a function of time (s) that gives the state within the last step; it stays valid after later steps."""
 
-    def steps(self, until: float) -> Iterator[tuple[float, list[float]]]:
-        """Yield (time, state) after each step; the last one ends at `until` (s), as with OpenSim's Manager."""
+    def iterate_steps(self, until: float) -> Iterator[tuple[float, list[float]]]:
+        """Yield time and state after each step; the last step ends at `until` (s), as with OpenSim's Manager."""
         while self.time < until:
             self.step(until)
             yield self.time, self.state
 
-    def table(self, times: Sequence[float], progress: Progress | None = None) -> Sequence[Any]:
-        """The states at times that do not decrease (s), one row for each, or for those reached when it was `ended`.
+    def tabulate(self, times: Sequence[float], progress: Progress | None = None) -> Sequence[Any]:
+        """Return the states at non-decreasing times (s), up to the time that was reached if the motion ended early.
 
         Args:
-            times: of the rows, s.
-            progress: called after every step, or after several that are quick.
+            times: times of the rows, s.
+            progress: called after every step, or after several that are fast.
         """
         rows: list[list[float]] = []
         try:
@@ -124,15 +128,15 @@ class Stepper(ABC):
                     self.step(times[-1])
                     if progress is not None:
                         progress(self.time, self.time - self.previous[0])
-                rows.append(self.at(t))
+                rows.append(self.interpolate(t))
         except (KeyboardInterrupt, SimulationError) as ended:
             self.ended = ended
-            # Ctrl-C may have come after a step and before its rows.
-            rows += [self.at(t) for t in times[len(rows) : bisect_right(times, self.time)]]
+            # Ctrl-C may have interrupted between a step and its rows.
+            rows += [self.interpolate(t) for t in times[len(rows) : bisect_right(times, self.time)]]
         return rows
 
-    def at(self, t: float) -> list[float]:
-        """State at a time not before the start of the last step nor after its end, s."""
+    def interpolate(self, t: float) -> list[float]:
+        """Return the state at a time within the last step, s."""
         if t == self.time:
             return self.state
         start = self.previous[0]
@@ -140,9 +144,9 @@ class Stepper(ABC):
             raise ValueError(
                 f"t = {t:.9g} s is outside the last step, {start:.9g} to {self.time:.9g} s"
             )
-        return self.interpolant()(t)
+        return self.make_interpolant()(t)
 
-    def _advance(self, t: float, y: list[float]) -> None:
+    def _accept_step(self, t: float, y: list[float]) -> None:
         """Make (t, y) the present state."""
         self.previous = self.time, self.state, self.derivative
         self.derivative = self._evaluate(t, y)
@@ -153,14 +157,15 @@ class Stepper(ABC):
         if self._observe is not None:
             self._observe(t, y)
 
-    def _require_room(self, limit: float) -> None:
+    def _require_later(self, limit: float) -> None:
+        """Raise ValueError if the limit of a step (s) is not after the present time."""
         if not limit > self.time:
             raise ValueError(
                 f"the limit {limit:.9g} s of the step is not after the present {self.time:.9g} s"
             )
 
     def _evaluate(self, t: float, y: list[float]) -> Sequence[float]:
-        """The derivative at a state that is part of the motion, where it must exist."""
+        """Return the derivative at a state of the motion; raise an IntegrationError where it does not exist."""
         try:
             derivative = self._f(t, y)
         except (ArithmeticError, ValueError) as failure:
@@ -177,18 +182,21 @@ class Stepper(ABC):
         for index, value in enumerate(derivative):
             if not isfinite(value):
                 raise IntegrationError(
-                    f"The derivative of {self._name(index)} is {value} at t = {t:.9g} s; check the masses, inertias "
+                    f"The derivative of {self._get_state_name(index)} is {value} at t = {t:.9g} s; check the masses, inertias "
                     "and parameters of forces that it depends on, of a muscle also whether it starts in equilibrium, "
                     "and whether its control is above 0: near rest, an elastic tendon can be stiff without bound.",
                     t,
                     index,
                 )
 
-    def _name(self, index: int) -> str:
+    def _get_state_name(self, index: int) -> str:
+        """Return the name of a state in messages."""
         return f"state {index}" if self._names is None else self._names[index]
 
 
-def straight_line(t0: float, y0: list[float], t1: float, y1: list[float], t: float) -> list[float]:
-    """State at time t on the straight line from y0 at t0 to y1 at t1."""
+def interpolate_linearly(
+    t0: float, y0: list[float], t1: float, y1: list[float], t: float
+) -> list[float]:
+    """Return the state at time t on the straight line from y0 at t0 to y1 at t1."""
     s = (t - t0) / (t1 - t0)
     return [y + s * (z - y) for y, z in zip(y0, y1, strict=True)]

@@ -1,4 +1,4 @@
-"""A recorded motion."""
+"""Motions over time: coordinates alone (`Movement`), and simulated motions with forces and energies (`Trajectory`)."""
 
 from __future__ import annotations
 
@@ -26,15 +26,19 @@ from osimlite.schema.tree import Snapshot
 class Trajectory(Tabular):
     """The motion of a mechanism over time, with its forces, energies and summary.
 
-    Forces, energies and events are worked out when they are asked for.
+    Forces, energies and events are computed when they are first read.
 
-    Attributes: mechanism: what moves. times: moments (n,), s. coordinates: names of the k
-        coordinates, in the mechanism's order. values: coordinate values (n, k), rad or m. speeds:
-        generalized speeds (n, k). auxiliary: other states that are integrated (n,), by their paths
-        in OpenSim: the energy, J, that the dampers of a BushingForce have taken up, or of a
-        CoordinateLimitForce that is to compute it. paths: of all states, in the order of OpenSim:
-        ".../value" and ".../speed" of the coordinates, and `auxiliary`. controller: what was
-        recorded at each control step of a controller, None without one.
+    Attributes:
+        mechanism: the mechanism.
+        times: times of the n rows, s.
+        coordinates: names of the k coordinates, in the mechanism's order.
+        values: coordinate values (n, k), rad or m.
+        speeds: generalized speeds (n, k).
+        auxiliary: other integrated states (n,) by their paths in OpenSim, such as activations,
+            fiber lengths, and the energy (J) that the dampers of a BushingForce have dissipated.
+        paths: paths of all states in OpenSim's order: ".../value" and ".../speed" of the
+            coordinates, and those of `auxiliary`.
+        controller: record of a controller, one row for each of its control steps; None without one.
     """
 
     _repr_html_ = make_notebook_repr("trajectory")
@@ -70,7 +74,7 @@ class Trajectory(Tabular):
 
     @property
     def model(self) -> Model | None:
-        """A copy of what was simulated, if that is known: notebooks show it."""
+        """Copy of the simulated model if it is known; notebooks show it."""
         return self._model.model if isinstance(self._model, Snapshot) else self._model
 
     def __repr__(self) -> str:
@@ -80,18 +84,18 @@ class Trajectory(Tabular):
         )
 
     def __getstate__(self) -> dict[str, Any]:
-        # What the report needs to work anything out cannot go to another process.
+        # The report refers to an engine, which cannot be sent to another process.
         _ = self.forces, self.energy, self.probes, self.summary
         return {**self.__dict__, "_report": None, "_model": self.model}
 
     @cached_property
     def forces(self) -> Mapping[str, Array]:
-        """Columns (n,) of what the forces do, by the labels of OpenSim's ForceReporter, in SI units.
+        """Columns (n,) of the force records by the labels of OpenSim's ForceReporter, in SI units.
 
-        ``RFootForce.RightShank.force.X`` and its like are forces (N) and, about the body's origin,
-        torques (N·m) on bodies in ground; ``RKneeLimitTorque`` is a generalized force,
+        Labels such as ``RFootForce.RightShank.force.X`` stand for forces (N) and, about the body's
+        origin, torques (N·m) on bodies, in ground. ``RKneeLimitTorque`` is a generalized force,
         ``RKneeLimitTorque.PotentialEnergy`` its energy (J). Surfaces of one force on the same body
-        share their columns, which are those of the body.
+        share the columns of that body.
         """
         labels, table = self._force_table
         return {label: table[:, index] for index, label in enumerate(labels)}
@@ -104,7 +108,7 @@ class Trajectory(Tabular):
 
     @cached_property
     def probes(self) -> Mapping[str, Array]:
-        """Columns (n,) of what the model's probes report, by the labels of OpenSim's ProbeReporter."""
+        """Columns (n,) of the model's probes by the labels of OpenSim's ProbeReporter."""
         labels, table = self._probe_table
         return {label: table[:, index] for index, label in enumerate(labels)}
 
@@ -124,12 +128,12 @@ class Trajectory(Tabular):
 
     @cached_property
     def summary(self) -> dict[str, Any]:
-        """Counts, settings, energies, contact events and largest forces, as they are written to summary.json."""
+        """Counts, settings, energies, contact events and largest forces, as in summary.json."""
         assert self._report is not None
         return self._report.summary()
 
     def to_sto(self, path: str | Path) -> None:
-        """Write the states with OpenSim's column names, whole or not at all.
+        """Write the states with OpenSim's column names; the file is complete or not written at all.
 
         Raises:
             OsimliteError: the file cannot be written.
@@ -138,9 +142,9 @@ class Trajectory(Tabular):
 
     @property
     def columns(self) -> dict[str, Array]:
-        """All values, speeds, states, forces and probes (n,), in SI units and radians.
+        """Columns (n,) of values, speeds, states, forces and probes, in SI units and radians.
 
-        They are called ``<coordinate>``, ``<coordinate>/speed``, and as in `auxiliary`, `forces`
+        Names are ``<coordinate>`` and ``<coordinate>/speed``, and those of `auxiliary`, `forces`
         and `probes`.
         """
         columns: dict[str, Array] = {}
@@ -155,11 +159,11 @@ class Trajectory(Tabular):
         return {"time": self.times}, self.columns
 
     def to_xarray(self) -> Any:
-        """An xarray Dataset over ``time`` (s), in SI units and radians.
+        """Return an xarray Dataset over ``time`` (s), in SI units and radians.
 
         ``value`` and ``speed`` are also over ``coordinate``. ``state``, ``force``, ``probe`` and
         ``energy`` hold `auxiliary`, `forces`, `probes` and `energy`, over ``state_name`` and so on;
-        without any, they are left out.
+        empty ones are left out.
 
         Raises:
             MissingDependency: xarray is not installed.
@@ -182,7 +186,7 @@ class Trajectory(Tabular):
 
     @property
     def states(self) -> StoTable:
-        """All states, in the order of `paths`."""
+        """Table of all states, in the order of `paths`."""
         columns: dict[str, Array] = dict(self.auxiliary)
         for index, info in enumerate(self.mechanism.coordinates):
             columns[f"{info.path}/value"], columns[f"{info.path}/speed"] = (
@@ -197,27 +201,31 @@ class Trajectory(Tabular):
         return StoTable(self.mechanism.name, self.times, self.paths, rows)
 
     def states_text(self) -> str:
-        """The text of states.sto."""
-        return text_of(self.states)
+        """Return the text of states.sto."""
+        return format_table(self.states)
 
     def forces_text(self) -> str:
-        """The text of forces.sto, with the labels of OpenSim's ForceReporter."""
+        """Return the text of forces.sto, with the labels of OpenSim's ForceReporter."""
         labels, table = self._force_table
         return format_sto(
             "ModelForces", self.times.tolist(), label_as_opensim(labels), table.tolist()
         )
 
     def probes_text(self) -> str:
-        """The text of probes.sto, with the labels of OpenSim's ProbeReporter; empty if there are no probes."""
+        """Return the text of probes.sto, with the labels of OpenSim's ProbeReporter; empty without probes."""
         labels, table = self._probe_table
         return (
             format_sto("ModelProbes", self.times.tolist(), labels, table.tolist()) if labels else ""
         )
 
     def write(self, folder: str | Path) -> list[Path]:
-        """Write ``states.sto``, ``forces.sto``, ``summary.json``; ``probes.sto``, ``controller.sto`` if there are any.
+        """Write ``states.sto``, ``forces.sto``, ``summary.json``, and ``probes.sto`` and
+        ``controller.sto`` where there are any.
 
-        The folder is made if it is not there.
+        The folder is made if it does not exist.
+
+        Returns:
+            Paths of the written files.
 
         Raises:
             OsimliteError: the folder cannot be made or a file cannot be written.
@@ -227,7 +235,9 @@ class Trajectory(Tabular):
             "states.sto": self.states_text(),
             "forces.sto": self.forces_text(),
             **({"probes.sto": text} if (text := self.probes_text()) else {}),
-            **({} if self.controller is None else {"controller.sto": text_of(self.controller)}),
+            **(
+                {} if self.controller is None else {"controller.sto": format_table(self.controller)}
+            ),
             "summary.json": format_json(self.summary),
         }
         make_folder(base)
@@ -236,8 +246,8 @@ class Trajectory(Tabular):
         return [base / name for name in texts]
 
 
-def text_of(table: StoTable) -> str:
-    """The text of a table's file."""
+def format_table(table: StoTable) -> str:
+    """Return the text of a table's .sto file."""
     return format_sto(
         table.name, table.times.tolist(), table.columns, table.rows.tolist(), header=table.header
     )
@@ -247,7 +257,7 @@ class Interrupted(KeyboardInterrupt):
     """Ctrl-C ended a simulation.
 
     Attributes:
-        trajectory: up to where it was ended, which is the last moment.
+        trajectory: the motion up to the last time that was reached.
     """
 
     def __init__(self, trajectory: Trajectory) -> None:
@@ -256,7 +266,7 @@ class Interrupted(KeyboardInterrupt):
 
 
 class Report(NamedTuple):
-    """How a trajectory gets what it works out later."""
+    """Functions with which a trajectory computes its reports when they are first read."""
 
     forces: Callable[
         [], tuple[Sequence[str], Sequence[Sequence[float]]]
@@ -265,15 +275,15 @@ class Report(NamedTuple):
     energies: Callable[[], Sequence[Sequence[float]]]
     # labels, and one row for each moment
     probes: Callable[[], tuple[Sequence[str], Sequence[Sequence[float]]]]
-    summary: Callable[[], dict[str, Any]]  # what goes into summary.json
+    summary: Callable[[], dict[str, Any]]  # content of summary.json
 
 
 class Movement(Tabular):
-    """A motion of a mechanism."""
+    """A motion of a mechanism: values of its coordinates over time, from any source."""
 
-    mechanism: Mechanism  # what moves
-    times: Array  # (t,), s
-    values: Array  # of all n coordinates (t, n), in the mechanism's order, rad and m
+    mechanism: Mechanism  # the mechanism
+    times: Array  # times (t,), s
+    values: Array  # values of all n coordinates (t, n), in the mechanism's order, rad and m
 
     @property
     def coordinates(self) -> tuple[str, ...]:
@@ -287,12 +297,12 @@ class Movement(Tabular):
 
     @property
     def in_degrees(self) -> Array:
-        """The values (t, n) with rotational coordinates in degrees, as OpenSim's files have them."""
+        """Values (t, n) with rotational coordinates in degrees, as in OpenSim's files."""
         turning = [info.motion_type == "rotational" for info in self.mechanism.coordinates]
         return np.where(turning, np.rad2deg(self.values), self.values)
 
     def to_xarray(self) -> Any:
-        """An xarray Dataset: ``value`` over ``time`` and ``coordinate``, rad and m.
+        """Return an xarray Dataset: ``value`` over ``time`` and ``coordinate``, rad and m.
 
         Raises:
             MissingDependency: xarray is not installed.
@@ -304,14 +314,18 @@ class Movement(Tabular):
         )
 
 
-ENERGY = "PotentialEnergy"
-"""The label of the energy of every CoordinateLimitForce, however many there are in one file."""
+LIMIT_ENERGY_LABEL = "PotentialEnergy"
+"""OpenSim's label of the energy of a CoordinateLimitForce; several in one file share it."""
 
 
 def label_as_opensim(labels: Iterable[str]) -> list[str]:
     """Return labels of force records as OpenSim's ForceReporter and StaticOptimization write them.
 
-    Args: labels: of the force elements, in which the energy of a limit force carries the name of
-        that force.
+    Args:
+        labels: labels of the force elements, in which the energy of a limit force carries the name
+            of that force.
     """
-    return [ENERGY if label.endswith(f".{ENERGY}") else label for label in labels]
+    return [
+        LIMIT_ENERGY_LABEL if label.endswith(f".{LIMIT_ENERGY_LABEL}") else label
+        for label in labels
+    ]

@@ -12,7 +12,7 @@ from osimlite.io.tables.storage import read_sto
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.model import Model
 from osimlite.schema.tools.dynamics import AnalyzeTool
-from osimlite.simulation.initial_state import columns_of_states
+from osimlite.simulation.initial_state import match_state_columns
 from osimlite.simulation.recorded_motion import RecordedMotion
 from osimlite.simulation.run import Simulation
 from osimlite.simulation.system import System
@@ -114,7 +114,7 @@ def equilibrate_rows(
     for path, missing in unbalanced.items():
         element = elements[path]
         if element.states:
-            index = simulation.state.first_of(element)
+            index = simulation.state.find_first_state(element)
             states[missing, index : index + len(element.states)] = np.nan
         outcome.add_message(
             "no equilibrium",
@@ -216,7 +216,7 @@ def _read_speeds(
     table = read_sto(path)
     infos = recorded.mechanism.coordinates
     paths = [f"{info.path}/speed" for info in infos]
-    columns = columns_of_states(table.columns, paths)
+    columns = match_state_columns(table.columns, paths)
     if not columns:
         raise job.create_error(f"'{path}' has no column with a speed of the model")
     speeds = np.tile([float(info.default_speed) for info in infos], (len(table.times), 1))
@@ -230,7 +230,7 @@ def _read_speeds(
         speeds[:, paths.index(name)] = table.rows[:, index]
     state = simulation.state
     first = 2 * len(state.order)
-    auxiliary = columns_of_states(table.columns, state.paths)
+    auxiliary = match_state_columns(table.columns, state.paths)
     others = {
         first + state.paths.index(name): table.rows[rows, index]
         for name, index in auxiliary.items()

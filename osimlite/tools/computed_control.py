@@ -221,7 +221,7 @@ class ComputedControl:
         names = simulation.forces.controls.names
         paths = {path.rpartition("/")[2]: path for path in names}
         self._paths = [paths[name] for name in sharing.names]
-        self._places = [self.engine.places_of(path, ("actuation",))[0] for path in self._paths]
+        self._places = [self.engine.find_offsets(path, ("actuation",))[0] for path in self._paths]
         self._corrections = np.zeros((2, len(simulation.mechanism.coordinates)))
         self._poses: dict[float, list[float]] = {}
         self.has_states = self.engine.state.size > self._first
@@ -261,8 +261,8 @@ class ComputedControl:
             try:
                 # The integrator keeps its step size from window to window.
                 if stepper is None:
-                    stepper = self.engine.stepper(t, list(y), settings, note)
-                stepper.table([stop])
+                    stepper = self.engine.make_stepper(t, list(y), settings, note)
+                stepper.tabulate([stop])
                 stepper.catch_up()
             except SimulationError as error:
                 result.failure = error.message
@@ -357,7 +357,9 @@ class ComputedControl:
     def _drive_functions(self, functions: Sequence[Function]) -> None:
         """Drive the model with a function of time for each actuator."""
         controls = self.simulation.forces.controls
-        self.engine.drive(controls.add_functions(dict(zip(self._paths, functions, strict=True))))
+        self.engine.set_controls(
+            controls.add_functions(dict(zip(self._paths, functions, strict=True)))
+        )
 
     def drive_all_windows(self) -> None:
         """Drive the model with the computed controls of all windows."""
@@ -381,7 +383,7 @@ class ComputedControl:
             target,
             *self._predict_state(target, self._predict_auxiliary_states(t, target, z, controls)),
         ]
-        return self.engine.looked(np.array([moment]), self._places, STAGE.FORCE)[0]
+        return self.engine.evaluate_moments(np.array([moment]), self._places, STAGE.FORCE)[0]
 
     def _predict_state(self, t: float, z: Array) -> list[float]:
         """Return the predicted state (y,) at a time, with given auxiliary states."""
@@ -406,7 +408,7 @@ class ComputedControl:
             q, u = np.add(pose, self._corrections)
             y: list[float] = self.engine.state.pack(q.tolist(), u.tolist(), z.tolist())
             if self.simulation.constraints:
-                y = self.engine.projected(t, y, ASSEMBLY_TOLERANCE) or y
+                y = self.engine.project_state(t, y, ASSEMBLY_TOLERANCE) or y
             self._poses[t] = y[: self._first]
 
     def _predict_auxiliary_states(
@@ -431,8 +433,8 @@ class ComputedControl:
             y = self._predict_state(t if held else time, z)
             status = self.engine.realize(time, y, STAGE.FORCE)
             if status:
-                raise self.engine.refusal(status, time, y)
-            return np.array(self.engine.found()[self._first :])
+                raise self.engine.make_evaluation_error(status, time, y)
+            return np.array(self.engine.get_derivative()[self._first :])
 
         step = min(MAX_PREDICTION_STEP_S, target - t)
         time = t

@@ -18,7 +18,7 @@ from osimlite.schema.controller_types import CorrectionController, PrescribedCon
 from osimlite.schema.model import Model
 from osimlite.schema.specs import get_file_specs
 from osimlite.schema.tools.dynamics import AbstractTool
-from osimlite.simulation.initial_state import columns_of_states, starting
+from osimlite.simulation.initial_state import match_state_columns, resolve_initial_values
 from osimlite.simulation.inverse_dynamics import add_forces
 from osimlite.simulation.recorded_motion import RecordedMotion
 from osimlite.simulation.run import Simulation
@@ -227,7 +227,7 @@ class StateRows(NamedTuple):
             DocumentError: the file has no states of the model, or no rows, or is in degrees.
         """
         table = read_sto(path)
-        columns = columns_of_states(table.columns, simulation.paths)
+        columns = match_state_columns(table.columns, simulation.paths)
         if table.in_degrees:
             raise job.create_error(
                 f"OpenSim rejects states in degrees; convert '{path}' to radians"
@@ -254,7 +254,7 @@ class StateRows(NamedTuple):
         known = {path: float(self.table.rows[row, index]) for path, index in self.columns.items()}
         auxiliary = [path for path in simulation.state.paths if path in known]
         moving = {path: value for path, value in known.items() if path not in auxiliary}
-        q, u, _ = starting(simulation.mechanism, moving, {})
+        q, u, _ = resolve_initial_values(simulation.mechanism, moving, {})
         if simulation.constraints:
             q = simulation.mechanism.assemble(q, float(self.table.times[row])).tolist()
         y = simulation.state.pack(q, u)

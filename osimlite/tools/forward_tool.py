@@ -8,7 +8,7 @@ from osimlite.io.tables.storage import StoTable
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.tools.dynamics import ForwardTool
 from osimlite.simulation.engines.protocol import Settings
-from osimlite.simulation.options import MOST_STEPS
+from osimlite.simulation.options import MAX_FIXED_STEPS
 from osimlite.simulation.run import Simulation
 from osimlite.tools.dynamics_setup import (
     StateRows,
@@ -52,13 +52,13 @@ def run_forward_tool(job: Job, outcome: Outcome) -> None:
                 f"the final_time {setup.final_time:g} s does not come after the start at {start:g} "
                 "s"
             )
-        if setup.final_time - start > MOST_STEPS * bounds[1]:
+        if setup.final_time - start > MAX_FIXED_STEPS * bounds[1]:
             raise job.create_error(
                 f"the final_time {setup.final_time:g} s is too far away for steps of {bounds[1]:g} "
                 "s"
             )
         settings = Settings(setup.integrator_error_tolerance, step_bounds=bounds)
-        times, states, failure = simulation.every_step(start, y, setup.final_time, settings)
+        times, states, failure = simulation.record_every_step(start, y, setup.final_time, settings)
         outcome.done = failure is None
         if failure is not None:
             outcome.add_message("ended early", failure.message)
@@ -96,7 +96,7 @@ def _compute_start(job: Job, outcome: Outcome, simulation: Simulation) -> tuple[
                 "start", f"{start:g} s, the time of the row of the states file that is used"
             )
     if setup.solve_for_equilibrium_for_auxiliary_states:
-        y = simulation.engine.equilibrated(start, y)
+        y = simulation.engine.equilibrate_muscles(start, y)
     return start, y
 
 
@@ -128,7 +128,5 @@ range {times[0]:f} {times[-1]:f}"""
     add("states_degrees.mot", StoTable(name, times, paths, rows * turning, in_degrees=True), simm)
     labels = tuple(path.rpartition("/")[2] for path in simulation.forces.controls.names)
     # For a model without actuators OpenSim writes a table without rows.
-    result = (
-        motion.evaluate_kernels(motion.system.places_of_controls) if labels else np.empty((0, 0))
-    )
+    result = motion.evaluate_kernels(motion.system.control_offsets) if labels else np.empty((0, 0))
     add("controls.sto", StoTable("controls", times[: len(result)], labels, result))

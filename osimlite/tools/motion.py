@@ -186,7 +186,7 @@ class Motion:
     @cached_property
     def _histories(self) -> tuple[Array, Array]:
         """Values and speeds of all coordinates, each (t, n)."""
-        return self.simulation.state.histories(self.states.tolist())
+        return self.simulation.state.extract_histories(self.states.tolist())
 
     @property
     def values(self) -> Array:
@@ -201,7 +201,7 @@ class Motion:
     @cached_property
     def histories(self) -> dict[str, Array]:
         """Columns (t,) of all states by their paths, in OpenSim's order."""
-        columns = self.simulation.state.auxiliary_histories(self.states)
+        columns = self.simulation.state.extract_auxiliary(self.states)
         for index, info in enumerate(self.mechanism.coordinates):
             columns[f"{info.path}/value"], columns[f"{info.path}/speed"] = (
                 self.values[:, index],
@@ -220,7 +220,7 @@ class Motion:
             Entries (t, m); NaN at times at which a muscle lacks an equilibrium.
         """
         return self.compute_balanced(
-            lambda motion: motion.system.looked(motion.table, offsets, stage)
+            lambda motion: motion.system.evaluate_moments(motion.table, offsets, stage)
         )
 
     def read_records(self, paths: Sequence[str], *names: str) -> dict[str, Array]:
@@ -251,7 +251,7 @@ class Motion:
         """
         result = np.full((len(self.times), len(paths), len(names)), np.nan)
         there = [k for k, path in enumerate(paths) if path not in self.left_out]
-        offsets = [offset for k in there for offset in self.system.places_of(paths[k], names)]
+        offsets = [offset for k in there for offset in self.system.find_offsets(paths[k], names)]
         result[:, there] = self.evaluate_kernels(offsets).reshape(
             len(self.times), len(there), len(names)
         )
@@ -284,7 +284,7 @@ class Motion:
         """Derivatives of the speeds (t, n) under all forces; NaN without an equilibrium."""
         order = list(self.simulation.state.order)
         result = np.zeros_like(self.values)
-        first = self.system.room + len(order)
+        first = self.system.work_size + len(order)
         result[:, order] = self.evaluate_kernels(
             range(first, first + len(order)), STAGE.ACCELERATION
         )
@@ -309,8 +309,8 @@ class Motion:
     def links(self) -> LinkMotion:
         """Positions, velocities and accelerations of the bodies at every time."""
         system = System(self.mechanism.without_constraints(), Forces(()))
-        moments = np.column_stack([self.times, system.state.rows(self.values, self.speeds)])
-        return LinkMotion.of(system, moments, self.accelerations[:, list(system.order)])
+        moments = np.column_stack([self.times, system.state.pack_rows(self.values, self.speeds)])
+        return LinkMotion.compute(system, moments, self.accelerations[:, list(system.order)])
 
     def find_frame_path(self, requested: str, kind: str, *parents: str) -> str | None:
         """Return the path of a frame that a name or relative path denotes, or None.

@@ -47,7 +47,7 @@ def find_reader(motion: Motion, component: Component, name: str) -> Reader | Non
             return reader
     path = motion.model.tree().path_of(component) or ""
     known = name not in LAW_OUTPUTS or (
-        isinstance(component, Muscle) and motion.system.knows(path, LAW_OUTPUTS[name])
+        isinstance(component, Muscle) and motion.system.has_quantity(path, LAW_OUTPUTS[name])
     )
     known &= name not in UNSUPPORTED_OUTPUTS.get(type(component), ())
     if (
@@ -69,8 +69,8 @@ def _create_frame_reader(part: str) -> Reader:
 
     def read(motion: Motion, frame: Frame, path: str) -> Array:
         body, placed = motion.mechanism.placement(path)
-        turning = motion.links.turning(body)
-        moving = motion.links.point(body, placed[:3, 3])
+        turning = motion.links.get_angular_motion(body)
+        moving = motion.links.compute_point_motion(body, placed[:3, 3])
         return {
             "position": lambda: moving[0],
             "angular_velocity": lambda: turning[0],
@@ -100,7 +100,7 @@ def _create_station_reader(which: int) -> Reader:
         frame = tree.target(station, "socket_parent_frame", station.socket_parent_frame)
         body, placed = motion.mechanism.placement(tree.path_of(frame) or "")
         point = placed[:3, :3] @ np.array(station.location, dtype=float) + placed[:3, 3]
-        return motion.links.point(body, point)[which]
+        return motion.links.compute_point_motion(body, point)[which]
 
     return read
 
@@ -116,10 +116,11 @@ def _create_momentum_reader(about_origin: bool, part: slice) -> Reader:
     def read(motion: Motion, body: Body, path: str) -> Array:
         index, _ = motion.mechanism.placement(path)
         mass = motion.mechanism.bodies[index].mass_properties
-        rotation, origin = motion.links.placed(index, np.eye(4))
-        center, velocity, _ = motion.links.point(index, mass.center)
+        rotation, origin = motion.links.locate_frame(index, np.eye(4))
+        center, velocity, _ = motion.links.compute_point_motion(index, mass.center)
         spin = rotation @ (
-            mass.inertia @ (rotation.transpose(0, 2, 1) @ motion.links.turning(index)[0][..., None])
+            mass.inertia
+            @ (rotation.transpose(0, 2, 1) @ motion.links.get_angular_motion(index)[0][..., None])
         )
         angular = spin[..., 0]
         linear = mass.mass * velocity
@@ -183,7 +184,7 @@ def _read_potential_energy(motion: Motion, model: Model, path: str) -> Array:
     """Return the potential energy of gravity and of all forces, J."""
     return motion.compute_balanced(
         lambda part: np.array(
-            [sum(part.system.energies(t, y)[1:]) for t, y in part.moments]
+            [sum(part.system.compute_energies(t, y)[1:]) for t, y in part.moments]
         ).reshape(-1, 1)
     )
 
@@ -194,7 +195,9 @@ def _read_force_energy(motion: Motion, force: Force, path: str) -> Array:
     def compute(part: Motion) -> Array:
         if path in part.left_out:
             return np.full((len(part.times), 1), np.nan)
-        return np.array([part.system.energy_of(path, t, y) for t, y in part.moments]).reshape(-1, 1)
+        return np.array(
+            [part.system.compute_stored_energy(path, t, y) for t, y in part.moments]
+        ).reshape(-1, 1)
 
     return motion.compute_by_parts(compute)
 
@@ -227,7 +230,7 @@ def _read_excitation(motion: Motion, muscle: Muscle, path: str) -> Array:
         names = part.simulation.forces.controls.names
         if path not in names:
             return np.full((len(part.times), 1), np.nan)
-        return part.evaluate_kernels([part.system.places_of_controls[names.index(path)]])
+        return part.evaluate_kernels([part.system.control_offsets[names.index(path)]])
 
     return motion.compute_by_parts(compute)
 
@@ -268,7 +271,9 @@ def _read_muscle_output(
         of: computes the output (t, 1) from these quantities.
     """
     extra = [
-        name for name in dict.fromkeys(LAW_OUTPUTS.values()) if motion.system.knows(path, name)
+        name
+        for name in dict.fromkeys(LAW_OUTPUTS.values())
+        if motion.system.has_quantity(path, name)
     ]
     known = motion.read_records([path], *LAW_RECORDS, *extra)
     with np.errstate(invalid="ignore", divide="ignore"):

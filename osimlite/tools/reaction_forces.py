@@ -25,7 +25,7 @@ from osimlite.mechanics.multibody.program import Program
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema import sets as schema
 from osimlite.schema.joints import Joint
-from osimlite.simulation.constrained import constraints_on
+from osimlite.simulation.constrained import select_constraints
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.controls import Controls
 from osimlite.simulation.link_motion import LinkMotion
@@ -50,8 +50,8 @@ class ConstraintForces:
         """
         mechanism, system = motion.mechanism, motion.system
         order = list(system.order)
-        kept, _ = constraints_on(mechanism, order)
-        needed = system.missing(motion.table, motion.accelerations[:, order])
+        kept, _ = select_constraints(mechanism, order)
+        needed = system.compute_required_forces(motion.table, motion.accelerations[:, order])
         for t, q, u, missing in zip(
             motion.times.tolist(), motion.values, motion.speeds, needed, strict=True
         ):
@@ -220,9 +220,9 @@ class JointWrenches:
         }
         system = System(self.mechanism, motion.simulation.forces, apart=True)
         if controls is not None:
-            system.drive(controls)
+            system.set_controls(controls)
         balanced = motion.select_times(motion.balanced) if motion.unbalanced else motion
-        self.moved = LinkMotion.of(
+        self.moved = LinkMotion.compute(
             system, balanced.table, balanced.accelerations[:, list(system.order)]
         )
         if self.mechanism.constrained:
@@ -236,8 +236,10 @@ class JointWrenches:
     def _add_unbalanced_times(self, motion: Motion) -> Array:
         """Return the links at all times (t, l, n), with NaN wrenches at unbalanced times."""
         still = System(self.mechanism.without_constraints(), Forces(()), apart=True)
-        moments = np.column_stack([motion.times, still.state.rows(motion.values, motion.speeds)])
-        links = still.links_in_motion(moments, motion.accelerations[:, list(still.order)])
+        moments = np.column_stack(
+            [motion.times, still.state.pack_rows(motion.values, motion.speeds)]
+        )
+        links = still.compute_accelerated_links(moments, motion.accelerations[:, list(still.order)])
         links[motion.balanced] = self.moved.links
         return links
 
@@ -281,6 +283,6 @@ class JointWrenches:
         is_outer = (side == "child") != mobilizer.reversed
         wrench = (-1.0 if is_outer else 1.0) * link[:, LINK_WORK.WRENCH : LINK_WORK.WRENCH + 6]
         frame = mobilizer.child_frame if side == "child" else mobilizer.parent_frame
-        _, point = self.moved.placed(outer if is_outer else body.parent, frame)
+        _, point = self.moved.locate_frame(outer if is_outer else body.parent, frame)
         arm = point - link[:, LINK_WORK.ORIGIN : LINK_WORK.ORIGIN + 3]
         return wrench[:, 3:], wrench[:, :3] - np.cross(arm, wrench[:, 3:]), point

@@ -17,10 +17,10 @@ from osimlite.mechanics.multibody.smoothing_spline import SampledCurves, derivat
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.model import Model
 from osimlite.schema.tools.tracking import CMC_Joint, CMC_TaskSet, CMCTool, RRATool
-from osimlite.simulation.lowpass import continued, lowpassed_by_sinc
+from osimlite.simulation.lowpass import extend_ends, filter_lowpass_by_sinc
 from osimlite.simulation.recorded_motion import RecordedMotion
 from osimlite.simulation.run import Simulation
-from osimlite.simulation.static_optimization import least_effort
+from osimlite.simulation.static_optimization import minimize_effort
 from osimlite.tools.dynamics_setup import build_static_optimization, satisfy_constraints
 from osimlite.tools.job import Job, NotRunnable
 from osimlite.tools.outcome import Outcome
@@ -95,10 +95,10 @@ class DesiredMotion:
             )
         start = float(recorded.times[0])
         end = float(recorded.times[-1])
-        times = continued(recorded.times, PADDING_ROWS)
-        values = continued(recorded.values, PADDING_ROWS)
+        times = extend_ends(recorded.times, PADDING_ROWS)
+        values = extend_ends(recorded.values, PADDING_ROWS)
         if setup.lowpass_cutoff_frequency >= 0.0:
-            times, values = lowpassed_by_sinc(
+            times, values = filter_lowpass_by_sinc(
                 times, values, setup.lowpass_cutoff_frequency, FILTER_ORDER
             )
         _apply_locks(outcome, mechanism, recorded, values)
@@ -332,7 +332,7 @@ class ForceDistribution:
         times = np.array([t])
         values = q[None]
         speeds = u[None]
-        return self._unit.responses(times, values, speeds)
+        return self._unit.compute_responses(times, values, speeds)
 
     def compute_forces(
         self,
@@ -374,7 +374,7 @@ class ForceDistribution:
         given = np.hstack([weights[:, None] * columns * scale, np.eye(size)])
         free = np.full(size, np.inf)
         ends = np.hstack([np.sort(np.array(bounds) / scale, axis=0), [-free, free]])
-        found, _, _ = least_effort(given.T[None], (weights * rest)[None], 2.0, ends)
+        found, _, _ = minimize_effort(given.T[None], (weights * rest)[None], 2.0, ends)
         return found[0, : len(scale)] * scale, ""
 
     def _compute_exact_forces(
@@ -402,7 +402,7 @@ class ForceDistribution:
             Forces (a,), and the missing accelerations in words; "" if none is missing.
         """
         assert self._strong is not None
-        strengths = self._strong.strengths(np.array([t]), q[None], u[None])
+        strengths = self._strong.compute_strengths(np.array([t]), q[None], u[None])
         # Forces of muscles whose fibers have no strength have infinite cost: they are as small as
         # their bounds allow.
         able = np.abs(strengths) > MIN_STRENGTH * np.abs(self.optimal)
@@ -421,7 +421,7 @@ class ForceDistribution:
             lightness[np.ix_(has_target, has_target)], RANK_TOLERANCE, hermitian=True
         )
         rows = np.ascontiguousarray((mass @ (each * scale)).T)
-        result, _, solved = least_effort(rows[None], (mass @ left)[None], 2.0, scaled)
+        result, _, solved = minimize_effort(rows[None], (mass @ left)[None], 2.0, scaled)
         forces[able] = result[0] * scale
         lacking = left - each @ forces[able]
         if (

@@ -152,7 +152,7 @@ def _compute_average_residuals(job: Job, model: Model, desired: DesiredMotion) -
         desired.speeds[selected],
     )
     (wanted,) = derivatives_of_samples(desired.times, desired.speeds, times, (1,))
-    forces = sharing.balanced(times, values, speeds, wanted)
+    forces = sharing.balance_accelerations(times, values, speeds, wanted)
     return _average_residual_columns(times, sharing.names, forces)
 
 
@@ -291,7 +291,7 @@ def _write_tables(
             "controls",
             motion.times,
             labels,
-            motion.evaluate_kernels(motion.system.places_of_controls),
+            motion.evaluate_kernels(motion.system.control_offsets),
         ),
     )
     columns = tuple(task.name for task in tracker.tasks.tasks)

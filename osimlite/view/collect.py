@@ -30,7 +30,7 @@ from osimlite.schema.specs import get_field_specs
 from osimlite.schema.tree import Use
 from osimlite.simulation.elements.builder import OPENSIM, ElementBuilder
 from osimlite.simulation.elements.geometries.path import PATH
-from osimlite.simulation.polylines import Course
+from osimlite.simulation.polylines import TraceablePath
 from osimlite.simulation.robot.visuals import frame_of
 from osimlite.view.scene import (
     Axes,
@@ -263,7 +263,7 @@ class _Collector:
     def _path(self, path: AbstractGeometryPath, name: str) -> None:
         owner = self.tree.parent_of(path)
         course = PATH.read(self.builder, owner)
-        if not isinstance(course, Course):
+        if not isinstance(course, TraceablePath):
             raise UnsupportedError(
                 f"is a {type(path).__name__}, which runs nowhere: osimlite does not draw it"
             )

@@ -124,7 +124,8 @@ def muscle_curves(item: MuscleCurves) -> str:
     from osimlite.simulation.muscle_curves import QUANTITIES
 
     spans = (
-        map(format_range, *item.bounds(name), [".4g"] * len(item.muscles)) for name in item.columns
+        map(format_range, *item.get_bounds(name), [".4g"] * len(item.muscles))
+        for name in item.columns
     )
     cells = zip(map(escape, item.muscles), *spans, strict=True)
     over = f" over {escape(join_words(item.coordinates))}" if item.coordinates else ""

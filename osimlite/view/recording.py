@@ -135,7 +135,7 @@ def compute_forces(
     if not forces.elements:
         return {}
     system = System(mechanism, forces)
-    table = system.force_table(times, system.state.rows(values, speeds))
+    table = system.force_table(times, system.state.pack_rows(values, speeds))
     return {label: table[:, index] for index, label in enumerate(system.columns)}
 
 

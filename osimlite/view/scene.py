@@ -16,7 +16,7 @@ from osimlite.base.records import dataclass
 from osimlite.io.meshes.surface import Surface
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.spatial import Array
-from osimlite.simulation.polylines import Course, Polylines
+from osimlite.simulation.polylines import Polylines, TraceablePath
 
 Color = tuple[float, float, float]
 Layer = Literal["geometry", "contact", "wrap", "markers", "paths", "springs", "frames"]
@@ -62,7 +62,7 @@ class Line:
     path: str  # absolute path of the component it shows
     layer: Layer  # what it belongs to
     # two or more corners that are fixed to bodies, or the path whose corners they are
-    course: tuple[LinePoint, ...] | Course
+    course: tuple[LinePoint, ...] | TraceablePath
     color: Color  # red, green, blue, 0 to 1
     radius: float = 0.004  # how thick to draw it, m
     visible: bool = True  # whether the model wants it shown
@@ -120,7 +120,7 @@ class Bodies:
     @cached_property
     def lines(self) -> list[Array]:
         """Corners (k, 3) in ground of each line of the scene."""
-        paths = iter(self.scene.polylines.at(self.q, self.rotations[:-1], self.origins[:-1]))
+        paths = iter(self.scene.polylines.trace(self.q, self.rotations[:-1], self.origins[:-1]))
         return [
             np.concatenate([self.points(point.body, point.location[None]) for point in line.course])
             if isinstance(line.course, tuple)

@@ -17,7 +17,7 @@ from osimlite.simulation.engines.protocol import Settings
 
 pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
 
-from osimlite.simulation.engines.bullet.engine import make
+from osimlite.simulation.engines.bullet.engine import make_engine
 from osimlite.simulation.engines.compiled import CompiledEngine
 
 
@@ -49,7 +49,7 @@ def test_same_accelerations(corpus_model):
     for seed in range(2):
         q, u = state_near(mechanism, seed)
         try:
-            result = bare.acceleration(0.0, q, u)
+            result = bare.compute_accelerations(0.0, q, u)
         except SimulationError:
             with pytest.raises(SimulationError, match="no mass"):
                 mechanism.acceleration(q, u)
@@ -58,12 +58,12 @@ def test_same_accelerations(corpus_model):
     forces = force_elements(
         model, mechanism, skip_unsupported=True, folder=corpus_model.path.parent
     )
-    ours, theirs = CompiledEngine(mechanism, forces), make(mechanism, forces, Settings())
+    ours, theirs = CompiledEngine(mechanism, forces), make_engine(mechanism, forces, Settings())
     with theirs:
         for seed in range(2):
             q, u = (values.tolist() for values in state_near(mechanism, seed))
             difference = largest_difference(
-                ours.acceleration(0.1, q, u), theirs.acceleration(0.1, q, u)
+                ours.compute_accelerations(0.1, q, u), theirs.compute_accelerations(0.1, q, u)
             )
             assert difference < 1e-9 * scale
             assert ours.force_records(0.1, ours.state.pack(q, u)) == pytest.approx(
@@ -81,22 +81,22 @@ def test_same_accelerations_under_constraints(corpus_model):
     forces = force_elements(
         model, mechanism, skip_unsupported=True, folder=corpus_model.path.parent
     )
-    ours, theirs = CompiledEngine(mechanism, forces), make(mechanism, forces, Settings())
+    ours, theirs = CompiledEngine(mechanism, forces), make_engine(mechanism, forces, Settings())
     y = ours.state.pack(*state_near(mechanism, 3))
-    result = ours.projected(0.1, y, 1e-10)
+    result = ours.project_state(0.1, y, 1e-10)
     assert result is not None
     q, u = ours.state.values(result), ours.state.speeds(result)
     with theirs:
         try:
-            expected = theirs.acceleration(0.1, q, u)
+            expected = theirs.compute_accelerations(0.1, q, u)
         except SimulationError as error:
             with pytest.raises(SimulationError, match="no mass"):
-                ours.acceleration(0.1, q, u)
+                ours.compute_accelerations(0.1, q, u)
             assert "no mass" in str(error)
             return
-        assert largest_difference(ours.acceleration(0.1, q, u), expected) < 1e-9 * conditioning(
-            mechanism
-        )
+        assert largest_difference(
+            ours.compute_accelerations(0.1, q, u), expected
+        ) < 1e-9 * conditioning(mechanism)
         assert ours.force_records(0.1, ours.state.pack(q, u)) == pytest.approx(
             theirs.force_records(0.1, theirs.state.pack(q, u)), rel=1e-7, abs=1e-7
         )

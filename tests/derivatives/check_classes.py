@@ -172,10 +172,10 @@ def test_probes():
         rng = np.random.default_rng(seed)
         x = functions.x + 0.01 * rng.normal(size=len(functions.x))
         # Integrals are states of the engine, after those of the functions.
-        y = [*x, *[0.0] * (len(engine.found()) - len(x))]
-        engine.derivative(0.3, y)
-        found = functions.outputs(0.3, x, engine.controls(), functions.p)[place]
-        results = zip(engine.probes, engine.probe_results(0.3, y), strict=True)
+        y = [*x, *[0.0] * (len(engine.get_derivative()) - len(x))]
+        engine.compute_derivative(0.3, y)
+        found = functions.outputs(0.3, x, engine.read_controls(), functions.p)[place]
+        results = zip(engine.probes, engine.evaluate_probes(0.3, y), strict=True)
         wanted = [
             probe.gain * value for probe, row in results if probe.probe_type.law for value in row
         ]

@@ -132,11 +132,11 @@ def test_outputs_are_those_of_the_simulation(name):
         [bodies.point(k, body.mass_properties.center) for k, body in enumerate(mechanism.bodies)]
     )
     assert off(matrix(found["mass_center"]).ravel(), masses @ centers / masses.sum()) < 1e-12
-    both.engine.applied(both.t, y.tolist())
+    both.engine.compute_applied_forces(both.t, y.tolist())
     for label, value in zip(f.output_names["forces"], matrix(found["forces"]).ravel(), strict=True):
         path, _, what = label.partition("|")
         assert value == pytest.approx(
-            both.engine.recorded(path, both.engine.kind_at(path).record_offsets[what]),
+            both.engine.read_record(path, both.engine.get_force_type(path).record_offsets[what]),
             rel=1e-11,
             abs=1e-11,
         )
@@ -150,7 +150,7 @@ def test_contact_forces_are_those_of_the_simulation():
     while not any(_bits(both)):
         x[height] -= 0.005
         y[both.places] = x
-        both.engine.applied(both.t, y.tolist())
+        both.engine.compute_applied_forces(both.t, y.tolist())
     force = matrix(f.outputs(both.t, x, [], f.p)[f.outputs.index_out("contact_forces")]).reshape(
         -1, 2, 3
     )

@@ -31,8 +31,8 @@ def kernel_of(model, functions):
             name: Constant(value)
             for name, value in zip(functions.controls, u.tolist(), strict=True)
         }
-        simulation.engine.drive(simulation.forces.controls.add_functions(driven))
-        return np.array(simulation.engine.derivative(0.0, y))[functions.state_indices]
+        simulation.engine.set_controls(simulation.forces.controls.add_functions(driven))
+        return np.array(simulation.engine.compute_derivative(0.0, y))[functions.state_indices]
 
     return derivative
 

@@ -17,7 +17,7 @@ from osimlite.mechanics.kernels.dynamics import evaluate
 from osimlite.mechanics.kernels.layout import MODEL, STAGE, WORK
 from osimlite.mechanics.laws.dual_numbers import is_nothing, settled
 from osimlite.simulation.elements.laws import find_function
-from osimlite.simulation.engines.linking import PYTHON, Program
+from osimlite.simulation.engines.linking import PYTHON_CODE, Program
 
 
 class Jet:
@@ -243,7 +243,7 @@ def carried(
         controls: of its actuators.
         along: the direction (n,).
     """
-    program = Program(packed, PYTHON)
+    program = Program(packed, PYTHON_CODE)
     s = program.ints
     s[MODEL.CONTROLS] = 0
     w = np.zeros(int(s[MODEL.WORK_SIZE])).astype(object)

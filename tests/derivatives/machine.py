@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 import osimlite
-from osimlite.simulation.constrained import kept_state
+from osimlite.simulation.constrained import find_consistent_state
 from osimlite.simulation.pack import pack
 from osimlite.simulation.run import Simulation
 from tests.derivatives.jets import carried
@@ -52,7 +52,9 @@ class Beside:
         y = np.zeros(len(x))
         y[self.places] = x
         values[[*order]], speeds[[*order]] = y[: self.size], y[self.size : 2 * self.size]
-        values, speeds = kept_state(self.engine.mechanism, values.tolist(), speeds.tolist(), (), ())
+        values, speeds = find_consistent_state(
+            self.engine.mechanism, values.tolist(), speeds.tolist(), (), ()
+        )
         y[: self.size], y[self.size : 2 * self.size] = values[[*order]], speeds[[*order]]
         return y[self.places]
 
@@ -60,12 +62,12 @@ class Beside:
         """By machine code."""
         y = np.zeros(len(x))
         y[self.places] = x
-        return np.array(self.engine.derivative(self.t, y.tolist()))[self.places]
+        return np.array(self.engine.compute_derivative(self.t, y.tolist()))[self.places]
 
     def controls(self, x: np.ndarray) -> list[float]:
         """What the model's controllers say."""
         self.derivative(x)
-        result: list[float] = self.engine.controls()
+        result: list[float] = self.engine.read_controls()
         return result
 
     def xdot(self, x: np.ndarray) -> np.ndarray:

@@ -12,7 +12,7 @@ import osimlite
 from osimlite.errors import SettingError, SimulationError
 from osimlite.models.jumper import jumper
 from osimlite.models.walkers import furthest_walker
-from osimlite.simulation.properties import places
+from osimlite.simulation.properties import find_properties
 from tests.simulation.test_constrained import MODELS
 
 ACCURACY = 1e-11
@@ -55,8 +55,8 @@ def difference(model, found, number, by, to, **choices):
         if number in found.states:
             initial[number] = found.motion[0, found.states.index(number)] + h
         else:
-            for place in places(changed, number):
-                setter = place.setter(changed)
+            for place in find_properties(changed, number):
+                setter = place.make_setter(changed)
                 setter.put(setter.get() + h)
         run = osimlite.simulate(
             changed, to, "compiled", **{**choices, "initial": initial, "accuracy": ACCURACY}

@@ -45,7 +45,7 @@ from osimlite.simulation.elements.force_type import ForceType
 from osimlite.simulation.elements.laws import ALONG, DIRECTIONS, RIGID, WITHOUT_DERIVATIVES
 from osimlite.simulation.elements.registry import FORCE_TYPES
 from osimlite.simulation.engines.compiled_laws import compile_function
-from osimlite.simulation.engines.machine_code import make_ready
+from osimlite.simulation.engines.machine_code import prepare_laws
 from osimlite.simulation.pack import pack
 from tests.conftest import ROOT, SHARED
 from tests.derivatives.jets import Jet, _carried, carried
@@ -185,7 +185,7 @@ OF_RATES += [
 
 @pytest.mark.parametrize("name", OF_RATES)
 def test_every_kernel_has_derivatives(name):
-    make_ready([f"{name}{ALONG}{DIRECTIONS}"])
+    prepare_laws([f"{name}{ALONG}{DIRECTIONS}"])
 
 
 def model_named(name):

@@ -22,7 +22,7 @@ from osimlite.mechanics.multibody import functions as f
 from osimlite.mechanics.multibody.constraints import Coupler
 from osimlite.mechanics.multibody.mechanism import FramePlacement, Mechanism, StationPlacement
 from osimlite.mechanics.multibody.spatial import make_transform, rotation_xyz
-from osimlite.simulation.engines.linking import COMPILED, PYTHON
+from osimlite.simulation.engines.linking import MACHINE_CODE, PYTHON_CODE
 from tests.mechanics.multibody.strategies import Case, cases, constraint_of
 
 ROUND = "ConstantCurvatureJoint"
@@ -86,7 +86,7 @@ def test_the_derivatives_are_those_of_the_cost(case: Case, seed: int) -> None:
     if not mechanism.coordinates:
         return
     markers = markers_of(mechanism, rng, 2)
-    fit = PoseFit(mechanism, markers, goals=[CoordinateTarget(0, 0.3)], code=PYTHON)
+    fit = PoseFit(mechanism, markers, goals=[CoordinateTarget(0, 0.3)], code=PYTHON_CODE)
     measured = places_at(mechanism, markers, case.q) + rng.normal(0.0, 0.1, (len(markers), 3))
     measured[-1, 1] = np.nan
     frame = [*measured.ravel(), 0.2]
@@ -142,7 +142,7 @@ def test_the_derivatives_of_angles_are_those_of_the_cost(case: Case, seed: int, 
     off = Rotation.from_rotvec(far * axes / np.linalg.norm(axes, axis=1)[:, None]).as_matrix()
     measured = off @ orientations_at(mechanism, sensors, case.q)
     measured[-1, 1, 1] = np.nan if len(sensors) > 2 else measured[-1, 1, 1]
-    fit = PoseFit(mechanism, [], sensors, code=PYTHON)
+    fit = PoseFit(mechanism, [], sensors, code=PYTHON_CODE)
     frame = measured.ravel()
     value, slope, second = derivatives(fit, frame, case.q)
     # OpenSim's own: half the weighted mean of the squared angles.
@@ -224,7 +224,7 @@ def test_python_and_machine_code_find_the_same_poses() -> None:
     frames = np.array(motion).reshape(4, -1) + rng.normal(0.0, 0.01, (4, 3 * len(markers)))
     result = [
         PoseFit(case, markers, code=code).fit_frames(frames, q=np.zeros(6)).values
-        for code in (COMPILED, PYTHON)
+        for code in (MACHINE_CODE, PYTHON_CODE)
     ]
     assert result[0] == pytest.approx(result[1], abs=1e-10)
 
@@ -367,7 +367,7 @@ def test_a_sensor_that_is_half_a_turn_off_is_found(
     sensor = SensorTarget(FramePlacement(0, np.eye(4)))
     wanted = Rotation.from_rotvec((np.pi - short) * np.array(axis)).as_matrix()
     value, _, _ = derivatives(
-        PoseFit(mechanism, [], [sensor], code=PYTHON), wanted.ravel(), np.zeros(6)
+        PoseFit(mechanism, [], [sensor], code=PYTHON_CODE), wanted.ravel(), np.zeros(6)
     )
     assert value == pytest.approx(0.5 * (np.pi - short) ** 2, rel=1e-12)
     poses = PoseFit(mechanism, [], [sensor]).fit_frames(wanted.reshape(1, -1), q=np.zeros(6))

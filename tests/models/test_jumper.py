@@ -28,8 +28,8 @@ def test_nothing_is_said_of_it():
 def test_it_squats_in_balance():
     with Simulation(jumper(driven=False), "compiled") as simulation:
         start, count = simulation.initial_state({}, {}), len(simulation.engine.order)
-        rates = simulation.engine.derivative(0.0, start)
-        rest = simulation.engine.equilibrated(0.0, start)
+        rates = simulation.engine.compute_derivative(0.0, start)
+        rest = simulation.engine.equilibrate_muscles(0.0, start)
     # Feet of 1 kg are as quick as the digits of the fiber lengths let them be.
     assert np.abs(rates[count : 2 * count]).max() < 0.5
     assert start == pytest.approx(rest, abs=1e-6)

@@ -88,7 +88,7 @@ def compare(model, tmp_path, *, counted=1, tolerance=1e-9):
             expected = [
                 theirs.getCoordinateSet().get(name).getAccelerationValue(state) for name in names
             ]
-            ours = engine.acceleration(TIME, q.tolist(), u.tolist())
+            ours = engine.compute_accelerations(TIME, q.tolist(), u.tolist())
             scale = max(1.0, np.abs(expected).max())
             assert np.abs(np.subtract(ours, expected)).max() <= tolerance * scale
             labels, values = [], []
@@ -108,7 +108,7 @@ def compare(model, tmp_path, *, counted=1, tolerance=1e-9):
                 values, rel=tolerance, abs=tolerance * max(1.0, *map(abs, [0, *values]))
             )
             if counted is not None:
-                kinetic, gravity, stored = engine.energies(TIME, y)
+                kinetic, gravity, stored = engine.compute_energies(TIME, y)
                 assert kinetic == pytest.approx(theirs.calcKineticEnergy(state), rel=1e-10)
                 total = theirs.calcPotentialEnergy(state)
                 assert gravity + counted * stored == pytest.approx(total, rel=1e-9, abs=1e-9)

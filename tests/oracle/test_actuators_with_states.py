@@ -155,7 +155,9 @@ def test_derivatives_and_records(case, control, tmp_path):
     named = [theirs.getStateVariableNames().get(k) for k in range(theirs.getNumStateVariables())]
     own = [path for path in named if path.startswith("/forceset/")]
     assert engine.state.paths == own
-    assert engine.state.default()[2:] == [theirs.getStateVariableValue(state, path) for path in own]
+    assert engine.state.pack_defaults()[2:] == [
+        theirs.getStateVariableValue(state, path) for path in own
+    ]
     force, coordinate = theirs.getForceSet().get(0), theirs.getCoordinateSet().get(0)
     for _ in range(STATES):
         y = [rng.uniform(0.3, 0.37), rng.uniform(-0.4, 0.4)]
@@ -168,14 +170,14 @@ def test_derivatives_and_records(case, control, tmp_path):
         theirs.realizeAcceleration(state)
         expected = [theirs.getStateVariableDerivativeValue(state, path) for path in own]
         expected = [y[1], coordinate.getAccelerationValue(state), *expected]
-        assert engine.derivative(0.0, y) == pytest.approx(expected, rel=1e-9)
+        assert engine.compute_derivative(0.0, y) == pytest.approx(expected, rel=1e-9)
         labels, values = force.getRecordLabels(), force.getRecordValues(state)
         assert list(engine.columns) == [labels.get(k) for k in range(labels.getSize())]
         assert engine.force_records(0.0, y) == pytest.approx([values.get(0)], rel=1e-9, abs=1e-12)
         # The old muscles know nothing of energy.
         if "Deprecated" not in CASES[case][0]:
             stored = theirs.calcPotentialEnergy(state) + MASS * 9.80665 * y[0]
-            assert engine.energies(0.0, y)[2] == pytest.approx(stored, rel=1e-9, abs=1e-9)
+            assert engine.compute_energies(0.0, y)[2] == pytest.approx(stored, rel=1e-9, abs=1e-9)
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -241,6 +243,6 @@ print(model.getStateVariableDerivativeValue(state, "/forceset/mu/activation"))
     )
     mechanism = build_mechanism(model)
     engine = CompiledEngine(mechanism, force_elements(model, mechanism))
-    y = engine.state.default()
-    rates = dict(zip(engine.state.paths, engine.derivative(0.0, y)[2:], strict=True))
+    y = engine.state.pack_defaults()
+    rates = dict(zip(engine.state.paths, engine.compute_derivative(0.0, y)[2:], strict=True))
     assert rates["/forceset/mu/activation"] == pytest.approx(float(result.stdout), rel=1e-12)

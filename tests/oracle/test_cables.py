@@ -141,7 +141,7 @@ def test_cable(elements, tmp_path):
             path.getLengtheningSpeed(state), rel=0, abs=1e-9
         )
         expected = [coordinate.getAccelerationValue(state) for coordinate in coordinates]
-        assert engine.acceleration(0.0, q.tolist(), u.tolist()) == pytest.approx(
+        assert engine.compute_accelerations(0.0, q.tolist(), u.tolist()) == pytest.approx(
             expected, rel=1e-9, abs=1e-9
         )
         arms = [path.computeMomentArm(state, coordinate) for coordinate in coordinates]

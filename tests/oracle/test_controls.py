@@ -48,9 +48,9 @@ def compare_controls(path, times, tolerance=1e-12) -> None:
     for time in times:
         state.setTime(time)
         theirs.realizeVelocity(state)
-        system.applied(time, system.state.default())
+        system.compute_applied_forces(time, system.state.pack_defaults())
         expected = theirs.getControls(state).to_numpy()
-        assert np.abs(system.controls() - expected).max() <= tolerance * max(
+        assert np.abs(system.read_controls() - expected).max() <= tolerance * max(
             1.0, np.abs(expected).max()
         )
 

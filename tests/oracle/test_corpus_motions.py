@@ -118,7 +118,7 @@ def test_derivatives(both: Both, corpus_model: Any, engine: str) -> None:
             opensim.Coordinate.safeDownCast(both.theirs.getComponent(info.path)) for info in free
         ]
         expected[:n] = [owner.getQDotValue(state) for owner in owners]
-        result = np.array(simulation.engine.derivative(0.0, y))
+        result = np.array(simulation.engine.compute_derivative(0.0, y))
         for part in (slice(n), slice(n, 2 * n), slice(2 * n, None)):
             scale = max(1.0, np.abs(expected[part]).max(initial=0.0))
             assert np.abs(result[part] - expected[part]).max(initial=0.0) < NEAR * scale

@@ -123,7 +123,7 @@ def test_accelerations_and_records(kinds, within, rows, tmp_path, monkeypatch):
             expected = [
                 theirs.getCoordinateSet().get(name).getAccelerationValue(state) for name in names
             ]
-            ours = engine.acceleration(time, q.tolist(), u.tolist())
+            ours = engine.compute_accelerations(time, q.tolist(), u.tolist())
             assert np.abs(np.subtract(ours, expected)).max() <= 1e-9 * max(
                 1.0, np.abs(expected).max()
             )

@@ -13,7 +13,7 @@ import re
 import pytest
 
 import osimlite
-from osimlite.simulation.engines.linking import COMPILED, PYTHON
+from osimlite.simulation.engines.linking import MACHINE_CODE, PYTHON_CODE
 from tests.simulation.equations import runge_kutta_merson
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
@@ -70,7 +70,7 @@ def counts(integrator):
     return integrator.taken, integrator.attempted, integrator.evaluations
 
 
-@pytest.mark.parametrize("code", [COMPILED, PYTHON], ids=lambda code: code.name)
+@pytest.mark.parametrize("code", [MACHINE_CODE, PYTHON_CODE], ids=lambda code: code.name)
 @pytest.mark.parametrize(
     ("accuracy", "expected"),
     [(None, (135, 173, 828)), (1e-5, (360, 440, 2121)), (1e-8, (1799, 1972, 9688))],
@@ -80,7 +80,7 @@ def test_the_walkers_steps_are_opensims(walker, accuracy, expected, code):
     f, y0 = dynamics(walker, walker.initSystem())
     given = {} if accuracy is None else {"accuracy": accuracy}
     integrator = runge_kutta_merson(f, 0.0, y0, 8, code=code, **given)
-    steps = list(integrator.steps(2.0))
+    steps = list(integrator.iterate_steps(2.0))
     assert counts(integrator) == measured == expected
     assert [t for t, _ in steps] == times[1:]
     assert steps[-1][1] == last
@@ -94,7 +94,7 @@ def test_recorded_steps(walker, shared):
             [float(x) for x in row]
             for row in csv.reader(line for line in text if line[0] not in "#t")
         ]
-    steps = list(runge_kutta_merson(f, 0.0, y0, 8).steps(2.0))
+    steps = list(runge_kutta_merson(f, 0.0, y0, 8).iterate_steps(2.0))
     assert len(rows) == 1 + len(steps) == 136
     for row, (t, y) in zip(rows[1:], steps, strict=True):
         assert [t, *y] == pytest.approx(row[:17], rel=1e-9, abs=1e-9)
@@ -111,11 +111,11 @@ def test_a_locked_coordinate_left_out_but_counted(walker):
 
     y = y0[1:8] + y0[9:]
     integrator = runge_kutta_merson(f, 0.0, y, 7, counted=(8, 8))
-    steps = list(integrator.steps(2.0))
+    steps = list(integrator.iterate_steps(2.0))
     assert [t for t, _ in steps] == times[1:]
     assert steps[-1][1] == last[1:8] + last[9:]
     uncounted = runge_kutta_merson(f, 0.0, y, 7)
-    assert [t for t, _ in uncounted.steps(2.0)] != times[1:]
+    assert [t for t, _ in uncounted.iterate_steps(2.0)] != times[1:]
 
 
 @pytest.mark.parametrize("interval", [1, 13, 37])
@@ -128,7 +128,7 @@ def test_a_manager_that_is_stopped_often(walker, interval):
     integrator = runge_kutta_merson(f, 0.0, y0, 8)
     for stop in range(interval, 150 * interval, interval):
         expected = manager.integrate(stop / 1000).getY()
-        for _ in integrator.steps(stop / 1000):
+        for _ in integrator.iterate_steps(stop / 1000):
             pass
         assert integrator.state == [expected.get(j) for j in range(16)]
 
@@ -143,7 +143,7 @@ def test_auxiliary_states(walker):
     assert (state.getNQ(), state.getNU(), state.getNZ()) == (8, 8, 2)
     f, y0 = dynamics(walker, state)
     integrator = runge_kutta_merson(f, 0.0, y0, 8)
-    steps = list(integrator.steps(2.0))
+    steps = list(integrator.iterate_steps(2.0))
     assert counts(integrator) == measured
     assert [t for t, _ in steps] == times[1:]
     assert steps[-1][1] == last
@@ -172,7 +172,7 @@ def test_a_free_joint_counts_one_coordinate_more():
         return derivative[:6] + derivative[7:]
 
     integrator = runge_kutta_merson(f, 0.0, y0[:6] + y0[7:], 6, accuracy=1e-6, counted=(7, 6))
-    steps = list(integrator.steps(1.0))
+    steps = list(integrator.iterate_steps(1.0))
     assert counts(integrator)[:2] == measured[:2]
     # Simbody weights errors of q by way of those of u, which rounds.
     assert [t for t, _ in steps] == pytest.approx(times[1:], abs=1e-9)

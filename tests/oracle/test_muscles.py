@@ -127,7 +127,7 @@ def put(engine, theirs, state, y):
 
 def test_a_start_derivatives_records_and_energy(both):
     engine, theirs, start = both
-    assert engine.state.default()[2:] == [
+    assert engine.state.pack_defaults()[2:] == [
         theirs.getStateVariableValue(start, path) for path in engine.state.paths
     ]
     for y, _ in zip(random_states(engine, 1), range(60), strict=False):
@@ -139,15 +139,15 @@ def test_a_start_derivatives_records_and_energy(both):
             with pytest.raises(
                 SimulationError, match="no solution of the equations of '/forceset/mu', whose path"
             ):
-                engine.derivative(0.0, y)
+                engine.compute_derivative(0.0, y)
             continue
         expected = [theirs.getStateVariableDerivativeValue(state, path) for path in paths]
-        assert engine.derivative(0.0, y) == pytest.approx(expected, rel=1e-10, abs=1e-10)
+        assert engine.compute_derivative(0.0, y) == pytest.approx(expected, rel=1e-10, abs=1e-10)
         record = theirs.getForceSet().get(0).getRecordValues(state)
         assert engine.force_records(0.0, y) == pytest.approx([record.get(0)], rel=1e-10, abs=1e-9)
         # OpenSim's integrals of curves are splines.
         stored = theirs.calcPotentialEnergy(state)
-        assert engine.energies(0.0, y)[2] == pytest.approx(stored, rel=1e-4, abs=1e-5)
+        assert engine.compute_energies(0.0, y)[2] == pytest.approx(stored, rel=1e-4, abs=1e-5)
 
 
 def test_equilibrium(both):
@@ -159,10 +159,12 @@ def test_equilibrium(both):
             theirs.equilibrateMuscles(state)
         except RuntimeError:
             with pytest.raises(SimulationError, match="no equilibrium was found of '/forceset/mu'"):
-                engine.equilibrated(0.0, y)
+                engine.equilibrate_muscles(0.0, y)
             continue
         expected = [theirs.getStateVariableValue(state, path) for path in engine.state.paths]
-        assert engine.equilibrated(0.0, y)[2:] == pytest.approx(expected, rel=1e-9, abs=1e-12)
+        assert engine.equilibrate_muscles(0.0, y)[2:] == pytest.approx(
+            expected, rel=1e-9, abs=1e-12
+        )
 
 
 @pytest.mark.parametrize("engine", ["bullet", "compiled"])
@@ -262,7 +264,10 @@ def test_whole_models(name, corpus):
                     [theirs.getStateVariableDerivativeValue(state, path) for path in paths]
                 )
                 scale = np.maximum(1.0, np.abs(expected[n : 2 * n]).max(initial=0.0))
-                assert np.abs(simulation.engine.derivative(0.0, y) - expected).max() < 1e-9 * scale
+                assert (
+                    np.abs(simulation.engine.compute_derivative(0.0, y) - expected).max()
+                    < 1e-9 * scale
+                )
     manager = opensim.Manager(theirs)
     manager.setIntegratorAccuracy(1e-5)
     manager.initialize(start)

@@ -306,7 +306,7 @@ def test_muscles_are_in_equilibrium_at_speeds_that_break_constraints(tmp_path: P
     assert theirs is not None
     with Simulation(osimlite.read(path), "compiled") as simulation:
         y = simulation.initial_state({}, {}, equilibrate=True)
-        free = simulation.engine.equilibrated(0.0, y)
+        free = simulation.engine.equilibrate_muscles(0.0, y)
     assert y[2:4] == pytest.approx(theirs[1], abs=1e-6)
     assert y[-1] == pytest.approx(theirs[0][0], rel=1e-7)
     # The equilibrium at the projected speeds is another.

@@ -36,7 +36,7 @@ from osimlite.schema.probe_types import (
 from osimlite.simulation import Simulation
 from osimlite.simulation.elements import force_elements
 from osimlite.simulation.engines.protocol import Settings
-from osimlite.simulation.run_report import probe_labels, probe_rows
+from osimlite.simulation.run_report import compute_probe_rows, list_probe_labels
 from osimlite.simulation.system import System
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
@@ -84,7 +84,7 @@ def compare(model, tmp_path, tolerance=1e-9):
             for probe in probes
             if probe.isEnabled()
         ]
-        result = system.probe_results(TIME, system.state.pack(q.tolist(), u.tolist(), z.tolist()))
+        result = system.evaluate_probes(TIME, system.state.pack(q.tolist(), u.tolist(), z.tolist()))
         result = [
             [probe.gain * x for x in row] for probe, row in zip(system.probes, result, strict=True)
         ]
@@ -274,12 +274,12 @@ def test_smooth_metabolic_powers(model, switches, tmp_path):
         expected += [
             outputs.getMuscleMetabolicRate(state, f"/forceset/along{number}") for number in (0, 1)
         ]
-        (result,) = system.probe_results(TIME, system.state.pack(q.tolist(), u.tolist()))
+        (result,) = system.evaluate_probes(TIME, system.state.pack(q.tolist(), u.tolist()))
         assert result == pytest.approx(expected, rel=1e-9, abs=1e-9)
     ends = ["metabolic", "activation", "maintenance", "shortening", "mechanical_work"]
     labels = [f"/used|total_{end}_rate" for end in ends]
     labels += [f"/used|muscle_metabolic_rate:/forceset/along{number}" for number in (0, 1)]
-    assert probe_labels(system.probes) == labels
+    assert list_probe_labels(system.probes) == labels
 
 
 def reported(model, tmp_path, to, accuracy):
@@ -309,17 +309,17 @@ def compare_motion(model, tmp_path, to=0.3, accuracy=1e-5):
         rows[0] = [0.0] * len(labels)
     with Simulation(model, "compiled") as ready:
         steps = []
-        stepper = ready.engine.stepper(
+        stepper = ready.engine.make_stepper(
             0.0,
             ready.initial_state({}, {}),
             Settings(accuracy=accuracy),
             lambda t, y: steps.append((t, y)),
         )
         steps.append((stepper.time, stepper.state))
-        stepper.table([to])
+        stepper.tabulate([to])
         stepper.catch_up()
-        result = np.array(list(probe_rows(ready.engine, steps, steps)))
-        assert probe_labels(ready.engine.probes) == labels
+        result = np.array(list(compute_probe_rows(ready.engine, steps, steps)))
+        assert list_probe_labels(ready.engine.probes) == labels
         assert [t for t, _ in steps] == pytest.approx(times, abs=1e-9)
         # A rate of second order is twice a difference of neighbours, less the rate before.
         scale = np.maximum(1.0, np.abs(rows).max(axis=0))

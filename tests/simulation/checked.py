@@ -29,15 +29,15 @@ def _inside(place: Any) -> Any:
     return place
 
 
-class Checked(linking._Python):
+class Checked(linking._PythonCode):
     """Kernels as Python on such vectors."""
 
-    def entry(self, function: str) -> Any:
-        kernel = super().entry(function)
+    def get_entry(self, function: str) -> Any:
+        kernel = super().get_entry(function)
         return lambda *parts: kernel(*map(bounded, parts))
 
-    def bound(self, function: str, *arrays: Any) -> Any:
-        return super().bound(function, *map(bounded, arrays))
+    def bind_entry(self, function: str, *arrays: Any) -> Any:
+        return super().bind_entry(function, *map(bounded, arrays))
 
 
 def bounded(part: Any) -> Any:

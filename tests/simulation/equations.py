@@ -12,8 +12,8 @@ from osimlite.mechanics.kernels import record
 from osimlite.mechanics.kernels.layout import MODEL, WORK
 from osimlite.mechanics.kernels.table import LAW_NUMBERS
 from osimlite.simulation.engines.controlled_steps import ControlledSteps
-from osimlite.simulation.engines.linking import PYTHON, Program
-from osimlite.simulation.pack import Packed
+from osimlite.simulation.engines.linking import PYTHON_CODE, Program
+from osimlite.simulation.pack import PackedModel
 
 
 def oscillator(t, y):
@@ -55,7 +55,7 @@ class Equations:
 
     contacts = ()
 
-    def __init__(self, f, size, n, counted=None, names=None, code=PYTHON):
+    def __init__(self, f, size, n, counted=None, names=None, code=PYTHON_CODE):
         def evaluate(s, x, w, y, derivative, stage):
             derivative[:size] = f(float(w[WORK.TIME]), y[:size].tolist())
 
@@ -64,18 +64,18 @@ class Equations:
         structure[[MODEL.DOFS, MODEL.STATE_SIZE, MODEL.WORK_STATE]] = n, size, first
         structure[MODEL.WORK_SIZE] = first + record.STATES * size
         kernels = {MODEL.LAWS + LAW_NUMBERS["evaluate"]: evaluate}
-        packed = Packed(structure, np.zeros(1), (), kernels, {}, {}, {}, {}, (), [], [])
+        packed = PackedModel(structure, np.zeros(1), (), kernels, {}, {}, {}, {}, (), [], [])
         self.program = Program(packed, code, ("run_several", "merson"))
         self.structure, self.numbers, self.order = structure, packed.numbers, (0,) * n
-        self.counted = (n, n) if counted is None else counted
+        self.error_counts = (n, n) if counted is None else counted
         names = [f"state {k}" for k in range(size)] if names is None else names
-        self.state = SimpleNamespace(names=names, table=lambda rows: np.array(rows, dtype=float))
-        self.derivative = f
+        self.state = SimpleNamespace(names=names, as_table=lambda rows: np.array(rows, dtype=float))
+        self.compute_derivative = f
 
-    def projected(self, t, y, tolerance):
+    def project_state(self, t, y, tolerance):
         return y
 
-    def note_loads(self, forces):
+    def store_contact_loads(self, forces):
         pass
 
 

@@ -38,7 +38,7 @@ def alone(engine):
 def test_muscles_abreast_are_those_by_themselves(change) -> None:
     together = Simulation(change(jumper(driven=False)), "compiled").engine
     single = alone(Simulation(change(jumper(driven=False)), "compiled").engine)
-    start = np.array(together.equilibrated(0.0, together.state.default()))
+    start = np.array(together.equilibrate_muscles(0.0, together.state.pack_defaults()))
     rng, size = np.random.default_rng(0), len(together.order)
     found = 0
     for _ in range(200):
@@ -51,13 +51,13 @@ def test_muscles_abreast_are_those_by_themselves(change) -> None:
         )
         y[2 * size :] *= rng.uniform(0.5, 1.6, len(start) - 2 * size)
         try:
-            expected = single.derivative(0.0, y.tolist())
+            expected = single.compute_derivative(0.0, y.tolist())
         except SimulationError as error:
             with pytest.raises(type(error)):
-                together.derivative(0.0, y.tolist())
+                together.compute_derivative(0.0, y.tolist())
             continue
         found += 1
-        assert np.array_equal(expected, together.derivative(0.0, y.tolist()))
+        assert np.array_equal(expected, together.compute_derivative(0.0, y.tolist()))
         assert together.force_records(0.0, y.tolist()) == single.force_records(0.0, y.tolist())
     assert found > 100
 
@@ -65,7 +65,7 @@ def test_muscles_abreast_are_those_by_themselves(change) -> None:
 def test_a_muscle_without_a_solution_is_told_by_its_name() -> None:
     engines = [Simulation(jumper(driven=False), "compiled").engine for _ in range(2)]
     alone(engines[1])
-    y = engines[0].equilibrated(0.0, engines[0].state.default())
+    y = engines[0].equilibrate_muscles(0.0, engines[0].state.pack_defaults())
     place = 2 * len(engines[0].order) + engines[0].state.paths.index(
         "/forceset/vasti_l/fiber_length"
     )
@@ -73,6 +73,6 @@ def test_a_muscle_without_a_solution_is_told_by_its_name() -> None:
     told = []
     for engine in engines:
         with pytest.raises(SimulationError) as error:
-            engine.derivative(0.0, y)
+            engine.compute_derivative(0.0, y)
         told.append(str(error.value))
     assert told[0] == told[1]

@@ -61,7 +61,7 @@ def test_walker_with_all_forces(fixtures, cases, route):
         model, mechanism = walker_at(fixtures, case["q"][0])
         assert list(mechanism.coordinate_names) == cases["coordinates"]
         with BulletEngine(mechanism, force_elements(model, mechanism), route=route) as engine:
-            ours = engine.acceleration(0.0, case["q"], case["u_with_locked_platform"])
+            ours = engine.compute_accelerations(0.0, case["q"], case["u_with_locked_platform"])
         assert ours[0] == 0.0
         assert within(ours, case["udot_locked_all_forces"])
         touched += engine.loads[-1] != 0
@@ -74,9 +74,12 @@ def test_walker_under_gravity_alone(fixtures, cases, route):
         _, mechanism = walker_at(fixtures, case["q"][0], locked=False)
         with BulletEngine(mechanism, Forces(()), route=route) as engine:
             assert within(
-                engine.acceleration(0.0, case["q"], case["u"]), case["udot_unlocked_gravity_only"]
+                engine.compute_accelerations(0.0, case["q"], case["u"]),
+                case["udot_unlocked_gravity_only"],
             )
-            kinetic, gravity, stored = engine.energies(0.0, engine.state.pack(case["q"], case["u"]))
+            kinetic, gravity, stored = engine.compute_energies(
+                0.0, engine.state.pack(case["q"], case["u"])
+            )
         assert kinetic == pytest.approx(case["kinetic_energy"], rel=1e-12)
         assert gravity == pytest.approx(case["potential_energy_gravity"], rel=1e-12)
         assert stored == 0.0
@@ -181,9 +184,9 @@ def test_every_joint_as_our_own_recursion_has_it(kinds, route, seed):
     q, u = state_of(mechanism, seed)
     with BulletEngine(mechanism, Forces(()), route=route) as engine:
         assert within(
-            engine.acceleration(0.0, q.tolist(), u.tolist()), mechanism.acceleration(q, u)
+            engine.compute_accelerations(0.0, q.tolist(), u.tolist()), mechanism.acceleration(q, u)
         )
-        kinetic, gravity, _ = engine.energies(0.0, engine.state.pack(q, u))
+        kinetic, gravity, _ = engine.compute_energies(0.0, engine.state.pack(q, u))
     assert kinetic == pytest.approx(mechanism.kinetic_energy(q, u), rel=1e-12)
     assert gravity == pytest.approx(mechanism.potential_energy(q), rel=1e-12, abs=1e-12)
 
@@ -199,7 +202,7 @@ def test_contact_pushes_as_a_wrench_on_the_body_does(kinds, route):
     for seed in range(6):
         q, u = state_of(mechanism, seed)
         with BulletEngine(mechanism, force_elements(model, mechanism), route=route) as engine:
-            ours = engine.acceleration(0.0, q.tolist(), u.tolist())
+            ours = engine.compute_accelerations(0.0, q.tolist(), u.tolist())
         row = dict(
             zip(engine.columns, engine.force_records(0.0, engine.state.pack(q, u)), strict=True)
         )
@@ -222,7 +225,7 @@ def test_limit_of_an_angle_of_a_ball_joint_acts_on_its_speed(route):
     mechanism = build_mechanism(model)
     q, u = np.array((0.4, 0.9, -0.3)), np.array((0.5, -1.0, 2.0))
     with BulletEngine(mechanism, force_elements(model, mechanism), route=route) as engine:
-        ours = engine.acceleration(0.0, q.tolist(), u.tolist())
+        ours = engine.compute_accelerations(0.0, q.tolist(), u.tolist())
     row = dict(zip(engine.columns, engine.force_records(0.0, engine.state.pack(q, u)), strict=True))
     assert row["limit"] != 0.0
     assert within(ours, mechanism.acceleration(q, u, {"q0_1": row["limit"]}))
@@ -239,7 +242,7 @@ def test_long_chains_by_both_routes(seed, lengths):
     result = []
     for route in ROUTES:
         with BulletEngine(mechanism, Forces(()), route=route) as engine:
-            result.append(engine.acceleration(0.0, q.tolist(), u.tolist()))
+            result.append(engine.compute_accelerations(0.0, q.tolist(), u.tolist()))
     assert within(result[0], result[1], 1e-8)
 
 

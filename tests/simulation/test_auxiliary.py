@@ -71,7 +71,7 @@ def test_many_runs_equal_single_ones():
         assert runs.states.shape == starts.shape and runs.reports.shape == (3, 4, starts.shape[1])
         for index, q in enumerate((0.1, 0.5, 0.9)):
             alone = simulation.run(0.3, accuracy=1e-6, initial={"q1": q}, report_interval=0.1)
-            values, speeds = simulation.state.histories(runs.states[index][None])
+            values, speeds = simulation.state.extract_histories(runs.states[index][None])
             assert np.array_equal(values[0], alone.values[-1]) and np.array_equal(
                 speeds[0], alone.speeds[-1]
             )

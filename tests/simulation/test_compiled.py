@@ -52,7 +52,7 @@ from osimlite.schema.functions import PiecewiseConstantFunction
 from osimlite.simulation import Simulation
 from osimlite.simulation.elements import Forces, force_elements
 from osimlite.simulation.engines.compiled import CompiledEngine
-from osimlite.simulation.engines.linking import PYTHON
+from osimlite.simulation.engines.linking import PYTHON_CODE
 from osimlite.simulation.engines.protocol import Settings
 from osimlite.simulation.system import System
 
@@ -149,11 +149,11 @@ def check(mechanism, seeds=3):
     engine = CompiledEngine(mechanism, Forces(()))
     for seed in range(seeds):
         q, u = state_of(mechanism, seed)
-        assert within(engine.acceleration(0.0, q, u), mechanism.acceleration(q, u))
+        assert within(engine.compute_accelerations(0.0, q, u), mechanism.acceleration(q, u))
         y = engine.state.pack(q, u)
         rates = mechanism.coordinate_rates(q, u)[list(engine.order)]
-        assert within(engine.derivative(0.0, y)[: len(engine.order)], rates)
-        kinetic, gravity, stored = engine.energies(0.0, y)
+        assert within(engine.compute_derivative(0.0, y)[: len(engine.order)], rates)
+        kinetic, gravity, stored = engine.compute_energies(0.0, y)
         assert kinetic == pytest.approx(mechanism.kinetic_energy(q, u), rel=1e-10)
         assert gravity == pytest.approx(mechanism.potential_energy(q), rel=1e-10, abs=1e-10)
         assert stored == 0.0
@@ -178,9 +178,9 @@ def test_far_from_ground_as_near():
     mechanism = tree(["FreeJoint", "PinJoint", "BallJoint"])
     engine = CompiledEngine(mechanism, Forces(()))
     q, u = state_of(mechanism, 1)
-    near = engine.acceleration(0.0, q, u)
+    near = engine.compute_accelerations(0.0, q, u)
     q[3:6] += 1000.0
-    assert within(engine.acceleration(0.0, q, u), near, 1e-11)
+    assert within(engine.compute_accelerations(0.0, q, u), near, 1e-11)
 
 
 def test_locked_coordinates():
@@ -257,7 +257,9 @@ def test_forces_are_those_of_the_bullet_engine():
         assert (ours.contacts, ours.columns) == (bullet.contacts, bullet.columns)
         for seed in range(12):
             q, u = (values.tolist() for values in state_of(mechanism, seed))
-            assert within(ours.acceleration(0.0, q, u), bullet.acceleration(0.0, q, u))
+            assert within(
+                ours.compute_accelerations(0.0, q, u), bullet.compute_accelerations(0.0, q, u)
+            )
             assert ours.loads[-1] == bullet.loads[-1]
             for number in range(len(ours.contacts)):
                 if ours.loads[-1] >> number & 1:
@@ -265,8 +267,8 @@ def test_forces_are_those_of_the_bullet_engine():
                     touched |= 1 << number
             y, z = ours.state.pack(q, u), bullet.state.pack(q, u)
             assert within(ours.force_records(0.0, y), bullet.force_records(0.0, z))
-            assert ours.energies(0.0, y) == pytest.approx(
-                bullet.energies(0.0, z), rel=1e-9, abs=1e-12
+            assert ours.compute_energies(0.0, y) == pytest.approx(
+                bullet.compute_energies(0.0, z), rel=1e-9, abs=1e-12
             )
     # With the floor and with one another.
     assert touched.bit_count() > 3
@@ -283,7 +285,7 @@ def test_walker_with_all_forces(fixtures):
         platform.default_value = case["q"][0]
         mechanism = build_mechanism(model)
         engine = CompiledEngine(mechanism, force_elements(model, mechanism))
-        ours = engine.acceleration(0.0, case["q"], case["u_with_locked_platform"])
+        ours = engine.compute_accelerations(0.0, case["q"], case["u_with_locked_platform"])
         assert within(ours, case["udot_locked_all_forces"])
         touched += engine.loads[-1] != 0
     assert touched > 2
@@ -340,9 +342,10 @@ def test_steps_one_by_one_are_those_of_a_whole_motion(fast):
     """To the last bit."""
     y = fast.initial_state({}, {})
     ours, theirs = (
-        fast.engine.stepper(0.0, y, Settings(accuracy=1e-5), lambda t, y: None) for _ in range(2)
+        fast.engine.make_stepper(0.0, y, Settings(accuracy=1e-5), lambda t, y: None)
+        for _ in range(2)
     )
-    (end,), steps = ours.table([2.0]).tolist(), list(theirs.steps(2.0))
+    (end,), steps = ours.tabulate([2.0]).tolist(), list(theirs.iterate_steps(2.0))
     assert end == steps[-1][1]
     assert (ours.taken, ours.attempted, ours.evaluations) == (
         theirs.taken,
@@ -355,11 +358,11 @@ def test_kernels_are_what_they_mean_in_python(fast, fixtures):
     """The same numbers to the last bit, with joints of all kinds and contact."""
     mixed = build_mechanism(osimlite.read(fixtures / "kinematics" / "mixed_joint_tree.osim"))
     for engine in (fast.engine, CompiledEngine(mixed, Forces(()))):
-        python = System(engine.mechanism, engine.forces, code=PYTHON)
+        python = System(engine.mechanism, engine.forces, code=PYTHON_CODE)
         q, u = state_of(engine.mechanism, 3)
         y = engine.state.pack(0.2 * q, u)
         assert python.realize(0.0, y, STAGE.ACCELERATION) == OUTCOME.OK
-        assert python.found() == engine.derivative(0.0, y)
+        assert python.get_derivative() == engine.compute_derivative(0.0, y)
 
 
 def test_log_in_pieces(fast, monkeypatch):
@@ -384,8 +387,8 @@ def test_fixed_steps(fast, simulation):
 def test_wholly_locked_mechanism_stands_still(walker):
     mechanism = tree(["PinJoint"], locked=(0,))
     engine = CompiledEngine(mechanism, Forces(()))
-    assert engine.derivative(0.0, []) == []
-    assert engine.energies(0.0, [])[1] == pytest.approx(mechanism.potential_energy([0.4]))
+    assert engine.compute_derivative(0.0, []) == []
+    assert engine.compute_energies(0.0, [])[1] == pytest.approx(mechanism.potential_energy([0.4]))
 
 
 def test_massless_motion_is_refused():
@@ -437,7 +440,7 @@ def test_why_there_is_no_step_is_told_late_too():
 def test_singular_ball_is_refused():
     engine = CompiledEngine(tree(["BallJoint"]), Forces(()))
     with pytest.raises(SimulationError, match=r"/j0.*90 degrees"):
-        engine.derivative(0.0, [0.0, np.pi / 2, 0.0, 1.0, 0.0, 0.0])
+        engine.compute_derivative(0.0, [0.0, np.pi / 2, 0.0, 1.0, 0.0, 0.0])
 
 
 def test_window_and_route_are_refused(walker):

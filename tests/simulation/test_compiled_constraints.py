@@ -24,7 +24,7 @@ from osimlite.simulation.batches import ENDINGS, Watch, run_many
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.laws import find_function
 from osimlite.simulation.engines.compiled import CompiledEngine
-from osimlite.simulation.engines.linking import PYTHON
+from osimlite.simulation.engines.linking import PYTHON_CODE
 from osimlite.simulation.engines.protocol import Settings
 from osimlite.simulation.system import System
 from tests.mechanics.multibody.strategies import KINDS, Case, cases, constraint_of
@@ -32,7 +32,7 @@ from tests.simulation.test_constrained import MODELS, four_bars, knee, patella, 
 
 
 def accelerations(mechanism: Mechanism, q: Any, u: Any, t: float = 0.0) -> Any:
-    return np.array(CompiledEngine(mechanism, Forces(())).acceleration(t, q, u))
+    return np.array(CompiledEngine(mechanism, Forces(())).compute_accelerations(t, q, u))
 
 
 # ------------------------------------------------------------------------------------ random trees and constraints
@@ -191,9 +191,9 @@ def test_kernels_are_what_they_mean_in_python(make: Any):
         engine: Any = simulation.engine
         y = np.array(simulation.initial_state({}, {}))
     y += np.random.default_rng(1).uniform(-0.02, 0.02, len(y))
-    python = System(engine.mechanism, engine.forces, code=PYTHON)
+    python = System(engine.mechanism, engine.forces, code=PYTHON_CODE)
     assert python.realize(0.0, y.tolist(), STAGE.ACCELERATION) == OUTCOME.OK
-    assert python.found() == engine.derivative(0.0, y)
+    assert python.get_derivative() == engine.compute_derivative(0.0, y)
     ends = run_many(engine, [y], 1e-30, accuracy=1e-8)
     room, result = np.zeros(engine.structure[MODEL.WORK_SIZE]), np.zeros(len(y))
     room[WORK.SCRATCH : WORK.SCRATCH + 2] = 1e-9, np.inf
@@ -273,7 +273,7 @@ def test_watches_see_states_where_the_constraints_hold(loop: Any):
     assert ENDINGS[int(runs.endings[0])] == "stopped"
     state = runs.states[0].tolist()
     assert state[engine.order.index(1)] == pytest.approx(level, abs=1e-7)
-    assert engine.projected(runs.times[0], state, 1e-6) == state
+    assert engine.project_state(runs.times[0], state, 1e-6) == state
     assert runs.event_states[0][-1] == pytest.approx(state, abs=1e-12)
 
 
@@ -320,7 +320,9 @@ def test_a_motion_without_mass_is_named_where_a_coordinate_that_moves_with_other
     joint.coordinates[0].locked = True
     mechanism = build_mechanism(model)
     with pytest.raises(SimulationError, match="moves no mass"):
-        CompiledEngine(mechanism, Forces(())).derivative(0.0, [0.0, 0.0, 0.0, 99.0, 99.0, 99.0])
+        CompiledEngine(mechanism, Forces(())).compute_derivative(
+            0.0, [0.0, 0.0, 0.0, 99.0, 99.0, 99.0]
+        )
 
 
 def test_an_unknown_constraint_is_refused_by_name():

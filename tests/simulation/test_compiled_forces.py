@@ -27,7 +27,7 @@ from osimlite.simulation.elements.external_loads import make_external_load
 from osimlite.simulation.elements.geometries.load import Load
 from osimlite.simulation.engines.bullet.engine import BulletEngine
 from osimlite.simulation.engines.compiled import CompiledEngine
-from osimlite.simulation.engines.linking import PYTHON
+from osimlite.simulation.engines.linking import PYTHON_CODE
 from osimlite.simulation.system import System
 from tests.simulation.force_cases import (
     FORCE_NAMES,
@@ -67,7 +67,7 @@ def assert_same(mechanism, ours, theirs, count=8) -> int:
     touched = 0
     assert (ours.contacts, ours.columns) == (theirs.contacts, theirs.columns)
     for t, q, u in states(mechanism, count):
-        assert_close(ours.acceleration(t, q, u), theirs.acceleration(t, q, u))
+        assert_close(ours.compute_accelerations(t, q, u), theirs.compute_accelerations(t, q, u))
         assert ours.loads[-1] == theirs.loads[-1]
         for number in range(len(ours.contacts)):
             if ours.loads[-1] >> number & 1:
@@ -76,7 +76,9 @@ def assert_same(mechanism, ours, theirs, count=8) -> int:
         y, z = ours.state.pack(q, u), theirs.state.pack(q, u)
         assert_close(ours.force_records(t, y), theirs.force_records(t, z))
         assert ours.force_table([t, t], [y, y]).tolist() == [ours.force_records(t, y)] * 2
-        assert ours.energies(t, y) == pytest.approx(theirs.energies(t, z), rel=1e-9, abs=1e-9)
+        assert ours.compute_energies(t, y) == pytest.approx(
+            theirs.compute_energies(t, z), rel=1e-9, abs=1e-9
+        )
     return touched
 
 
@@ -87,13 +89,13 @@ def test_force(name, monkeypatch):
         touched = assert_same(mechanism, ours, theirs)
         assert touched or not ours.contacts
     # As Python, the same kernels give the same bits, and look nowhere that is not theirs.
-    python = System(mechanism, ours.forces, code=PYTHON)
+    python = System(mechanism, ours.forces, code=PYTHON_CODE)
     # Its records are what each evaluation leaves: as Python, another takes long.
-    monkeypatch.setattr(python, "applied", lambda t, y: None)
+    monkeypatch.setattr(python, "compute_applied_forces", lambda t, y: None)
     for t, q, u in states(mechanism, 2):
         y = ours.state.pack(q, u)
         assert python.realize(t, y, STAGE.ACCELERATION) == OUTCOME.OK
-        assert_close(python.found(), ours.derivative(t, y), 1e-13)
+        assert_close(python.get_derivative(), ours.compute_derivative(t, y), 1e-13)
         assert_close(python.force_records(t, y), ours.force_records(t, y), 1e-13)
 
 
@@ -101,7 +103,7 @@ def test_force_does_something():
     """What is compared is not nothing against nothing."""
     mechanism, plain, _ = engines(chain())
     t, q, u = next(states(mechanism, 1))
-    without = plain.acceleration(t, q, u)
+    without = plain.compute_accelerations(t, q, u)
     idle = {
         "limit of a locked coordinate",
         "spring on a locked coordinate",
@@ -111,7 +113,7 @@ def test_force_does_something():
     for name in FORCES.keys() - idle:
         _, ours, _ = engines(with_force(FORCES[name]))
         changes = [
-            ours.acceleration(*state) != plain.acceleration(*state)
+            ours.compute_accelerations(*state) != plain.compute_accelerations(*state)
             for state in states(mechanism, choose(3, 8))
         ]
         assert any(changes), name
@@ -183,7 +185,9 @@ def test_early_return():
     with plain[2], defect[2]:
         assert assert_same(*defect, count=40)
         for t, q, u in states(plain[0], 40):
-            changed += plain[1].acceleration(t, q, u) != defect[1].acceleration(t, q, u)
+            changed += plain[1].compute_accelerations(t, q, u) != defect[1].compute_accelerations(
+                t, q, u
+            )
     assert changed > 3
 
 

@@ -76,14 +76,14 @@ def test_meshes_on_each_other(tmp_path, monkeypatch):
         assert assert_same(mechanism, ours, theirs, 20) == 0b1
 
     near = [(t, ours.state.pack(q, u)) for t, q, u in states(mechanism, 20)]
-    t, y = next(moment for moment in near if ours.touching(*moment))
+    t, y = next(moment for moment in near if ours.find_touching_contacts(*moment))
 
     def wrong(*_):
         raise ZeroDivisionError("in Python")
 
     monkeypatch.setattr(Springs, "load", wrong)
     with pytest.raises(ZeroDivisionError, match="in Python"):
-        ours.derivative(t, y)
+        ours.compute_derivative(t, y)
 
 
 def test_a_motion(tmp_path):

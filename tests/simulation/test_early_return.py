@@ -55,8 +55,8 @@ def sled(positions, *, early_return):
 def test_simbodys_early_return_behind_its_switch(positions, speeds, early_return):
     mechanism, forces = sled(positions, early_return=early_return)
     with BulletEngine(mechanism, forces) as engine:
-        udot = engine.acceleration(0.0, [0.04, 0.04], speeds)
-        stored = engine.energies(0.0, engine.state.pack([0.04, 0.04], speeds))[2]
+        udot = engine.compute_accelerations(0.0, [0.04, 0.04], speeds)
+        stored = engine.compute_energies(0.0, engine.state.pack([0.04, 0.04], speeds))[2]
     (element,) = forces.elements
     k, a, *rest = element.pairs[0].effective
     d, *_ = half_space_sphere((0.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.04, 0.0), 0.05, a)
@@ -90,7 +90,12 @@ def test_spheres_of_one_force_push_each_other():
                 strict=True,
             )
         )
-        assert engine.touching(0.0, engine.state.pack([1.0, 1.01], [0.0, 0.0])).bit_count() == 1
+        assert (
+            engine.find_touching_contacts(
+                0.0, engine.state.pack([1.0, 1.01], [0.0, 0.0])
+            ).bit_count()
+            == 1
+        )
     push = np.array([row[f"f.B.force.{axis}"] for axis in "XYZ"])
     assert push == pytest.approx(-np.array([row[f"f.A.force.{axis}"] for axis in "XYZ"]))
     gap = np.array((0.06, 0.01, 0.0))

@@ -11,7 +11,7 @@ from numpy.random import Generator, default_rng
 
 from osimlite.mechanics.kernels.effort import effort_size
 from osimlite.mechanics.multibody.spatial import Array
-from osimlite.simulation.engines.linking import PYTHON, Code, best
+from osimlite.simulation.engines.linking import PYTHON_CODE, Code, select_code
 
 optimize: Any = pytest.importorskip("scipy.optimize", reason="needs scipy (extra 'sweep')")
 
@@ -29,10 +29,10 @@ def solved(
     sizes = np.array([frames, m, n, *[0] * (n * (m + 1))], dtype=np.int64)
     given = np.hstack([columns.reshape(frames, -1), wanted])
     result = np.zeros((frames, n + m + 1))
-    code = code or best()
+    code = code or select_code()
     code.make_ready(("least_effort",))
     numbers = np.concatenate([[power], low, high])
-    code.entry("least_effort")(sizes, numbers, given, result, np.zeros(effort_size(m, n)))
+    code.get_entry("least_effort")(sizes, numbers, given, result, np.zeros(effort_size(m, n)))
     return result[:, :n], result[:, n:-1], result[:, -1]
 
 
@@ -177,6 +177,6 @@ def test_entries_that_are_rounding_errors_are_none() -> None:
 
 def test_python_does_the_same() -> None:
     columns, wanted, low, high = problem(default_rng(11), 3, 8)
-    assert solved(columns, wanted, low, high, code=PYTHON)[0] == pytest.approx(
+    assert solved(columns, wanted, low, high, code=PYTHON_CODE)[0] == pytest.approx(
         solved(columns, wanted, low, high)[0], abs=1e-12
     )

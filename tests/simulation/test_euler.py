@@ -23,7 +23,7 @@ def test_one_euler_step():
 def test_euler_is_of_first_order():
     errors = []
     for h in (1e-2, 5e-3, 2.5e-3):
-        _, y = last(SemiImplicitEuler(cannon, 0.0, [0.0, 0.0], 1, h).steps(2.0))
+        _, y = last(SemiImplicitEuler(cannon, 0.0, [0.0, 0.0], 1, h).iterate_steps(2.0))
         errors.append(abs(y[0] - math.log(math.cosh(2.0))))
     for coarse, fine in pairwise(errors):
         assert coarse / fine == pytest.approx(2.0, rel=0.05)
@@ -31,7 +31,9 @@ def test_euler_is_of_first_order():
 
 def test_euler_keeps_the_energy_of_an_oscillator():
     """The semi-implicit method is symplectic: no drift in a hundred swings."""
-    for _, (q, u) in SemiImplicitEuler(oscillator, 0.0, [1.0, 0.0], 1, 0.05).steps(200 * math.pi):
+    for _, (q, u) in SemiImplicitEuler(oscillator, 0.0, [1.0, 0.0], 1, 0.05).iterate_steps(
+        200 * math.pi
+    ):
         assert q * q + u * u == pytest.approx(1.0, abs=0.06)
 
 
@@ -51,22 +53,22 @@ def test_euler_with_rates_of_its_own():
 
 def test_euler_counts_its_steps_without_drift():
     stepper = SemiImplicitEuler(oscillator, 0.0, [1.0, 0.0], 1, 1e-3)
-    times = [t for t, _ in stepper.steps(2.0)]
+    times = [t for t, _ in stepper.iterate_steps(2.0)]
     assert stepper.taken == 2000 and times[-1] == 2.0
     assert max(abs(t - (i + 1) / 1000) for i, t in enumerate(times)) < 1e-15 * 4
 
 
 def test_euler_shortens_only_the_last_step():
     stepper = SemiImplicitEuler(lambda t, y: [0.0, 0.0], 0.0, [0.0, 1.0], 1, 0.25)
-    assert [t for t, _ in stepper.steps(0.6)] == [0.25, 0.5, 0.6]
+    assert [t for t, _ in stepper.iterate_steps(0.6)] == [0.25, 0.5, 0.6]
     assert stepper.state[0] == pytest.approx(0.6)
-    assert [t for t, _ in stepper.steps(1.1)] == pytest.approx([0.85, 1.1])
+    assert [t for t, _ in stepper.iterate_steps(1.1)] == pytest.approx([0.85, 1.1])
     assert stepper.taken == 5 and stepper.state[0] == pytest.approx(1.1)
 
 
 def test_euler_interpolates_on_a_line():
     stepper = SemiImplicitEuler(lambda t, y: [0.0, 0.0], 0.0, [0.0, 2.0], 1, 0.25)
-    assert [y[0] for y in stepper.table([0.1, 0.3, 0.5])] == pytest.approx([0.2, 0.6, 1.0])
+    assert [y[0] for y in stepper.tabulate([0.1, 0.3, 0.5])] == pytest.approx([0.2, 0.6, 1.0])
 
 
 def test_euler_names_what_is_no_number():
@@ -81,7 +83,7 @@ def test_euler_names_what_is_no_number():
     with pytest.raises(
         IntegrationError, match=r"derivative of hip_speed is nan.*control is above 0"
     ) as caught:
-        list(stepper.steps(1.0))
+        list(stepper.iterate_steps(1.0))
     assert caught.value.time == pytest.approx(0.6)
 
 

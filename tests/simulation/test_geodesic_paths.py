@@ -179,7 +179,7 @@ def test_surfaces_that_intersect():
 
 
 def test_nothing_outside_of_a_path_is_touched(monkeypatch):
-    monkeypatch.setattr("osimlite.simulation.system.best", lambda: Checked("Python"))
+    monkeypatch.setattr("osimlite.simulation.evaluation.select_code", lambda: Checked("Python"))
     setup = SETUPS["cylinder_sphere_ellipsoid"]
     case = setup["cases"][15]
     paths = osimlite.paths(wrapped(setup), wrapping="geodesic")

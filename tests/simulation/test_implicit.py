@@ -33,7 +33,7 @@ from osimlite.simulation import Simulation
 from osimlite.simulation.batches import run_many
 from osimlite.simulation.elements import force_elements
 from osimlite.simulation.engines.controlled_steps import ControlledSteps
-from osimlite.simulation.engines.linking import PYTHON
+from osimlite.simulation.engines.linking import PYTHON_CODE
 from osimlite.simulation.system import System
 from tests.simulation.elements.muscle_rows import hung, muscle
 from tests.simulation.equations import Equations, last, oscillator
@@ -47,7 +47,7 @@ def steps_of(
 ) -> tuple[list[float], Any]:
     """The end of a motion of auxiliary states only, and its stepper."""
     stepper = ControlledSteps(Equations(f, len(y), 0), 0.0, y, accuracy, None, method)  # type: ignore[arg-type]
-    return last(stepper.steps(to))[1], stepper
+    return last(stepper.iterate_steps(to))[1], stepper
 
 
 def hanging(case: str, excitation: float = 0.5, gravity: float = 9.80665) -> Any:
@@ -113,7 +113,7 @@ def test_equations_of_a_contact_are_those_of_all_coordinates(is_smooth):
 def assert_condensed(model, y, rel=1e-4):
     """The linear equations are those of the engine's own derivatives."""
     mechanism = build_mechanism(model)
-    system = System(mechanism, force_elements(model, mechanism), code=PYTHON)
+    system = System(mechanism, force_elements(model, mechanism), code=PYTHON_CODE)
     s = system.structure
     system.program.link_responses("bdf")
     size, c = int(s[MODEL.DOFS]), 2e-3
@@ -137,7 +137,7 @@ def assert_condensed(model, y, rel=1e-4):
 
 def rates_at(system: System, y: Any) -> Any:
     assert system.realize(0.0, y, STAGE.ACCELERATION) == OUTCOME.OK
-    return np.array(system.found())
+    return np.array(system.get_derivative())
 
 
 # ------------------------------------------------------------------------------------------------------------- order

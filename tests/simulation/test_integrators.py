@@ -71,7 +71,7 @@ def test_exact_for_cubic_derivatives(coefficients, h, t0):
 @pytest.mark.parametrize("accuracy", [1e-3, 1e-5, 1e-7, 1e-9, 1e-11])
 def test_error_follows_the_accuracy(accuracy):
     integrator = runge_kutta_merson(oscillator, 0.0, [1.0, 0.0], 1, accuracy=accuracy)
-    t, y = last(integrator.steps(10.0))
+    t, y = last(integrator.iterate_steps(10.0))
     assert t == 10.0
     error = max(abs(y[0] - math.cos(10.0)), abs(y[1] + math.sin(10.0)))
     # No step may err by more than the accuracy; an oscillator does not amplify what was erred
@@ -84,7 +84,7 @@ def test_more_accuracy_costs_more_and_gains():
     errors, costs = [], []
     for accuracy in (1e-3, 1e-5, 1e-7, 1e-9):
         integrator = runge_kutta_merson(cannon, 0.0, [0.0, 0.0], 1, accuracy=accuracy)
-        _, y = last(integrator.steps(3.0))
+        _, y = last(integrator.iterate_steps(3.0))
         errors.append(abs(y[0] - math.log(math.cosh(3.0))))
         costs.append(integrator.evaluations)
     assert errors == sorted(errors, reverse=True)
@@ -97,9 +97,9 @@ def test_default_accuracy_and_first_step_are_opensims():
     assert first.time == 0.01  # no error at all: taken as it is ...
     first.step()
     assert first.time == pytest.approx(0.06)  # ... and followed by one five times as large
-    by_default = list(runge_kutta_merson(pendulum, 0.0, [1.0, 0.0], 1).steps(2.0))
+    by_default = list(runge_kutta_merson(pendulum, 0.0, [1.0, 0.0], 1).iterate_steps(2.0))
     assert by_default == list(
-        runge_kutta_merson(pendulum, 0.0, [1.0, 0.0], 1, accuracy=1e-3).steps(2.0)
+        runge_kutta_merson(pendulum, 0.0, [1.0, 0.0], 1, accuracy=1e-3).iterate_steps(2.0)
     )
 
 
@@ -109,7 +109,7 @@ def test_speeds_count_relative_to_their_size_and_coordinates_do_not():
 
     def count(y, n):
         integrator = runge_kutta_merson(exponential, 0.0, y, n, accuracy=1e-6)
-        last(integrator.steps(1.0))
+        last(integrator.iterate_steps(1.0))
         return integrator.attempted
 
     assert count([0.0, 1e3], 1) == count([0.0, 1e6], 1)
@@ -128,10 +128,14 @@ def test_coordinates_left_out_may_be_counted():
     def locked(t, y):
         return [0.0, y[3], 0.0, -9.81 * math.sin(y[1])]
 
-    with_it = [t for t, _ in runge_kutta_merson(locked, 0.0, [0.3, 1.0, 0.0, 0.0], 2).steps(2.0)]
+    with_it = [
+        t for t, _ in runge_kutta_merson(locked, 0.0, [0.3, 1.0, 0.0, 0.0], 2).iterate_steps(2.0)
+    ]
     counted = runge_kutta_merson(pendulum, 0.0, [1.0, 0.0], 1, counted=(2, 2))
-    assert [t for t, _ in counted.steps(2.0)] == with_it
-    assert [t for t, _ in runge_kutta_merson(pendulum, 0.0, [1.0, 0.0], 1).steps(2.0)] != with_it
+    assert [t for t, _ in counted.iterate_steps(2.0)] == with_it
+    assert [
+        t for t, _ in runge_kutta_merson(pendulum, 0.0, [1.0, 0.0], 1).iterate_steps(2.0)
+    ] != with_it
 
 
 def test_the_worst_of_coordinates_speeds_and_auxiliary_states_decides():
@@ -142,7 +146,7 @@ def test_the_worst_of_coordinates_speeds_and_auxiliary_states_decides():
 
     together = runge_kutta_merson(apart, 0.0, [0.0, 0.0, 0.0], 1)
     alone = runge_kutta_merson(lambda t, y: [math.cos(20 * t)], 0.0, [0.0], 0)
-    assert [t for t, _ in together.steps(1.0)] == [t for t, _ in alone.steps(1.0)]
+    assert [t for t, _ in together.iterate_steps(1.0)] == [t for t, _ in alone.iterate_steps(1.0)]
 
 
 positive = st.floats(1e-12, 1e3)
@@ -190,14 +194,14 @@ def test_next_step_after_a_failed_evaluation(error):
 def test_counts():
     f = Counting(pendulum)
     integrator = runge_kutta_merson(f, 0.0, [3.0, 0.0], 1)
-    steps = list(integrator.steps(10.0))
+    steps = list(integrator.iterate_steps(10.0))
     assert len(steps) == integrator.taken
     assert integrator.attempted > integrator.taken
     assert integrator.evaluations == 1 + 4 * integrator.attempted + integrator.taken
     # A step that is taken by itself looks at its start once more.
     assert f.calls == integrator.evaluations + integrator.taken
     together = Counting(pendulum)
-    runge_kutta_merson(together, 0.0, [3.0, 0.0], 1).table([10.0])
+    runge_kutta_merson(together, 0.0, [3.0, 0.0], 1).tabulate([10.0])
     assert integrator.evaluations < together.calls < f.calls
 
 
@@ -225,7 +229,7 @@ def test_a_derivative_that_ceases_to_exist(bad):
 
     integrator = runge_kutta_merson(f, 0.0, [0.0, 1.0, 0.0], 1)
     with pytest.raises(IntegrationError, match="derivative of state 2") as caught:
-        list(integrator.steps(1.0))
+        list(integrator.iterate_steps(1.0))
     assert caught.value.time == pytest.approx(0.7)
     assert caught.value.index == 2
     assert integrator.time == pytest.approx(0.7)
@@ -238,7 +242,7 @@ def test_no_number_in_a_trial_step_only():
         return [math.nan if y[0] > 1.1 else -400.0 * (y[0] - 1.0)]
 
     integrator = runge_kutta_merson(f, 0.0, [0.0], 0)
-    _, y = last(integrator.steps(0.1))
+    _, y = last(integrator.iterate_steps(0.1))
     assert y[0] == pytest.approx(1.0, abs=1e-3)
     assert integrator.attempted > integrator.taken
 
@@ -254,7 +258,7 @@ def test_overflow_in_a_trial_step_only():
             raise
 
     integrator = runge_kutta_merson(steep, 0.0, [8.0], 0)
-    _, y = last(integrator.steps(0.1))
+    _, y = last(integrator.iterate_steps(0.1))
     assert y[0] == pytest.approx(0.0, abs=5e-3)
     assert failures and integrator.attempted > integrator.taken
 
@@ -266,7 +270,7 @@ def test_overflow_for_good():
     with pytest.raises(
         IntegrationError, match=r"cannot be computed at t = 0\.5 s: math range error"
     ) as caught:
-        list(runge_kutta_merson(f, 0.0, [0.0], 0).steps(1.0))
+        list(runge_kutta_merson(f, 0.0, [0.0], 0).iterate_steps(1.0))
     assert isinstance(caught.value.__cause__, OverflowError)
     assert caught.value.time == pytest.approx(0.5)
 
@@ -277,7 +281,7 @@ def test_states_that_leave_the_range_of_numbers():
         return [0.0, 1e308 if t > 0.5 else 0.0]
 
     with pytest.raises(IntegrationError, match="leaves the range of numbers in state 1") as caught:
-        list(runge_kutta_merson(f, 0.0, [0.0, 1.7e308], 0).steps(3.0))
+        list(runge_kutta_merson(f, 0.0, [0.0, 1.7e308], 0).iterate_steps(3.0))
     assert caught.value.index == 1
 
 
@@ -292,7 +296,7 @@ def test_no_step_small_enough():
         lambda t, y: [0.0, y[1] * y[1]], 0.0, [0.0, 1.0], 1, names=["q", "speed of q"]
     )
     with pytest.raises(IntegrationError) as caught:
-        list(integrator.steps(2.0))
+        list(integrator.iterate_steps(2.0))
     assert caught.value.time == pytest.approx(1.0, abs=1e-3)
     assert caught.value.index == 1
     assert "speed of q" in str(caught.value)
@@ -300,7 +304,7 @@ def test_no_step_small_enough():
 
 def test_a_jump_is_passed():
     _, y = last(
-        runge_kutta_merson(lambda t, y: [0.0 if t < 0.5 else 1e6], 0.0, [0.0], 0).steps(0.6)
+        runge_kutta_merson(lambda t, y: [0.0 if t < 0.5 else 1e6], 0.0, [0.0], 0).iterate_steps(0.6)
     )
     assert y[0] == pytest.approx(1e5, rel=1e-6)
 
@@ -329,5 +333,5 @@ def test_a_motion_ends_at_a_state_that_has_a_derivative():
 
     integrator = runge_kutta_merson(f, 0.0, [0.0], 0)
     with pytest.raises(IntegrationError):
-        list(integrator.steps(1.0))
+        list(integrator.iterate_steps(1.0))
     assert ends and f(integrator.time, integrator.state) == [1.0]

@@ -108,10 +108,10 @@ def test_what_is_ready_is_used_again_and_goes_with_the_model(repo, monkeypatch):
 
 
 def test_few_models_stay_ready(repo):
-    models = [osimlite.read(repo / WALKER) for _ in range(run.KEPT + 2)]
+    models = [osimlite.read(repo / WALKER) for _ in range(run.CACHED_SIMULATIONS + 2)]
     for model in models:
         osimlite.simulate(model, to=0.01, engine="compiled")
-    assert [len(model.tree().kept) for model in models] == [0, 0, *[1] * run.KEPT]
+    assert [len(model.tree().kept) for model in models] == [0, 0, *[1] * run.CACHED_SIMULATIONS]
 
 
 def test_a_trajectory_has_the_model_as_it_was(repo):

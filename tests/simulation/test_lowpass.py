@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from osimlite.errors import SettingError
-from osimlite.simulation.lowpass import lowpassed
+from osimlite.simulation.lowpass import filter_lowpass
 
 
 @pytest.mark.parametrize("rows", [2, 3, 4, 7])
 def test_what_does_not_change_stays(rows):
-    times, values = lowpassed(0.01 * np.arange(rows), np.full((rows, 2), 0.3), 6.0)
+    times, values = filter_lowpass(0.01 * np.arange(rows), np.full((rows, 2), 0.3), 6.0)
     assert len(times) == len(values)
     assert values == pytest.approx(np.full((len(times), 2), 0.3), abs=1e-12)
 
@@ -21,20 +21,20 @@ def test_what_does_not_change_stays(rows):
 def test_a_wave_at_the_cutoff_loses_half_of_its_size():
     """Half of the power each time, and the filter is run twice."""
     times = np.arange(2001) / 500.0
-    _, values = lowpassed(times, np.sin(2.0 * np.pi * 6.0 * times)[:, None], 6.0)
+    _, values = filter_lowpass(times, np.sin(2.0 * np.pi * 6.0 * times)[:, None], 6.0)
     middle = values[len(values) // 2 - 250 : len(values) // 2 + 250]
     assert np.abs(middle).max() == pytest.approx(0.5, abs=1e-3)
 
 
 def test_one_row_is_no_motion():
     with pytest.raises(SettingError, match="two rows"):
-        lowpassed(np.zeros(1), np.ones((1, 2)), 6.0)
+        filter_lowpass(np.zeros(1), np.ones((1, 2)), 6.0)
 
 
 def test_a_slow_filter_keeps_its_digits() -> None:
     """Of what forty digits give, ten are kept, though the factors of a slow filter nearly cancel."""
     values = np.random.default_rng(5).normal(size=400).cumsum()
-    _, result = lowpassed(np.arange(400) / 600.0, values[:, None], 2.5)
+    _, result = filter_lowpass(np.arange(400) / 600.0, values[:, None], 2.5)
     continued = [
         *(2.0 * values[0] - values[200:0:-1]),
         *values,

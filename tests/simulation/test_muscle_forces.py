@@ -55,7 +55,7 @@ def test_the_shares_are_those_of_the_strengths(exponent: float) -> None:
     )
     shares = np.array([30.0, 10.0]) ** (1.0 / (exponent - 1.0))
     expected = NEEDED * shares / (shares @ [30.0, 10.0])
-    assert found.solved.all() and found.unsolved() == ""
+    assert found.solved.all() and found.describe_unsolved() == ""
     assert found.rows == pytest.approx(np.tile(expected, (51, 1)), rel=1e-6)
     assert found.forces is not None and found.forces.rows.sum(axis=1) == pytest.approx(
         np.full(51, NEEDED), rel=1e-9
@@ -80,7 +80,7 @@ def test_one_actuator_bounds_and_forces_from_files(tmp_path: Path) -> None:
     # Two newtons are all that it has.
     assert other.columns == ("reserve",)
     assert not other.solved.any() and np.isnan(other.rows).all()
-    assert "no solution at 51 of 51 times, from 0 s on" in (said := other.unsolved())
+    assert "no solution at 51 of 51 times, from 0 s on" in (said := other.describe_unsolved())
     assert "the actuators lack 19.61 at y" in said
     off = lift(30.0, 10.0)
     off.force_set.objects[1].appliesForce = False
@@ -157,7 +157,7 @@ def test_random_bounds_never_end_in_a_traceback() -> None:
                 needed, rel=1e-9, abs=1e-9
             ), number
         else:
-            assert np.isnan(found.rows[0]).all() and "at y" in found.unsolved(), number
+            assert np.isnan(found.rows[0]).all() and "at y" in found.describe_unsolved(), number
     assert 50 < solved < 250
 
 

@@ -9,7 +9,7 @@ import pytest
 import osimlite
 from osimlite.errors import DoubtfulWarning, SettingError
 from osimlite.simulation import Options, Simulation
-from osimlite.simulation.options import PER_RUN
+from osimlite.simulation.options import RUN_OPTIONS
 from tests.simulation.damped import damped
 
 
@@ -36,7 +36,7 @@ def test_what_was_chosen_first_holds_for_every_run():
 
 def test_every_option_is_described():
     names = [item.name for item in fields(Options)]
-    assert set(PER_RUN) < set(names)
+    assert set(RUN_OPTIONS) < set(names)
     assert all(f"        {name}: " in (Options.__doc__ or "") for name in names)
     with pytest.raises(FrozenInstanceError):
         Options().accuracy = 1.0

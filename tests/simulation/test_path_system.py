@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 
 from osimlite import read
-from osimlite.simulation.engines.linking import AT_HAND, COMPILED, PYTHON
+from osimlite.simulation.engines.linking import MACHINE_CODE, PYTHON_CODE, READY_CODE
 from osimlite.simulation.engines.machine_code import has_machine_code
 from osimlite.simulation.paths import Paths
 
 CODES = [
-    PYTHON,
-    AT_HAND,
+    PYTHON_CODE,
+    READY_CODE,
     pytest.param(
-        COMPILED,
+        MACHINE_CODE,
         marks=pytest.mark.skipif(not has_machine_code(), reason="there is no machine code"),
     ),
 ]
@@ -42,22 +42,23 @@ def poses(paths):
 
 
 def test_lengths_are_those_of_each_pose(paths, poses):
-    result = paths.system.lengths(poses)
+    result = paths.system.measure_poses(poses)
     assert result.tolist() == [list(paths.lengths(q).values()) for q in poses]
 
 
 def test_one_path_is_measured_alone(paths, poses):
     places = [k % len(paths.names) for k in range(len(poses))]
-    every = paths.system.lengths(poses)
+    every = paths.system.measure_poses(poses)
     assert (
-        paths.system.lengths_of(places, poses).tolist() == every[range(len(poses)), places].tolist()
+        paths.system.measure_one_path(places, poses).tolist()
+        == every[range(len(poses)), places].tolist()
     )
 
 
 def test_lengths_on_surfaces_are_those_of_each_pose(paths, poses):
     every = {
         (name, surface): lengths
-        for name, surface, lengths in paths.system.all_on_surfaces(poses, paths.routes)
+        for name, surface, lengths in paths.system.measure_all_on_surfaces(poses, paths.routes)
     }
     for k, q in enumerate(poses):
         for name, own in paths.lengths_on_surfaces(q).items():
@@ -72,7 +73,7 @@ def test_the_length_on_the_far_side_of_a_sphere_is_negative(fixtures, code):
     )
     every = {
         name: lengths
-        for name, _, lengths in paths.system.all_on_surfaces(np.zeros((2, 5)), paths.routes)
+        for name, _, lengths in paths.system.measure_all_on_surfaces(np.zeros((2, 5)), paths.routes)
     }
     assert every["/forceset/far"].tolist() == pytest.approx([-0.18, -0.18], abs=5e-4)
     assert np.isnan(every["/forceset/middle"]).all()
@@ -80,14 +81,14 @@ def test_the_length_on_the_far_side_of_a_sphere_is_negative(fixtures, code):
 
 def test_a_pose_that_cannot_be_computed_is_no_number_and_the_next_one_is(paths, poses):
     poses[1] = np.nan
-    result = paths.system.lengths(poses)
+    result = paths.system.measure_poses(poses)
     assert np.isnan(result[1]).all() and not np.isnan(result[2]).any()
     assert result[2].tolist() == list(paths.lengths(poses[2]).values())
 
 
 def test_paths_around_surfaces_share_the_mechanism(fixtures):
     model = read(fixtures / "lint" / "OSIM631" / "fail-01-example.osim")
-    paths = Paths(model, code=AT_HAND)
-    around = paths.around_surfaces(model, "geodesic", AT_HAND)
+    paths = Paths(model, code=READY_CODE)
+    around = paths.rewrap_paths(model, "geodesic", READY_CODE)
     assert around.mechanism is paths.mechanism
-    assert around.lengths({}) == Paths(model, "geodesic", AT_HAND).lengths({})
+    assert around.lengths({}) == Paths(model, "geodesic", READY_CODE).lengths({})

@@ -87,7 +87,7 @@ def test_wrapped(name):
 )
 def test_several_as_python(name, monkeypatch):
     """Nothing is read or written outside of what belongs to a path."""
-    monkeypatch.setattr("osimlite.simulation.system.best", lambda: Checked("Python"))
+    monkeypatch.setattr("osimlite.simulation.evaluation.select_code", lambda: Checked("Python"))
     paths = osimlite.paths(wrapped(SETUPS[name]))
     for case in SETUPS[name]["cases"][:1]:
         compare(paths, case)

@@ -30,7 +30,7 @@ def paths_over(surface, *stations, wrapping):
 @pytest.fixture(params=["as it is", "Python"], autouse=True)
 def code(request, monkeypatch):
     if request.param == "Python":
-        monkeypatch.setattr("osimlite.simulation.polylines.best", lambda: Checked("Python"))
+        monkeypatch.setattr("osimlite.simulation.polylines.select_code", lambda: Checked("Python"))
 
 
 SURFACES = {

@@ -17,7 +17,7 @@ from osimlite.mechanics.multibody import Mechanism, build_mechanism
 from osimlite.mechanics.multibody import functions as f
 from osimlite.mechanics.multibody.assembly import tolerance_of
 from osimlite.mechanics.multibody.constraints import Coupler, Prescribed
-from osimlite.simulation.engines.linking import COMPILED, PYTHON, Code
+from osimlite.simulation.engines.linking import MACHINE_CODE, PYTHON_CODE, Code
 from osimlite.simulation.pose_assembly import assemble_motion
 from osimlite.simulation.recorded_motion import RecordedMotion
 from tests.mechanics.multibody.strategies import KINDS, Case, cases, constraint_of
@@ -32,7 +32,7 @@ def change_of(mechanism: Mechanism, poses: np.ndarray, wanted: np.ndarray) -> np
 
 
 def compare(
-    mechanism: Mechanism, wanted: np.ndarray, code: Code = COMPILED, accuracy: float = 1e-9
+    mechanism: Mechanism, wanted: np.ndarray, code: Code = MACHINE_CODE, accuracy: float = 1e-9
 ) -> None:
     """Compare assembled poses with those of the search in Python, at a time of 0.7 s."""
     known = np.array([mechanism.assemble(q, 0.7) for q in wanted])
@@ -84,7 +84,7 @@ def test_any_mechanism(case: Case, kind: str, seed: int, what: str, off: float) 
         [mechanism.assemble(q, 0.7) for q in wanted]
     except SimulationError:
         with pytest.raises(SimulationError):
-            assemble_motion(mechanism, np.full(4, 0.7), wanted, COMPILED)
+            assemble_motion(mechanism, np.full(4, 0.7), wanted, MACHINE_CODE)
         return
     compare(mechanism, wanted, accuracy=1e-7)
 
@@ -104,7 +104,7 @@ def build_tree() -> Mechanism:
 
 
 @pytest.mark.parametrize(
-    "code", [COMPILED, PYTHON, Checked("Python")], ids=["compiled", "Python", "bounded"]
+    "code", [MACHINE_CODE, PYTHON_CODE, Checked("Python")], ids=["compiled", "Python", "bounded"]
 )
 def test_couplers_prescribed_and_clamped_coordinates(
     code: Code, monkeypatch: pytest.MonkeyPatch, fixtures

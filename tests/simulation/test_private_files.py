@@ -9,7 +9,11 @@ from pathlib import Path
 import pytest
 
 from osimlite.errors import OsimliteError
-from osimlite.simulation.engines.private_files import others_in, read_private, write_private
+from osimlite.simulation.engines.private_files import (
+    find_other_writers,
+    read_private,
+    write_private,
+)
 
 pytestmark = pytest.mark.skipif(
     sys.platform == "win32", reason="who may write is not told by bits there"
@@ -91,4 +95,4 @@ def test_special_files_and_nothing(kept, tmp_path):
 
 
 def test_a_folder_in_tmp_is_as_safe_as_any(tmp_path):
-    assert others_in(Path(os.path.realpath(tmp_path))) is None
+    assert find_other_writers(Path(os.path.realpath(tmp_path))) is None

@@ -25,18 +25,18 @@ def compare(model: osimlite.Model, monkeypatch: pytest.MonkeyPatch, count: int =
     mechanism = build_mechanism(model)
     forces = force_elements(model, mechanism, skip_unsupported=True)
     compiled = CompiledEngine(mechanism, forces)
-    monkeypatch.setattr("osimlite.simulation.system.best", lambda: Checked("Python"))
+    monkeypatch.setattr("osimlite.simulation.evaluation.select_code", lambda: Checked("Python"))
     plain = CompiledEngine(mechanism, forces)
     assert plain.program.code is not compiled.program.code
     for t, q, u in states(mechanism, count):
         if compiled.structure[MODEL.CONSTRAINED]:
             q = mechanism.assemble(q).tolist()
         y = compiled.state.pack(q, u)
-        ours, theirs = plain.derivative(t, y), compiled.derivative(t, y)
+        ours, theirs = plain.compute_derivative(t, y), compiled.compute_derivative(t, y)
         assert np.allclose(ours, theirs, rtol=1e-12, atol=1e-12 * max(1.0, np.abs(theirs).max()))
         with monkeypatch.context() as patched:
             # What the derivative leaves: as Python, it takes long to compute it again.
-            patched.setattr(plain, "applied", lambda t, y: None)
+            patched.setattr(plain, "compute_applied_forces", lambda t, y: None)
             records = plain.force_records(t, y)
         assert np.allclose(records, compiled.force_records(t, y), rtol=1e-9, atol=1e-9)
 

@@ -31,7 +31,7 @@ from osimlite.errors import (
 from osimlite.schema.contact_forces import ExponentialContactForce
 from osimlite.simulation import Interrupted, Simulation, read_sto
 from osimlite.simulation.engines.batch import Batch
-from osimlite.simulation.run import report_times
+from osimlite.simulation.options import compute_report_times
 
 
 @pytest.fixture
@@ -148,8 +148,8 @@ def test_settings_without_meaning(pendulum, setting, words):
     ],
 )
 def test_report_times(to, interval, times):
-    assert report_times(to, interval) == pytest.approx(times, abs=1e-15)
-    assert report_times(to, interval)[-1] == to
+    assert compute_report_times(to, interval) == pytest.approx(times, abs=1e-15)
+    assert compute_report_times(to, interval)[-1] == to
 
 
 @pytest.mark.parametrize("engine", ["bullet", "compiled"])

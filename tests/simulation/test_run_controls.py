@@ -14,8 +14,8 @@ from osimlite.schema.controller_types import PrescribedController, SynergyContro
 from osimlite.schema.functions import Constant, LinearFunction
 from osimlite.schema.reporters import TableSource__double_
 from osimlite.simulation import Simulation, StoTable, read_sto, write_sto
-from osimlite.simulation.engines.linking import COMPILED, PYTHON
-from osimlite.simulation.run_controls import driven
+from osimlite.simulation.engines.linking import MACHINE_CODE, PYTHON_CODE
+from osimlite.simulation.run_controls import add_controls
 from osimlite.simulation.system import System
 from tests.simulation.test_force_elements import arm
 
@@ -113,7 +113,7 @@ def test_a_control_set_can_be_given(model, tmp_path):
     assert (forces["second"] == 7.0).all()
 
 
-@pytest.mark.parametrize("code", [COMPILED, PYTHON], ids=lambda code: code.name)
+@pytest.mark.parametrize("code", [MACHINE_CODE, PYTHON_CODE], ids=lambda code: code.name)
 def test_the_kernel_alone(model, code):
     mechanism = osimlite.mechanism(model)
     forces = osimlite.simulation.elements.force_elements(model, mechanism)
@@ -124,13 +124,13 @@ def test_the_kernel_alone(model, code):
         {"second": 1.0, "push_0": 3.0},
         {},
     ):
-        system.drive(driven(forces.controls, given, 1.0))
-        functions = driven(forces.controls, given, 1.0).functions
+        system.set_controls(add_controls(forces.controls, given, 1.0))
+        functions = add_controls(forces.controls, given, 1.0).functions
         expected = [
             sum(float(item.evaluate(np.array((0.7,)))[0]) for item in row) for row in functions
         ]
-        system.applied(0.7, system.state.default())
-        assert system.controls() == pytest.approx(expected, abs=1e-15)
+        system.compute_applied_forces(0.7, system.state.pack_defaults())
+        assert system.read_controls() == pytest.approx(expected, abs=1e-15)
 
 
 @pytest.mark.parametrize(

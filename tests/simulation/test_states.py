@@ -39,12 +39,12 @@ def test_a_state_of_another_length_is_refused(simulations, engine, y):
     made = simulations[engine].engine
     size = made.state.size
     for ask in (
-        made.derivative,
-        made.touching,
+        made.compute_derivative,
+        made.find_touching_contacts,
         made.force_records,
-        made.energies,
-        lambda t, y: made.stepper(t, y, Settings(), lambda t, y: None),
-        lambda t, y: made.stepper(t, y, Settings(fixed_step=1e-3), lambda t, y: None),
+        made.compute_energies,
+        lambda t, y: made.make_stepper(t, y, Settings(), lambda t, y: None),
+        lambda t, y: made.make_stepper(t, y, Settings(fixed_step=1e-3), lambda t, y: None),
     ):
         if len(y) == size:
             ask(0.0, y)
@@ -56,10 +56,10 @@ def test_a_state_of_another_length_is_refused(simulations, engine, y):
 def test_nothing_of_the_call_before_is_left(simulations):
     """A vector without its tail is no state, whatever was computed before it."""
     engine = simulations["compiled"].engine
-    y = engine.state.default()
-    engine.derivative(0.0, [*y[:-1], 5.0])
+    y = engine.state.pack_defaults()
+    engine.compute_derivative(0.0, [*y[:-1], 5.0])
     with pytest.raises(OsimliteError, match="not 9"):
-        engine.derivative(0.0, y[:-1])
+        engine.compute_derivative(0.0, y[:-1])
 
 
 @settings(max_examples=30, deadline=None)
@@ -69,7 +69,7 @@ def test_a_batch_refuses_states_of_another_length(simulations, rows, columns):
 
     engine = simulations["compiled"].engine
     states = np.zeros((rows, columns))
-    for ask in (lambda: run_many(engine, states, 1e-3), lambda: engine.contact_places(states)):
+    for ask in (lambda: run_many(engine, states, 1e-3), lambda: engine.locate_contacts(states)):
         if columns == engine.state.size:
             ask()
         else:
@@ -98,16 +98,19 @@ def test_states_have_the_order_and_the_starts_of_their_owners():
         "/m/fiber_length",
         "/b/dissipated_energy",
     ]
-    assert [layout.first_of(element) for element in (bushing, spring, muscle)] == [8, -1, 6]
+    assert [layout.find_first_state(element) for element in (bushing, spring, muscle)] == [8, -1, 6]
     assert layout.names[2:4] == ["q1", "the speed of q3"] and layout.names[6:] == layout.paths
-    y = layout.default()
+    y = layout.pack_defaults()
     assert y == pytest.approx([0.3] * 3 + [1.0] * 3 + [0.05, 0.1 + 0.3 + 1.0, 0.0])
     assert layout.pack(layout.values(y), layout.speeds(y), layout.auxiliary(y)) == y
     with pytest.raises(OsimliteError, match="not 7"):
         layout.pack(layout.values(y), layout.speeds(y), [1.0])
     moved = np.array([y, y])
     moved[1, 2], moved[:, 6:] = 0.5, 9.0
-    assert layout.started(moved).tolist() == [y, pytest.approx([*moved[1, :6], 0.05, 1.6, 0.0])]
+    assert layout.restart_auxiliary(moved).tolist() == [
+        y,
+        pytest.approx([*moved[1, :6], 0.05, 1.6, 0.0]),
+    ]
 
 
 def with_states(seed):
@@ -141,8 +144,8 @@ def test_random_models_keep_their_states(seed, tmp_path_factory):
                 ).all()
             trajectory.to_sto(file)
             assert tuple(read_sto(file).columns) == tuple(simulation.paths)
-            last = simulation.initial_state(simulation.state_in(file), {})
-            history = simulation.state.rows(
+            last = simulation.initial_state(simulation.read_state(file), {})
+            history = simulation.state.pack_rows(
                 trajectory.values, trajectory.speeds, trajectory.auxiliary
             )
             # Constraints hold a little better at a start.
@@ -151,7 +154,7 @@ def test_random_models_keep_their_states(seed, tmp_path_factory):
             )
             again = simulation.run(0.01, initial=str(file))
             assert [rows[0] for rows in again.auxiliary.values()] == ends[engine, "fixed_step"]
-            middle = simulation.initial_state(simulation.state_in(file, 0.0101), {})
+            middle = simulation.initial_state(simulation.read_state(file, 0.0101), {})
             assert middle == pytest.approx(
                 history[1].tolist(), abs=1e-7 if simulation.constraints else 0.0, rel=0.0
             )
@@ -167,7 +170,7 @@ def test_random_models_keep_their_states(seed, tmp_path_factory):
                     atol=1e-8 if simulation.constraints else 0.0,
                 )
                 alone = simulation.run(0.02, accuracy=1e-8, initial=z)
-                ending = simulation.state.rows(alone.values, alone.speeds, alone.auxiliary)
+                ending = simulation.state.pack_rows(alone.values, alone.speeds, alone.auxiliary)
                 assert np.array_equal(runs.states[0], ending[-1])
     assert ends["bullet", "accuracy"] == pytest.approx(
         ends["compiled", "accuracy"], rel=1e-7, abs=1e-9
@@ -184,7 +187,7 @@ def test_what_a_file_says_gives_way_to_what_holds(tmp_path):
     file = tmp_path / "states.sto"
     osimlite.simulate(damped(), 0.1).to_sto(file)
     with Simulation(damped(), "compiled") as simulation:
-        state = simulation.state_in(file)
+        state = simulation.read_state(file)
         state["/jointset/j2/q2/value"] = 7.0
         y = simulation.initial_state({**state, "q1": 0.25}, {})
         assert simulation.state.values(y)[2] == 0.3 and simulation.state.values(y)[1] == 0.25
@@ -208,4 +211,6 @@ def test_what_a_file_says_gives_way_to_what_holds(tmp_path):
             [[90.0]],
             in_degrees=True,
         )
-        assert simulation.state_in(tmp_path / "degrees.sto") == {"/jointset/j1/q1/value": np.pi / 2}
+        assert simulation.read_state(tmp_path / "degrees.sto") == {
+            "/jointset/j1/q1/value": np.pi / 2
+        }

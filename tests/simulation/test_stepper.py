@@ -26,7 +26,7 @@ from tests.simulation.equations import Counting, last, oscillator, pendulum, run
 def test_steps_near_a_limit(limit, ends):
     """No error at all, so that the first step is the initial one of 0.01 s and any growth is fivefold."""
     integrator = runge_kutta_merson(lambda t, y: [y[1], 0.0], 0.0, [0.0, 0.0], 1)
-    times = [t for t, _ in integrator.steps(limit)]
+    times = [t for t, _ in integrator.iterate_steps(limit)]
     integrator.step()
     assert [*times, integrator.time] == pytest.approx(ends, rel=1e-12)
 
@@ -41,22 +41,22 @@ def steppers():
 @pytest.mark.parametrize("which", [0, 1])
 def test_steps_end_where_they_are_told_to_and_go_on(which):
     stepper = steppers()[which]
-    first = list(stepper.steps(0.7305))
+    first = list(stepper.iterate_steps(0.7305))
     assert first[-1][0] == stepper.time == 0.7305
     assert first[-1][1] is stepper.state
-    second = list(stepper.steps(1.0))
+    second = list(stepper.iterate_steps(1.0))
     assert second[-1][0] == 1.0
     times = [t for t, _ in first + second]
     assert times == sorted(set(times))
-    assert list(stepper.steps(1.0)) == []
-    assert last(stepper.steps(2.0))[0] == 2.0
+    assert list(stepper.iterate_steps(1.0)) == []
+    assert last(stepper.iterate_steps(2.0))[0] == 2.0
 
 
 @pytest.mark.parametrize("which", [0, 1])
 def test_reports_do_not_change_the_steps(which):
     alone, reporting = steppers()[which], steppers()[which]
-    list(alone.steps(1.0))
-    seen = [list(row) for row in reporting.table([0.0, 0.0, 1e-4, 0.25, 0.2503, 1.0])]
+    list(alone.iterate_steps(1.0))
+    seen = [list(row) for row in reporting.tabulate([0.0, 0.0, 1e-4, 0.25, 0.2503, 1.0])]
     assert len(seen) == 6
     assert (reporting.taken, reporting.time, reporting.state) == (
         alone.taken,
@@ -70,7 +70,7 @@ def test_reports_do_not_change_the_steps(which):
 def test_reports_are_as_accurate_as_steps():
     integrator = runge_kutta_merson(oscillator, 0.0, [1.0, 0.0], 1, accuracy=1e-6)
     times = [i / 100 for i in range(501)]
-    for t, y in zip(times, integrator.table(times), strict=True):
+    for t, y in zip(times, integrator.tabulate(times), strict=True):
         assert y == pytest.approx([math.cos(t), -math.sin(t)], abs=2e-5)
     assert integrator.taken < 200
 
@@ -79,20 +79,20 @@ def test_reports_are_as_accurate_as_steps():
 def test_interpolation_is_exact_for_cubic_motion(coefficients, fraction):
     a, b, c, d = coefficients
     integrator = runge_kutta_merson(lambda t, y: [b + t * (2 * c + t * 3 * d)], 0.0, [a], 0)
-    list(integrator.steps(0.5))
+    list(integrator.iterate_steps(0.5))
     start = integrator.previous[0]
     t = start + fraction * (0.5 - start)
-    assert integrator.at(t)[0] == pytest.approx(a + t * (b + t * (c + t * d)), abs=1e-9)
+    assert integrator.interpolate(t)[0] == pytest.approx(a + t * (b + t * (c + t * d)), abs=1e-9)
 
 
 @pytest.mark.parametrize("which", [0, 1])
 def test_states_outside_the_last_step_are_refused(which):
     stepper = steppers()[which]
-    list(stepper.steps(0.5))
+    list(stepper.iterate_steps(0.5))
     with pytest.raises(ValueError, match="outside the last step"):
-        stepper.at(0.1)
+        stepper.interpolate(0.1)
     with pytest.raises(ValueError, match="outside the last step"):
-        stepper.at(0.5001)
+        stepper.interpolate(0.5001)
     with pytest.raises(ValueError, match="limit"):
         stepper.step(0.5)
 
@@ -108,4 +108,4 @@ def test_the_observer_sees_each_step_right_after_its_derivative(make):
 
     stepper = make(f, 0.0, [1.0, 0.0], 1, observe=observe)
     assert seen == []
-    assert list(stepper.steps(0.5)) == seen
+    assert list(stepper.iterate_steps(0.5)) == seen

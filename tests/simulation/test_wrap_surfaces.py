@@ -13,7 +13,7 @@ from osimlite.mechanics.kernels import wrapping
 from osimlite.mechanics.kernels.layout import ITEM
 from osimlite.mechanics.kernels.wrap_cylinder import smooth_heights
 from osimlite.mechanics.multibody.spatial import invert_transform, make_offset, make_transform
-from osimlite.simulation.engines.linking import COMPILED
+from osimlite.simulation.engines.linking import MACHINE_CODE
 from tests.conftest import ROOT
 from tests.simulation.checked import Checked
 
@@ -54,11 +54,11 @@ def bent(law, p, first, second):
     )
 
 
-@pytest.mark.parametrize("code", [Checked("Python"), COMPILED], ids=lambda code: code.name)
+@pytest.mark.parametrize("code", [Checked("Python"), MACHINE_CODE], ids=lambda code: code.name)
 @pytest.mark.parametrize("name", SETUPS)
 def test_surface(name, code):
     (surface,) = SETUPS[name]["objects"]
-    law, p = code.entry(f"wrap_{surface['kind'].lower()}"), numbers(surface, alone=1.0)
+    law, p = code.get_entry(f"wrap_{surface['kind'].lower()}"), numbers(surface, alone=1.0)
     frame = make_offset(surface["translation"], surface["xyz_body_rotation"])
     for case in SETUPS[name]["cases"]:
         to_surface = invert_transform(make_transform(case["R_W"], case["p_W"]) @ frame)

@@ -12,7 +12,7 @@ import pytest
 import osimlite
 from osimlite.errors import OsimliteError
 from osimlite.io.tables.storage import read_sto
-from osimlite.simulation.initial_state import columns_of_states
+from osimlite.simulation.initial_state import match_state_columns
 
 SETUP = """<OpenSimDocument Version="40600">
     <ForwardTool name="fall">
@@ -141,16 +141,16 @@ def test_what_a_setup_adds_may_be_old(setup: Path, tmp_path: Path) -> None:
 
 def test_labels_of_all_ages_are_states() -> None:
     paths = ["/jointset/knee/angle/value", "/jointset/knee/angle/speed", "/forceset/m/activation"]
-    assert columns_of_states(paths, paths) == {path: k for k, path in enumerate(paths)}
+    assert match_state_columns(paths, paths) == {path: k for k, path in enumerate(paths)}
     for labels in (
         ["knee/angle/value", "knee/angle/speed", "m/activation"],
         ["angle", "angle_u", "m.activation"],
         ["angle/value", "angle/speed", "activation"],
     ):
-        assert columns_of_states(["other", *labels], paths) == {
+        assert match_state_columns(["other", *labels], paths) == {
             path: k + 1 for k, path in enumerate(paths)
         }
-    assert columns_of_states(["x", "angle_v"], paths) == {}
+    assert match_state_columns(["x", "angle_v"], paths) == {}
 
 
 def test_a_motion_with_muscles_and_controls_is_opensims(shared: Path, tmp_path: Path) -> None:

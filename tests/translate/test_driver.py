@@ -217,7 +217,7 @@ def test_what_fails_in_a_callback_is_raised(monkeypatch):
     driver = osimlite.mjcf.Driver(
         chain(SpringGeneralizedForce(name="s", coordinate="q1", stiffness=1.0))
     )
-    monkeypatch.setattr(driver.system, "applied", lambda *_: 1 / 0)
+    monkeypatch.setattr(driver.system, "compute_applied_forces", lambda *_: 1 / 0)
     with pytest.raises(ZeroDivisionError):
         driver.step()
     assert mujoco.get_mjcb_control() is None
@@ -257,7 +257,7 @@ def test_real_models_accelerate_as_the_mechanism_does(corpus_model):
     if not len(q):
         assert driver.model.nv == 0
         return
-    row = driver.system.applied(0.0, layout.pack(q.tolist(), u.tolist(), z.tolist()))
+    row = driver.system.compute_applied_forces(0.0, layout.pack(q.tolist(), u.tolist(), z.tolist()))
     forces, order = np.zeros(len(q)), list(layout.order)
     forces[order] = row[len(order) : 2 * len(order)]
     try:

@@ -10,7 +10,7 @@ import pytest
 import osimlite
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.mechanics.multibody.constraints import Coupler
-from osimlite.simulation.polylines import Course, Polylines
+from osimlite.simulation.polylines import Polylines, TraceablePath
 from osimlite.view.kernels import kernels_text, program_data
 from tests.simulation.test_compiled import JOINTS, tree
 
@@ -78,7 +78,9 @@ def test_models_are_where_osimlite_has_them_and_their_paths_pull_alike(name, sha
     model = osimlite.read(path)
     mechanism = build_mechanism(model)
     paths = osimlite.paths(model, mechanism=mechanism)
-    routes = {name: route for name, route in paths.routes.items() if isinstance(route, Course)}
+    routes = {
+        name: route for name, route in paths.routes.items() if isinstance(route, TraceablePath)
+    }
     random, start = np.random.default_rng(3), mechanism.values({})
     poses = start + random.uniform(-0.3, 0.3, (2, len(start)))
     couplers = [item for item in mechanism.constraints if isinstance(item, Coupler)]
@@ -97,9 +99,9 @@ def test_models_are_where_osimlite_has_them_and_their_paths_pull_alike(name, sha
             expected[item.dependent] = item.function.evaluate(expected[list(item.independent)])[0]
         assert np.abs(q - expected).max() < 1e-12
         assert off(bodies, mechanism.at(expected)) < 1e-12
-        lengths, arms = paths.lengths(expected), paths.all_moment_arms(expected[None])[0]
+        lengths, arms = paths.lengths(expected), paths.compute_moment_arms(expected[None])[0]
         # Rounding counts for as much as others move further than the coordinate.
-        polylines, far = paths.polylines(expected), np.abs(paths.coupling(expected)).max()
+        polylines, far = paths.polylines(expected), np.abs(paths.compute_coupling(expected)).max()
         for route, line, row in zip(routes, corners, measured, strict=True):
             assert line == pytest.approx(polylines[route].ravel(), abs=1e-12)
             assert [each["length"] for each in row] == pytest.approx(

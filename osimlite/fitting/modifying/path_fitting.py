@@ -68,8 +68,8 @@ def fit_paths(
     mechanism = known.mechanism
     q, free = _sample_poses(mechanism, poses)
     still = np.zeros(len(mechanism.coordinates))
-    lengths = np.array([known.system.measured(row, still, LENGTH) for row in q])
-    arms = known.all_moment_arms(q)
+    lengths = np.array([known.system.measure_paths(row, still, LENGTH) for row in q])
+    arms = known.compute_moment_arms(q)
     tree = model.tree()
     result = []
     for index, name in enumerate(known.names):

@@ -31,7 +31,7 @@ from osimlite.simulation.elements.geometries.paths.scholz2015_geometry_path impo
     check_cable as check_cable,
 )
 from osimlite.simulation.elements.probe_type import make_probes
-from osimlite.simulation.engines.linking import AT_HAND
+from osimlite.simulation.engines.linking import READY_CODE
 from osimlite.simulation.system import System
 
 SINGULAR = 1e-12
@@ -169,7 +169,7 @@ class _Construction:
         """Evaluate the accelerations in the default pose, and yield what is wrong with them."""
         try:
             u = mechanism.project_speeds(q, {})
-            system = System(mechanism, forces, code=AT_HAND)
+            system = System(mechanism, forces, code=READY_CODE)
         except OsimliteError as error:
             yield self.describe(error, Stage.ACCELERATION)
             return
@@ -183,7 +183,9 @@ class _Construction:
             if not _is_indefinite(mechanism, q):
                 yield self.describe_inertia(system, state)
         elif status != OUTCOME.OK:
-            refusal = system.refusal(status, 0.0, state) if status is not None else None
+            refusal = (
+                system.make_evaluation_error(status, 0.0, state) if status is not None else None
+            )
             culprits = [*self.find_culprits(mechanism, forces, q, u)]
             if culprits:
                 yield from culprits
@@ -191,7 +193,7 @@ class _Construction:
                 yield self.describe(refusal, Stage.ACCELERATION)
             elif status is None:
                 yield Obstacle(Stage.ACCELERATION, "", "the accelerations are not finite")
-        elif not np.isfinite(np.array(system.found())[: 2 * len(system.order)]).all():
+        elif not np.isfinite(np.array(system.get_derivative())[: 2 * len(system.order)]).all():
             culprits = [*self.find_culprits(mechanism, forces, q, u)]
             yield from culprits or [
                 Obstacle(Stage.ACCELERATION, "", "the accelerations are not finite")
@@ -201,7 +203,7 @@ class _Construction:
 
     def find_rates(self, system: System) -> Iterator[Obstacle]:
         """Yield the auxiliary states whose rates are not numbers."""
-        rates = system.found()[2 * len(system.order) :]
+        rates = system.get_derivative()[2 * len(system.order) :]
         for variable, rate in zip(system.state.variables, rates, strict=True):
             if not isfinite(rate):
                 owner, _, name = variable.path.rpartition("/")
@@ -216,7 +218,7 @@ class _Construction:
 
     def describe_inertia(self, system: System, state: list[float]) -> Obstacle:
         """Return the obstacle of a mass matrix that cannot be divided by."""
-        refusal = system.refusal(OUTCOME.SINGULAR_MASS, 0.0, state)
+        refusal = system.make_evaluation_error(OUTCOME.SINGULAR_MASS, 0.0, state)
         message = refusal.message.partition(";")[0]
         named = re.search(r"coordinate '([^']*)'", message)
         for info in system.mechanism.coordinates:
@@ -272,13 +274,13 @@ def _is_indefinite(mechanism: Mechanism, q: Array) -> bool:
 def _is_computed(mechanism: Mechanism, forces: Forces, q: Array, u: Array) -> bool:
     """Return whether a mechanism has accelerations under some forces, or they cannot be told apart."""
     try:
-        system = System(mechanism, forces, code=AT_HAND)
+        system = System(mechanism, forces, code=READY_CODE)
     except OsimliteError:
         # A probe reads another element.
         return True
     status = _evaluate_accelerations(system, system.state.pack(q.tolist(), u.tolist()))
     if status == OUTCOME.OK:
-        return bool(np.isfinite(np.array(system.found())[: 2 * len(system.order)]).all())
+        return bool(np.isfinite(np.array(system.get_derivative())[: 2 * len(system.order)]).all())
     return status in (OUTCOME.SINGULAR_MASS, OUTCOME.SINGULAR_RATES, OUTCOME.UNSOLVED)
 
 

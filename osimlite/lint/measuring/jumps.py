@@ -50,7 +50,7 @@ def find_jumps(paths: Paths, looked_at: Sequence[Sweep]) -> Iterator[PathJump]:
         [_compute_side_poses(item, value) for item, value in zip(suspects, values, strict=True)]
     )
     sides = sides.reshape(2 * len(suspects), -1)
-    both = paths.system.lengths_of([item.path for item in suspects for _ in range(2)], sides)
+    both = paths.system.measure_one_path([item.path for item in suspects for _ in range(2)], sides)
     sizes = np.abs(np.diff(both.reshape(-1, 2), axis=1))[:, 0].tolist()
     greatest: dict[int, int] = {}
     for k in sorted(range(len(suspects)), key=lambda k: (suspects[k].path, -suspects[k].excess)):
@@ -106,7 +106,7 @@ def _bisect_suspects(paths: Paths, suspects: Sequence[JumpSuspect]) -> list[floa
         part = (middle - first) / (last - first)
         poses = (begin + part[:, None] * (end - begin))[places]
         here = np.full(len(suspects), np.nan)
-        here[places] = paths.system.lengths_of([suspects[k].path for k in places], poses)
+        here[places] = paths.system.measure_one_path([suspects[k].path for k in places], poses)
         smooth = rate * (middle - low)
         is_before = np.abs(here - before - smooth) > np.abs(after - here - smooth)
         moves = active & is_before

@@ -26,7 +26,7 @@ from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.model import Model
 from osimlite.simulation.elements.builder import GEODESIC
 from osimlite.simulation.elements.geometries.paths.geometry_path import ThroughPoints
-from osimlite.simulation.engines.linking import AT_HAND
+from osimlite.simulation.engines.linking import READY_CODE
 from osimlite.simulation.engines.machine_code import has_machine_code
 from osimlite.simulation.paths import Paths
 
@@ -70,14 +70,14 @@ def measure_model(
     before, still = known if known is not None else (None, None)
     if compiles and not has_machine_code():
         raise NoMachineCodeError(NEEDS_MACHINE_CODE)
-    code = None if compiles else AT_HAND
+    code = None if compiles else READY_CODE
     paths = Paths(
         model, code=code, left_out=still.swept if still is not None else (), mechanism=mechanism
     )
     has_surfaces = any(
         isinstance(route, ThroughPoints) and route.surfaces for route in paths.routes.values()
     )
-    around = paths.around_surfaces(model, GEODESIC, code) if has_surfaces else None
+    around = paths.rewrap_paths(model, GEODESIC, code) if has_surfaces else None
     _refuse_many_loops(paths.mechanism)
     start = paths.mechanism.assemble({})
     default = np.array(list(paths.lengths(start).values()))
@@ -127,7 +127,7 @@ def _find_bad_surface_lengths(
     """Yield the first negative or NaN length of each path on each surface."""
     poses = [Pose(), *(sweep.pose(value) for sweep in looked_at for value in sweep.values)]
     every = np.concatenate([start[None], *(sweep.poses for sweep in looked_at)])
-    for name, surface, lengths in paths.system.all_on_surfaces(every, paths.routes):
+    for name, surface, lengths in paths.system.measure_all_on_surfaces(every, paths.routes):
         for k in np.flatnonzero(~(lengths >= 0.0))[:1]:
             yield LengthOnSurface(name, surface, float(lengths[k]), poses[k])
 

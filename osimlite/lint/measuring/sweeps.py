@@ -106,7 +106,7 @@ def sweep_coordinates(paths: Paths, start: Array, others: Container[int] = ()) -
         )
         if len(poses) > 1:
             result.append((place, poses, is_tied))
-    rows = paths.system.lengths(
+    rows = paths.system.measure_poses(
         np.concatenate([np.empty((0, len(start))), *(poses for _, poses, _ in result)])
     )
     swept = []

@@ -38,8 +38,10 @@ def compare_wrappings(
     poses = np.concatenate([start[None], *(sweep.poses for sweep in looked_at), together])
     columns = [paths.names.index(name) for name in geodesic.names]
     swept = [sweep.lengths[:, columns] for sweep in looked_at]
-    ends = np.split(paths.system.lengths(np.concatenate([start[None], together]))[:, columns], [1])
-    excesses = np.concatenate([ends[0], *swept, ends[1]]) - geodesic.system.lengths(poses)
+    ends = np.split(
+        paths.system.measure_poses(np.concatenate([start[None], together]))[:, columns], [1]
+    )
+    excesses = np.concatenate([ends[0], *swept, ends[1]]) - geodesic.system.measure_poses(poses)
     for own, (name, path) in enumerate(zip(geodesic.names, columns, strict=True)):
         route, excess = paths.routes[name], excesses[:, own]
         around = tuple(
@@ -97,7 +99,7 @@ def _is_certain(
 ) -> bool:
     """Return whether a path has the same excess right beside a pose; otherwise it is due to rounding."""
     beside = np.array([q - ASIDE, q + ASIDE])
-    there = paths.system.lengths_of([path] * 2, beside) - geodesic.system.lengths_of(
+    there = paths.system.measure_one_path([path] * 2, beside) - geodesic.system.measure_one_path(
         [own] * 2, beside
     )
     return bool((np.abs(there - excess) < NEAR).all())

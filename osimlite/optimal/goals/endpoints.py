@@ -21,7 +21,7 @@ from osimlite.schema.moco.goals import (
     MocoMarkerFinalGoal,
     MocoPeriodicityGoal,
 )
-from osimlite.simulation.properties import places
+from osimlite.simulation.properties import find_properties
 
 if TYPE_CHECKING:
     from osimlite.optimal.problem import Problem
@@ -165,8 +165,8 @@ def build_expression_based_parameter_goal(
 
 def _read_number(goal: MocoExpressionBasedParameterGoal, problem: Problem, path: str) -> float:
     """Return the number that the model has at the path of a property."""
-    matches = places(problem.model, path)
+    matches = find_properties(problem.model, path)
     try:
-        return matches[0].setter(problem.model).get()
+        return matches[0].make_setter(problem.model).get_value()
     except (IndexError, SettingError):
         raise problem.invalid_error(goal, f"the model has no number '{path}'") from None

@@ -139,7 +139,9 @@ def _measure_joint_power(
     if any(driven):
         state, count = system.state, len(system.order)
         q, u = state.values(y), state.speeds(y)
-        forces = state.spread(system.applied(t, y)[count : 2 * count], [0.0] * len(q))
+        forces = state.spread(
+            system.compute_applied_forces(t, y)[count : 2 * count], [0.0] * len(q)
+        )
         udot = system.mechanism.acceleration(q, u, forces, time=t)
         powers = (system.mechanism.inverse_dynamics(q, u, udot) - forces) * u
     result = [raise_to_power(float(sum(powers[places])), exponent) for places in driven]
@@ -163,7 +165,9 @@ def _measure_energy(probe: DeclaredProbe, system: Any, t: float, y: Sequence[flo
     return [
         sum(
             factor * part
-            for factor, part in zip(probe.reading.details, system.energies(t, y), strict=True)
+            for factor, part in zip(
+                probe.reading.details, system.compute_energies(t, y), strict=True
+            )
         )
     ]
 

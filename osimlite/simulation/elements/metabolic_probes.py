@@ -232,7 +232,7 @@ def _measure_smoothed(
             SmoothTransitions(*numbers[-len(SmoothTransitions._fields) :]),
         )
         activation, control, active, passive, length, velocity, factor = (
-            system.recorded(*place) for place in places
+            system.read_record(*place) for place in places
         )
         maintained, _, _ = MAINTENANCE_CURVE.derivatives(length / m.optimal_fiber_length)
         rates.append(

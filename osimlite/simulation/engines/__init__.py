@@ -1,4 +1,4 @@
-"""Engines: programs that compute accelerations, each behind the same protocol, each in a module of its own."""
+"""Engines: programs that compute accelerations, one module each, behind the protocol of :mod:`.protocol`."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ ENGINES = {
     "bullet": "osimlite.simulation.engines.bullet.engine",
     "compiled": "osimlite.simulation.engines.compiled",
 }
-"""Module of each engine, whose `make` makes one."""
+"""Module of each engine, whose `make_engine` makes one."""
 
 
 DEFAULT_ENGINE = "compiled"
-"""What computes a motion if nothing else is selected, whatever packages are installed."""
+"""Engine that is used if none is selected, whatever packages are installed."""
 
 DEPRECATED_NAME = "auto"
 """Earlier name of the default: PyBullet where it was installed, so that results depended on that."""
@@ -57,4 +57,4 @@ def engine_factory(name: str | None = None) -> EngineFactory:
         OsimliteError: there is no engine of that name.
         MissingDependency: the package it works with is not installed.
     """
-    return import_module(ENGINES[engine_name(name)]).make
+    return import_module(ENGINES[engine_name(name)]).make_engine

@@ -1,4 +1,4 @@
-"""What all engines have in common: forces, constraints and steps are those of the kernels."""
+"""Base class of the engines: forces, constraints and steps by the kernels."""
 
 from __future__ import annotations
 
@@ -16,24 +16,25 @@ from osimlite.simulation.system import System
 
 
 class KernelEngine(System):
-    """Motion by the kernels; see the protocol for what it offers.
+    """Motion by the kernels; see :class:`osimlite.simulation.engines.protocol.Engine` for its methods.
 
     Args:
-        mechanism: what moves.
-        forces: what pushes it, besides gravity.
-        chain: of joints whose mass matrix another program computes; the kernels do without one.
+        mechanism: the mechanism.
+        forces: forces on it besides gravity.
+        chain: joints whose mass matrix another program computes; None if the kernels compute it.
 
     Raises:
-        UnsupportedError: a joint, a function, a constraint or a force that the kernels do not know.
+        UnsupportedError: the kernels do not support a joint, function, constraint or force.
     """
 
     entries = ("evaluate", "run_several", MERSON)
 
     @property
-    def counted(self) -> tuple[int, int]:
-        """What the sums of the squared errors of values and of speeds are divided by.
+    def error_counts(self) -> tuple[int, int]:
+        """Divisors of the sums of squared errors of values and of speeds, in the norm of the integrator.
 
-        Simbody counts locked coordinates too, and the fourth number that it keeps for three angles.
+        Simbody counts locked coordinates too, and the fourth number of a quaternion for each joint
+        with three angles.
         """
         count = len(self.mechanism.coordinates)
         return count + sum(
@@ -41,32 +42,36 @@ class KernelEngine(System):
         ), count
 
     # ---------------------------------------------------------------------------------------- accelerations
-    def derivative(self, t: float, y: Sequence[float]) -> list[float]:
-        """(qdot, udot, zdot) at a state."""
+    def compute_derivative(self, t: float, y: Sequence[float]) -> list[float]:
+        """Return (qdot, udot, zdot) at a state."""
         status = self.realize(t, y, STAGE.ACCELERATION)
         if status != OUTCOME.OK:
-            raise self.refusal(status, t, y)
-        self.note_loads(self._pairs[:, :3])
-        return self.found()
+            raise self.make_evaluation_error(status, t, y)
+        self.store_contact_loads(self._pairs[:, :3])
+        return self.get_derivative()
 
-    def acceleration(self, t: float, q: Sequence[float], u: Sequence[float]) -> list[float]:
-        """Derivatives of the speeds of all coordinates, in the mechanism's order; zero if locked."""
-        udot = self.derivative(t, self.state.pack(q, u))[len(self.order) : 2 * len(self.order)]
-        return self.state.spread(udot, [0.0] * len(self.mechanism.coordinates))
+    def compute_accelerations(
+        self, t: float, q: Sequence[float], u: Sequence[float]
+    ) -> list[float]:
+        """Return the derivatives of the speeds of all coordinates, in the mechanism's order; 0 if locked."""
+        udot = self.compute_derivative(t, self.state.pack(q, u))[
+            len(self.order) : 2 * len(self.order)
+        ]
+        return self.state.spread_to_all(udot, [0.0] * len(self.mechanism.coordinates))
 
     # ---------------------------------------------------------------------------------------------- motion
-    def stepper(
+    def make_stepper(
         self, t: float, y: Sequence[float], settings: Settings, observe: Observer
     ) -> Stepper:
-        """What integrates from a state on: steps whose error is controlled, or fixed steps of semi-implicit Euler."""
+        """Return a stepper from a state on: error-controlled steps, or fixed steps of semi-implicit Euler."""
         if settings.fixed_step is not None:
             rates = (
                 None
                 if all(body.mobilizer.speeds_are_rates for body in self.mechanism.bodies)
-                else self._rates
+                else self._compute_rates
             )
             return SemiImplicitEuler(
-                self.derivative,
+                self.compute_derivative,
                 t,
                 y,
                 len(self.order),
@@ -74,7 +79,7 @@ class KernelEngine(System):
                 rates=rates,
                 observe=observe,
                 names=self.state.names,
-                projected=self.projected,
+                projected=self.project_state,
             )
         bounds, held = settings.step_bounds, settings.held
         return ControlledSteps(
@@ -88,28 +93,29 @@ class KernelEngine(System):
             held=held,
         )
 
-    def projected(self, t: float, y: Sequence[float], tolerance: float) -> list[float] | None:
-        """The state (y,) nearest to one where the constraints hold to a tolerance; None if none is near."""
+    def project_state(self, t: float, y: Sequence[float], tolerance: float) -> list[float] | None:
+        """Return the nearest state (y,) that fulfils the constraints to a tolerance; None if none is near."""
         if not self.structure[MODEL.CONSTRAINED]:
             return list(y)
-        self._set(t, y)
+        self._set_state(t, y)
         self._w[WORK.SCRATCH : WORK.SCRATCH + 2] = tolerance, inf
-        entry = self.program.code.entry("project")
+        entry = self.program.code.get_entry("project")
         status = entry(self.program.ints, self.numbers, self._w, self._y, self._f, 0)
         return self._y.tolist() if status == OUTCOME.OK else None
 
-    def _rates(self, q: list[float], u: list[float]) -> list[float]:
+    def _compute_rates(self, q: list[float], u: list[float]) -> list[float]:
+        """Return the rates of the coordinates for values and speeds."""
         y = q + u + [0.0] * len(self.state.variables)
         status = self.realize(0.0, y, STAGE.VELOCITY)
         if status != OUTCOME.OK:
-            raise self.refusal(status, 0.0, y)
-        return self.found()[: len(self.order)]
+            raise self.make_evaluation_error(status, 0.0, y)
+        return self.get_derivative()[: len(self.order)]
 
-    def hold(self) -> None:
-        """There is no window."""
+    def hold_window(self) -> None:
+        """Do nothing: this engine has no window."""
 
     def close(self) -> None:
-        """Nothing is held."""
+        """Do nothing: this engine holds no resources."""
 
     def __enter__(self) -> Self:
         return self

@@ -1,4 +1,4 @@
-"""Several motions of the compiled engine: the arrays that they read and write, and the call that computes them."""
+"""Workspace of several motions of the compiled engine, and the kernel calls that compute them."""
 
 from __future__ import annotations
 
@@ -16,37 +16,47 @@ from osimlite.mechanics.kernels.layout import MODEL
 from osimlite.mechanics.kernels.pointers import Floats, Ints
 from osimlite.mechanics.kernels.table import LAW_MODULES
 from osimlite.simulation.batches import BatchOptions
-from osimlite.simulation.options import INITIAL_STEP
+from osimlite.simulation.options import INITIAL_STEP_S
 
 if TYPE_CHECKING:
-    from osimlite.simulation.control_steps import HeldRuns
+    from osimlite.simulation.control_steps import ControllerRuns
     from osimlite.simulation.engines.base import KernelEngine
 
-NO_KINDS, NO_LEVELS = np.zeros((0, 3), dtype=np.int64), np.zeros((0, 7))
+NO_WATCH_KINDS = np.zeros((0, 3), dtype=np.int64)
+"""Kinds of an empty list of watches."""
+
+NO_WATCH_LEVELS = np.zeros((0, 7))
+"""Levels of an empty list of watches."""
 
 
 class Batch:
-    """Runs that differ in their starts or in their numbers.
+    """Runs that differ in their initial states or in their numbers.
 
-    Args: engine: whose mechanism. states: where the runs start (W, y). options: how they go;
-        watches are given as `kinds` and `levels`. start: time from which they go on, s. next_step:
-        that is tried first, s. vectors: numbers, one row for all or one for each run. kinds: of the
-        watches (k, 3). levels: of the watches (k, 7). most_logged: room for steps in the log, which
-        all runs share. start_holds: the constraints hold where the runs start; otherwise they start
-        from the nearest such states. held: of a controller that they go by, which writes into the
-        numbers of each.
+    Args:
+        engine: the engine.
+        states: initial states (W, y).
+        options: options; watches are given as `kinds` and `levels`.
+        start: start time, s.
+        next_step: first step that is tried, s.
+        vectors: numbers of the model, one row for all runs or one for each.
+        kinds: kinds of the watches (k, 3).
+        levels: levels of the watches (k, 7).
+        most_logged: largest number of steps in the log, which all runs share.
+        start_holds: whether the initial states fulfil the constraints; otherwise the runs start
+            from the nearest states that do.
+        held: controllers of the runs, which write into the numbers of each run.
 
     Attributes:
         clocks: time and next step of each run, s (W, 2).
         counts: see :mod:`osimlite.mechanics.kernels.record` (W, 6).
-        states: at the end (W, y).
-        endings: of the runs (W,).
-        reports: states at the times (W, r, y), not a number after the end of a run.
-        events: time, number, 1 for a beginning, and the state if it is kept (W, e, 3 or 3 + y).
+        states: states at the end (W, y).
+        endings: how each run ended (W,).
+        reports: states at the report times (W, r, y), NaN after the end of a run.
+        events: time, index, 1 for a begin, and the state if it is recorded (W, e, 3 or 3 + y).
         peaks: largest force of each contact and its time (W, P, 2).
-        log: of each step time, state and derivative.
-        forces: of each step the force of each contact.
-        errors: of the step that was tried last (y,).
+        log: time, state and derivative of each step.
+        forces: contact forces of each step.
+        errors: errors of the last attempted step (y,).
     """
 
     def __init__(
@@ -56,20 +66,20 @@ class Batch:
         options: BatchOptions,
         *,
         start: float = 0.0,
-        next_step: float = INITIAL_STEP,
+        next_step: float = INITIAL_STEP_S,
         vectors: Floats | None = None,
-        kinds: Ints = NO_KINDS,
-        levels: Floats = NO_LEVELS,
+        kinds: Ints = NO_WATCH_KINDS,
+        levels: Floats = NO_WATCH_LEVELS,
         most_logged: int = 0,
         start_holds: bool = False,
-        held: HeldRuns | None = None,
+        held: ControllerRuns | None = None,
     ) -> None:
-        self.states = engine.state.table(states)
+        self.states = engine.state.as_table(states)
         (count, size), pairs = self.states.shape, len(engine.contacts)
         self._engine, self._kinds, self._levels, self._held = engine, kinds, levels, held
         self._vectors = engine.numbers[None] if vectors is None else vectors
         self._times = np.array(options.report_times, dtype=np.float64)
-        self._settings = options.to, options.accuracy, *engine.counted, *options.step_bounds
+        self._settings = options.to, options.accuracy, *engine.error_counts, *options.step_bounds
         s, event, program = engine.structure, 3 + size * options.event_states, engine.program
         method = import_module(f"{kernels.__name__}.{LAW_MODULES[options.integrator]}")
         self._method_at = int(s[MODEL.WORK_SIZE]) + 3 * (pairs + len(kinds))
@@ -85,7 +95,7 @@ class Batch:
             len(kinds),
             most_logged,
         )
-        address = program.code.address(options.integrator)
+        address = program.code.get_address(options.integrator)
         self._sizes = np.array((*sizes, start_holds, address, self._method_at), dtype=np.int64)
         self.clocks = np.empty((count, 2))
         self.clocks[:] = start, next_step
@@ -103,16 +113,16 @@ class Batch:
             np.empty((most_logged, pairs, 3)),
         )
 
-    def allow(self, steps: int) -> None:
-        """Let the next call end after so many steps, or when the log is full."""
+    def limit_steps(self, steps: int) -> None:
+        """Let the next call end after a number of steps, or when the log is full."""
         self._sizes[record.MOST_LOGGED] = min(steps, len(self.log))
 
-    def room(self) -> Floats:
-        """What a call of `run` works on; a method goes on from what it has left there."""
+    def make_workspace(self) -> Floats:
+        """Return the workspace of `run`; a method continues from what it has left there."""
         return np.zeros(self._room)
 
     def run(self, room: Floats, first: int = 0, last: int | None = None) -> None:
-        """Compute the runs from `first` up to `last`; other threads compute others in rooms of theirs."""
+        """Compute the runs from `first` to before `last`; other threads compute others in their own workspaces."""
         size = self.states.shape[1]
         first_error = int(self._engine.structure[MODEL.WORK_STATE]) + ERRORS * size
         self.errors = room[first_error : first_error + size]
@@ -124,7 +134,7 @@ class Batch:
             ("run_several", ()) if self._held is None else ("run_by_reflexes", self._held.parts)
         )
         parts = *records, self._kinds, self._levels, self.endings, *more
-        self._call(
+        self._call_law(
             law,
             vectors,
             room,
@@ -135,16 +145,16 @@ class Batch:
             len(self.states) if last is None else last,
         )
 
-    def hold(self, law: str, room: Floats, numbers: Floats, *parts: Any) -> int:
-        """Compute by a law of :mod:`osimlite.mechanics.kernels.walks`, with what it takes besides.
+    def run_walk_law(self, law: str, room: Floats, numbers: Floats, *parts: Any) -> int:
+        """Call a law of :mod:`osimlite.mechanics.kernels.walks`.
 
         Args:
             law: its name.
-            room: as of `run`.
-            numbers: of the model (x,), which are changed.
-            parts: as said.
+            room: workspace, see :meth:`make_workspace`.
+            numbers: numbers of the model (x,), which the law changes.
+            parts: further arguments of the law.
         """
-        return self._call(
+        return self._call_law(
             law,
             numbers,
             room,
@@ -156,7 +166,7 @@ class Batch:
             *parts,
         )
 
-    def _call(self, law: str, numbers: Floats, room: Floats, *parts: Any) -> int:
+    def _call_law(self, law: str, numbers: Floats, room: Floats, *parts: Any) -> int:
         room[self._method_at :][: len(self._settings)] = self._settings
         program = self._engine.program
-        return program.run(program.code.entry(law), program.ints, numbers, room, *parts)
+        return program.run(program.code.get_entry(law), program.ints, numbers, room, *parts)

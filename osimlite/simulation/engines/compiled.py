@@ -1,7 +1,8 @@
-"""The compiled engine: accelerations, steps and events in machine code.
+"""The compiled engine: accelerations, steps, events and batches in machine code.
 
-What is compiled are the functions of :mod:`osimlite.mechanics.kernels` with the force laws and the
-step control that they call. The code serves every model: models and parameters are arrays.
+The kernels of :mod:`osimlite.mechanics.kernels` are compiled with the force laws and the step
+control that they call. The code serves every model, because models and parameters are arrays.
+:mod:`osimlite.simulation.batches` describes batches.
 """
 
 from __future__ import annotations
@@ -27,15 +28,20 @@ from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.builder import OPENSIM
 from osimlite.simulation.engines.base import KernelEngine
 from osimlite.simulation.engines.batch import Batch
-from osimlite.simulation.engines.linking import version
+from osimlite.simulation.engines.linking import describe_version
 from osimlite.simulation.engines.protocol import Settings
 
 if TYPE_CHECKING:
-    from osimlite.simulation.engines.model_update import NumbersOnly
+    from osimlite.simulation.engines.model_update import NumberUpdater
 
 
-def make(mechanism: Mechanism, forces: Forces, settings: Settings) -> BatchEngine:
-    """Make the engine."""
+def make_engine(mechanism: Mechanism, forces: Forces, settings: Settings) -> BatchEngine:
+    """Return a compiled engine.
+
+    Raises:
+        SimulationError: a window is requested.
+        OsimliteError: there is no such route.
+    """
     if settings.show:
         raise SimulationError(
             "the compiled engine shows no window; osimlite view plays its motions, or take --engine bullet for --gui"
@@ -48,8 +54,8 @@ def make(mechanism: Mechanism, forces: Forces, settings: Settings) -> BatchEngin
     return CompiledEngine(mechanism, forces)
 
 
-AT_ONCE = 8
-"""So many runs a thread takes at a time."""
+RUNS_PER_TASK = 8
+"""Number of runs that a thread computes before it takes the next ones."""
 
 
 def run_many(
@@ -58,32 +64,32 @@ def run_many(
     options: BatchOptions,
     numbers: ArrayLike | None = None,
 ) -> Runs:
-    """Compute a batch."""
+    """Compute a batch; see :meth:`osimlite.simulation.batches.BatchEngine.run_many`."""
     from concurrent.futures import ThreadPoolExecutor
 
-    starts = engine.state.table(states)
+    starts = engine.state.as_table(states)
     options.check()
-    vectors, count = _rows(engine, numbers), len(starts)
+    vectors, count = _as_number_rows(engine, numbers), len(starts)
     if vectors.shape not in ((1, len(engine.numbers)), (count, len(engine.numbers))):
         raise OsimliteError(
             f"the numbers are one row of {len(engine.numbers)} for each of the {count} runs; got {vectors.shape}"
         )
-    kinds, levels = _watches(engine, options.watches)
+    kinds, levels = _encode_watches(engine, options.watches)
     held = None
     if options.held:
         if len(options.held) != count:
             raise OsimliteError(f"{len(options.held)} controllers are given for {count} runs")
         first, *others = options.held
-        held = first.runs(engine, engine.forces.controls, others=others)
-        # Each run holds controls of its own among its numbers.
+        held = first.make_runs(engine, engine.forces.controls, others=others)
+        # Each run writes its held controls into its own numbers.
         vectors = vectors if len(vectors) == count else np.tile(vectors, (count, 1))
     batch = Batch(engine, starts, options, vectors=vectors, kinds=kinds, levels=levels, held=held)
 
     def work(first: int) -> None:
-        batch.run(batch.room(), first, min(first + AT_ONCE, count))
+        batch.run(batch.make_workspace(), first, min(first + RUNS_PER_TASK, count))
 
     with ThreadPoolExecutor(options.threads or count_cores()) as pool:
-        list(pool.map(work, range(0, count, AT_ONCE)))
+        list(pool.map(work, range(0, count, RUNS_PER_TASK)))
     names = [*engine.contacts, *(watch.name for watch in options.watches)]
     kept = [
         rows[:total]
@@ -106,35 +112,36 @@ def run_many(
     )
 
 
-def contact_places(
+def locate_contacts(
     engine: CompiledEngine,
     states: ArrayLike,
     numbers: ArrayLike | None = None,
     rows: ArrayLike | None = None,
 ) -> Floats:
-    """Where the surfaces of all contacts are (k, P, 9)."""
-    vectors, given = _rows(engine, numbers), engine.state.table(states)
+    """Return the surfaces of all contacts (k, P, 9); see :meth:`osimlite.simulation.batches.BatchEngine.locate_contacts`."""
+    vectors, given = _as_number_rows(engine, numbers), engine.state.as_table(states)
     which = np.zeros(len(given), dtype=np.int64) if rows is None else np.array(rows, dtype=np.int64)
     places = np.zeros((len(given), len(engine.contacts), 9))
     w, derivative = np.zeros(engine.structure[MODEL.WORK_SIZE]), np.zeros(engine.state.size)
     arrays = vectors, w, vectors.shape[1], which, given, derivative, places
-    engine.program.code.entry("contact_places")(engine.program.ints, *arrays, len(given))
+    engine.program.code.get_entry("contact_places")(engine.program.ints, *arrays, len(given))
     return places
 
 
-def contact_radii(engine: CompiledEngine, numbers: ArrayLike | None = None) -> Floats:
-    """Radii of the second surfaces (v, P)."""
+def get_contact_radii(engine: CompiledEngine, numbers: ArrayLike | None = None) -> Floats:
+    """Return the radii of the second surfaces (v, P), m."""
     s = engine.structure
     records = s[s[MODEL.CONTACT_AT] : s[MODEL.CONTACT_AT] + len(engine.contacts)]
-    return _rows(engine, numbers)[:, s[records + ITEM.NUMBERS] + RADIUS]
+    return _as_number_rows(engine, numbers)[:, s[records + ITEM.NUMBERS] + RADIUS]
 
 
-def _rows(engine: CompiledEngine, numbers: ArrayLike | None) -> Floats:
+def _as_number_rows(engine: CompiledEngine, numbers: ArrayLike | None) -> Floats:
     vectors = np.array(engine.numbers if numbers is None else numbers, dtype=np.float64, order="C")
     return vectors.reshape(-1, vectors.shape[-1])
 
 
-def _watches(engine: CompiledEngine, watches: Sequence[Watch]) -> tuple[Ints, Floats]:
+def _encode_watches(engine: CompiledEngine, watches: Sequence[Watch]) -> tuple[Ints, Floats]:
+    """Return kinds (k, 3) and levels (k, 7) of watches for the kernels."""
     kinds, levels = np.zeros((len(watches), 3), dtype=np.int64), np.zeros((len(watches), 7))
     mechanism = engine.mechanism
     for row, watch in enumerate(watches):
@@ -165,30 +172,30 @@ def _watches(engine: CompiledEngine, watches: Sequence[Watch]) -> tuple[Ints, Fl
 
 
 class CompiledEngine(KernelEngine):
-    """The accelerations of a mechanism in machine code; see the protocol for what it offers.
+    """Engine that computes accelerations in machine code; see :class:`osimlite.simulation.engines.protocol.Engine`.
 
     Args:
-        mechanism: what moves.
-        forces: what pushes it, besides gravity.
+        mechanism: the mechanism.
+        forces: forces on it besides gravity.
 
     Raises:
-        UnsupportedError: a joint, a function, a constraint or a force that it does not know.
+        UnsupportedError: the kernels do not support a joint, function, constraint or force.
     """
 
     name = "compiled"
-    version = version()
+    version = describe_version()
     route = "composite-rigid-body"
 
     def __reduce__(self) -> Any:
-        # Addresses mean nothing in another process.
+        # Addresses are not valid in another process.
         return CompiledEngine, (self.mechanism, self.forces)
 
     run_many = run_many
-    contact_places = contact_places
-    contact_radii = contact_radii
+    locate_contacts = locate_contacts
+    get_contact_radii = get_contact_radii
 
-    def renewal(self, model: Model, folder: Path, wrapping: str = OPENSIM) -> NumbersOnly:
-        """What makes parts of the model anew."""
-        from osimlite.simulation.engines.model_update import NumbersOnly
+    def make_updater(self, model: Model, folder: Path, wrapping: str = OPENSIM) -> NumberUpdater:
+        """Return an updater of parts of the model."""
+        from osimlite.simulation.engines.model_update import NumberUpdater
 
-        return NumbersOnly(model, self, folder, wrapping)
+        return NumberUpdater(model, self, folder, wrapping)

@@ -1,8 +1,8 @@
-"""Laws that a C++ compiler compiles one by one: edited ones, and those of a user's own types of forces.
+"""Laws that a C++ compiler compiles one by one: edited laws, and those of a user's own force types.
 
-Each becomes a small shared library, which is kept in a folder that only the user can write in. Its
-name has the digest of the law's sources. A checksum tells damage; who wrote a file is told by who
-can write there.
+Each becomes a small shared library in a folder that only the user can write to. The file name
+contains the digest of the law's sources. A checksum detects damage; the permissions of the folder
+guarantee who wrote a file.
 """
 
 from __future__ import annotations
@@ -36,23 +36,23 @@ from osimlite.simulation.engines.private_files import read_private, write_privat
 
 _log = logging.getLogger(__name__)
 
-FOLDER = "NUMBA_CACHE_DIR"
-"""Environment variable that may name the only folder for the files; numba uses it for its own."""
+CACHE_VARIABLE = "NUMBA_CACHE_DIR"
+"""Environment variable that names the only folder for compiled files; numba uses it for its own files."""
 
 _libraries: list[ctypes.CDLL] = []
-"""Machine code stays where it is as long as these do."""
+"""Loaded libraries; their machine code is valid as long as these objects exist."""
 
 
 Function = Callable[..., Any]
 
 
 def load_function(symbol: str, function: Function, directions: int) -> int | None:
-    """Return the address of a function that was compiled before; None if there is no file that only the user can write.
+    """Return the address of a function that was compiled earlier; None if no trusted file has it.
 
     Args:
         symbol: its name in the library.
-        function: that it was compiled from.
-        directions: number of derivatives that its numbers carry; 0 for floats.
+        function: the function it was compiled from.
+        directions: number of derivatives of its dual numbers; 0 for floats.
     """
     file = _file_name(symbol, function, directions)
     for folder in cache_folders():
@@ -63,25 +63,25 @@ def load_function(symbol: str, function: Function, directions: int) -> int | Non
             and hashlib.sha256(code).hexdigest().encode() == checksum
         ):
             try:
-                return _load(folder / file, symbol)
+                return _load_library(folder / file, symbol)
             except (OSError, AttributeError):
                 continue
     return None
 
 
 def load_law(name: str) -> int | None:
-    """Return the address of a law that was compiled before; None if there is no file that only the user can write."""
+    """Return the address of a law that was compiled earlier; None if no trusted file has it."""
     return load_function(get_symbol(name), *find_law(name))
 
 
 def compile_laws(names: Sequence[str]) -> dict[str, int]:
-    """Compile laws, on as many cores as there are.
+    """Compile laws on all cores.
 
     Args:
-        names: of the laws.
+        names: names of the laws.
 
     Returns:
-        The address of each.
+        Addresses by name.
 
     Raises:
         CompilationError: there is no compiler, it failed, or a law cannot be translated.
@@ -96,12 +96,12 @@ def compile_laws(names: Sequence[str]) -> dict[str, int]:
 
 
 def compile_function(symbol: str, function: Function, directions: int) -> int:
-    """Compile a function, keep it if there is a folder for that, and return its address.
+    """Compile a function, save it if a folder allows that, and return its address.
 
     Args:
         symbol: its name in the library.
-        function: in the restricted Python of kernels.
-        directions: number of derivatives that its numbers carry; 0 for floats.
+        function: a function in the restricted Python of kernels.
+        directions: number of derivatives of its dual numbers; 0 for floats.
 
     Raises:
         CompilationError: there is no compiler, it failed, or the function cannot be translated.
@@ -112,7 +112,7 @@ def compile_function(symbol: str, function: Function, directions: int) -> int:
     try:
         text = cplusplus.write_library({symbol: (function, directions)})
     except (TranslationError, OSError) as error:
-        # An OSError is Python's word for a function without a text.
+        # Python raises OSError for a function without source text.
         raise CompilationError(f"'{symbol}' cannot be compiled: {error}") from error
     with tempfile.TemporaryDirectory() as work:
         folder = Path(work)
@@ -121,19 +121,19 @@ def compile_function(symbol: str, function: Function, directions: int) -> int:
         result = folder / _file_name(symbol, function, directions)
         compiler.compile(folder / "law.cpp", folder / "law.o", NATIVE)
         compiler.link([folder / "law.o"], result)
-        kept = _keep(result)
+        kept = _save_library(result)
         if kept is not None:
-            return _load(kept, symbol)
-        # A loaded file can be removed, but not where the system is Windows.
+            return _load_library(kept, symbol)
+        # A loaded library can be deleted, except on Windows.
         if os.name != "nt":
-            return _load(result, symbol)
+            return _load_library(result, symbol)
         lasting = Path(tempfile.mkdtemp()) / result.name
         result.rename(lasting)
-        return _load(lasting, symbol)
+        return _load_library(lasting, symbol)
 
 
-def _keep(library: Path) -> Path | None:
-    """Copy a library into the first folder that can be written by the user alone, and return its path there."""
+def _save_library(library: Path) -> Path | None:
+    """Copy a library into the first folder that only the user can write to, and return its path there; None without one."""
     code = library.read_bytes()
     refusals = []
     for folder in cache_folders():
@@ -156,8 +156,8 @@ def _warn_once(sentence: str) -> None:
     _log.warning(sentence)
 
 
-def _load(path: Path, symbol: str) -> int:
-    """Load a library, and return the address of the function in it."""
+def _load_library(path: Path, symbol: str) -> int:
+    """Load a library, and return the address of its function."""
     library = ctypes.CDLL(os.path.realpath(path))
     address = ctypes.cast(library[symbol], ctypes.c_void_p).value
     _libraries.append(library)
@@ -166,14 +166,14 @@ def _load(path: Path, symbol: str) -> int:
 
 
 def _file_name(symbol: str, function: Function, directions: int) -> str:
-    """Return the name of the file of a function: it holds for one state of its sources and one kind of processor."""
-    parts = compute_digest(function, _translation()), directions, _machine()
+    """Return the file name of a function, which depends on its sources and on the processor."""
+    parts = compute_digest(function, _digest_translator()), directions, _describe_machine()
     return f"{symbol}-{hashlib.sha256(repr(parts).encode()).hexdigest()[:16]}{library_suffix()}"
 
 
 @cache
-def _translation() -> str:
-    """Return a digest of what translates laws to C++."""
+def _digest_translator() -> str:
+    """Return a digest of the translator from laws to C++."""
     folder = Path(cplusplus.__file__).parent
     files = sorted(path for path in folder.rglob("*") if path.suffix in (".py", ".h"))
     files.append(Path(reader.__file__))
@@ -181,23 +181,23 @@ def _translation() -> str:
 
 
 @cache
-def _machine() -> tuple[str, ...]:
-    """Return what the machine code is good for."""
+def _describe_machine() -> tuple[str, ...]:
+    """Return what machine code depends on: operating system, architecture, processor features."""
     return sys.platform, machine_name(), *sorted(processor_features())
 
 
 def cache_folders() -> Iterator[Path]:
-    """Yield the folders where files may be, the best one first."""
-    if os.environ.get(FOLDER):
-        yield Path(os.environ[FOLDER])
+    """Yield the folders for compiled files, the preferred one first."""
+    if os.environ.get(CACHE_VARIABLE):
+        yield Path(os.environ[CACHE_VARIABLE])
         return
     yield Path(__file__).parents[2] / "mechanics" / "kernels" / "__pycache__"
     home: str | Path | None = os.environ.get("LOCALAPPDATA") or os.environ.get("XDG_CACHE_HOME")
-    # A relative path would lead into whatever folder the program is started in.
+    # A relative path would depend on the current folder.
     if not home or not os.path.isabs(home):
         try:
             home = Path.home() / ".cache"
         except RuntimeError:
-            # The system knows no home of this user, as in some containers.
+            # Some containers have no home folder for the user.
             return
     yield Path(home) / "osimlite"

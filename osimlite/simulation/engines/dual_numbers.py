@@ -1,8 +1,7 @@
-"""Numbers that carry their derivatives along several directions, as Python has them, and their rules.
+"""Dual numbers: numbers with derivatives along several directions, and their rules in Python.
 
-A kernel runs on such numbers from the text that it has, with functions of them in the place of
-Python's mathematics. What takes no derivatives from one (a comparison, an integer, a vector of
-floats) takes its value.
+A kernel runs on dual numbers with unchanged code; the functions of Python's `math` are replaced.
+Comparisons, integers and vectors of floats use the value alone.
 """
 
 from __future__ import annotations
@@ -23,8 +22,8 @@ from osimlite.mechanics.laws.dual_numbers import (
     slope_of,
 )
 
-# Where a slope has no end, at the edge of what a function is defined for, it counts as 0.
-SLOPES: dict[Any, tuple[Callable[..., float], ...]] = {
+# At the edge of a function's domain, where the slope is infinite, it counts as 0.
+FUNCTION_SLOPES: dict[Any, tuple[Callable[..., float], ...]] = {
     operator.neg: (lambda x, f: -1.0,),
     abs: (lambda x, f: -1.0 if x < 0.0 else 1.0,),
     float: (lambda x, f: 1.0,),
@@ -51,21 +50,21 @@ SLOPES: dict[Any, tuple[Callable[..., float], ...]] = {
         lambda x, y, f: f * math.log(x) if x > 0.0 else 0.0,
     ),
 }
-"""Of functions the derivative by each argument, from the arguments and the value."""
-ARITHMETIC: dict[Any, tuple[Callable[..., float], ...]] = {
+"""Derivative of each function by each argument, from the arguments and the value f."""
+ARITHMETIC_SLOPES: dict[Any, tuple[Callable[..., float], ...]] = {
     operator.add: (lambda x, y, f: 1.0, lambda x, y, f: 1.0),
     operator.sub: (lambda x, y, f: 1.0, lambda x, y, f: -1.0),
     operator.mul: (lambda x, y, f: y, lambda x, y, f: x),
     operator.truediv: (lambda x, y, f: 1.0 / y, lambda x, y, f: -f / y),
 }
-"""The same of what machine code has instructions for."""
+"""Derivatives of the operations for which machine code has instructions."""
 
 
-class Carrying:
+class DualNumber:
     """A number with its derivatives along several directions."""
 
     __array_ufunc__ = None
-    # Two are equal where their values are, whatever they carry, so that none is a key.
+    # Equality compares values only, so dual numbers cannot be dictionary keys.
     __hash__ = None  # type: ignore[assignment]
     __slots__ = "slopes", "value"
 
@@ -83,10 +82,10 @@ class Carrying:
 
 
 class DualVector:
-    """A vector of such numbers, which are made of the rows of an array where they are read.
+    """A vector of dual numbers, which are made of the rows of an array when they are read.
 
     Args:
-        rows: (n, 1 + directions), each a number and its derivatives.
+        rows: numbers with their derivatives (n, 1 + directions).
     """
 
     __slots__ = ("_rows",)
@@ -107,89 +106,96 @@ class DualVector:
         return (
             DualVector(row)
             if isinstance(index, slice)
-            else Carrying(float(row[0]), row[1:].tolist())
+            else DualNumber(float(row[0]), row[1:].tolist())
         )
 
     def __setitem__(self, index: int, number: Any) -> None:
         row = self._rows[index]
-        if isinstance(number, Carrying):
+        if isinstance(number, DualNumber):
             row[0], row[1:] = number.value, number.slopes
         else:
             row[0], row[1:] = number, 0.0
 
 
-def _through(function: Any, slopes: tuple[Callable[..., float], ...]) -> Callable[..., Any]:
-    """A function of such numbers and of floats."""
+def _apply_chain_rule(
+    function: Any, slopes: tuple[Callable[..., float], ...]
+) -> Callable[..., Any]:
+    """Return a function of dual numbers and floats, by the chain rule."""
 
     def called(*given: Any) -> Any:
         values = [float(x) for x in given]
         result = function(*values)
         change: list[float] = []
         for x, slope in zip(given, slopes, strict=True):
-            if isinstance(x, Carrying):
+            if isinstance(x, DualNumber):
                 by = slope(*values, result)
                 more = [by * own for own in x.slopes]
                 change = [a + b for a, b in zip(change, more, strict=True)] if change else more
-        return Carrying(result, change) if change else result
+        return DualNumber(result, change) if change else result
 
     return called
 
 
-def _compared(comparison: Callable[[float, float], bool]) -> Callable[[Any, Any], bool]:
+def _compare_values(comparison: Callable[[float, float], bool]) -> Callable[[Any, Any], bool]:
+    """Return a comparison of values that ignores derivatives."""
     return lambda x, y: comparison(float(x), float(y))
 
 
 _RULES = {
-    function: _through(function, slopes) for function, slopes in (SLOPES | ARITHMETIC).items()
+    function: _apply_chain_rule(function, slopes)
+    for function, slopes in (FUNCTION_SLOPES | ARITHMETIC_SLOPES).items()
 }
 for _name in ("neg", "abs"):
-    setattr(Carrying, f"__{_name}__", _RULES[abs if _name == "abs" else operator.neg])
+    setattr(DualNumber, f"__{_name}__", _RULES[abs if _name == "abs" else operator.neg])
 for _name in ("add", "sub", "mul", "truediv", "mod", "pow"):
     _rule = _RULES[getattr(operator, _name)]
-    setattr(Carrying, f"__{_name}__", _rule)
-    setattr(Carrying, f"__r{_name}__", lambda x, y, rule=_rule: rule(y, x))
+    setattr(DualNumber, f"__{_name}__", _rule)
+    setattr(DualNumber, f"__r{_name}__", lambda x, y, rule=_rule: rule(y, x))
 for _name in ("lt", "le", "gt", "ge", "eq", "ne"):
-    setattr(Carrying, f"__{_name}__", _compared(getattr(operator, _name)))
+    setattr(DualNumber, f"__{_name}__", _compare_values(getattr(operator, _name)))
 
 
-def _begun(number: float, direction: int, directions: int) -> Carrying:
-    return Carrying(float(number), [float(k == direction) for k in range(directions)])
+def _seed_direction(number: float, direction: int, directions: int) -> DualNumber:
+    """Return a number whose derivative is 1 along one direction and 0 along the others."""
+    return DualNumber(float(number), [float(k == direction) for k in range(directions)])
 
 
-def _settled(root: Any, error: Any, slope: Any) -> Any:
+def _differentiate_root(root: Any, error: Any, slope: Any) -> Any:
+    """Return a root with derivatives by the implicit function theorem: one Newton step whose value is zero."""
     return root - (error - float(error)) / float(slope)
 
 
-def _is_nothing(number: Any) -> bool:
-    return not number and not (isinstance(number, Carrying) and any(number.slopes))
+def _is_zero(number: Any) -> bool:
+    """Return whether a number and all its derivatives are 0."""
+    return not number and not (isinstance(number, DualNumber) and any(number.slopes))
 
 
-IN_PLACE: dict[Any, Any] = {
+DUAL_REPLACEMENTS: dict[Any, Any] = {
     **_RULES,
     plain: float,
-    settled: _settled,
-    is_nothing: _is_nothing,
-    carrying: _begun,
+    settled: _differentiate_root,
+    is_nothing: _is_zero,
+    carrying: _seed_direction,
     carrying_room: lambda vector, directions: [0.0] * len(vector),
     slope_of: lambda number, direction: (
-        number.slopes[direction] if isinstance(number, Carrying) else 0.0
+        number.slopes[direction] if isinstance(number, DualNumber) else 0.0
     ),
 }
-"""What stands in the place of functions where numbers carry derivatives."""
+"""Functions that replace others where numbers are dual."""
 
 
 @cache
-def carried_by(function: Any) -> Any:
-    """A kernel or a law that takes numbers with derivatives too, and makes such where its text says so."""
+def make_dual(function: Any) -> Any:
+    """Return a kernel or law that also accepts dual numbers, together with the functions that it calls."""
     scope = dict(function.__globals__)
     for name in function.__code__.co_names:
         value = scope.get(name, float if name == "float" else None)
         if (
             isinstance(value, FunctionType)
-            and value not in IN_PLACE
+            and value not in DUAL_REPLACEMENTS
             and value.__module__.startswith("osimlite.")
         ):
-            scope[name] = carried_by(value)
+            scope[name] = make_dual(value)
         elif callable(value):
-            scope[name] = IN_PLACE.get(value, value)
+            scope[name] = DUAL_REPLACEMENTS.get(value, value)
     return FunctionType(function.__code__, scope, function.__name__, function.__defaults__)

@@ -1,8 +1,8 @@
-"""The library of kernels that was compiled when osimlite was installed.
+"""Library of kernels that was compiled at installation.
 
 A wheel has one library for each level of processors, an editable installation one for the processor
-that compiled it. Each carries a table: the digest of every kernel, and the files that these were
-computed from.
+that compiled it. Each library contains a table: the digest of every kernel, and the files from
+which they were compiled.
 """
 
 from __future__ import annotations
@@ -20,34 +20,37 @@ from osimlite.mechanics.codegen.toolchain import BASELINE, NATIVE, X86_64_V3, li
 from osimlite.simulation.elements.laws import find_law, get_symbol
 
 PACKAGE = Path(__file__).parents[2]
-FOLDER = PACKAGE / "native"
-"""Where the build puts the libraries."""
+"""Folder of the package."""
+LIBRARY_FOLDER = PACKAGE / "native"
+"""Folder in which the build puts the libraries."""
 
-TABLE = "osimlite_kernel_table"
-"""Symbol of the table."""
+TABLE_SYMBOL = "osimlite_kernel_table"
+"""Symbol of the table in a library."""
 
 
 class KernelLibrary:
     """A loaded library of kernels.
 
     Args:
-        path: of the shared library.
+        path: path of the shared library.
 
-    Attributes: path: as given. table: its contents: "version", "target", "compiler", "sources" and
-        "laws", and of a native one "features" and "times".
+    Attributes:
+        path: path of the shared library.
+        table: its table: "version", "target", "compiler", "sources" and "laws"; for a native
+            library also "features" and "times".
 
     Raises:
-        OSError: it cannot be loaded.
-        ValueError: it has no table.
+        OSError: the library cannot be loaded.
+        ValueError: the library has no table.
     """
 
     def __init__(self, path: Path) -> None:
         self.path = path
         self._library = ctypes.CDLL(str(path))
-        address = ctypes.addressof(ctypes.c_char.in_dll(self._library, TABLE))
+        address = ctypes.addressof(ctypes.c_char.in_dll(self._library, TABLE_SYMBOL))
         self.table: dict[str, Any] = json.loads(ctypes.string_at(address))
 
-    def address(self, name: str) -> int | None:
+    def get_address(self, name: str) -> int | None:
         """Return the address of a law; None if the library has none for the present sources."""
         digest = self.table["laws"].get(name)
         if digest is None or not self._is_current(name, digest):
@@ -63,7 +66,7 @@ class KernelLibrary:
             path = PACKAGE / name
             try:
                 info = path.stat()
-                # An installed wheel keeps no times: there the size has to do.
+                # An installed wheel has no times of its sources: there the size must suffice.
                 if info.st_size == size and info.st_mtime_ns == times.get(name, info.st_mtime_ns):
                     continue
                 if info.st_size == size and crc32(path.read_bytes()) == checksum:
@@ -74,20 +77,20 @@ class KernelLibrary:
         return changed
 
     def _is_current(self, name: str, digest: str) -> bool:
-        """Return whether a law is what it was when the library was compiled."""
+        """Return whether the sources of a law are those from which the library was compiled."""
         if not self.changed_files:
             return True
         if any(file.startswith("mechanics/codegen/") for file in self.changed_files):
-            # Another translation of the same law.
+            # With another translator the same law gives other code.
             return False
         return compute_digest(find_law(name)[0]) == digest
 
 
 @cache
 def load_library() -> KernelLibrary | None:
-    """Load the best library for this processor, or return None without one."""
+    """Load the best library for this processor; None if there is none."""
     for target in (NATIVE, X86_64_V3, BASELINE):
-        path = FOLDER / f"kernels-{target}{library_suffix()}"
+        path = LIBRARY_FOLDER / f"kernels-{target}{library_suffix()}"
         if path.exists() and (target != X86_64_V3 or supports_v3()):
             try:
                 library = KernelLibrary(path)
@@ -101,11 +104,11 @@ def load_library() -> KernelLibrary | None:
 
 
 _problems: list[str] = []
-"""Why libraries that are there are not used."""
+"""Reasons why existing libraries are not used."""
 
 
 def explain_absence() -> str:
-    """Return why there is no library."""
+    """Return the reason why there is no library; empty if there is one."""
     if load_library() is not None:
         return ""
     if _problems:

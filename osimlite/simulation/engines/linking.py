@@ -1,4 +1,4 @@
-"""From a packed model to something that runs: machine code where there is some, else the kernels as Python."""
+"""Linking of packed models: machine code where it is available, else the kernels as Python."""
 
 from __future__ import annotations
 
@@ -18,66 +18,66 @@ from osimlite.mechanics.kernels.pointers import Ints
 from osimlite.mechanics.kernels.table import LAW_NUMBERS
 from osimlite.simulation.elements.laws import ALONG, RESPONSE, find_function
 from osimlite.simulation.engines import machine_code
-from osimlite.simulation.engines.dual_numbers import DualVector, carried_by
+from osimlite.simulation.engines.dual_numbers import DualVector, make_dual
 from osimlite.simulation.interrupts import defer_sigint
-from osimlite.simulation.pack import Packed
+from osimlite.simulation.pack import PackedModel
 
 KERNEL = ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_void_p] * 5, ctypes.c_int64)
-"""A kernel: takes the three vectors, a state, room for its derivative, and the place of an item."""
+"""C type of a kernel: the vectors of the model, a state, its derivative, and the offset of an item."""
 
 
-def version() -> str:
+def describe_version() -> str:
     """Return what runs the kernels, for summaries."""
     return machine_code.describe_source()
 
 
 class Code(ABC):
-    """What runs the kernels: `COMPILED` and `PYTHON`, and `AT_HAND`, which is one of them.
+    """Backend that runs the kernels: `MACHINE_CODE`, `PYTHON_CODE`, or `READY_CODE`, which selects one of them.
 
     Args:
-        name: for people.
+        name: name in messages.
     """
 
     def __init__(self, name: str) -> None:
         self.name = name
 
-    def chosen_for(self, functions: Sequence[str], later: Sequence[str] = ()) -> Code:
-        """Return what runs functions of the kernels: this, unless it leaves that to others.
+    def select_for(self, functions: Sequence[str], later: Sequence[str] = ()) -> Code:
+        """Return the backend that runs the given functions: this one, or the one to which it delegates.
 
         Args:
             functions: names of the functions.
-            later: of those that may be asked for afterwards.
+            later: names of functions that may be needed later.
         """
         return self
 
     @abstractmethod
     def make_ready(self, functions: Sequence[str]) -> None:
-        """Compile functions of the kernels together, if that is to be done."""
+        """Compile functions together, if the backend compiles."""
 
     @abstractmethod
-    def address(self, function: str) -> int:
-        """What stands for the address of a function of the kernels."""
+    def get_address(self, function: str) -> int:
+        """Return the address of a function, or the number that stands for it."""
 
     @abstractmethod
-    def entry(self, function: str) -> Callable[..., int]:
-        """A function of the kernels, called with contiguous arrays and integers."""
+    def get_entry(self, function: str) -> Callable[..., int]:
+        """Return a function that is called with contiguous arrays and integers."""
 
     @abstractmethod
-    def bound(self, function: str, *arrays: Any) -> Callable[[int], int]:
-        """The same with its arrays, which the caller keeps; what is left is one integer."""
+    def bind_entry(self, function: str, *arrays: Any) -> Callable[[int], int]:
+        """Return a function with its arrays bound, which is called with one integer; the caller keeps the arrays."""
 
     @abstractmethod
-    def callback(self, python: Callable[..., int], sizes: Sequence[int]) -> tuple[int, Any]:
-        """What stands for the address of a kernel in Python, and what the caller has to keep for it.
+    def make_callback(self, python: Callable[..., int], sizes: Sequence[int]) -> tuple[int, Any]:
+        """Return the address of a Python function as a kernel, and an object that the caller has to keep.
 
         Args:
-            python: takes the five arrays and an integer.
-            sizes: of the arrays.
+            python: function of the five arrays and an integer.
+            sizes: lengths of the arrays.
         """
 
 
-class _Compiled(Code):
-    def chosen_for(self, functions: Sequence[str], later: Sequence[str] = ()) -> Code:
+class _MachineCode(Code):
+    def select_for(self, functions: Sequence[str], later: Sequence[str] = ()) -> Code:
         if not machine_code.can_prepare((*functions, *later)):
             warn_of_python()
             return self._fall_back_to_python()
@@ -89,65 +89,65 @@ class _Compiled(Code):
         return self
 
     def _fall_back_to_python(self) -> Code:
-        """Return the code to use where kernels cannot be compiled."""
-        return PYTHON
+        """Return the backend to use where kernels cannot be compiled."""
+        return PYTHON_CODE
 
     def make_ready(self, functions: Sequence[str]) -> None:
-        machine_code.make_ready(functions)
+        machine_code.prepare_laws(functions)
 
-    def address(self, function: str) -> int:
-        return machine_code.address_of(function)
+    def get_address(self, function: str) -> int:
+        return machine_code.get_address(function)
 
     @cache  # noqa: B019 - there is one object
-    def entry(self, function: str) -> Callable[..., int]:
-        code = self._function(function)
+    def get_entry(self, function: str) -> Callable[..., int]:
+        code = self._make_function(function)
         return lambda *parts: code(
             *(part.ctypes.data if isinstance(part, np.ndarray) else part for part in parts)
         )
 
-    def bound(self, function: str, *arrays: Any) -> Callable[[int], int]:
-        code, addresses = self._function(function), [item.ctypes.data for item in arrays]
+    def bind_entry(self, function: str, *arrays: Any) -> Callable[[int], int]:
+        code, addresses = self._make_function(function), [item.ctypes.data for item in arrays]
         return lambda number: code(*addresses, number)
 
-    def _function(self, function: str) -> Callable[..., int]:
+    def _make_function(self, function: str) -> Callable[..., int]:
         parts = signature(find_function(function)).parameters.values()
         kinds = [
             ctypes.c_void_p if part.annotation in ("Floats", "Ints") else ctypes.c_int64
             for part in parts
         ]
-        # It runs without Python's lock.
-        return ctypes.CFUNCTYPE(ctypes.c_int64, *kinds)(self.address(function))
+        # ctypes releases Python's global lock during the call.
+        return ctypes.CFUNCTYPE(ctypes.c_int64, *kinds)(self.get_address(function))
 
-    def callback(self, python: Callable[..., int], sizes: Sequence[int]) -> tuple[int, Any]:
+    def make_callback(self, python: Callable[..., int], sizes: Sequence[int]) -> tuple[int, Any]:
         kinds = ctypes.c_int64, *[ctypes.c_double] * 4
 
         def called(*parts: int) -> int:
-            return python(*map(self._seen, parts, kinds, sizes), parts[5])
+            return python(*map(self._view_values, parts, kinds, sizes), parts[5])
 
         callback = KERNEL(called)
         return int(ctypes.cast(callback, ctypes.c_void_p).value or 0), callback
 
-    def _seen(self, address: int, kind: Any, count: int) -> Any:
-        """The numbers at an address, as Python is given them."""
-        return _view(address, kind, count)
+    def _view_values(self, address: int, kind: Any, count: int) -> Any:
+        """Return the numbers at an address as an array for Python."""
+        return _view_array(address, kind, count)
 
 
-class Tangents(_Compiled):
-    """Machine code whose numbers carry derivatives, along several directions at once.
+class Tangents(_MachineCode):
+    """Machine code with dual numbers along several directions.
 
-    All arrays of floats have a row for each number: the number, and its derivatives. Python is
-    given the numbers alone.
+    Arrays of floats have a row for each number: its value and its derivatives. Python functions get
+    the values alone.
 
     Args:
-        directions: how many.
+        directions: number of directions.
     """
 
     def __init__(self, directions: int) -> None:
         super().__init__(f"machine code along {directions} directions")
         self._width, self._suffix = 1 + directions, f"{ALONG}{directions}"
 
-    def chosen_for(self, functions: Sequence[str], later: Sequence[str] = ()) -> Code:
-        """Return this, or Python where the functions cannot be compiled."""
+    def select_for(self, functions: Sequence[str], later: Sequence[str] = ()) -> Code:
+        """Return this backend, or Python where the functions cannot be compiled."""
         if not machine_code.can_prepare([name + self._suffix for name in (*functions, *later)]):
             warn_of_python()
             return self._fall_back_to_python()
@@ -159,55 +159,55 @@ class Tangents(_Compiled):
         return self
 
     def _fall_back_to_python(self) -> Code:
-        """Return Python code whose numbers carry derivatives."""
+        """Return the Python backend with dual numbers."""
         return PythonTangents(self._width - 1)
 
     def make_ready(self, functions: Sequence[str]) -> None:
-        """Compile functions of the kernels together."""
+        """Compile functions together."""
         super().make_ready([name + self._suffix for name in functions])
 
-    def address(self, function: str) -> int:
-        """Of a function of the kernels."""
-        return super().address(function + self._suffix)
+    def get_address(self, function: str) -> int:
+        """Return the address of a function."""
+        return super().get_address(function + self._suffix)
 
-    def _seen(self, address: int, kind: Any, count: int) -> Any:
+    def _view_values(self, address: int, kind: Any, count: int) -> Any:
         if kind is not ctypes.c_double:
-            return _view(address, kind, count)
-        return _view(address, kind, self._width * count).reshape(count, self._width)[:, 0]
+            return _view_array(address, kind, count)
+        return _view_array(address, kind, self._width * count).reshape(count, self._width)[:, 0]
 
 
-class AtHand(_Compiled):
+class ReadyCode(_MachineCode):
     """Machine code if all of it is in the library or in files, else Python."""
 
-    def chosen_for(self, functions: Sequence[str], later: Sequence[str] = ()) -> Code:
-        """Return the one or the other."""
-        return COMPILED if all(map(machine_code.is_at_hand, functions)) else PYTHON
+    def select_for(self, functions: Sequence[str], later: Sequence[str] = ()) -> Code:
+        """Return machine code or Python for the given functions."""
+        return MACHINE_CODE if all(map(machine_code.is_ready, functions)) else PYTHON_CODE
 
 
-class _Python(Code):
+class _PythonCode(Code):
     def make_ready(self, functions: Sequence[str]) -> None:
         pass
 
-    def address(self, function: str) -> int:
+    def get_address(self, function: str) -> int:
         law = find_function(function)
-        return pointers.register_law(carried_by(law) if function.endswith(RESPONSE) else law)
+        return pointers.register_law(make_dual(law) if function.endswith(RESPONSE) else law)
 
-    def entry(self, function: str) -> Callable[..., int]:
+    def get_entry(self, function: str) -> Callable[..., int]:
         kernel = find_function(function)
         return lambda *parts: kernel(
             *(part.reshape(-1) if isinstance(part, np.ndarray) else part for part in parts)
         )
 
-    def bound(self, function: str, *arrays: Any) -> Callable[[int], int]:
+    def bind_entry(self, function: str, *arrays: Any) -> Callable[[int], int]:
         kernel = find_function(function)
         return lambda number: kernel(*arrays, number)
 
-    def callback(self, python: Callable[..., int], sizes: Sequence[int]) -> tuple[int, Any]:
+    def make_callback(self, python: Callable[..., int], sizes: Sequence[int]) -> tuple[int, Any]:
         return pointers.register_law(python), None
 
 
-class PythonTangents(_Python):
-    """Kernels as Python whose numbers carry derivatives; the arrays are those of :class:`Tangents`.
+class PythonTangents(_PythonCode):
+    """Kernels as Python with dual numbers; the arrays are those of :class:`Tangents`.
 
     Args:
         directions: number of directions.
@@ -216,22 +216,22 @@ class PythonTangents(_Python):
     def __init__(self, directions: int) -> None:
         super().__init__(f"Python along {directions} directions")
 
-    def address(self, function: str) -> int:
-        """Return what stands for the address of a function of the kernels."""
-        return pointers.register_law(carried_by(find_function(function)))
+    def get_address(self, function: str) -> int:
+        """Return the number that stands for the address of a function."""
+        return pointers.register_law(make_dual(find_function(function)))
 
-    def entry(self, function: str) -> Callable[..., int]:
-        """Return a function of the kernels, called with contiguous arrays and integers."""
-        kernel = carried_by(find_function(function))
+    def get_entry(self, function: str) -> Callable[..., int]:
+        """Return a function that is called with contiguous arrays and integers."""
+        kernel = make_dual(find_function(function))
         return lambda *parts: kernel(*map(_to_duals, parts))
 
-    def bound(self, function: str, *arrays: Any) -> Callable[[int], int]:
-        """Return a function of the kernels with its arrays, called with one integer."""
-        kernel, vectors = carried_by(find_function(function)), [_to_duals(item) for item in arrays]
+    def bind_entry(self, function: str, *arrays: Any) -> Callable[[int], int]:
+        """Return a function with its arrays bound, which is called with one integer."""
+        kernel, vectors = make_dual(find_function(function)), [_to_duals(item) for item in arrays]
         return lambda number: kernel(*vectors, number)
 
-    def callback(self, python: Callable[..., int], sizes: Sequence[int]) -> tuple[int, Any]:
-        """Return what stands for the address of a kernel in Python, which is given the numbers alone."""
+    def make_callback(self, python: Callable[..., int], sizes: Sequence[int]) -> tuple[int, Any]:
+        """Return the number that stands for the address of a Python function, which gets the values alone."""
 
         def called(*parts: Any) -> int:
             return python(
@@ -242,29 +242,34 @@ class PythonTangents(_Python):
 
 
 def _to_duals(part: Any) -> Any:
-    """Return an array of floats and their derivatives as a vector of numbers; anything else as it is."""
+    """Return an array of floats with derivatives as a vector of dual numbers; anything else unchanged."""
     is_rows = isinstance(part, np.ndarray) and part.dtype == np.float64
     return DualVector(part) if is_rows else part
 
 
-COMPILED, PYTHON = _Compiled("machine code"), _Python("Python")
-AT_HAND = AtHand("machine code that is in files, or Python")
-"""For those who evaluate so little that Python is sooner done than a compiler."""
+MACHINE_CODE = _MachineCode("machine code")
+"""Backend that compiles kernels or loads compiled ones."""
+
+PYTHON_CODE = _PythonCode("Python")
+"""Backend that interprets the kernels as Python."""
+
+READY_CODE = ReadyCode("machine code that is in files, or Python")
+"""Backend for few evaluations: Python is finished before a compiler would be."""
 
 
-def best() -> Code:
-    """Return machine code where there is any, else Python."""
+def select_code() -> Code:
+    """Return machine code where it is available, else Python."""
     if machine_code.has_machine_code():
-        return COMPILED
+        return MACHINE_CODE
     warn_of_python()
-    return PYTHON
+    return PYTHON_CODE
 
 
 @cache
 def warn_of_python(reason: str = "") -> None:
     """Warn that kernels run as Python, once for each reason."""
-    if machine_code.allows(machine_code.LIBRARY) or reason:
-        # Imported here, since it takes five milliseconds and hardly anybody is warned.
+    if machine_code.is_allowed(machine_code.LIBRARY) or reason:
+        # The import takes five milliseconds, and warnings are rare.
         import logging
 
         logging.getLogger(__name__).warning(
@@ -273,78 +278,84 @@ def warn_of_python(reason: str = "") -> None:
 
 
 class Program:
-    """The structure of a packed model with the addresses of all that it calls, good in this process only.
+    """The structure of a packed model with the addresses of all functions that it calls, valid in this process only.
 
-    Args: packed: the model. code: what runs it. entries: names of the functions that will be called
-        from outside, which are made ready with the rest.
+    Args:
+        packed: the packed model.
+        code: what runs it.
+        entries: names of the functions that are called from outside; they are prepared with the
+            rest.
 
     Attributes:
-        ints: the structure and the addresses.
-        failures: what the parts in Python have raised.
+        ints: the structure with addresses.
+        failures: exceptions of Python functions that machine code called.
     """
 
-    def __init__(self, packed: Packed, code: Code, entries: Sequence[str] = ()) -> None:
+    def __init__(self, packed: PackedModel, code: Code, entries: Sequence[str] = ()) -> None:
         self.ints: Ints = packed.structure.copy()
         kernels = [kernel for kernel in packed.kernels.values() if isinstance(kernel, str)]
-        # Searches side by side know nothing of derivatives.
+        # Batched kernels do not support dual numbers.
         runs = {} if isinstance(code, Tangents) else packed.runs
         functions = tuple(dict.fromkeys((*entries, *packed.laws, *kernels, *runs.values())))
         self._equilibria, self.responses = packed.equilibria, packed.responses
         later = *packed.equilibria.values(), *packed.responses.values()
-        self.code = code = code.chosen_for(functions, () if isinstance(code, Tangents) else later)
-        runs = runs if code is COMPILED else {}
+        self.code = code = code.select_for(functions, () if isinstance(code, Tangents) else later)
+        runs = runs if code is MACHINE_CODE else {}
         self.failures: list[Exception] = []
         self._kept: list[Any] = []
         code.make_ready(functions)
         for name in packed.laws:
-            self.ints[MODEL.LAWS + LAW_NUMBERS[name]] = code.address(name)
+            self.ints[MODEL.LAWS + LAW_NUMBERS[name]] = code.get_address(name)
         self._count = len(packed.numbers)
         for place, kernel in [*packed.kernels.items(), *runs.items()]:
-            self._link(place, kernel)
+            self._link_kernel(place, kernel)
 
-    def drive(self, structure: Ints, kernel: str | Callable[..., None]) -> None:
-        """Take the record of the controls, behind which there is nothing, from another structure."""
+    def set_controls(self, structure: Ints, kernel: str | Callable[..., None]) -> None:
+        """Replace the record of the controls, the last one, by that of another structure."""
         place = int(structure[MODEL.CONTROLS])
         self.ints = np.concatenate((self.ints[:place], structure[place:]))
         if isinstance(kernel, str):
             self.code.make_ready((kernel,))
-        self._link(place, kernel)
+        self._link_kernel(place, kernel)
 
-    def _link(self, place: int, kernel: str | Callable[..., None]) -> None:
-        """Put the address of a kernel at a place."""
+    def _link_kernel(self, place: int, kernel: str | Callable[..., None]) -> None:
+        """Write the address of a kernel at an offset of the structure."""
         if isinstance(kernel, str):
-            self.ints[place] = self.code.address(kernel)
+            self.ints[place] = self.code.get_address(kernel)
             return
         size = int(self.ints[MODEL.STATE_SIZE])
         sizes = len(self.ints), self._count, int(self.ints[MODEL.WORK_SIZE]), size, size
-        self.ints[place], kept = self.code.callback(self._guarded(kernel), sizes)
+        self.ints[place], kept = self.code.make_callback(self._catch_errors(kernel), sizes)
         self._kept.append(kept)
 
     def link_responses(self, method: str) -> None:
-        """Make ready an implicit method and the derivatives that it needs, which not everybody asks for."""
+        """Prepare an implicit method and the derivatives that it needs."""
         self.code.make_ready((method, *dict.fromkeys(self.responses.values())))
         for place, kernel in self.responses.items():
             if not self.ints[place]:
-                self._link(place, kernel)
+                self._link_kernel(place, kernel)
 
     def link_equilibria(self) -> None:
-        """Make ready what brings states into equilibrium, which not everybody asks for."""
+        """Prepare the kernels that bring states into equilibrium."""
         self.code.make_ready(("equilibrate", *dict.fromkeys(self._equilibria.values())))
         for place, kernel in self._equilibria.items():
-            self._link(place, kernel)
+            self._link_kernel(place, kernel)
 
     def run(self, function: Callable[..., int], *parts: Any) -> int:
-        """Call a function of the kernels.
+        """Call a kernel.
 
-        Ctrl-C in a part in Python is heard after it: no exception passes through machine code.
+        If the model calls Python functions, Ctrl-C is deferred to the end of the call, because
+        exceptions cannot pass through machine code.
         """
         if not any(self._kept):
             return function(*parts)
         with defer_sigint():
             return function(*parts)
 
-    def _guarded(self, python: Callable[..., None]) -> Callable[..., int]:
-        """A part in Python whose errors do not pass through machine code: who asked for an evaluation raises them."""
+    def _catch_errors(self, python: Callable[..., None]) -> Callable[..., int]:
+        """Return a function that stores exceptions in `failures`, since they cannot pass through
+        machine code; the caller raises them.
+        """
 
         def kernel(*parts: Any) -> int:
             try:
@@ -358,6 +369,6 @@ class Program:
 
 
 @lru_cache(maxsize=128)
-def _view(address: int, kind: Any, count: int) -> Any:
-    """The numbers at an address as an array; machine code asks for the same again and again."""
+def _view_array(address: int, kind: Any, count: int) -> Any:
+    """Return the numbers at an address as an array; cached, because machine code asks for the same ones repeatedly."""
     return np.ctypeslib.as_array((kind * count).from_address(address))

@@ -1,9 +1,8 @@
-"""Addresses of the machine code of laws, wherever it comes from.
+"""Addresses of laws as machine code, from any source.
 
 A law comes from the library that was compiled at installation. An edited law, or one of a user's
-own type of force, is compiled alone by the C++ compiler of the machine, else by numba. The
-environment variable OSIMLITE_KERNELS names the only source to use: library, compiler, numba or
-python.
+own force type, is compiled alone by the C++ compiler of the machine, else by numba. The environment
+variable OSIMLITE_KERNELS restricts the sources to one: library, compiler, numba or python.
 """
 
 from __future__ import annotations
@@ -36,11 +35,11 @@ _addresses: dict[str, int] = {}
 """Addresses of the laws that are ready, by name."""
 
 
-def allows(source: str) -> bool:
+def is_allowed(source: str) -> bool:
     """Return whether a source of machine code may be used.
 
     Raises:
-        OsimliteError: the environment variable names no source.
+        OsimliteError: the environment variable names an unknown source.
     """
     only = os.environ.get(VARIABLE, "")
     if only and only not in SOURCES:
@@ -50,24 +49,24 @@ def allows(source: str) -> bool:
     return only in ("", source)
 
 
-def address_of(name: str) -> int:
-    """Return the address of a law, which is compiled if need be.
+def get_address(name: str) -> int:
+    """Return the address of a law, after compiling it if necessary.
 
     Raises:
         CompilationError: it cannot be compiled here.
     """
-    make_ready([name])
+    prepare_laws([name])
     return _addresses[name]
 
 
-def is_at_hand(name: str) -> bool:
-    """Return whether a law is ready, in the library, or in a file; it is loaded then."""
+def is_ready(name: str) -> bool:
+    """Return whether a law is loaded, in the library, or in a file; it is loaded then."""
     if name in _addresses:
         return True
     address = None
-    if allows(LIBRARY) and (library := kernel_library.load_library()) is not None:
-        address = library.address(name)
-    if address is None and allows(COMPILER):
+    if is_allowed(LIBRARY) and (library := kernel_library.load_library()) is not None:
+        address = library.get_address(name)
+    if address is None and is_allowed(COMPILER):
         from osimlite.simulation.engines import compiled_laws
 
         address = compiled_laws.load_law(name)
@@ -76,17 +75,17 @@ def is_at_hand(name: str) -> bool:
     return address is not None
 
 
-def make_ready(names: Sequence[str]) -> None:
-    """Load laws, and compile those that are nowhere yet.
+def prepare_laws(names: Sequence[str]) -> None:
+    """Load laws, and compile those that no library or file has.
 
     Raises:
-        CompilationError: one cannot be compiled here.
+        CompilationError: a law cannot be compiled here.
     """
-    missing = [name for name in dict.fromkeys(names) if not is_at_hand(name)]
+    missing = [name for name in dict.fromkeys(names) if not is_ready(name)]
     if not missing:
         return
     reason: CompilationError | None = None
-    if allows(COMPILER) and find_compiler() is not None:
+    if is_allowed(COMPILER) and find_compiler() is not None:
         from osimlite.simulation.engines import compiled_laws
 
         try:
@@ -94,7 +93,7 @@ def make_ready(names: Sequence[str]) -> None:
             return
         except CompilationError as error:
             reason = error
-    if allows(NUMBA) and _has_numba():
+    if is_allowed(NUMBA) and _has_numba():
         from osimlite.simulation.engines import numba_laws
 
         for name in missing:
@@ -105,28 +104,28 @@ def make_ready(names: Sequence[str]) -> None:
 
 
 def can_prepare(names: Iterable[str]) -> bool:
-    """Return whether all laws are at hand, or there is something to compile them with."""
-    # The compiler is looked for last: to ask it for its version takes longer than all of a short
+    """Return whether all laws are ready, or can be compiled."""
+    # The compiler is searched last, because asking for its version takes longer than a short
     # simulation.
-    missing = [name for name in names if not is_at_hand(name)]
+    missing = [name for name in names if not is_ready(name)]
     if not missing:
         return True
-    if allows(COMPILER) and find_compiler() is not None:
+    if is_allowed(COMPILER) and find_compiler() is not None:
         return True
     has_duals = any(find_law(name)[1] for name in missing)
-    return not has_duals and allows(NUMBA) and _has_numba()
+    return not has_duals and is_allowed(NUMBA) and _has_numba()
 
 
 def has_machine_code() -> bool:
-    """Return whether laws run as machine code here, unless one is edited."""
-    has_library = allows(LIBRARY) and kernel_library.load_library() is not None
+    """Return whether laws run as machine code here, as long as none is edited."""
+    has_library = is_allowed(LIBRARY) and kernel_library.load_library() is not None
     return has_library or can_compile()
 
 
 def can_compile() -> bool:
     """Return whether there is a C++ compiler or numba."""
-    has_compiler = allows(COMPILER) and find_compiler() is not None
-    return has_compiler or (allows(NUMBA) and _has_numba())
+    has_compiler = is_allowed(COMPILER) and find_compiler() is not None
+    return has_compiler or (is_allowed(NUMBA) and _has_numba())
 
 
 def _has_numba() -> bool:
@@ -137,12 +136,12 @@ def _has_numba() -> bool:
 
 def describe_source() -> str:
     """Return what runs the kernels in a few words, for summaries."""
-    library = kernel_library.load_library() if allows(LIBRARY) else None
+    library = kernel_library.load_library() if is_allowed(LIBRARY) else None
     if library is not None:
         return f"compiled library ({library.table['target']})"
-    if allows(COMPILER) and find_compiler() is not None:
+    if is_allowed(COMPILER) and find_compiler() is not None:
         return "C++ compiler"
-    if allows(NUMBA) and _has_numba():
+    if is_allowed(NUMBA) and _has_numba():
         return "numba"
     return f"Python {platform.python_version()}"
 
@@ -150,8 +149,8 @@ def describe_source() -> str:
 def explain_source() -> list[str]:
     """Return sentences that say what runs the kernels, and why."""
     sentences = []
-    library = kernel_library.load_library() if allows(LIBRARY) else None
-    compiler = find_compiler() if allows(COMPILER) else None
+    library = kernel_library.load_library() if is_allowed(LIBRARY) else None
+    compiler = find_compiler() if is_allowed(COMPILER) else None
     if os.environ.get(VARIABLE):
         sentences.append(f"{VARIABLE}={os.environ[VARIABLE]} names the only source of machine code")
     if library is not None:
@@ -165,12 +164,12 @@ def explain_source() -> list[str]:
                 f"{count} of its source files have changed since: edited kernels are compiled one by one; "
                 "pip install -e . compiles the library anew"
             )
-    elif allows(LIBRARY):
+    elif is_allowed(LIBRARY):
         sentences.append(kernel_library.explain_absence())
     alone = "kernels that it lacks are" if library is not None else "each kernel is"
     if compiler is not None:
         sentences.append(f"{alone} compiled at first use by {compiler.name}")
-    elif allows(NUMBA) and _has_numba():
+    elif is_allowed(NUMBA) and _has_numba():
         sentences.append(
             f"no C++ compiler was found: {alone} compiled at first use by numba, without derivatives"
         )
@@ -184,4 +183,4 @@ def explain_source() -> list[str]:
 
 
 PYTHON_COST = "the kernels run as Python, some thousand times slower"
-"""What it costs to have no machine code."""
+"""Consequence of missing machine code, for messages."""

@@ -1,4 +1,4 @@
-"""The parts of a model that some numbers have a part in, made anew for the compiled engine."""
+"""Update of the compiled engine after numbers of its model have changed."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from osimlite.schema.forces import Force
 from osimlite.schema.frames import Body
 from osimlite.schema.model import Model
 from osimlite.schema.sets import Controller
-from osimlite.simulation.batches import Renewed
+from osimlite.simulation.batches import UpdatedModel
 from osimlite.simulation.elements import ElementBuilder, Forces
 from osimlite.simulation.elements.controls import Controls, ModelControls
 from osimlite.simulation.elements.force_records import ForceRecord
@@ -32,14 +32,14 @@ if TYPE_CHECKING:
     from osimlite.simulation.engines.compiled import CompiledEngine
 
 
-class NumbersOnly:
-    """Makes those parts of a model anew that its forces, masses and gravity have a part in.
+class NumberUpdater:
+    """Updater of the parts of a model that forces, masses and gravity affect.
 
     Args:
-        model: of which nothing else changes.
-        engine: of the same model before.
-        folder: of its file.
-        wrapping: how its paths bend around surfaces.
+        model: the model, of which nothing else changes.
+        engine: engine of the model before the change.
+        folder: folder of its file.
+        wrapping: how its paths wrap.
     """
 
     def __init__(self, model: Model, engine: CompiledEngine, folder: Path, wrapping: str) -> None:
@@ -53,19 +53,20 @@ class NumbersOnly:
         self._items = {
             element.path: element.make_records(self._places) for element in engine.forces.elements
         }
-        # The numbers of all items are the last ones before those of the controls, in their order.
+        # The numbers of the items precede those of the controls, which are last, in the same order.
         controls = engine.structure[MODEL.CONTROLS]
         end = engine.structure[controls + ITEM.NUMBERS] if controls > 0 else len(engine.numbers)
-        self._first, place = {}, end - sum(_length(items) for items in self._items.values())
+        self._first, place = {}, end - sum(_count_numbers(items) for items in self._items.values())
         for path, items in self._items.items():
             self._first[path] = place
-            place += _length(items)
+            place += _count_numbers(items)
 
-    def renewed(self, owners: Sequence[Component]) -> Renewed | None:
-        """The model with what its forces and bodies are now; None if more has changed than numbers.
+    def update(self, owners: Sequence[Component]) -> UpdatedModel | None:
+        """Return the model with the present properties of its forces and bodies; None if more than numbers changed.
 
-        Args: owners: forces, controllers, bodies and the model itself, if a property of theirs has
-            changed.
+        Args:
+            owners: forces, controllers, bodies and the model itself, if one of their properties has
+                changed.
         """
         made: dict[str, Any] = {}
         owners, controls = list(owners), self._forces.controls
@@ -74,11 +75,11 @@ class NumbersOnly:
         ]
         if controllers:
             for path in controllers:
-                # Others may have files that are read no more.
+                # Other controllers may name files, which are not read again.
                 self._builder.drives.pop(path, None)
             self._builder.controls = ModelControls(self._builder)
             controls = self._builder.controls.controls
-            # The gain of a reflex is a number of the muscle.
+            # The gain of a reflex is stored with the muscle.
             owners += [
                 self._components[path]
                 for path in self._builder.controls.reflexes
@@ -102,32 +103,36 @@ class NumbersOnly:
         has_probes = any(isinstance(element, DeclaredProbe) for element in self._forces.elements)
         if has_probes and not all(isinstance(owner, Controller) for owner in owners):
             if not only_forces:
-                # The mass of the model has a say in what muscles use.
+                # Metabolic probes depend on the mass of the model.
                 return None
             made |= {
                 probe.path: probe for probe in make_probes(self._builder, self._forces.elements)
             }
         elements = tuple(made.get(element.path, element) for element in self._forces.elements)
         forces = replace(self._forces, elements=elements, controls=controls)
-        mechanism = self._mechanism if only_forces else self._with_masses()
+        mechanism = self._mechanism if only_forces else self._replace_masses()
         if mechanism is None:
             return None
         numbers = (
-            self._with_forces(made, forces.controls)
+            self._replace_force_numbers(made, forces.controls)
             if only_forces
-            else self._packed(mechanism, forces)
+            else self._pack_numbers(mechanism, forces)
         )
-        return None if numbers is None else Renewed(mechanism, forces, numbers, self._engine)
+        return None if numbers is None else UpdatedModel(mechanism, forces, numbers, self._engine)
 
-    def _with_forces(self, made: Mapping[str, Any], controls: Controls) -> Floats | None:
-        """The given numbers with those of some elements, and of the controls, in their places."""
+    def _replace_force_numbers(self, made: Mapping[str, Any], controls: Controls) -> Floats | None:
+        """Return the numbers with those of some elements and of the controls replaced; None if their structure changed."""
         numbers = self._engine.numbers.copy()
         for path, element in made.items():
             items = element.make_records(self._places)
-            if [_kind(item) for item in items] != [_kind(item) for item in self._items[path]]:
+            if [_describe_structure(item) for item in items] != [
+                _describe_structure(item) for item in self._items[path]
+            ]:
                 return None
             place = self._first[path]
-            numbers[place : place + _length(items)] = [x for item in items for x in item.numbers]
+            numbers[place : place + _count_numbers(items)] = [
+                x for item in items for x in item.numbers
+            ]
         if controls is not self._forces.controls:
             structure = self._engine.structure
             place = structure[MODEL.CONTROLS]
@@ -137,11 +142,11 @@ class NumbersOnly:
             numbers[structure[place + ITEM.NUMBERS] :] = own
         return numbers
 
-    def _with_masses(self) -> Mechanism | None:
-        """The mechanism with the masses and the gravity that the model has now."""
+    def _replace_masses(self) -> Mechanism | None:
+        """Return the mechanism with the present masses and gravity; None if more than numbers changed."""
         mechanism = self._mechanism
         if not all(isinstance(item, Lock) for item in mechanism.constraints):
-            # Masses have a say in where loops are cut, and bodies are parted there.
+            # The masses decide where loops are cut and bodies are split.
             return None
         bodies = []
         for body in mechanism.bodies:
@@ -153,18 +158,20 @@ class NumbersOnly:
             mechanism, bodies=tuple(bodies), gravity=np.array(self._model.gravity, dtype=float)
         )
 
-    def _packed(self, mechanism: Mechanism, forces: Forces) -> Floats | None:
+    def _pack_numbers(self, mechanism: Mechanism, forces: Forces) -> Floats | None:
+        """Return the numbers of a newly packed model; None if its structure changed."""
         packed = pack(mechanism, forces)
         is_alike = np.array_equal(packed.structure, self._engine.structure)
         return packed.numbers if is_alike and packed.order == self._engine.order else None
 
 
-def _length(items: Sequence[ForceRecord]) -> int:
+def _count_numbers(items: Sequence[ForceRecord]) -> int:
+    """Return the number of numbers of some items."""
     return sum(len(item.numbers) for item in items)
 
 
-def _kind(item: ForceRecord) -> tuple[object, ...]:
-    """What of an item is not its numbers."""
+def _describe_structure(item: ForceRecord) -> tuple[object, ...]:
+    """Return everything of an item except its numbers."""
     return (
         item.kernel,
         item.ints,

@@ -1,7 +1,7 @@
 """Laws that numba compiles, where there is neither a compiled library nor a C++ compiler.
 
-Only what numba documents is used: `njit`, `cfunc` and `intrinsic`. Numba keeps what it compiled in
-files of its own.
+Only documented functions of numba are used: `njit`, `cfunc` and `intrinsic`. Numba caches compiled
+functions in its own files.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ from osimlite.mechanics.kernels.layout import Record
 from osimlite.simulation.elements.laws import find_law
 
 _entries: dict[str, Any] = {}
-"""Compiled laws by name: their machine code stays as long as these do."""
+"""Compiled laws by name; their machine code is valid as long as these objects exist."""
 
 
 @cache
 def has_numba() -> bool:
-    """Return whether numba is installed; it is not loaded to find out."""
+    """Return whether numba is installed, without loading it."""
     try:
         return find_spec("numba") is not None
     except ValueError:
@@ -38,7 +38,7 @@ def compile_law(name: str) -> int:
     """Compile a law of floats, and return its address.
 
     Raises:
-        CompilationError: numba has no numbers that carry derivatives, or cannot compile the law.
+        CompilationError: the law needs dual numbers, or numba cannot compile it.
     """
     function, directions = find_law(name)
     if directions:
@@ -46,9 +46,8 @@ def compile_law(name: str) -> int:
     if name not in _entries:
         tools = _load_tools()
         kinds = [tools.kinds[part.annotation] for part in signature(function).parameters.values()]
-        linked = _link(function, tools)
-        # Numba's cache does not notice an edited function that this one calls: the digest makes it
-        # another one.
+        linked = _link_callees(function, tools)
+        # Numba's cache does not notice changes of called functions: the digest in the name does.
         linked.__qualname__ = f"{linked.__qualname__}_{compute_digest(function)}"
         sign = tools.numba.types.int64(*kinds)
         try:
@@ -62,13 +61,13 @@ def compile_law(name: str) -> int:
 
 
 class _Tools:
-    """What numba compiles the kernels with."""
+    """Functions and types of numba that the kernels need."""
 
     def __init__(self, numba: ModuleType) -> None:
         config: Any = getattr(numba.core, "config", None)
         if hasattr(config, "_config_fname"):
-            # Numba reads `.numba_config.yaml` in the current folder again before each compilation;
-            # the folder may be a stranger's, and the file decides what is compiled and where it is
+            # Numba reads `.numba_config.yaml` in the current folder before each compilation. That
+            # folder may belong to others, and the file decides what is compiled and where it is
             # cached.
             config._config_fname = ""
         types: Any = numba.types
@@ -122,21 +121,21 @@ def _load_tools() -> _Tools:
 
 @cache
 def _compile_callee(function: Any) -> Any:
-    """Return a function that compiled ones call."""
+    """Return a compiled function for calls from compiled functions."""
     tools = _load_tools()
-    return tools.numba.njit(_link(function, tools), error_model="numpy")
+    return tools.numba.njit(_link_callees(function, tools), error_model="numpy")
 
 
 @cache
 def _to_module(record: Record) -> ModuleType:
-    """Return a record of constants as a module, from which numba reads them."""
+    """Return a record of constants as a module, from which numba reads constants."""
     module = ModuleType(record.__name__)
     vars(module).update(vars(record))
     return module
 
 
-def _link(function: Any, tools: _Tools) -> Any:
-    """Return a copy of a function in which calls within this package lead to compiled functions."""
+def _link_callees(function: Any, tools: _Tools) -> Any:
+    """Return a copy of a function whose calls within this package lead to compiled functions."""
     scope = dict(function.__globals__)
     for called in {
         item.argval for item in dis.get_instructions(function) if item.opname == "LOAD_GLOBAL"
@@ -148,7 +147,7 @@ def _link(function: Any, tools: _Tools) -> Any:
             scope[called] = _to_module(value)
     code = function.__code__
     if code.co_filename.startswith("<"):
-        # Numba keeps nothing of a function without a file; a written kernel belongs to the module
+        # Numba caches only functions that have a file; a generated kernel belongs to the module
         # that declares it.
         module = inspect.getsourcefile(__import__(function.__module__, fromlist=["_"]))
         code = code.replace(co_filename=module or code.co_filename)

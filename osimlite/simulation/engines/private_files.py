@@ -1,4 +1,4 @@
-"""Files that nobody but the user can have written: who can change a file that is run can run what he likes."""
+"""Files that only the user can have written: whoever can change a file that is executed can execute anything."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from osimlite.errors import OsimliteError
 
 
 def read_private(path: Path) -> bytes | None:
-    """What is in a file; None if there is none, or if anybody else could have put it there."""
+    """Return the content of a file; None if it does not exist, or if others could have written it."""
     folder = Path(os.path.realpath(path.parent))
-    if others_in(folder) is not None:
+    if find_other_writers(folder) is not None:
         return None
     flags = os.O_RDONLY | sum(
         getattr(os, name, 0) for name in ("O_NOFOLLOW", "O_NONBLOCK", "O_BINARY")
@@ -22,23 +22,27 @@ def read_private(path: Path) -> bytes | None:
     try:
         with open(os.open(folder / path.name, flags), "rb") as stream:
             info = os.fstat(stream.fileno())
-            return stream.read() if stat.S_ISREG(info.st_mode) and _others(info) is None else None
+            return (
+                stream.read()
+                if stat.S_ISREG(info.st_mode) and _describe_other_writers(info) is None
+                else None
+            )
     except OSError:
         return None
 
 
 def write_private(path: Path, content: bytes) -> None:
-    """Write a file that only the user can read and change, whole or not at all, and make its folder.
+    """Write a file that only the user can read and change, completely or not at all; make its folder.
 
-    Raises: OsimliteError: it cannot be written, or others can write in the folder or put another in
-        its place.
+    Raises:
+        OsimliteError: the file cannot be written, or others can write to the folder or replace it.
     """
     folder = Path(os.path.realpath(path.parent))
     try:
         for place in (*reversed(folder.parents), folder):
             if not place.exists():
                 place.mkdir(mode=0o700, exist_ok=True)
-        if (why := others_in(folder)) is not None:
+        if (why := find_other_writers(folder)) is not None:
             raise OsimliteError(why)
         handle, name = tempfile.mkstemp(dir=folder)
         try:
@@ -52,8 +56,8 @@ def write_private(path: Path, content: bytes) -> None:
         raise OsimliteError(f"cannot write here: {error.strerror}", file=str(folder)) from None
 
 
-def others_in(folder: Path) -> str | None:
-    """Why others than the user and the administrator can put files into a folder; None if they cannot.
+def find_other_writers(folder: Path) -> str | None:
+    """Return the reason why others than the user and the administrator can put files into a folder; None if they cannot.
 
     Args:
         folder: an absolute path without links.
@@ -63,17 +67,18 @@ def others_in(folder: Path) -> str | None:
             info = place.lstat()
         except OSError as error:
             return f"'{place}' cannot be looked at: {error.strerror}"
-        # In a folder such as /tmp everybody can make files, but move away or replace only his own.
+        # In a sticky folder such as /tmp anyone can create files, but can move or replace only
+        # their own.
         is_passage = place != folder and info.st_mode & stat.S_ISVTX
-        if (why := _others(info, is_passage=bool(is_passage))) is not None:
+        if (why := _describe_other_writers(info, is_passage=bool(is_passage))) is not None:
             return f"'{place}' {why}"
     return None
 
 
-def _others(info: os.stat_result, *, is_passage: bool = False) -> str | None:
+def _describe_other_writers(info: os.stat_result, *, is_passage: bool = False) -> str | None:
+    """Return why others can write to a file or folder; None if they cannot."""
     if sys.platform == "win32":
-        # A user's folders there are closed to others by lists of their own, which these bits do not
-        # tell.
+        # Windows protects the user's folders by access lists, which these bits do not show.
         return None
     if info.st_uid not in (0, os.geteuid()):
         return "belongs to another user"

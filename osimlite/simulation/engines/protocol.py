@@ -1,7 +1,7 @@
-"""What an engine is.
+"""Protocol of the engines.
 
-An engine integrates only the coordinates that are free to move, in an order of its own: its `state`
-tells what the numbers of a state y = (q, u, z) are.
+An engine integrates only the coordinates that are free to move, in its own order; its `state`
+describes the entries of a state y = (q, u, z).
 """
 
 from __future__ import annotations
@@ -15,105 +15,114 @@ from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.controls import Controls
 from osimlite.simulation.elements.probe_type import DeclaredProbe
-from osimlite.simulation.options import DEFAULT_ACCURACY, MERSON, NO_BOUNDS
+from osimlite.simulation.options import DEFAULT_ACCURACY, MERSON, UNBOUNDED_STEPS
 from osimlite.simulation.states import StateLayout
 from osimlite.simulation.stepper import Observer, Stepper
 
 if TYPE_CHECKING:
-    from osimlite.simulation.control_steps import HeldRuns
+    from osimlite.simulation.control_steps import ControllerRuns
     from osimlite.simulation.robot.visuals import Visuals
 
 
 @dataclass(frozen=True)
 class Settings:
-    """How to step."""
+    """Settings of the integration."""
 
-    accuracy: float = DEFAULT_ACCURACY  # as OpenSim understands it
-    integrator: str = MERSON  # with error control, see `Options`
-    # s; the engine's own steps of this length instead of error control
+    accuracy: float = DEFAULT_ACCURACY  # accuracy as OpenSim defines it
+    integrator: str = MERSON  # one of `INTEGRATORS`
+    # length (s) of fixed steps, which replace error control
     fixed_step: float | None = None
-    # the way to the accelerations, in the engine's words; "auto" lets it choose
+    # how the accelerations are computed, in the engine's terms; "auto" lets it choose
     route: str = "auto"
-    show: bool = False  # whether to show the motion in a window while it is computed
-    visuals: Visuals | None = None  # what bodies look like there
-    # shortest and longest step (s) of Merson's method; the shortest is taken whatever its error
-    step_bounds: tuple[float, float] = NO_BOUNDS
-    held: HeldRuns | None = None  # of a controller
+    show: bool = False  # whether a window shows the motion meanwhile
+    visuals: Visuals | None = None  # shapes of the bodies in the window
+    # shortest and longest step (s) of Merson's method; the shortest is accepted whatever its error
+    step_bounds: tuple[float, float] = UNBOUNDED_STEPS
+    held: ControllerRuns | None = None  # controllers of the runs
 
 
 class Engine(Protocol):
-    """Computes the motion of one mechanism under its forces. Close it after use, or use it in a ``with`` statement.
+    """Engine that computes the motion of one mechanism under its forces.
 
-    Every method that takes a state raises an OsimliteError where it has another length than `state`
-    says.
+    Close it after use, or use it in a ``with`` statement. Methods that take a state raise an
+    OsimliteError if its length differs from that of `state`.
     """
 
-    name: str  # of the engine
-    version: str  # of the program behind it
+    name: str  # name of the engine
+    version: str  # version of the program that computes
     route: str  # how the accelerations are computed
-    order: tuple[int, ...]  # place in the mechanism of each coordinate of the state
-    state: StateLayout  # what the numbers of a state are
-    contacts: tuple[str, ...]  # names of the contacts, by number
+    order: tuple[int, ...]  # index in the mechanism of each coordinate of the state
+    state: StateLayout  # layout of the state
+    contacts: tuple[str, ...]  # names of the contacts, by index
     columns: tuple[str, ...]  # labels of the force records
-    probes: tuple[DeclaredProbe, ...]  # of the model
-    # after an evaluation: the last entry has the bits of the contacts that touch; entry i is the
-    # force (N, in ground) of contact i if it does
+    probes: tuple[DeclaredProbe, ...]  # probes of the model
+    # contact forces of the last evaluation: entry i is the force (N, in ground) of contact i if it
+    # touches; the last entry has one bit for each contact that touches
     loads: list[object]
 
-    def derivative(self, t: float, y: list[float]) -> list[float]:
-        """(qdot, udot, zdot) at a state.
+    def compute_derivative(self, t: float, y: list[float]) -> list[float]:
+        """Return (qdot, udot, zdot) at a state.
 
-        Raises: SimulationError: a motion that nothing forbids moves no mass, or speeds are not
-            defined in a pose.
+        Raises:
+            SimulationError: an admissible motion moves no mass, or speeds are not defined in a
+                pose.
         """
 
-    def acceleration(self, t: float, q: Sequence[float], u: Sequence[float]) -> list[float]:
-        """Derivatives of the speeds of all coordinates of the mechanism, in its order; zero if locked.
+    def compute_accelerations(
+        self, t: float, q: Sequence[float], u: Sequence[float]
+    ) -> list[float]:
+        """Return the derivatives of the speeds of all coordinates, in the mechanism's order; 0 if locked.
 
-        The auxiliary states are where they start.
+        The auxiliary states have their initial values.
         """
 
-    def equilibrated(
+    def equilibrate_muscles(
         self, t: float, y: Sequence[float], numbers: Floats | None = None
     ) -> list[float]:
-        """A state with the auxiliary states that have an equilibrium in it.
+        """Return the state with auxiliary states in equilibrium.
 
         Args:
             t: time, s.
-            y: the state.
-            numbers: of a model of the same structure; the engine's own by default.
+            y: state.
+            numbers: numbers of a model of the same structure; by default the engine's.
 
         Raises:
             SimulationError: a force has no equilibrium there.
         """
 
-    def touching(self, t: float, y: list[float]) -> int:
-        """The bits of the contacts that touch at a state; sets `loads`. Works when the engine is closed."""
+    def find_touching_contacts(self, t: float, y: list[float]) -> int:
+        """Return one bit for each contact that touches at a state, and set `loads`. Works after `close`."""
 
     def force_records(self, t: float, y: list[float]) -> list[float]:
-        """One number for each of the columns. Works when the engine is closed."""
+        """Return one number for each of `columns`. Works after `close`."""
 
     def force_table(self, times: Sequence[float], states: Sequence[Sequence[float]]) -> Floats:
-        """Return one row of the columns for each moment (k, c). Works when the engine is closed."""
+        """Return one row of `columns` for each state (k, c). Works after `close`."""
 
-    def probe_results(self, t: float, y: Sequence[float]) -> list[list[float]]:
-        """What each probe gives at a state, before its operation. Works when the engine is closed."""
+    def evaluate_probes(self, t: float, y: Sequence[float]) -> list[list[float]]:
+        """Return the inputs of each probe at a state, before its operation. Works after `close`."""
 
-    def energies(self, t: float, y: Sequence[float]) -> tuple[float, float, float]:
-        """Kinetic energy, potential energy of gravity, energy stored in forces, J. Works when the engine is closed."""
+    def compute_energies(self, t: float, y: Sequence[float]) -> tuple[float, float, float]:
+        """Return the energies at a state. Works after `close`.
 
-    def stepper(self, t: float, y: list[float], settings: Settings, observe: Observer) -> Stepper:
-        """What integrates from a state on."""
+        Returns:
+            Kinetic energy, potential energy of gravity, and energy stored in forces, J.
+        """
 
-    def drive(self, controls: Controls) -> None:
-        """Have the actuators driven by other controls of the same names, in what is computed from now on."""
+    def make_stepper(
+        self, t: float, y: list[float], settings: Settings, observe: Observer
+    ) -> Stepper:
+        """Return a stepper from a state on."""
 
-    def hold(self) -> None:
-        """Keep the window, if there is one, until somebody closes it."""
+    def set_controls(self, controls: Controls) -> None:
+        """Set the controls of the actuators for all later evaluations and motions."""
+
+    def hold_window(self) -> None:
+        """Keep the window, if there is one, until the user closes it."""
 
     def close(self) -> None:
-        """Free what the engine holds; any number of times."""
+        """Free the resources of the engine; may be called repeatedly."""
 
 
 EngineFactory = Callable[[Mechanism, Forces, Settings], Engine]
-"""Makes an engine for a mechanism; of the settings, `route`, `show` and `visuals` count."""
+"""Function that makes an engine of a mechanism; it uses `route`, `show` and `visuals` of the settings."""

@@ -239,7 +239,7 @@ def choose_start(
             [[float(f"{number:.{digits}g}") for number in row] for row in states.tolist()]
         )
     # A file says where coordinates start, and the auxiliary states follow.
-    states = engine.state.started(states)
+    states = engine.state.restart_auxiliary(states)
     walks = walk_many(
         engine,
         states,

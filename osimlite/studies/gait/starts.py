@@ -148,7 +148,7 @@ def _compute_contact_centres(
     engine: BatchEngine, states: Floats, numbers: Floats | None = None, rows: Ints | None = None
 ) -> Floats:
     """Centres of the contacts' second surfaces (k, P, 3), in ground."""
-    return engine.contact_places(states, numbers, rows)[..., 6:]
+    return engine.locate_contacts(states, numbers, rows)[..., 6:]
 
 
 def _list_contacts(engine: BatchEngine, footing: FootContacts) -> Ints:

@@ -18,7 +18,7 @@ from osimlite.base.text import join_words
 from osimlite.errors import OsimliteError, UnsupportedError
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.simulation.batches import BatchEngine, Floats, Ints, Watch, run_many
-from osimlite.simulation.run import kept_constraints
+from osimlite.simulation.run import list_constraints
 from osimlite.studies.gait.foot_contacts import FootContacts, find_footing
 from osimlite.studies.gait.steps import (
     Step,
@@ -48,7 +48,7 @@ def refuse_constraints(mechanism: Mechanism) -> None:
     Raises:
         UnsupportedError: some do.
     """
-    if kept := kept_constraints(mechanism):
+    if kept := list_constraints(mechanism):
         raise UnsupportedError(
             f"gaits are looked for in all directions of the state, some of which {join_words(kept)} takes away; set "
             "isEnforced of a constraint and prescribed of a coordinate to false"
@@ -175,7 +175,7 @@ class StepMap:
     def land(self, state: Floats, foot: int) -> Floats:
         """A state (y,) a billionth of a second from a heel strike, moved onto it."""
         contacts = [self.engine.contacts.index(name) for name in self.footing.feet[foot]]
-        rate = np.array(self.engine.derivative(0.0, state.tolist()))
+        rate = np.array(self.engine.compute_derivative(0.0, state.tolist()))
         dt = 1e-7
         _, depths = measure_along_slope(self.engine, np.array([state, state + dt * rate]))
         touching = contacts[int(np.argmin(np.abs(depths[0, contacts])))]

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from osimlite.base.records import dataclass, field
 from osimlite.simulation.batches import (
     ENDINGS,
-    NO_LIMIT,
+    UNLIMITED_TRIES,
     BatchEngine,
     Floats,
     Runs,
@@ -99,7 +99,7 @@ def walk_many(
     footing: FootContacts | None = None,
     numbers: ArrayLike | None = None,
     accuracy: float = DEFAULT_ACCURACY,
-    most_tries: int = NO_LIMIT,
+    most_tries: int = UNLIMITED_TRIES,
     threads: int | None = None,
 ) -> list[Walk]:
     """Let many walkers walk.
@@ -273,7 +273,7 @@ def measure_along_slope(
     which = (
         np.zeros(len(states), dtype=np.int64) if rows is None else np.array(rows, dtype=np.int64)
     )
-    places = engine.contact_places(states, table, which)
+    places = engine.locate_contacts(states, table, which)
     origin, normal, center = places[..., :3], places[..., 3:6], places[..., 6:]
     gravity = table[:, :3]
     pull = (
@@ -285,5 +285,5 @@ def measure_along_slope(
     forward = np.array((1.0, 0.0, 0.0)) - normal[..., :1] * normal
     along = np.where(level[..., None], forward, pull)
     along /= np.linalg.norm(along, axis=2, keepdims=True)
-    radii = engine.contact_radii(table)[which]
+    radii = engine.get_contact_radii(table)[which]
     return np.sum(center * along, axis=2), radii - np.sum((center - origin) * normal, axis=2)

@@ -66,7 +66,9 @@ def leg_exchange(engine: BatchEngine, footing: FootContacts, states: ArrayLike) 
         source[[one, two, n + one, n + two]] = two, one, n + two, n + one
     exchange_auxiliary(engine, source, np.asarray(states, dtype=float))
     for state in np.asarray(states, dtype=float):
-        here, there = (np.array(engine.derivative(0.0, y.tolist())) for y in (state, state[source]))
+        here, there = (
+            np.array(engine.compute_derivative(0.0, y.tolist())) for y in (state, state[source])
+        )
         if not np.allclose(here[source], there, rtol=SAME, atol=SAME * np.abs(here).max()):
             return None
     return source
@@ -82,7 +84,7 @@ def exchange_auxiliary(engine: BatchEngine, source: Ints, states: Floats) -> Non
     if first == engine.state.size:
         return
     # Those that belong together have equal values where all have just started.
-    states = engine.state.started(states)
+    states = engine.state.restart_auxiliary(states)
     columns = [*source[:first], first, first + 1]
     before = np.stack([_compute_effects(engine, state)[:, columns] for state in states], axis=1)
     after = np.stack([_compute_effects(engine, state[source]) for state in states], axis=1)
@@ -95,12 +97,12 @@ def exchange_auxiliary(engine: BatchEngine, source: Ints, states: Floats) -> Non
 
 def _compute_effects(engine: BatchEngine, state: Floats) -> Floats:
     """What each auxiliary state (z) does: by how much it changes the other rates (2n) and its own, and that rate."""
-    first, here = 2 * len(engine.order), np.array(engine.derivative(0.0, state.tolist()))
+    first, here = 2 * len(engine.order), np.array(engine.compute_derivative(0.0, state.tolist()))
     rows = []
     for index in range(first, len(state)):
         moved = state.copy()
         moved[index] += NUDGE
-        slope = (np.array(engine.derivative(0.0, moved.tolist())) - here) / NUDGE
+        slope = (np.array(engine.compute_derivative(0.0, moved.tolist())) - here) / NUDGE
         rows.append([*slope[:first], slope[index], here[index]])
     return np.array(rows)
 
@@ -142,12 +144,12 @@ def derivative_matrix(engine: BatchEngine, state: Floats) -> tuple[Floats, float
         just touches.
     """
     columns, uneven = [], []
-    here = np.array(engine.derivative(0.0, state.tolist()))
+    here = np.array(engine.compute_derivative(0.0, state.tolist()))
     for k in range(len(state)):
         ahead, back = state.copy(), state.copy()
         ahead[k] += NUDGE
         back[k] -= NUDGE
-        rates = [np.array(engine.derivative(0.0, y.tolist())) for y in (ahead, back)]
+        rates = [np.array(engine.compute_derivative(0.0, y.tolist())) for y in (ahead, back)]
         columns.append((rates[0] - rates[1]) / (2.0 * NUDGE))
         uneven.append((rates[0] - 2.0 * here + rates[1]) / NUDGE)
     slope = np.array(columns).T

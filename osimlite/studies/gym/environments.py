@@ -63,7 +63,7 @@ class _Observed:
         start = self.copies.start
         if self.task.start is not None:
             start = self.task.start(start, self.names, rng)
-        self.copies.put(which, start)
+        self.copies.set_states(which, start)
 
     def seen(self, controls: Array) -> Seen:
         states = self.copies.states.copy()
@@ -85,7 +85,7 @@ class _Observed:
             )
         controls = np.clip(given, *self._limits)
         before = self.seen(controls)
-        going = self.copies.step(controls)
+        going = self.copies.step_all(controls)
         after = self.seen(controls)
         with np.errstate(all="ignore"):
             rewards = np.where(going, self.task.reward(before, after), 0.0)
@@ -244,7 +244,7 @@ class MuscleVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
         kept = {int(k): self._initial_state(int(k)) for k in again}
         rewards, over = self._all.step(actions)
         for k, state in kept.items():
-            self._all.copies.put(k, state)
+            self._all.copies.set_states(k, state)
         self._steps += 1
         self._steps[again], rewards[again], over[again] = 0, 0.0, False
         late = self._steps >= self._all.most

@@ -16,7 +16,7 @@ from osimlite.errors import SettingError
 from osimlite.mechanics.kernels.reflexes import LIMITS, TERM
 from osimlite.mechanics.kernels.sensors import SENSED
 from osimlite.schema.model import Model
-from osimlite.simulation.control_steps import Gain, Held
+from osimlite.simulation.control_steps import Gain, KernelController
 from osimlite.studies.reflexes.controllers import CONTROLLERS, Reflexes
 from osimlite.studies.reflexes.parameters import AUTO, Parameter, Parameters, par_line, read_par
 from osimlite.studies.reflexes.scenario import (
@@ -116,7 +116,7 @@ class Feedback:
                 )
         return felt, reflexes, parameters
 
-    def compile_for(self, model: Model, engine: Any) -> Held:
+    def compile_for(self, model: Model, engine: Any) -> KernelController:
         """What the kernels go by, for a model with its engine.
 
         Raises: OsimliteError: the model has not what a reflex names, or a value belongs to no
@@ -130,7 +130,7 @@ class Feedback:
         others = np.setdiff1d(everything, everything if is_noisy else targets)
         first, known = SENSED.HEAD + 2 * len(felt.muscles), felt.known.copy()
         known[first + others] = known[first + len(felt.names) + others] = 0.0
-        return Held(
+        return KernelController(
             tuple(felt.paths),
             self.step,
             tuple(source.name for source in reflexes.sources),

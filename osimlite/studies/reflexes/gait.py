@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from osimlite.mechanics.multibody.spatial import Array
-from osimlite.simulation.link_motion import centers_of_mass, stations
+from osimlite.simulation.link_motion import locate_mass_centers, locate_station
 
 if TYPE_CHECKING:
     from osimlite.studies.reflexes.scenario import Scenario, Walked
@@ -88,8 +88,8 @@ def gait_of(scenario: Scenario, walked: Walked) -> Gait | None:
     states = np.empty_like(walked.states.rows)
     states[:, [walkers.places[path] for path in walked.states.columns]] = walked.states.rows
     moments = list(zip(walked.states.times.tolist(), states.tolist(), strict=True))
-    centre = centers_of_mass(walkers.engine, moments)[:, :3]
-    pelvis = stations(walkers.engine, moments, walkers.legs[0].base, np.zeros(3))[:, :3]
+    centre = locate_mass_centers(walkers.engine, moments)[:, :3]
+    pelvis = locate_station(walkers.engine, moments, walkers.legs[0].base, np.zeros(3))[:, :3]
     far, times = centre[-1, 0] - centre[0, 0], walked.states.times
     upper, lower = (
         (float(y.mean()), float(y.min()), float(y.max())) for y in (centre[:, 1], pelvis[:, 1])

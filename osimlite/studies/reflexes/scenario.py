@@ -286,7 +286,7 @@ class Candidates:
         """States at the start."""
         walkers, node, scenario = self.walkers, self.scenario.settings, self.scenario
         states = walkers.copies.states
-        walkers.copies.put(slice(None), np.tile(walkers.copies.start, (walkers.count, 1)))
+        walkers.copies.set_states(slice(None), np.tile(walkers.copies.start, (walkers.count, 1)))
         file = node.text("state_init_file", "")
         if file:
             self._read_state(find_file(file, scenario.folder))

@@ -104,7 +104,7 @@ class Felt:
         limits: list[int] = []
         for item in model.components(CoordinateLimitForce):
             if item.appliesForce and str(item.coordinate) in self.coordinates:
-                places = engine.places_of(model.tree().path_of(item), ("force",))
+                places = engine.find_offsets(model.tree().path_of(item), ("force",))
                 limits += self.coordinates.index(str(item.coordinate)), *places
         m, n, b, legs = len(self.muscles), len(self.coordinates), len(bodies), len(self.legs)
         centres = []
@@ -126,7 +126,7 @@ class Felt:
         head = m, n, legs, len(limits) // 2, b, len(self.names), len(known)
         plan = [*head, 0, *np.cumsum(sizes).tolist()]
         plan += [
-            place for path in self.paths[:m] for place in engine.places_of(path, OF_MUSCLES)
+            place for path in self.paths[:m] for place in engine.find_offsets(path, OF_MUSCLES)
         ] + limits
         plan += [placement.link for placement in engine.placements]
         plan += [
@@ -282,10 +282,10 @@ class Walkers(Felt):
         record = np.empty((max(order, 0), states.shape[1] + len(self.names) + len(self.legs)))
         chosen, before = range(self.count) if which is None else which, int(self.progress[0, STEPS])
         parts = *self._asked, self.rows, self.excitations, record, self.progress, order
-        if self.copies.walk(chosen, *parts) != OUTCOME.OK:
+        if self.copies.walk_some(chosen, *parts) != OUTCOME.OK:
             # The engine tells what it is.
             for k in chosen:
-                self.engine.applied(0.0, states[k].tolist())
+                self.engine.compute_applied_forces(0.0, states[k].tolist())
         return record[: int(self.progress[0, STEPS]) - before] if order > 0 else record
 
     def loads(self) -> Array:
@@ -297,7 +297,7 @@ class Walkers(Felt):
         for k in range(self.count):
             state = self.copies.states[k].copy()
             state[self._activations] = activations[k]
-            self.copies.states[k] = self.engine.equilibrated(0.0, state.tolist())
+            self.copies.states[k] = self.engine.equilibrate_muscles(0.0, state.tolist())
 
     def close(self) -> None:
         """Free the engine."""

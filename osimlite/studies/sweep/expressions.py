@@ -29,8 +29,8 @@ import numpy as np
 
 from osimlite.base.text import suggest_name
 from osimlite.errors import SettingError
-from osimlite.simulation.link_motion import Moments, centers_of_mass, stations
-from osimlite.simulation.run_report import probe_labels, probe_rows
+from osimlite.simulation.link_motion import Moments, locate_mass_centers, locate_station
+from osimlite.simulation.run_report import compute_probe_rows, list_probe_labels
 from osimlite.studies.sweep.variables import Floats
 
 Quantity = Callable[[Any, Moments], Any]
@@ -162,7 +162,7 @@ def list_quantities(engine: Any) -> Mapping[str, Quantity]:
     for number, path in enumerate(engine.forces.controls.names):
         control = partial(_control, number)
         more += [(f"{path}/control", control), (f"{path.rpartition('/')[2]}/control", control)]
-    points: dict[str, Callable[[Any, Moments], Floats]] = {"center_of_mass": centers_of_mass}
+    points: dict[str, Callable[[Any, Moments], Floats]] = {"center_of_mass": locate_mass_centers}
     points |= {path.rpartition("/")[2]: partial(_marker, path) for path in mechanism.stations}
     points |= {body.name: partial(_body, number) for number, body in enumerate(mechanism.bodies)}
     for name, motion in points.items():
@@ -171,7 +171,8 @@ def list_quantities(engine: Any) -> Mapping[str, Quantity]:
             more += [(f"{name}_{letter}/speed", partial(_axis, motion, 3 + axis))]
     more += [(label, partial(_force, number)) for number, label in enumerate(engine.columns)]
     more += [
-        (label, partial(_probe, number)) for number, label in enumerate(probe_labels(engine.probes))
+        (label, partial(_probe, number))
+        for number, label in enumerate(list_probe_labels(engine.probes))
     ]
     return dict(reversed(more)) | result
 
@@ -183,7 +184,7 @@ def list_driven_names(engine: Any) -> set[str]:
         for path in engine.forces.controls.names
         for name in (path, path.rpartition("/")[2])
     }
-    return controls | {*engine.columns, *probe_labels(engine.probes)}
+    return controls | {*engine.columns, *list_probe_labels(engine.probes)}
 
 
 def _state(place: int, engine: Any, moments: Moments) -> Floats:
@@ -199,8 +200,8 @@ def _still(place: int | None, engine: Any, moments: Moments) -> Floats:
 def _control(place: int, engine: Any, moments: Moments) -> Floats:
     result = []
     for t, y in moments:
-        engine.applied(t, y)
-        result.append(engine.controls()[place])
+        engine.compute_applied_forces(t, y)
+        result.append(engine.read_controls()[place])
     return np.array(result)
 
 
@@ -209,15 +210,17 @@ def _force(place: int, engine: Any, moments: Moments) -> Floats:
 
 
 def _probe(place: int, engine: Any, moments: Moments) -> Floats:
-    return np.array(list(probe_rows(engine, moments, moments)))[:, place]
+    return np.array(list(compute_probe_rows(engine, moments, moments)))[:, place]
 
 
 def _marker(path: str, engine: Any, moments: Moments) -> Floats:
-    return stations(engine, moments, *engine.mechanism.stations[path])
+    return locate_station(engine, moments, *engine.mechanism.stations[path])
 
 
 def _body(number: int, engine: Any, moments: Moments) -> Floats:
-    return stations(engine, moments, number, engine.mechanism.bodies[number].mass_properties.center)
+    return locate_station(
+        engine, moments, number, engine.mechanism.bodies[number].mass_properties.center
+    )
 
 
 def _axis(

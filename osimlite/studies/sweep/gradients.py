@@ -20,7 +20,7 @@ from osimlite.errors import SettingError, SimulationError, UnsupportedError
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.simulation.batches import Runs, run_many
 from osimlite.simulation.engines.protocol import Settings
-from osimlite.simulation.options import MERSON, report_times
+from osimlite.simulation.options import MERSON, compute_report_times
 from osimlite.simulation.pack import pack
 from osimlite.studies.sweep.measures import Batch, measure
 from osimlite.studies.sweep.plan import MOST_TRIES, Plan
@@ -81,7 +81,9 @@ class Gradients:
                 f"'{self._measure.name}' is of events; take another measure, or another --method"
             )
         self._times = (
-            [0.0, plan.to] if plan.interval is None else report_times(plan.to, plan.interval)
+            [0.0, plan.to]
+            if plan.interval is None
+            else compute_report_times(plan.to, plan.interval)
         )
         self._steps: tuple[bytes, TangentSteps] | None = None
 
@@ -183,10 +185,10 @@ class Gradients:
             times.append(t)
             states.append(y)
 
-        stepper = here.variant.engine.stepper(
+        stepper = here.variant.engine.make_stepper(
             0.0, here.start.tolist(), Settings(self._plan.accuracy), note
         )
-        stepper.table([self._plan.to])
+        stepper.tabulate([self._plan.to])
         stepper.catch_up()
         if stepper.ended is not None:
             raise stepper.ended
@@ -195,7 +197,9 @@ class Gradients:
     def _steps_of(self, variant: Variant) -> TangentSteps:
         if self._steps is None or self._steps[0] != variant.structure:
             engine = variant.engine
-            packed = pack(engine.mechanism, replace(engine.forces, controls=engine.driving))
+            packed = pack(
+                engine.mechanism, replace(engine.forces, controls=engine.current_controls)
+            )
             self._steps = (
                 variant.structure,
                 TangentSteps(packed, engine.forces, range(len(variant.state.names))),

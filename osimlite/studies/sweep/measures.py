@@ -57,7 +57,7 @@ class Batch:
             engine_of=lambda _: self.engine_of(place),
             numbers=None if self.numbers is None else self.numbers[rows],
             starts=self.starts[rows],
-            runs=self.runs.of(rows),
+            runs=self.runs.select(rows),
             values=self.values[rows],
             memory={},
         )

@@ -21,7 +21,7 @@ from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.schema.model import Model
 from osimlite.simulation.elements.builder import OPENSIM
 from osimlite.simulation.engines import engine_name
-from osimlite.simulation.initial_state import in_units_of, suspect_value
+from osimlite.simulation.initial_state import convert_value, describe_suspect_value
 from osimlite.simulation.options import DEFAULT_ACCURACY, MERSON, check_integrator
 from osimlite.simulation.run import Simulation
 from osimlite.studies.sweep.controls import Control, check_nodes, controller_of
@@ -274,8 +274,8 @@ def _make_stop(mechanism: Mechanism, name: str, given: float | str, is_below: bo
         raise SettingError(
             f"the coordinate '{name}' is locked, so that it stops nothing; name one that moves"
         )
-    level = in_units_of(mechanism, name, given)
+    level = convert_value(mechanism, name, given)
     if not isfinite(level):
         raise SettingError(f"the level of '{name}' that stops a run is a number, not {given}")
-    warn_of_unit(suspect_value(infos[name], name, given))
+    warn_of_unit(describe_suspect_value(infos[name], name, given))
     return Stop(name, level, is_below)

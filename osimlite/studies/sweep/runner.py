@@ -11,7 +11,7 @@ import numpy as np
 from osimlite.base.records import dataclass, replace
 from osimlite.errors import OsimliteError, SettingError
 from osimlite.simulation.batches import Runs, Watch
-from osimlite.simulation.options import report_times
+from osimlite.simulation.options import compute_report_times
 from osimlite.studies.sweep.expressions import Expression, list_driven_names
 from osimlite.studies.sweep.measures import (
     Batch,
@@ -125,7 +125,7 @@ class Runner:
         self.variants = Variants(plan)
         given = self.variants.given
         self._looks: dict[bytes, _Look] = {given.structure: _Look(plan, given.engine)}
-        moments = [] if plan.interval is None else report_times(plan.to, plan.interval)
+        moments = [] if plan.interval is None else compute_report_times(plan.to, plan.interval)
         self._report_times = np.array(moments)
 
     def run(self, values: Floats) -> Block:
@@ -186,7 +186,7 @@ class Runner:
             lambda number: chosen[number].engine,
             self._numbers(chosen),
             starts[good],
-            runs.of(good),
+            runs.select(good),
             values[rows],
             [item.name for item in self.plan.variables],
             self._report_times,
@@ -316,7 +316,7 @@ class Runner:
                 why.append((FAILED, str(error)))
                 continue
             why.append((DONE, None))
-            history = simulation.state.rows(
+            history = simulation.state.pack_rows(
                 trajectory.values, trajectory.speeds, trajectory.auxiliary
             )
             times[number], states[number] = trajectory.times[-1], history[-1]

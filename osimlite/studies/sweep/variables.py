@@ -35,8 +35,14 @@ from osimlite.errors import SettingError
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.schema.actuators import Actuator
 from osimlite.schema.model import Model
-from osimlite.simulation.initial_state import suspect_value
-from osimlite.simulation.properties import Place, each, named, places, spellings
+from osimlite.simulation.initial_state import describe_suspect_value
+from osimlite.simulation.properties import (
+    PropertyPath,
+    expand_braces,
+    find_properties,
+    list_property_paths,
+    match_components,
+)
 from osimlite.studies.sweep.controls import SCALE, Control, control, nodes_of
 
 if TYPE_CHECKING:
@@ -65,11 +71,11 @@ class Start:
 class Property:
     """Numbers of the model that are the same, or are changed by the same factor."""
 
-    places: tuple[Place, ...]
+    places: tuple[PropertyPath, ...]
     is_scaled: bool = False
 
     @property
-    def parts(self) -> tuple[Place, ...]:
+    def parts(self) -> tuple[PropertyPath, ...]:
         """What no other variable may be."""
         return self.places
 
@@ -187,7 +193,7 @@ def resolve_variables(
     for names, given in ranges.items():
         known = [
             (name, _resolve_target(name, model, mechanism, parameters, gains))
-            for word in each(names, model)
+            for word in expand_braces(names, model)
             for name in nodes_of(word)
         ]
         for name, meaning in known:
@@ -236,7 +242,7 @@ def _resolve_target(
     front, _, last = name.rpartition("/")
     for key, is_speed in ((name, False), (front, last == "speed")):
         if (key == name or last in ("value", "speed")) and (
-            meant := named(key, mechanism.coordinates)
+            meant := match_components(key, mechanism.coordinates)
         ):
             return _list_coordinates(name, meant, is_speed, model)
     if name in parameters:
@@ -244,17 +250,17 @@ def _resolve_target(
         return Parameter(
             name, float(default) if type(default) in (int, float) else None
         ), "parameter"
-    if own := named(name, gains):
+    if own := match_components(name, gains):
         return Gains(tuple(gain.name for gain in own), own[0].value), "parameter"
     route, _, word = name.partition("@")
     front, _, last = route.rpartition("/")
-    if last == "control" and (driven := named(front, model.components(Actuator))):
+    if last == "control" and (driven := match_components(front, model.components(Actuator))):
         made = control(name, [item.path for item in driven], word)
         return made, made.unit
-    if word in ("", SCALE) and (result := places(model, route)):
+    if word in ("", SCALE) and (result := find_properties(model, route)):
         unit = result[0].unit
         if unit.startswith("rad | m") and (
-            infos := named(result[0].component, mechanism.coordinates)
+            infos := match_components(result[0].component, mechanism.coordinates)
         ):
             unit = infos[0].unit or "rad | m"
         return Property(result, bool(word)), "" if word else unit
@@ -268,7 +274,7 @@ def _describe_unknown_name(
 ) -> SettingError:
     """The error for a name that means nothing."""
     route = name.partition("@")[0]
-    if named(route, model.components(Actuator)):
+    if match_components(route, model.components(Actuator)):
         return SettingError(
             f"'{name}' is an actuator: vary '{route}/control', or one of its properties"
         )
@@ -280,7 +286,7 @@ def _describe_unknown_name(
     known += [
         f"{key}/control" for item in model.components(Actuator) for key in (item.name, item.path)
     ]
-    known += spellings(model) if "/" in name else []
+    known += list_property_paths(model) if "/" in name else []
     near = suggest_name(name, known)
     return SettingError(
         f"there is no coordinate, parameter, control or number '{name}' to vary{near}"
@@ -301,7 +307,9 @@ def _list_coordinates(
         raise SettingError(
             f"of '{name}', '{locked[0].name}' is locked and others are not; vary these one by one"
         )
-    return Property(places(model, ",".join(info.path for info in infos) + "/default_value")), unit
+    return Property(
+        find_properties(model, ",".join(info.path for info in infos) + "/default_value")
+    ), unit
 
 
 def _make_variable(name: str, target: Target, unit: str, given: Range) -> Variable:
@@ -369,7 +377,7 @@ def _looks_like_degrees(made: Variable, given: Range, mechanism: Mechanism) -> s
     infos = [
         mechanism.coordinates[mechanism.coordinate_index(path)] for path in made.target.coordinates
     ]
-    odd = (suspect_value(info, made.name, end) for info in infos for end in ends)
+    odd = (describe_suspect_value(info, made.name, end) for info in infos for end in ends)
     return next((words for words in odd if words), "")
 
 

@@ -25,7 +25,7 @@ from osimlite.schema.forces import Force
 from osimlite.schema.frames import Body
 from osimlite.schema.model import Model
 from osimlite.schema.sets import Controller
-from osimlite.simulation.batches import Renewal
+from osimlite.simulation.batches import ModelUpdater
 from osimlite.simulation.run import Simulation
 from osimlite.simulation.states import StateLayout
 from osimlite.studies.sweep.controls import Control, VariedControls, controller_of
@@ -35,7 +35,7 @@ from osimlite.studies.sweep.variables import Floats, Gains, Parameter, Property,
 
 if TYPE_CHECKING:
     from osimlite.simulation.control_steps import Controller as Feedback
-    from osimlite.simulation.control_steps import Held
+    from osimlite.simulation.control_steps import KernelController
 
 RENEWED = Force, Controller, Body, Model
 """What an engine need not be made anew for."""
@@ -54,7 +54,7 @@ class Variant:
     maker: Callable[[], Any]  # makes its engine
     simulation: Simulation | None = None  # that the engine is part of; None if only forces are new
     controller: Feedback | None = None
-    held: Held | None = None  # of it
+    held: KernelController | None = None  # of it
 
     @cached_property
     def engine(self) -> Any:
@@ -95,7 +95,7 @@ class Variants:
             # A model without two feet is told of before any run.
             start_named("planted")(self.given.engine, plan.feet)
         self._kept: dict[tuple[float, ...], Variant | OsimliteError] = {}
-        self._renewal: Renewal | None = None
+        self._renewal: ModelUpdater | None = None
 
     @property
     def is_fixed(self) -> bool:
@@ -132,7 +132,7 @@ class Variants:
         """
         # An engine of its own is only made where the coordinates may be others.
         engine = (self.given if variant.structure == self.given.structure else variant).engine
-        row = np.array(variant.state.default())
+        row = np.array(variant.state.pack_defaults())
         simulation = variant.simulation or self.given.simulation
         if simulation is not None and simulation.constraints:
             # The rest follows from what is set.
@@ -162,7 +162,7 @@ class Variants:
         """
         rows = np.concatenate(
             [
-                variant.state.started(row[None])
+                variant.state.restart_auxiliary(row[None])
                 for variant, row in zip(variants, states, strict=True)
             ]
         )
@@ -173,8 +173,8 @@ class Variants:
                 y, result = row.tolist(), None
                 if len(variant.numbers):
                     with suppress(SimulationError):
-                        result = engine.equilibrated(0.0, y, variant.numbers)
-                row[:] = variant.engine.equilibrated(0.0, y) if result is None else result
+                        result = engine.equilibrate_muscles(0.0, y, variant.numbers)
+                row[:] = variant.engine.equilibrate_muscles(0.0, y) if result is None else result
         return rows
 
     def place_states(self, engine: Any, variants: Sequence[Variant], starts: Floats) -> Floats:
@@ -206,7 +206,7 @@ class Variants:
                 ]
                 result.append(info.default_speed if item.target.is_speed else info.default_value)
             elif isinstance(item.target, Property):
-                result.append(1.0 if item.target.is_scaled else setters[index][0].get())
+                result.append(1.0 if item.target.is_scaled else setters[index][0].get_value())
             elif isinstance(item.target, Control | Gains):
                 result.append(item.target.present)
             else:
@@ -270,7 +270,7 @@ class Variants:
             self._controller = self.controller(values)
         for place, setters in self._setters:
             for setter in setters:
-                setter.put(float(values[place]))
+                setter.set_value(float(values[place]))
         self._controls.apply(values)
         for place in self._slopes:
             angle, g = float(values[place]), self._gravity
@@ -285,9 +285,9 @@ class Variants:
         for place in self._changes:
             target = self._plan.variables[place].target
             if isinstance(target, Property):
-                setters = [item.setter(model) for item in target.places]
+                setters = [item.make_setter(model) for item in target.places]
                 self._setters.append(
-                    (place, [item.scaling() for item in setters] if target.is_scaled else setters)
+                    (place, [item.as_factor() for item in setters] if target.is_scaled else setters)
                 )
                 owners += [model.tree().by_path[item.component] for item in target.places]
             elif isinstance(target, Slope):
@@ -341,12 +341,12 @@ class Variants:
         if self._owners is None:
             return self._whole()
         if self._renewal is None:
-            self._renewal = given.engine.renewal(
+            self._renewal = given.engine.make_updater(
                 self.model, Path(self._plan.folder or "."), self._plan.wrapping
             )
-        made = self._renewal.renewed(self._owners)
+        made = self._renewal.update(self._owners)
         if made is None:
             return self._whole()
         # The auxiliary states may start otherwise.
         state = StateLayout(made.mechanism, given.state.order, made.forces.elements)
-        return self._add_controls(Variant(state, given.structure, made.numbers, made.engine))
+        return self._add_controls(Variant(state, given.structure, made.numbers, made.make_engine))

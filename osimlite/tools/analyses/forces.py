@@ -17,8 +17,8 @@ from osimlite.schema.model import Model
 from osimlite.schema.muscles import PathActuator
 from osimlite.schema.tools.analyses import Actuation, JointReaction
 from osimlite.simulation.elements.controls import Controls
-from osimlite.simulation.run_controls import driven
-from osimlite.simulation.static_optimization import ideal
+from osimlite.simulation.run_controls import add_controls
+from osimlite.simulation.static_optimization import make_ideal_actuator
 from osimlite.tools.dynamics_setup import build_simulation
 from osimlite.tools.motion import AnalysisTables, Motion
 from osimlite.tools.reaction_forces import JointWrenches
@@ -59,7 +59,7 @@ def write_joint_reactions(analysis: JointReaction, motion: Motion, tables: Analy
         bases = {end: _find_base_path(model, joint, end) for end in ("child", "parent")}
         frame = _find_frame_path(motion, requested, bases, tables)
         force, moment, point = loads.get_reaction(joint, side)
-        rotation, origin = loads.moved.placed(*mechanism.placement(frame))
+        rotation, origin = loads.moved.locate_frame(*mechanism.placement(frame))
         back = rotation.transpose(0, 2, 1)
         rows += [(back @ item[..., None])[..., 0] for item in (force, moment, point - origin)]
         root = f"{joint.name}_on_{_get_last_name(bases[side])}_in_{_get_last_name(frame)}"
@@ -175,7 +175,7 @@ def _override_forces(
     model.probe_set.objects.clear()
     indices = {id(force): number for number, force in enumerate(model.force_set.objects)}
     for item in actuators:
-        other = ideal(item, 1.0)
+        other = make_ideal_actuator(item, 1.0)
         if other is None or id(item) not in indices:
             raise tables.job.create_unsupported_error(
                 f"the {type(item).__name__} '{item.name}' cannot take its force from '{path}'; "
@@ -185,10 +185,10 @@ def _override_forces(
     simulation = build_simulation(tables.job, model)
     forces = {item.name: (table.times, table[item.name]) for item in actuators}
     first, last = (float(time) for time in motion.times[[0, -1]])
-    controls = driven(
+    controls = add_controls(
         simulation.forces.controls, forces, last, start=first, what=f"forces of '{path.name}'"
     )
-    simulation.engine.drive(controls)
+    simulation.engine.set_controls(controls)
     pairs = zip(motion.values.tolist(), motion.speeds.tolist(), strict=True)
     return Motion(
         model, simulation, motion.times, np.array([simulation.state.pack(q, u) for q, u in pairs])

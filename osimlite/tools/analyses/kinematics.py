@@ -64,10 +64,12 @@ def write_body_kinematics(analysis: BodyKinematics, motion: Motion, tables: Anal
     whole = np.zeros((3, len(motion.times), 3))
     for body in bodies:
         index = indices[tree.path_of(body) or ""]
-        linear = np.array(motion.links.point(index, np.array(body.mass_center)))
+        linear = np.array(motion.links.compute_point_motion(index, np.array(body.mass_center)))
         whole += body.mass / total * linear
-        rotation, _ = motion.links.placed(index, np.eye(4))
-        rows = np.stack([linear, [angles_xyz(rotation), *motion.links.turning(index)]], axis=2)
+        rotation, _ = motion.links.locate_frame(index, np.eye(4))
+        rows = np.stack(
+            [linear, [angles_xyz(rotation), *motion.links.get_angular_motion(index)]], axis=2
+        )
         if local:
             rows[1:] = rows[1:] @ rotation
         if analysis.in_degrees:
@@ -136,11 +138,13 @@ def write_point_kinematics(
         motion.find_frame_path(body_name, *FRAME_SEARCH) or body_name
     )
     result = np.array(
-        motion.links.point(body, placed[:3, :3] @ np.array(analysis.point) + placed[:3, 3])
+        motion.links.compute_point_motion(
+            body, placed[:3, :3] @ np.array(analysis.point) + placed[:3, 3]
+        )
     )
     path = motion.find_frame_path(beside, *FRAME_SEARCH)
     if path is not None:
-        rotation, origin = motion.links.placed(*mechanism.placement(path))
+        rotation, origin = motion.links.locate_frame(*mechanism.placement(path))
         result[0] -= origin
         result = (result[..., None, :] @ rotation)[..., 0, :]
     elif beside not in ("", "none"):

@@ -11,7 +11,7 @@ from osimlite.schema.muscles import Muscle
 from osimlite.schema.tools.analyses import MuscleAnalysis, StaticOptimization
 from osimlite.simulation.elements.muscle import SPRING
 from osimlite.simulation.paths import Paths
-from osimlite.simulation.static_optimization import Shared
+from osimlite.simulation.static_optimization import SharedForces
 from osimlite.tools.analyses.reporters import FORCES_DESCRIPTION
 from osimlite.tools.dynamics_setup import build_static_optimization
 from osimlite.tools.motion import AnalysisTables, Motion
@@ -66,7 +66,11 @@ def _compute_tables(motion: Motion, muscles: list[Muscle]) -> dict[str, Array]:
     for cls in dict.fromkeys(map(type, muscles)):
         indices = [index for index, muscle in enumerate(muscles) if type(muscle) is cls]
         paths = [tree.path_of(muscles[index]) or "" for index in indices]
-        names = LAW_RECORDS if not motion.system.knows(paths[0], SPRING) else (*LAW_RECORDS, SPRING)
+        names = (
+            LAW_RECORDS
+            if not motion.system.has_quantity(paths[0], SPRING)
+            else (*LAW_RECORDS, SPRING)
+        )
         with np.errstate(invalid="ignore", divide="ignore"):
             of_class = compute_quantities(
                 motion.read_records(paths, *names), [muscles[index] for index in indices]
@@ -90,7 +94,7 @@ def _add_moments(
     tree = motion.model.tree()
     paths = Paths(motion.model)
     rows = [paths.names.index(tree.path_of(muscle) or "") for muscle in muscles]
-    arms = paths.all_moment_arms(motion.values)[:, rows]
+    arms = paths.compute_moment_arms(motion.values)[:, rows]
     requested = [
         "all" if str(name).lower() == "all" else name
         for name in analysis.moment_arm_coordinate_list
@@ -132,11 +136,11 @@ def write_static_optimization(
     problem = build_static_optimization(
         job, motion.model, motion.mechanism, exponent=analysis.activation_exponent, muscles=muscles
     )
-    shared = problem.share(
+    shared = problem.solve_motion(
         motion.times, motion.values, motion.speeds, motion.measured_accelerations
     )
-    forces = problem.records(shared, motion.values, motion.speeds)
-    activations = shared.table()
+    forces = problem.report_forces(shared, motion.values, motion.speeds)
+    activations = shared.to_table()
     tables.add_table(
         "activation",
         activations.name,
@@ -151,10 +155,10 @@ def write_static_optimization(
     _report_unsolved(shared, analysis.name, tables)
 
 
-def _report_unsolved(shared: Shared, name: str, tables: AnalysisTables) -> None:
+def _report_unsolved(shared: SharedForces, name: str, tables: AnalysisTables) -> None:
     """Report the times without a solution, and the coordinates that lack strength there."""
     outcome = tables.outcome
     outcome.summary[f"{name}_unsolved"] = np.count_nonzero(~shared.solved)
-    if said := shared.unsolved():
+    if said := shared.describe_unsolved():
         outcome.done = False
         outcome.add_message(name, said)

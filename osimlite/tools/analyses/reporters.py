@@ -18,7 +18,7 @@ from osimlite.schema.tools.analyses import (
     ProbeReporter,
     StatesReporter,
 )
-from osimlite.simulation.run_report import probe_labels, probe_rows
+from osimlite.simulation.run_report import compute_probe_rows, list_probe_labels
 from osimlite.simulation.system import System
 from osimlite.simulation.trajectory import label_as_opensim
 from osimlite.tools.motion import AnalysisTables, Motion
@@ -156,7 +156,7 @@ def write_probes(analysis: ProbeReporter, motion: Motion, tables: AnalysisTables
     ]
     labels = [
         label
-        for label, is_shown in zip(probe_labels(engine.probes), shown, strict=True)
+        for label, is_shown in zip(list_probe_labels(engine.probes), shown, strict=True)
         if is_shown
     ]
     tables.add_table(
@@ -166,9 +166,9 @@ def write_probes(analysis: ProbeReporter, motion: Motion, tables: AnalysisTables
 
 def _compute_probe_rows(motion: Motion) -> Array:
     """Return the values of all probes at every time (t, m)."""
-    rows = list(probe_rows(motion.simulation.engine, [*motion.moments], motion.steps))
+    rows = list(compute_probe_rows(motion.simulation.engine, [*motion.moments], motion.steps))
     return np.array(rows).reshape(
-        len(motion.times), len(probe_labels(motion.simulation.engine.probes))
+        len(motion.times), len(list_probe_labels(motion.simulation.engine.probes))
     )
 
 

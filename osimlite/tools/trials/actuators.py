@@ -220,7 +220,9 @@ def _find_crossed_coordinates(tool: TrialTool) -> set[str]:
         poses = motion[np.unique(np.linspace(0, len(motion) - 1, POSE_COUNT).astype(int))]
     except MissingInput:
         poses = mechanism.values({})[None]
-    arms = np.abs(paths.all_moment_arms(poses)[:, rows]).max(axis=(0, 1)) if rows else np.zeros(0)
+    arms = (
+        np.abs(paths.compute_moment_arms(poses)[:, rows]).max(axis=(0, 1)) if rows else np.zeros(0)
+    )
     return {
         info.name
         for info, arm in zip(mechanism.coordinates, arms, strict=bool(rows))

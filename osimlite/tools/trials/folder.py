@@ -156,7 +156,7 @@ class TrialFolder:
             table = self.read_table(file)
             is_later = np.diff(np.maximum.accumulate(table.times), prepend=-np.inf) > 0.0
             kept = replace(table, times=table.times[is_later], rows=table.rows[is_later])
-            return RecordedMotion.of_table(self.build_mechanism(model), kept)
+            return RecordedMotion.from_table(self.build_mechanism(model), kept)
 
         return self.compute_once(("motion", file, model), read)
 

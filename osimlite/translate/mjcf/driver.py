@@ -140,7 +140,7 @@ class Driver:
         q, u, _ = self.state()
         y = self.system.state.pack(q.tolist(), u.tolist())
         if self._equilibrate:
-            y = self.system.equilibrated(0.0, y)
+            y = self.system.equilibrate_muscles(0.0, y)
         if self._states >= 0:
             self.data.act[:] = self.system.state.auxiliary(y)
         self.set_state(q, u)
@@ -212,7 +212,7 @@ class Driver:
             state = self.system.state
             if len(self._controls):
                 self.system.numbers[self._controls] = data.ctrl[: len(self._controls)]
-            row = self.system.applied(
+            row = self.system.compute_applied_forces(
                 data.time, state.pack(q.tolist(), u.tolist(), data.act.tolist())
             )
         except Exception as failure:
@@ -344,7 +344,7 @@ class Driver:
             controls.add_functions(dict.fromkeys(controls.names, Constant(value)))
             for value in (0.0, 1.0)
         )
-        self.system.drive(none)
+        self.system.set_controls(none)
         place = self.system.structure[MODEL.CONTROLS]
         first = self.system.structure[place + ITEM.NUMBERS] if place else 0
         self._controls = first + np.flatnonzero(

@@ -50,6 +50,6 @@ def isometric_tension(force: Any, lengths: Array, activations: Sequence[float]) 
         ]
         for index, length in enumerate(lengths.tolist()):
             with suppress(SimulationError):
-                state = system.equilibrated(activation, [length, 0.0, *start])
+                state = system.equilibrate_muscles(activation, [length, 0.0, *start])
                 row[index] = system.force_records(activation, state)[0]
     return result

@@ -126,7 +126,7 @@ def random_poses(paths: Paths, count: int, seed: int = 0) -> tuple[Poses, Mappin
         np.array(free_coordinates(mechanism), dtype=int),
     )
     states = [mechanism.at(row) for row in values]
-    couplings = [paths.coupling_of_free(state) for state in states]
+    couplings = [paths.compute_free_coupling(state) for state in states]
     rates = np.nan_to_num(np.stack([coupling[:, moving] for coupling in couplings]))
     poses = Poses(
         values,
@@ -136,9 +136,11 @@ def random_poses(paths: Paths, count: int, seed: int = 0) -> tuple[Poses, Mappin
         np.stack([state.jacobians @ own for state, own in zip(states, rates, strict=True)], axis=1),
         rates,
     )
-    lengths = paths.system.lengths(values).T.copy()
+    lengths = paths.system.measure_poses(values).T.copy()
     arms = (
-        np.nan_to_num(paths.all_moment_arms(values, couplings)[:, :, moving]).swapaxes(0, 1).copy()
+        np.nan_to_num(paths.compute_moment_arms(values, couplings)[:, :, moving])
+        .swapaxes(0, 1)
+        .copy()
     )
     nodes = [paths.points(row) for row in values]
     truth = {

@@ -114,7 +114,7 @@ def _slopes(draft: Draft, elements: Sequence[ForceElement], along: Array, at: Ar
             y = system.state.pack(
                 (q + nudge * along[:, k]).tolist(), (u + nudge * at[:, k]).tolist()
             )
-            row[places] = system.applied(0.0, y)[len(places) : 2 * len(places)]
+            row[places] = system.compute_applied_forces(0.0, y)[len(places) : 2 * len(places)]
             return row
 
         for k in range(result.shape[1]):

@@ -68,7 +68,7 @@ def describe(*arrays: Any) -> str:
 def run(model: Any) -> str:
     """Return a digest of two motions of a model."""
     engine: Any = Simulation(model, "compiled", skip_unsupported=True).engine
-    start = np.array(engine.found())
+    start = np.array(engine.get_derivative())
     starts = np.tile(start, (2, 1))
     moving = 2 * len(engine.order)
     starts[:, :moving] += np.random.default_rng(0).uniform(-0.01, 0.01, (2, moving))

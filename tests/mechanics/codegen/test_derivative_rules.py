@@ -16,11 +16,11 @@ from osimlite.mechanics.codegen.cplusplus import write_library
 from osimlite.mechanics.kernels.pointers import Floats, Ints
 from osimlite.mechanics.laws.dual_numbers import is_nothing, plain, settled
 from osimlite.simulation.engines.dual_numbers import (
-    ARITHMETIC,
-    IN_PLACE,
-    SLOPES,
-    Carrying,
-    carried_by,
+    ARITHMETIC_SLOPES,
+    DUAL_REPLACEMENTS,
+    FUNCTION_SLOPES,
+    DualNumber,
+    make_dual,
 )
 from tests.mechanics.codegen.compiled import are_same_bits, compile_text, needs_compiler
 
@@ -55,7 +55,7 @@ def write_function(function, which):
     return scope[name]
 
 
-RULES = {**SLOPES, **ARITHMETIC}
+RULES = {**FUNCTION_SLOPES, **ARITHMETIC_SLOPES}
 CASES = [
     (function, which)
     for function, slopes in RULES.items()
@@ -103,11 +103,11 @@ def test_each_rule_is_that_of_python(compiled, case):
     for values in itertools.product(VALUES, repeat=len(which)):
         numbers = list(zip(values, CHANGES[: len(which)], strict=True))
         given = [
-            Carrying(v, [*c]) if carries else v
+            DualNumber(v, [*c]) if carries else v
             for (v, c), carries in zip(numbers, which, strict=True)
         ]
         try:
-            expected = IN_PLACE[function](*given)
+            expected = DUAL_REPLACEMENTS[function](*given)
         except (ValueError, ZeroDivisionError, OverflowError):
             continue
         if isinstance(expected.value, complex):
@@ -159,7 +159,7 @@ def test_corners_are_those_of_python(tmp_path):
     library = compile_text(tmp_path, write_library({"corners": (corners, DIRECTIONS)}))
     kernel = library.corners
     kernel.restype, kernel.argtypes = ctypes.c_int64, [*[ctypes.c_void_p] * 3, ctypes.c_int64]
-    in_python = carried_by(corners)
+    in_python = make_dual(corners)
     size, count = 1 + DIRECTIONS, 14
     for a, b in itertools.product((0.0, -0.0, 1.0, -0.75, 2.5), (0.5, -0.5, 1.0)):
         for changes in (CHANGES, [(0.0,) * 3, (1.0, 0.0, 0.0)]):
@@ -169,12 +169,12 @@ def test_corners_are_those_of_python(tmp_path):
             )
             out = (ctypes.c_double * (count * size))()
             expected = [0.0] * count
-            wanted = in_python([0], [Carrying(v, [*c]) for v, c in numbers], expected, 3)
+            wanted = in_python([0], [DualNumber(v, [*c]) for v, c in numbers], expected, 3)
             assert kernel(None, x, out, 3) == wanted
             for k, number in enumerate(expected):
                 row = (
                     [number.value, *number.slopes]
-                    if isinstance(number, Carrying)
+                    if isinstance(number, DualNumber)
                     else [float(number), 0.0, 0.0, 0.0]
                 )
                 assert out[k * size : (k + 1) * size] == pytest.approx(row, rel=1e-15, abs=1e-16), (
@@ -185,7 +185,7 @@ def test_corners_are_those_of_python(tmp_path):
 
 
 def test_every_rule_has_a_test():
-    assert {function for function, _ in CASES} == {*SLOPES, *ARITHMETIC}
+    assert {function for function, _ in CASES} == {*FUNCTION_SLOPES, *ARITHMETIC_SLOPES}
     assert all(
         len(inspect.signature(rules[0]).parameters) == len(rules) + 1 for rules in RULES.values()
     )

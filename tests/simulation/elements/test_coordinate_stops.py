@@ -61,7 +61,7 @@ def exponential(lower=(50.0, 75.0)) -> ExponentialCoordinateLimitForce:
 def test_linear_stop(engine, x, v, force, energy):
     with Simulation(slide(linear()), engine) as simulation:
         y = simulation.initial_state({"x": x}, {"x": v})
-        assert simulation.engine.derivative(0.0, y)[1] == pytest.approx(force / 2.0)
+        assert simulation.engine.compute_derivative(0.0, y)[1] == pytest.approx(force / 2.0)
         assert simulation.engine.columns == ("stop", "PotentialEnergy")
         assert simulation.engine.force_records(0.0, y) == pytest.approx([force, energy])
 
@@ -71,7 +71,7 @@ def test_exponential_limits(x):
     expected = 50.0 * math.exp(-75.0 * (x + 0.2)) - 20.0 * math.exp(25.0 * (x - 0.3))
     with Simulation(slide(exponential()), "compiled") as simulation:
         y = simulation.initial_state({"x": x}, {"x": 1.0})
-        assert simulation.engine.derivative(0.0, y)[1] == pytest.approx(expected / 2.0)
+        assert simulation.engine.compute_derivative(0.0, y)[1] == pytest.approx(expected / 2.0)
 
 
 def test_the_force_is_what_the_energy_falls_by():

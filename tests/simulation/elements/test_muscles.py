@@ -76,9 +76,9 @@ def test_derivatives_forces_and_energy(case, code):
                 SimulationError,
                 match="no solution of the equations of '/forceset/mu', whose path of",
             ):
-                ready.applied(float(number), y)
+                ready.compute_applied_forces(float(number), y)
             continue
-        _, force, *rates = ready.applied(float(number), y)
+        _, force, *rates = ready.compute_applied_forces(float(number), y)
         ((_, records),) = ready.read_records()
         known = element.named_values(records[-1])
         ours = dict(zip([f"d_{name}" for name in states(ready)], rates, strict=True))
@@ -114,7 +114,7 @@ def test_derivatives_forces_and_energy(case, code):
         stored = 0.0 if "n/a" in parts else sum(map(float, parts))
         # OpenSim's integrals of Millard's curves are splines.
         close = 1e-4 if "millard" in case else 1e-8
-        assert ready.energies(float(number), y)[2] == pytest.approx(
+        assert ready.compute_energies(float(number), y)[2] == pytest.approx(
             stored, rel=close, abs=0.001 * close
         )
 
@@ -131,9 +131,9 @@ def test_equilibrium(case, code):
         y = [float(row["path_length"]), float(row["path_speed"]), *start]
         if row["error"]:
             with pytest.raises(SimulationError, match=NOWHERE):
-                ready.equilibrated(float(number), y)
+                ready.equilibrate_muscles(float(number), y)
             continue
-        result = ready.equilibrated(float(number), y)
+        result = ready.equilibrate_muscles(float(number), y)
         expected = [
             float(row.get(f"eq_{name}") or value)
             for name, value in zip(states(ready), start, strict=True)
@@ -151,7 +151,7 @@ def test_a_motion_may_start_in_equilibrium():
         assert trajectory.auxiliary["/forceset/mu/activation"][0] == 0.4
         fiber = trajectory.auxiliary[path][0]
         engine, rest = simulation.engine, simulation.initial_state(resting, {}, equilibrate=True)
-        assert rest[-1] == fiber and abs(engine.derivative(0.0, rest)[-1]) < 1e-6
+        assert rest[-1] == fiber and abs(engine.compute_derivative(0.0, rest)[-1]) < 1e-6
         # What is given stays, and without the option nothing is found.
         assert (
             simulation.run(0.01, initial={"x": 0.3, path: 0.05}, equilibrate=True).auxiliary[path][
@@ -168,9 +168,9 @@ def test_numbers_of_another_model_of_the_structure():
     )
     y = [0.325, 0.1, 0.3, 0.1]
     assert (
-        ready.equilibrated(0.0, y, other.numbers)
-        == other.equilibrated(0.0, y)
-        != ready.equilibrated(0.0, y)
+        ready.equilibrate_muscles(0.0, y, other.numbers)
+        == other.equilibrate_muscles(0.0, y)
+        != ready.equilibrate_muscles(0.0, y)
     )
 
 
@@ -238,7 +238,7 @@ def test_no_muscle_is_in_equilibrium_where_there_is_none():
     ready = system(
         hung(PathActuator(name="mu", geometry_path=muscle("thelen_default").geometry_path))
     )
-    assert ready.equilibrated(0.0, [0.3, 0.0]) == [0.3, 0.0]
+    assert ready.equilibrate_muscles(0.0, [0.3, 0.0]) == [0.3, 0.0]
 
 
 @pytest.mark.parametrize(
@@ -251,7 +251,7 @@ def test_no_muscle_is_in_equilibrium_where_there_is_none():
 def test_an_equilibrium_beyond_all_numbers_is_none(code, words):
     ready = system(hung(muscle("thelen_default", optimal_fiber_length=1e-160)), code)
     with np.errstate(all="ignore"), pytest.raises(SimulationError, match=words):
-        ready.equilibrated(0.0, [0.3, 0.0, 0.1, 0.1])
+        ready.equilibrate_muscles(0.0, [0.3, 0.0, 0.1, 0.1])
 
 
 def test_activation_times_of_the_first_muscle_count_for_all():
@@ -265,7 +265,11 @@ def test_activation_times_of_the_first_muscle_count_for_all():
 
     def rates(engine):
         return dict(
-            zip(engine.state.paths, engine.derivative(0.0, engine.state.default())[2:], strict=True)
+            zip(
+                engine.state.paths,
+                engine.compute_derivative(0.0, engine.state.pack_defaults())[2:],
+                strict=True,
+            )
         )
 
     def made(**more):
@@ -277,9 +281,9 @@ def test_activation_times_of_the_first_muscle_count_for_all():
         != rates(before)[path]
         == rates(before)["/forceset/mu/activation"]
     )
-    renewal = before.renewal(model, Path())
+    renewal = before.make_updater(model, Path())
     first.deactivation_time_constant = 0.02
-    assert rates(renewal.renewed([first]).engine()) == rates(made()) != rates(before)
+    assert rates(renewal.update([first]).make_engine()) == rates(made()) != rates(before)
 
 
 @pytest.mark.parametrize("length", [0.2, 0.6])
@@ -287,4 +291,4 @@ def test_a_tendon_force_that_is_nowhere(length):
     """OpenSim seeks it between 0 and 5 times the largest force of the fibers."""
     words = f"whose path of {length} m is .* than its tendon_slack_length and optimal_fiber_length together; start"
     with pytest.raises(SimulationError, match=f"'/forceset/mu', {words}"):
-        system(hung(muscle("dgf_default"))).equilibrated(0.0, [length, 0.0, 0.3, 0.5])
+        system(hung(muscle("dgf_default"))).equilibrate_muscles(0.0, [length, 0.0, 0.3, 0.5])

@@ -24,7 +24,7 @@ from osimlite.schema.probe_types import (
 from osimlite.simulation import Simulation, read_sto
 from osimlite.simulation.batches import run_many
 from osimlite.simulation.elements import force_elements
-from osimlite.simulation.engines.linking import COMPILED, PYTHON
+from osimlite.simulation.engines.linking import MACHINE_CODE, PYTHON_CODE
 from osimlite.simulation.system import System
 from tests.simulation.elements.muscle_rows import hung, line
 from tests.simulation.test_force_elements import arm
@@ -165,14 +165,14 @@ def test_kernels_as_python(operation):
     mechanism = build_mechanism(model)
     systems = [
         System(mechanism, force_elements(model, mechanism), code=code)
-        for code in (COMPILED, PYTHON)
+        for code in (MACHINE_CODE, PYTHON_CODE)
     ]
-    state = systems[0].state.default()
-    first, second = (system.probe_results(0.3, state) for system in systems)
+    state = systems[0].state.pack_defaults()
+    first, second = (system.evaluate_probes(0.3, state) for system in systems)
     assert [len(row) for row in first] == [3, 1]
     for ours, theirs in zip(first, second, strict=True):
         assert ours == pytest.approx(theirs, rel=1e-13)
-    derivatives = [system.applied(0.3, state) for system in systems]
+    derivatives = [system.compute_applied_forces(0.3, state) for system in systems]
     assert derivatives[0] == pytest.approx(derivatives[1], rel=1e-13, abs=1e-13)
     assert (derivatives[0][-3:] == first[0]) is (operation == "integrate")
 
@@ -181,11 +181,11 @@ def test_numbers_of_muscles_are_those_of_their_probes():
     """A model that only numbers have changed in, as in a sweep."""
     model = muscular(probe_operation="integrate")
     with Simulation(model, "compiled") as ready:
-        renewal = ready.engine.renewal(model, Path())
+        renewal = ready.engine.make_updater(model, Path())
         model.find("/forceset/mu").max_isometric_force = 300.0
-        renewed = renewal.renewed([model.find("/forceset/mu")])
+        renewed = renewal.update([model.find("/forceset/mu")])
     with Simulation(model, "compiled") as whole:
         assert renewed.numbers.tolist() == whole.engine.numbers.tolist()
-        start = [ready.state.default()]
+        start = [ready.state.pack_defaults()]
         runs = run_many(ready.engine, start, 0.1, numbers=renewed.numbers[None])
         assert (runs.states == run_many(whole.engine, start, 0.1).states).all()

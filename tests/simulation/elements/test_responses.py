@@ -16,7 +16,7 @@ from osimlite.simulation import Simulation
 from osimlite.simulation.elements import force_elements
 from osimlite.simulation.elements.force_type import DeclaredForce
 from osimlite.simulation.elements.laws import RESPONSE
-from osimlite.simulation.engines.linking import COMPILED
+from osimlite.simulation.engines.linking import MACHINE_CODE
 from osimlite.simulation.system import System
 from tests.derivatives.jets import Jet, _carried
 from tests.simulation.checked import Checked
@@ -61,7 +61,9 @@ def test_they_are_derivatives_of_the_law(case, monkeypatch):
     forces = force_elements(model, mechanism)
     with Simulation(model, "compiled") as simulation:
         start = np.array(simulation.initial_state({}, {}))
-    code, python = (System(mechanism, forces, code=each) for each in (COMPILED, Checked("Python")))
+    code, python = (
+        System(mechanism, forces, code=each) for each in (MACHINE_CODE, Checked("Python"))
+    )
     size, rng = int(code.structure[MODEL.DOFS]), np.random.default_rng(1)
     for system in (code, python):
         system.program.link_responses("bdf")
@@ -115,7 +117,7 @@ def responses(system: System, y: np.ndarray) -> dict[str, np.ndarray]:
     """The derivatives of each force, by the name of what finds them."""
     s, result = system.program.ints, {}
     for place, name in system.program.responses.items():
-        kernel = system.program.code.bound(
+        kernel = system.program.code.bind_entry(
             name, s, system.numbers, system.work_vector, y, np.zeros(len(y))
         )
         if isinstance(system.program.code, Checked):

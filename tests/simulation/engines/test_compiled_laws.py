@@ -57,7 +57,9 @@ def test_an_edited_function_is_compiled_anew(folder):
 
 def test_another_processor_gets_its_own_files(folder, monkeypatch):
     compile_function("answer", answer, 0)
-    monkeypatch.setattr(compiled_laws, "_machine", lambda: ("linux", "x86_64", "new_instructions"))
+    monkeypatch.setattr(
+        compiled_laws, "_describe_machine", lambda: ("linux", "x86_64", "new_instructions")
+    )
     assert load_function("answer", answer, 0) is None
 
 
@@ -104,9 +106,9 @@ def test_without_a_folder_the_code_lasts_for_the_process(tmp_path, monkeypatch, 
 
 def test_folders(monkeypatch, tmp_path):
     """The one that is named, or the package's own and then the user's."""
-    monkeypatch.setenv(compiled_laws.FOLDER, str(tmp_path / "named"))
+    monkeypatch.setenv(compiled_laws.CACHE_VARIABLE, str(tmp_path / "named"))
     assert list(compiled_laws.cache_folders()) == [tmp_path / "named"]
-    monkeypatch.delenv(compiled_laws.FOLDER)
+    monkeypatch.delenv(compiled_laws.CACHE_VARIABLE)
     monkeypatch.delenv("LOCALAPPDATA", raising=False)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "home"))
     first, last = compiled_laws.cache_folders()
@@ -115,7 +117,7 @@ def test_folders(monkeypatch, tmp_path):
 
 def test_a_user_without_a_home(monkeypatch):
     """As in a container that runs under a number of no user."""
-    for name in (compiled_laws.FOLDER, "LOCALAPPDATA", "XDG_CACHE_HOME"):
+    for name in (compiled_laws.CACHE_VARIABLE, "LOCALAPPDATA", "XDG_CACHE_HOME"):
         monkeypatch.delenv(name, raising=False)
 
     def nowhere():
@@ -146,7 +148,11 @@ def test_a_second_process_compiles_nothing(tmp_path):
         "machine_code.make_ready(['wrap_sphere'])\n"
         "print(machine_code.is_at_hand('wrap_sphere'), 'numba' in sys.modules)\n"
     )
-    kept = {**os.environ, "OSIMLITE_KERNELS": "compiler", compiled_laws.FOLDER: str(tmp_path)}
+    kept = {
+        **os.environ,
+        "OSIMLITE_KERNELS": "compiler",
+        compiled_laws.CACHE_VARIABLE: str(tmp_path),
+    }
     for compiler in ({}, {"CXX": "no-such-compiler"}):
         done = subprocess.run(
             [sys.executable, "-c", program],

@@ -31,8 +31,8 @@ def test_every_law_is_in_the_library():
 def test_the_library_is_that_of_these_sources():
     if LIBRARY.changed_files:
         pytest.skip("the sources have changed since the library was compiled: pip install -e .")
-    assert all(LIBRARY.address(name) for name in LIBRARY.table["laws"])
-    assert LIBRARY.address("no_such_law") is None
+    assert all(LIBRARY.get_address(name) for name in LIBRARY.table["laws"])
+    assert LIBRARY.get_address("no_such_law") is None
 
 
 @pytest.fixture
@@ -64,22 +64,22 @@ def test_an_edited_law_is_not_taken_from_the_library(library, tmp_path, monkeypa
     path.write_text(path.read_text("utf-8") + "\n# edited\n", "utf-8")
     assert library.changed_files == ["mechanics/kernels/dynamics.py"]
     # Only a comment: every law is what it was.
-    assert library.address("evaluate") is not None
+    assert library.get_address("evaluate") is not None
     monkeypatch.setattr(kernel_library, "compute_digest", lambda function: "of an edited function")
-    assert library.address("evaluate") is None
+    assert library.get_address("evaluate") is None
 
 
 @needs_library
 def test_another_translator_concerns_all_laws(library, tmp_path):
     path = tmp_path / "mechanics/codegen/cplusplus/library.py"
     path.write_text(path.read_text("utf-8") + "\n# edited\n", "utf-8")
-    assert library.address("evaluate") is None
+    assert library.get_address("evaluate") is None
 
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
     """An empty folder of libraries."""
-    monkeypatch.setattr(kernel_library, "FOLDER", tmp_path)
+    monkeypatch.setattr(kernel_library, "LIBRARY_FOLDER", tmp_path)
     monkeypatch.setattr(kernel_library, "_problems", [])
     load_library.cache_clear()
     yield tmp_path

@@ -26,7 +26,7 @@ class Library:
     def __init__(self):
         self.table = {"target": "baseline", "compiler": "clang version 14"}
 
-    def address(self, name):
+    def get_address(self, name):
         return 100 if name == "evaluate" else None
 
 
@@ -62,19 +62,19 @@ def add_numba(sources):
 def test_the_library_comes_first_and_the_compiler_has_the_rest(sources):
     for add in (add_library, add_compiler, add_numba):
         add(sources)
-    machine_code.make_ready(["evaluate", "an_edited_law"])
-    assert [machine_code.address_of(name) for name in ("evaluate", "an_edited_law")] == [100, 200]
+    machine_code.prepare_laws(["evaluate", "an_edited_law"])
+    assert [machine_code.get_address(name) for name in ("evaluate", "an_edited_law")] == [100, 200]
 
 
 def test_a_file_of_an_earlier_compilation_comes_before_the_compiler(sources):
     add_compiler(sources)
     sources.setattr(compiled_laws, "load_law", lambda name: 250)
-    assert machine_code.address_of("evaluate") == 250
+    assert machine_code.get_address("evaluate") == 250
 
 
 def test_numba_compiles_without_a_compiler(sources):
     add_numba(sources)
-    assert machine_code.address_of("evaluate") == 300
+    assert machine_code.get_address("evaluate") == 300
     # It has no numbers that carry derivatives.
     assert machine_code.can_prepare(["merson"]) and not machine_code.can_prepare(["merson~16"])
 
@@ -86,16 +86,16 @@ def test_numba_compiles_what_the_compiler_refuses(sources):
     add_compiler(sources)
     sources.setattr(compiled_laws, "compile_laws", refuse)
     with pytest.raises(CompilationError, match="not translatable"):
-        machine_code.make_ready(["evaluate"])
+        machine_code.prepare_laws(["evaluate"])
     add_numba(sources)
-    assert machine_code.address_of("evaluate") == 300
+    assert machine_code.get_address("evaluate") == 300
 
 
 def test_without_any_source_the_law_is_named(sources):
     with pytest.raises(
         CompilationError, match=r"'merson' is in no library.*neither a C\+\+ compiler nor numba"
     ):
-        machine_code.make_ready(["merson"])
+        machine_code.prepare_laws(["merson"])
 
 
 @pytest.mark.parametrize(
@@ -107,7 +107,7 @@ def test_one_source_can_be_asked_for(sources, only, address):
     sources.setenv(machine_code.VARIABLE, only)
     assert machine_code.has_machine_code() is (address is not None)
     if address is not None:
-        assert machine_code.address_of("evaluate") == address
+        assert machine_code.get_address("evaluate") == address
 
 
 def test_no_compiler_is_looked_for_where_the_library_has_all(sources):
@@ -159,7 +159,7 @@ def test_a_library_of_older_sources_is_reported(sources):
 
 def test_python_takes_over_with_one_warning(sources, caplog):
     for _ in range(2):
-        assert linking.best() is linking.PYTHON
+        assert linking.select_code() is linking.PYTHON_CODE
     (message,) = caplog.messages
     assert (
         "run as Python, some thousand times slower" in message
@@ -170,13 +170,13 @@ def test_python_takes_over_with_one_warning(sources, caplog):
 def test_one_edited_law_without_compiler_has_all_run_as_python(sources, caplog):
     """Machine code calls laws by their addresses, which a law in Python has not."""
     add_library(sources)
-    assert linking.COMPILED.chosen_for(["evaluate"]) is linking.COMPILED
-    assert linking.COMPILED.chosen_for(["evaluate", "merson"]) is linking.PYTHON
-    assert linking.COMPILED.chosen_for(["evaluate"], later=["merson"]) is linking.PYTHON
+    assert linking.MACHINE_CODE.select_for(["evaluate"]) is linking.MACHINE_CODE
+    assert linking.MACHINE_CODE.select_for(["evaluate", "merson"]) is linking.PYTHON_CODE
+    assert linking.MACHINE_CODE.select_for(["evaluate"], later=["merson"]) is linking.PYTHON_CODE
     assert "thousand times slower" in caplog.text
 
 
 def test_derivatives_in_python(sources):
     add_library(sources)
-    code = linking.Tangents(4).chosen_for(["merson"])
+    code = linking.Tangents(4).select_for(["merson"])
     assert isinstance(code, linking.PythonTangents)

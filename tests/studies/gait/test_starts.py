@@ -56,7 +56,7 @@ def test_a_planted_foot_touches_and_rests(walker, states, slope):
     n, dt = len(walker.order), 1e-6
     later = placed.copy()
     later[:, :n] += dt * placed[:, n:]
-    before, after = (walker.contact_places(moved, numbers, which) for moved in (placed, later))
+    before, after = (walker.locate_contacts(moved, numbers, which) for moved in (placed, later))
     moved = (after - before)[:, feet, 6:]
     assert np.linalg.norm(moved[rows, depths.argmax(axis=1)], axis=1).max() < 20 * dt**2
     others = [

@@ -68,8 +68,8 @@ def test_states_that_push_are_exchanged_by_what_they_do():
             (states[:, :4], np.tile((0.05, 0.05, 0.05, 0.05, 0.1, 0.0, 0.0), (len(states), 1)))
         )
 
-    state = SimpleNamespace(size=11, started=started)
-    engine = SimpleNamespace(order=(0, 1), state=state, derivative=derivative)
+    state = SimpleNamespace(size=11, restart_auxiliary=started)
+    engine = SimpleNamespace(order=(0, 1), state=state, compute_derivative=derivative)
     source = np.arange(11)
     source[:4] = 1, 0, 3, 2
     exchange_auxiliary(engine, source, np.random.default_rng(1).normal(size=(3, 11)))

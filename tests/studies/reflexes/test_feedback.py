@@ -11,7 +11,7 @@ import osimlite
 from osimlite.errors import OsimliteError
 from osimlite.mechanics.kernels.reflexes import draw_normal, philox
 from osimlite.models.walking import write_scenario
-from osimlite.simulation.control_steps import HeldRuns
+from osimlite.simulation.control_steps import ControllerRuns
 from osimlite.simulation.trajectory import Interrupted
 from osimlite.studies.gym.tasks import arm as task
 from osimlite.studies.reflexes.scenario import Scenario
@@ -106,13 +106,13 @@ def test_what_was_interrupted_goes_on(model) -> None:
 
 def test_a_record_ends_with_the_motion(model, monkeypatch) -> None:
     """A signal may come when control steps are recorded whose states are not kept."""
-    seen, table = [], HeldRuns.table
+    seen, table = [], ControllerRuns.table
 
-    def noted(self: HeldRuns, *end: float) -> Any:
+    def noted(self: ControllerRuns, *end: float) -> Any:
         seen.append(self)
         return table(self, *end)
 
-    monkeypatch.setattr(HeldRuns, "table", noted)
+    monkeypatch.setattr(ControllerRuns, "table", noted)
     simulate(model, 0.1, controller=osimlite.Feedback({"ReflexController": REFLEXES}))
     for end, last in ((0.0525, 0.05), (0.055, 0.055), (1.0, 0.1)):
         cut = seen[0].table(end)
@@ -497,7 +497,7 @@ def test_kernels_as_python_go_likewise(model, monkeypatch) -> None:
     feedback = noisy(base_noise=0.01, sensor_noise=0.01)
     expected = osimlite.simulation.Simulation(model, "compiled").run(0.02, controller=feedback)
     with monkeypatch.context() as patched:
-        patched.setattr("osimlite.simulation.system.best", lambda: Checked("Python"))
+        patched.setattr("osimlite.simulation.evaluation.select_code", lambda: Checked("Python"))
         plain = osimlite.simulation.Simulation(model, "compiled").run(0.02, controller=feedback)
     assert plain.states.rows == pytest.approx(expected.states.rows, rel=1e-12, abs=1e-12)
     assert expected.controller is not None and plain.controller is not None

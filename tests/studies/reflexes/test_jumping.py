@@ -10,7 +10,7 @@ import pytest
 import osimlite
 from osimlite.errors import OsimliteError
 from osimlite.models.walking import write_scenario
-from osimlite.simulation.link_motion import centers_of_mass
+from osimlite.simulation.link_motion import locate_mass_centers
 from osimlite.studies.gym.tasks import arm
 from osimlite.studies.reflexes.scenario import Scenario
 
@@ -72,7 +72,7 @@ def judged(
     walkers, table = given.walkers(1), walked.states
     states = np.empty_like(table.rows)
     states[:, [walkers.places[path] for path in table.columns]] = table.rows
-    centre = centers_of_mass(
+    centre = locate_mass_centers(
         walkers.engine, list(zip(table.times.tolist(), states.tolist(), strict=True))
     )
     height, rise = centre[:, 1], centre[:, 4]
@@ -179,7 +179,7 @@ def test_kernels_as_python_jump_likewise(folder, monkeypatch) -> None:
         scenario(folder, ("prepare_time = 0.2", "prepare_time = 0")) for _ in range(2)
     )
     with monkeypatch.context() as patched:
-        patched.setattr("osimlite.simulation.system.best", lambda: Checked("Python"))
+        patched.setattr("osimlite.simulation.evaluation.select_code", lambda: Checked("Python"))
         walked = plain.walk(PUSHES, duration=2 * STEP)
     assert walked.results == pytest.approx(
         compiled.walk(PUSHES, duration=2 * STEP).results, rel=1e-12

@@ -10,13 +10,15 @@ import osimlite
 from osimlite.errors import OsimliteError
 from osimlite.models.arm import arm
 from osimlite.models.walking import write_scenario
-from osimlite.simulation.control_steps import Held
+from osimlite.simulation.control_steps import KernelController
 
 POINT = {"target": "flexor", "source": "forearm", "offset": [0, -0.2, 0], "direction": [0, 1, 0]}
 TURN = {"target": "flexor", "source": "forearm", "KP": "~0.1<0,1>", "KV": 0.1}
 
 
-def held(model: Any, given: dict[str, Any], values: dict[str, float] | None = None) -> Held:
+def held(
+    model: Any, given: dict[str, Any], values: dict[str, float] | None = None
+) -> KernelController:
     controller = osimlite.Feedback({"ReflexController": given}, values or {})
     return controller.compile_for(model, osimlite.simulation.Simulation(model, "compiled").engine)
 
@@ -109,7 +111,7 @@ def test_kernels_as_python_feel_likewise(monkeypatch) -> None:
     model, controller = arm(), osimlite.Feedback({"ReflexController": given})
     expected = osimlite.simulation.Simulation(model, "compiled").run(0.02, controller=controller)
     with monkeypatch.context() as patched:
-        patched.setattr("osimlite.simulation.system.best", lambda: Checked("Python"))
+        patched.setattr("osimlite.simulation.evaluation.select_code", lambda: Checked("Python"))
         plain = osimlite.simulation.Simulation(model, "compiled").run(0.02, controller=controller)
     assert expected.controller is not None and plain.controller is not None
     assert plain.controller.rows == pytest.approx(expected.controller.rows, rel=1e-9, abs=1e-12)

@@ -351,7 +351,7 @@ def test_kernels_as_python_walk_likewise(ours, arm, monkeypatch) -> None:
         compiled = Scenario(file)
         expected = compiled.walk(compiled.best(), duration=seconds)
         with monkeypatch.context() as patched:
-            patched.setattr("osimlite.simulation.system.best", lambda: Checked("Python"))
+            patched.setattr("osimlite.simulation.evaluation.select_code", lambda: Checked("Python"))
             plain = Scenario(file)
             walked = plain.walk(plain.best(), duration=seconds)
         for name in ("states", "excitations", "loads"):

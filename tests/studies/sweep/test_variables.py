@@ -13,7 +13,7 @@ from osimlite.errors import SettingError
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.schema.actuators import CoordinateActuator
-from osimlite.simulation.properties import places
+from osimlite.simulation.properties import find_properties
 from osimlite.studies.sweep.controls import Control
 from osimlite.studies.sweep.variables import (
     Parameter,
@@ -93,11 +93,11 @@ def test_every_number_that_is_found_can_be_set_and_read():
         "/gravity/0": 1.0,
     }.items():
         model = dynamic_walker()
-        (place,) = places(model, path)
-        setter = place.setter(model)
+        (place,) = find_properties(model, path)
+        setter = place.make_setter(model)
         setter.put(value)
         assert setter.get() == value
-        assert places(model, path)[0].setter(model).get() == value
+        assert find_properties(model, path)[0].make_setter(model).get() == value
     assert model.gravity == (1.0, -9.80665, 0.0)
 
 

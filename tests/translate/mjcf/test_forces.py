@@ -28,8 +28,8 @@ from osimlite import (
 )
 from osimlite.mechanics.kernels.layout import STAGE
 from osimlite.simulation.elements import force_elements
-from osimlite.simulation.engines.linking import PYTHON
-from osimlite.simulation.run_controls import driven
+from osimlite.simulation.engines.linking import PYTHON_CODE
+from osimlite.simulation.run_controls import add_controls
 from osimlite.simulation.system import System
 from osimlite.translate import to_mjcf
 from tests.translate.mjcf.compiled import Compiled
@@ -70,16 +70,16 @@ def both(model: Model, q, u, control: float = 0.7) -> tuple[np.ndarray, np.ndarr
     """Applied generalized forces in the order of the coordinates: MuJoCo's, and osimlite's."""
     mechanism = osimlite.mechanism(model)
     forces = force_elements(model, mechanism)
-    system = System(mechanism, forces, code=PYTHON)
+    system = System(mechanism, forces, code=PYTHON_CODE)
     names = [force.name for force in model.force_set.objects if hasattr(force, "min_control")]
     if names:
-        system.drive(driven(forces.controls, dict.fromkeys(names, control), 1.0))
+        system.set_controls(add_controls(forces.controls, dict.fromkeys(names, control), 1.0))
     n, z = len(mechanism.coordinates), system.state.size - 2 * len(mechanism.coordinates)
     y = np.concatenate(
         (np.array(q)[list(system.order)], np.array(u)[list(system.order)], np.full(z, control))
     )
     wanted = np.empty(n)
-    wanted[list(system.order)] = system.applied(0.0, y.tolist())[n : 2 * n]
+    wanted[list(system.order)] = system.compute_applied_forces(0.0, y.tolist())[n : 2 * n]
 
     compiled = Compiled(to_mjcf(model))
     data, order = compiled.data, [compiled.model.joint(f"q{k}").dofadr[0] for k in range(n)]
@@ -186,11 +186,11 @@ def test_a_bushing_accelerates_as_opensims_does():
         )
     )  # fmt: skip
     mechanism = osimlite.mechanism(model)
-    system = System(mechanism, force_elements(model, mechanism), code=PYTHON)
+    system = System(mechanism, force_elements(model, mechanism), code=PYTHON_CODE)
     q = mechanism.values({})
     system.realize(0.0, [*q[list(system.order)], *np.zeros(6)], STAGE.ACCELERATION)
     wanted = np.empty(5)
-    wanted[list(system.order)] = system.found()[5:10]
+    wanted[list(system.order)] = system.get_derivative()[5:10]
     compiled = Compiled(to_mjcf(model))
     mujoco.mj_resetDataKeyframe(compiled.model, compiled.data, 0)
     mujoco.mj_forward(compiled.model, compiled.data)

@@ -60,7 +60,7 @@ def test_poses_know_what_paths_say_one_by_one() -> None:
         assert truth["/forceset/spring"].arms[number].tolist() == [
             arms.get(name, 0.0) for name in names
         ]
-        state, coupling = paths.mechanism.at(q), paths.coupling(q)
+        state, coupling = paths.mechanism.at(q), paths.compute_coupling(q)
         assert np.array_equal(poses.rates[number], coupling[:, poses.moving])
         for body in (-1, 0, 1, 2):
             assert np.array_equal(poses.rotations[body, number], state.rotations[body])

@@ -1,10 +1,10 @@
-"""The PyBullet engine: Bullet computes mass matrix and bias, the kernels all else; or Bullet takes the steps.
+"""The PyBullet engine: Bullet computes mass matrix and bias, or takes the steps; the kernels compute the rest.
 
-Bullet carries the expanded chain: each axis of a joint is a joint of its own. Two routes lead to
-the accelerations. "mass-matrix" takes the matrix and the bias from Bullet's inverse dynamics.
+Bullet simulates the expanded chain, in which each axis of a joint is a joint. Two routes lead to
+the accelerations. "mass-matrix" uses the matrix and the bias of Bullet's inverse dynamics.
 "articulated-body" lets Bullet take a step of one second from the state and reads the change of the
-speeds, which is exactly the acceleration, since Bullet's step is semi-implicit Euler; it is for
-models without constraints whose coordinates move one axis each.
+speeds. That is exactly the acceleration, because Bullet's step is semi-implicit Euler. This route
+is for models without constraints whose coordinates move one axis each.
 """
 
 from __future__ import annotations
@@ -22,12 +22,17 @@ from osimlite.mechanics.kernels.pointers import Floats, Ints
 from osimlite.mechanics.multibody.constraints import Lock
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.spatial import Array
-from osimlite.simulation.constrained import free_coordinates
+from osimlite.simulation.constrained import find_free_coordinates
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.engines.base import KernelEngine
-from osimlite.simulation.engines.bullet.world import World, bullet, excess, require_masses
+from osimlite.simulation.engines.bullet.world import (
+    World,
+    bullet,
+    compute_inertia_excess,
+    require_masses,
+)
 from osimlite.simulation.engines.protocol import Settings
-from osimlite.simulation.euler import SemiImplicitEuler, burst
+from osimlite.simulation.euler import SemiImplicitEuler, make_divergence_error
 from osimlite.simulation.pack_chain import Chain
 from osimlite.simulation.robot.build import build_robot
 from osimlite.simulation.robot.merge_fixed import merge_fixed
@@ -40,30 +45,35 @@ if TYPE_CHECKING:
     from osimlite.simulation.robot.visuals import Visuals
 
 
-MASS_MATRIX, ARTICULATED_BODY = "mass-matrix", "articulated-body"
+MASS_MATRIX = "mass-matrix"
+"""Route by Bullet's mass matrix and bias."""
+
+ARTICULATED_BODY = "articulated-body"
+"""Route by Bullet's articulated-body algorithm."""
+
 ROUTES = ("auto", MASS_MATRIX, ARTICULATED_BODY)
 
 
-def make(mechanism: Mechanism, forces: Forces, settings: Settings) -> BulletEngine:
-    """Make the engine."""
+def make_engine(mechanism: Mechanism, forces: Forces, settings: Settings) -> BulletEngine:
+    """Return a Bullet engine."""
     return BulletEngine(
         mechanism, forces, route=settings.route, show=settings.show, visuals=settings.visuals
     )
 
 
 class BulletEngine(KernelEngine):
-    """The accelerations of a mechanism by PyBullet; see the protocol for what it offers.
+    """Engine that computes accelerations by PyBullet; see :class:`osimlite.simulation.engines.protocol.Engine`.
 
     Args:
-        mechanism: what moves.
-        forces: what pushes it, besides gravity.
-        route: "mass-matrix", which is what "auto" stands for, or "articulated-body".
-        show: open Bullet's window.
-        visuals: what the bodies look like.
+        mechanism: the mechanism.
+        forces: forces on it besides gravity.
+        route: "mass-matrix" (also "auto") or "articulated-body".
+        show: whether Bullet's window opens.
+        visuals: shapes of the bodies.
 
-    Raises: UnsupportedError: the joints or constraints of the mechanism rule out the route asked
-        for. SimulationError: a body at the end of a chain has no mass; or there is no screen to
-        show the motion on.
+    Raises:
+        UnsupportedError: the joints or constraints do not allow the requested route.
+        SimulationError: a body at the end of a chain has no mass, or there is no screen.
     """
 
     name = "bullet"
@@ -80,18 +90,18 @@ class BulletEngine(KernelEngine):
     ) -> None:
         if route not in ROUTES:
             raise OsimliteError(f"there is no route '{route}'; there are {', '.join(ROUTES)}")
-        free = free_coordinates(mechanism)
+        free = find_free_coordinates(mechanism)
         fixed = [place for place in range(len(mechanism.coordinates)) if place not in free]
         shapes = {} if visuals is None else visuals.by_body
         robot = legal_names(
             merge_fixed(build_robot(mechanism, locked=fixed, body_frames=False, visuals=shapes))
         )
-        is_plain = _is_plain(mechanism, robot)
-        # What is added to inertias that no body has, and taken off again, costs digits.
-        is_exact = is_plain and any(excess(link) > 0.0 for link in robot.links)
+        is_plain = _has_own_coordinates(mechanism, robot)
+        # Adding moments to invalid inertias and subtracting them again loses digits.
+        is_exact = is_plain and any(compute_inertia_excess(link) > 0.0 for link in robot.links)
         self.route = (ARTICULATED_BODY if is_exact else MASS_MATRIX) if route == "auto" else route
         if is_plain:
-            # A constraint might decide how the end of a chain moves.
+            # With constraints, a chain may end with a massless body.
             require_masses(robot)
         elif route == ARTICULATED_BODY:
             raise UnsupportedError(
@@ -103,13 +113,15 @@ class BulletEngine(KernelEngine):
         if show:
             from osimlite.simulation.engines.bullet.window import Window
 
-            self.window = Window(robot, mechanism.gravity.tolist(), files, self._joint_values)
+            self.window = Window(
+                robot, mechanism.gravity.tolist(), files, self._compute_joint_values
+            )
         is_exact = self.route == ARTICULATED_BODY
         self.world = body = World(robot, mechanism.gravity.tolist(), files=files, exact=is_exact)
         try:
             indices = {item.path: index for index, item in enumerate(mechanism.bodies)}
             added = [
-                (indices[next(iter(link.bodies))], excess(link))
+                (indices[next(iter(link.bodies))], compute_inertia_excess(link))
                 for link in robot.links
                 if link.name in body.impossible
             ]
@@ -120,7 +132,7 @@ class BulletEngine(KernelEngine):
         except BaseException:
             self.close()
             raise
-        # Bullet takes inertias that no body has, but not for mass matrices.
+        # Bullet accepts invalid inertias, but not for mass matrices.
         self._steps_itself = is_plain and (is_exact or not added)
         count = len(body.joints)
         self._moves = (
@@ -135,7 +147,7 @@ class BulletEngine(KernelEngine):
     def _supply_matrix(
         self, model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, unused: int
     ) -> None:
-        """Mass matrix and bias; see :class:`osimlite.simulation.pack_chain.Chain`."""
+        """Write mass matrix and bias; see :class:`osimlite.simulation.pack_chain.Chain`."""
         robot, client, first = self.world.id, self.world.client, self._forces
         values, rates, accelerations = data[self._moves : first].reshape(3, -1).tolist()
         try:
@@ -146,34 +158,34 @@ class BulletEngine(KernelEngine):
                 "for masses and mass centers beyond belief, or take --engine compiled"
             ) from None
         self._pack_forces(data, 8 * first, *forces)
-        # numpy takes twice as long to read tuples.
+        # numpy reads tuples at half the speed.
         matrix = chain.from_iterable(bullet.calculateMassMatrix(robot, values, 0, client))
         self._pack_matrix(data, 8 * (first + len(forces)), *matrix)
 
     def _supply_by_step(
         self, model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, unused: int
     ) -> None:
-        """Accelerations a: a mass matrix of one, and b - a as what has to be overcome."""
+        """Write an identity mass matrix, and b - a as forces to overcome, where a are Bullet's accelerations."""
         first, size = self._forces, len(self.order)
         values, rates, biases = data[self._moves : first].reshape(3, -1)
         count, applied = len(values), f[size : 2 * size]
-        forces = self.joint_forces(y.tolist(), applied)
+        forces = self.compute_joint_forces(y.tolist(), applied)
         result = self.world.accelerations_by_step(values.tolist(), rates.tolist(), forces)
         applied[:] = 0.0
         data[first : first + count] = biases - result
         data[first + count : first + count + count * count] = np.eye(count).ravel()
 
-    def joint_forces(self, y: Sequence[float], forces: Array) -> list[float]:
-        """Forces on joints that are coordinates each, which do what forces conjugate to the generalized speeds do."""
+    def compute_joint_forces(self, y: Sequence[float], forces: Array) -> list[float]:
+        """Return forces on joints that equal coordinates, equivalent to forces along the generalized speeds."""
         rates = self.mechanism.rate_matrix(self.state.values(y))
-        spread = self.state.spread(forces.tolist(), [0.0] * len(rates))
+        spread = self.state.spread_to_all(forces.tolist(), [0.0] * len(rates))
         return np.linalg.solve(rates.T, spread)[self.coordinates].tolist()
 
     # ---------------------------------------------------------------------------------------------- motion
-    def stepper(
+    def make_stepper(
         self, t: float, y: Sequence[float], settings: Settings, observe: Observer
     ) -> Stepper:
-        """What integrates from a state on: Runge-Kutta-Merson, or fixed steps, which Bullet takes if it can."""
+        """Return a stepper from a state on: error-controlled steps, or fixed steps, by Bullet if it can."""
         window = self.window
         if window is not None:
             tell = observe
@@ -184,26 +196,26 @@ class BulletEngine(KernelEngine):
 
         if settings.fixed_step is not None and self._steps_itself:
             return BulletStepper(self, t, y, settings.fixed_step, observe)
-        return super().stepper(t, y, settings, observe)
+        return super().make_stepper(t, y, settings, observe)
 
-    def _joint_values(self, y: Sequence[float]) -> list[float]:
+    def _compute_joint_values(self, y: Sequence[float]) -> list[float]:
         q = np.array(self.state.values(y))
         return [joint.value(q) for joint in self.world.joints]
 
     def close(self) -> None:
-        """Leave Bullet; any number of times."""
+        """Close the worlds of Bullet; may be called repeatedly."""
         self.world.close()
         if self.window is not None:
             self.window.close()
 
-    def hold(self) -> None:
-        """Keep the window, if there is one, until somebody closes it."""
+    def hold_window(self) -> None:
+        """Keep the window, if there is one, until the user closes it."""
         if self.window is not None:
             self.window.hold()
 
 
-def _is_plain(mechanism: Mechanism, robot: Robot) -> bool:
-    """Whether nothing constrains the mechanism, and the value of each joint is a coordinate of its own."""
+def _has_own_coordinates(mechanism: Mechanism, robot: Robot) -> bool:
+    """Return whether nothing constrains the mechanism and each joint of the robot equals a coordinate of its own."""
     places = [joint.coordinates[0] for joint in robot.moving]
     return (
         all(joint.coordinate is not None for joint in robot.moving)
@@ -214,34 +226,40 @@ def _is_plain(mechanism: Mechanism, robot: Robot) -> bool:
 
 
 class BulletStepper(SemiImplicitEuler):
-    """Bullet's own fixed steps: speeds by the accelerations at the start of the step, then values by the new speeds.
+    """Bullet's fixed steps: new speeds from the accelerations at the start of the step, then values from the new speeds.
 
-    That is what a PyBullet user expects of ``stepSimulation``: first order, one force evaluation a
-    step. In the place of the accelerations, the derivative has the forces.
+    This is what ``stepSimulation`` of PyBullet does: a first-order method with one evaluation of
+    the forces per step. The derivative contains forces in place of the accelerations.
 
     Args:
-        engine: whose mechanism; each joint of Bullet's is a coordinate.
+        engine: engine in which each of Bullet's joints is a coordinate.
         t: initial time, s.
         y: initial state.
-        h: step, s; a last one may be shorter.
-        observe: called with (time, state) after each step; the loads are those at that state.
+        h: step, s; the last one may be shorter.
+        observe: called with time and state after each step; the loads belong to that state.
     """
 
     def __init__(
         self, engine: BulletEngine, t: float, y: Sequence[float], h: float, observe: Observer
     ) -> None:
         super().__init__(
-            engine.applied, t, y, len(engine.order), h, observe=observe, names=engine.state.names
+            engine.compute_applied_forces,
+            t,
+            y,
+            len(engine.order),
+            h,
+            observe=observe,
+            names=engine.state.names,
         )
         self._engine, self.world, self._places = engine, engine.world, engine.coordinates
         q, u = engine.state.values(y), engine.state.speeds(y)
         rates = engine.mechanism.coordinate_rates(q, u)[self._places]
         self.world.set_state([q[place] for place in self._places], rates.tolist())
 
-    def _moved(self, h: float) -> list[float]:
+    def _take_step(self, h: float) -> list[float]:
         layout, mechanism, count = self._engine.state, self._engine.mechanism, self._nq
         forces = np.array(self.derivative[count : 2 * count])
-        self.world.step(h, self._engine.joint_forces(self.state, forces))
+        self.world.step(h, self._engine.compute_joint_forces(self.state, forces))
         q, rates = np.array(layout.values(self.state)), np.zeros(len(mechanism.coordinates))
         q[self._places], rates[self._places] = self.world.get_state()
         z = [
@@ -249,7 +267,7 @@ class BulletStepper(SemiImplicitEuler):
             for x, rate in zip(self.state[2 * count :], self.derivative[2 * count :], strict=True)
         ]
         y = layout.pack(q.tolist(), mechanism.speeds_from_rates(q, rates).tolist(), z)
-        # Bullet clips what would be faster, so that a motion that has burst may look finite.
+        # Bullet limits joint speeds, so that a diverged motion may look finite.
         if not max(map(abs, y[: 2 * count]), default=0.0) < 0.5 * self.world.FASTEST:
-            raise burst(self.time, self._h)
+            raise make_divergence_error(self.time, self._h)
         return y

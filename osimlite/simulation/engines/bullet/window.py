@@ -1,4 +1,4 @@
-"""Bullet's window: a picture of the robot that follows the motion in real time. The space bar stops it meanwhile."""
+"""Bullet's window, which shows the robot in real time during a motion; the space bar pauses it."""
 
 from __future__ import annotations
 
@@ -11,29 +11,44 @@ from contextlib import contextmanager, suppress
 import numpy as np
 
 from osimlite.errors import SimulationError
-from osimlite.simulation.engines.bullet.world import bullet, muted, robot_text, temporary_file
+from osimlite.simulation.engines.bullet.world import (
+    bullet,
+    mute_output,
+    write_robot,
+    write_temporary_file,
+)
 from osimlite.simulation.robot.robot import Robot
 
-FRAME = 1.0 / 60.0
+FRAME_S = 1.0 / 60.0
 """Time between two pictures, s."""
 
-YAW, PITCH, SIZES_AWAY = 25.0, -15.0, 2.0
-"""From where the camera looks at first, degrees: a little from the side and from above; and how far away it is."""
+YAW_DEG = 25.0
+"""First yaw of the camera, degrees: slightly from the side."""
 
-BULLETS_VIEW = 50.0, -35.0, 5.0
-"""Yaw, pitch (degrees) and distance (m) of the camera before it is told anything."""
+PITCH_DEG = -15.0
+"""First pitch of the camera, degrees: slightly from above."""
 
-SPACE, ESCAPE = ord(" "), 27
+DISTANCE_FACTOR = 2.0
+"""First distance of the camera, as a multiple of the model's size."""
+
+INITIAL_BULLET_VIEW = 50.0, -35.0, 5.0
+"""Yaw, pitch (degrees) and distance (m) of Bullet's camera before it is set."""
+
+SPACE = ord(" ")
+"""Bullet's code of the space bar."""
+
+ESCAPE = 27
+"""Bullet's code of the Escape key."""
 
 
 class Window:
-    """A window with a robot of its own, which is only looked at.
+    """A window with its own robot, which does not take part in the simulation.
 
     Args:
-        robot: with what its links look like.
-        gravity: (3,) tells what is up.
+        robot: the robot with the shapes of its links.
+        gravity: gravity (3,), which defines the vertical axis.
         files: mesh files that the robot names.
-        values: of the joints in Bullet's order at a state of the motion.
+        values: function of a state of the motion that returns joint values in Bullet's order.
 
     Raises:
         SimulationError: there is no screen.
@@ -51,13 +66,13 @@ class Window:
                 "there is no screen to show the motion on (DISPLAY is not set); leave out --gui, "
                 "and take --animate for a film"
             )
-        with muted(1):
+        with mute_output(1):
             self.client = int(bullet.connect(bullet.GUI))
         if self.client < 0:
             raise SimulationError(
                 "Bullet opens no window here; leave out --gui, and take --animate for a film"
             )
-        # Models without gravity have OpenSim's Y up too.
+        # Y is up in OpenSim's models without gravity, too.
         y_is_up = abs(gravity[2]) <= max(abs(gravity[0]), abs(gravity[1]))
         switches = {
             bullet.COV_ENABLE_Y_AXIS_UP: y_is_up,
@@ -66,7 +81,7 @@ class Window:
         }
         for switch, state in switches.items():
             bullet.configureDebugVisualizer(switch, int(state), physicsClientId=self.client)
-        with temporary_file(robot_text(robot), files) as path:
+        with write_temporary_file(write_robot(robot), files) as path:
             self._robot = bullet.loadURDF(path, useFixedBase=1, physicsClientId=self.client)
         count = bullet.getNumJoints(self._robot, self.client)
         infos = [bullet.getJointInfo(self._robot, index, self.client) for index in range(count)]
@@ -79,10 +94,10 @@ class Window:
         self._last: Sequence[float] | None = None
 
     def show(self, t: float, y: Sequence[float]) -> None:
-        """Show a state when the time t (s) since the first call has passed.
+        """Show a state when t (s) has passed since the first call.
 
         Raises:
-            SimulationError: somebody has closed the window.
+            SimulationError: the user has closed the window.
         """
         now, self._last = time.perf_counter(), y
         if self._start is None:
@@ -95,26 +110,26 @@ class Window:
         began = time.perf_counter()
         with self._while_open(t):
             self.draw(self._values(y))
-            # A slow screen leaves half of the time to the motion.
-            self._next = time.perf_counter() + max(FRAME, time.perf_counter() - began)
-            if SPACE in self.pressed_keys():
+            # On a slow screen, drawing takes at most half of the time.
+            self._next = time.perf_counter() + max(FRAME_S, time.perf_counter() - began)
+            if SPACE in self.read_pressed_keys():
                 stopped = time.perf_counter()
-                while SPACE not in self.pressed_keys():
-                    time.sleep(FRAME)
+                while SPACE not in self.read_pressed_keys():
+                    time.sleep(FRAME_S)
                 self._start = self._start[0], self._start[1] + time.perf_counter() - stopped
 
     def hold(self) -> None:
-        """Keep the last pose in sight until somebody closes the window or presses Escape."""
+        """Show the last pose until the user closes the window or presses Escape."""
         with suppress(bullet.error):
             if self._last is not None:
                 self.draw(self._values(self._last))
-            while bullet.isConnected(self.client) and ESCAPE not in self.pressed_keys():
-                time.sleep(FRAME)
+            while bullet.isConnected(self.client) and ESCAPE not in self.read_pressed_keys():
+                time.sleep(FRAME_S)
 
     def close(self) -> None:
-        """Close the window; any number of times."""
+        """Close the window; may be called repeatedly."""
         if self.client >= 0 and bullet.isConnected(self.client):
-            with muted(1):
+            with mute_output(1):
                 bullet.disconnect(self.client)
         self.client = -1
 
@@ -141,23 +156,28 @@ class Window:
         states = bullet.getLinkStates(self._robot, self._links, physicsClientId=client)
         places = np.array([state[0] for state in states])
         if self._view is None:
-            self._view = YAW, PITCH, max(0.5, SIZES_AWAY * float(np.ptp(places, axis=0).max()))
-        elif asked := self._asked():
+            self._view = (
+                YAW_DEG,
+                PITCH_DEG,
+                max(0.5, DISTANCE_FACTOR * float(np.ptp(places, axis=0).max())),
+            )
+        elif asked := self._get_selected_view():
             self._view = asked
         yaw, pitch, distance = self._view
         bullet.resetDebugVisualizerCamera(
             distance, yaw, pitch, places.mean(axis=0).tolist(), physicsClientId=client
         )
 
-    def _asked(self) -> tuple[float, float, float] | None:
-        """The view that somebody has turned to; None as long as it is that of the start."""
-        # PyBullet tells of the first world only, and for some pictures yet what was before.
+    def _get_selected_view(self) -> tuple[float, float, float] | None:
+        """Return the view that the user has selected; None while it is the initial one."""
+        # PyBullet reports the camera of the first world only, and for some pictures an outdated
+        # one.
         if self.client != 0:
             return None
         yaw, pitch, distance = bullet.getDebugVisualizerCamera(self.client)[8:11]
-        return None if (yaw, pitch, distance) == BULLETS_VIEW else (yaw, pitch, distance)
+        return None if (yaw, pitch, distance) == INITIAL_BULLET_VIEW else (yaw, pitch, distance)
 
-    def pressed_keys(self) -> set[int]:
+    def read_pressed_keys(self) -> set[int]:
         """Return the keys that were pressed since the last call."""
         keys = bullet.getKeyboardEvents(self.client)
         return {key for key, state in keys.items() if state & bullet.KEY_WAS_TRIGGERED}

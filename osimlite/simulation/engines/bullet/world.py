@@ -1,7 +1,7 @@
-"""A robot alone in a Bullet world of its own, set up so that it obeys mechanics and nothing else.
+"""A robot in its own Bullet world, configured to obey mechanics only.
 
-Bullet is made for games; what has to be changed so that it computes mechanics is here, one method
-or constant for each.
+Bullet is made for games. Each change that it needs to compute mechanics is one method or constant
+here, as are the properties of the URDF file that make Bullet read it correctly.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ from osimlite.errors import SimulationError
 from osimlite.simulation.robot.robot import Link, Robot, RobotJoint, principal_axes
 from osimlite.simulation.robot.urdf import urdf_text
 
-__all__ = ["World", "bullet", "muted"]
+__all__ = ["World", "bullet", "mute_output"]
 
 
 @contextmanager
-def muted(descriptor: int = 2) -> Iterator[None]:
-    """Nothing goes to standard error (2) or output (1) meanwhile, where PyBullet tells of its build, and more."""
+def mute_output(descriptor: int = 2) -> Iterator[None]:
+    """Discard standard error (2) or output (1) meanwhile; PyBullet prints its build there."""
     try:
         kept = os.dup(descriptor)
     except OSError:
@@ -45,7 +45,7 @@ def muted(descriptor: int = 2) -> Iterator[None]:
         os.close(nowhere)
 
 
-with muted():
+with mute_output():
     require(
         "pybullet",
         extra="bullet",
@@ -54,28 +54,29 @@ with muted():
     )
     import pybullet as bullet
 
-NO_LIMIT = 1e9
+UNLIMITED_SPEED = 1e9
+"""Joint speed (rad/s, m/s) that no motion reaches."""
 
 
 class World:
-    """One robot alone in a Bullet world of its own, set up so that it obeys mechanics and nothing else.
+    """A robot in its own Bullet world, configured to obey mechanics only.
 
     Attributes:
         client: Bullet's number of the world.
         id: Bullet's number of the robot.
-        joints: the robot's joints in the order of Bullet's degrees of freedom.
+        joints: joints of the robot in the order of Bullet's degrees of freedom.
         impossible: names of links whose inertia no real body has.
     """
 
-    # Without this flag Bullet makes up inertias from collision shapes, of which there are none.
-    # Sleeping stays off.
+    # Without this flag Bullet derives inertias from collision shapes, which are missing here. The
+    # flag for sleeping stays off.
     FLAGS = bullet.URDF_USE_INERTIA_FROM_FILE
 
     DAMPING = 0.0
-    """Bullet's default is 0.04, in every link."""
+    """Damping of every link; Bullet's default is 0.04."""
 
-    FASTEST = NO_LIMIT
-    """Bullet clips joint speeds at 100 by default."""
+    FASTEST = UNLIMITED_SPEED
+    """Limit of joint speeds; Bullet's default is 100."""
 
     def __init__(
         self,
@@ -86,22 +87,24 @@ class World:
         exact: bool = True,
     ) -> None:
         self.client = _connect()
-        # Worlds are few: who forgets to close one leaves it to the garbage collector.
+        # Bullet has few worlds, so the garbage collector closes those that users forget.
         self._leave = weakref.finalize(self, bullet.disconnect, self.client)
         self._step = 0.0
         self._exact = exact
         try:
-            self._load(robot, gravity, files or {})
+            self._load_robot(robot, gravity, files or {})
         except BaseException:
             self.close()
             raise
 
-    def _load(self, robot: Robot, gravity: Sequence[float], files: Mapping[str, bytes]) -> None:
+    def _load_robot(
+        self, robot: Robot, gravity: Sequence[float], files: Mapping[str, bytes]
+    ) -> None:
         client = self.client
         bullet.setGravity(*gravity, physicsClientId=client)
         bullet.setPhysicsEngineParameter(numSubSteps=0, physicsClientId=client)
-        self.impossible = [link.name for link in robot.links if excess(link) > 0.0]
-        with temporary_file(robot_text(robot), files) as path:
+        self.impossible = [link.name for link in robot.links if compute_inertia_excess(link) > 0.0]
+        with write_temporary_file(write_robot(robot), files) as path:
             self.id = bullet.loadURDF(
                 path, useFixedBase=1, flags=self.FLAGS, physicsClientId=client
             )
@@ -111,18 +114,18 @@ class World:
         ]
         self.joints = self.sort_joints(robot, infos)
         self._indices = [int(info[0]) for info in infos if info[3] >= 0]
-        self._release(infos)
+        self._remove_damping(infos)
         if self.impossible and self._exact:
             self.set_inertias(robot, infos)
 
     @staticmethod
     def sort_joints(robot: Robot, infos: Sequence[Sequence[Any]]) -> list[RobotJoint]:
-        """The joints in Bullet's order, which is not that of the model nor of the robot."""
+        """Return the joints in Bullet's order, which differs from that of the model and of the robot."""
         joints = {joint.name: joint for joint in robot.moving}
         return [joints[info[1].decode()] for info in infos if info[3] >= 0]
 
-    def _release(self, infos: Sequence[Sequence[Any]]) -> None:
-        """Take away everything that slows a joint down."""
+    def _remove_damping(self, infos: Sequence[Sequence[Any]]) -> None:
+        """Remove everything that slows a joint down."""
         client = self.client
         for index in (-1, *(int(info[0]) for info in infos)):
             bullet.changeDynamics(
@@ -137,7 +140,7 @@ class World:
         self.switch_motors_off()
 
     def switch_motors_off(self) -> None:
-        """Bullet starts every joint with a motor that holds it."""
+        """Switch off the motor with which Bullet starts every joint."""
         if self._indices:
             none = [0.0] * len(self._indices)
             bullet.setJointMotorControlArray(
@@ -149,7 +152,7 @@ class World:
             )
 
     def set_inertias(self, robot: Robot, infos: Sequence[Sequence[Any]]) -> None:
-        """Give Bullet the inertias that it refuses to read; only its articulated-body algorithm takes them."""
+        """Set the inertias that Bullet refuses to read; only its articulated-body algorithm uses them."""
         links = {link.name: link for link in robot.links}
         for info in infos:
             link = links[info[12].decode()]
@@ -163,18 +166,22 @@ class World:
                 )
 
     def set_state(self, q: Sequence[float], rates: Sequence[float]) -> None:
-        """Put the joints into a state, and all links where they then are."""
+        """Set values and rates of the joints, and update all links."""
         bullet.resetJointStatesMultiDof(
             self.id, self._indices, [(x,) for x in q], [(x,) for x in rates], self.client
         )
 
     def get_state(self) -> tuple[list[float], list[float]]:
-        """Values and rates of the joints."""
+        """Read the state of the joints.
+
+        Returns:
+            Values and rates of the joints.
+        """
         states = bullet.getJointStates(self.id, self._indices, self.client)
         return [state[0] for state in states], [state[1] for state in states]
 
     def step(self, h: float, forces: Sequence[float]) -> None:
-        """Let Bullet take one step of length h (s) under forces on the joints, which hold for this step only."""
+        """Take one of Bullet's steps of length h (s), with forces on the joints that act during this step only."""
         client = self.client
         if h != self._step:
             bullet.setTimeStep(h, client)
@@ -187,14 +194,14 @@ class World:
     def accelerations_by_step(
         self, q: list[float], rates: list[float], forces: Sequence[float]
     ) -> list[float]:
-        """Second derivatives of the joint values: what one second changes the rates by."""
+        """Return the second derivatives of the joint values: the change of the rates in a step of one second."""
         self.set_state(q, rates)
         self.step(1.0, forces)
         states = bullet.getJointStates(self.id, self._indices, self.client)
         return [state[1] - rate for state, rate in zip(states, rates, strict=True)]
 
     def close(self) -> None:
-        """Leave the world."""
+        """Close the world."""
         if self.client >= 0:
             self._leave()
             self.client = -1
@@ -209,26 +216,32 @@ def _connect() -> int:
     return client
 
 
-def robot_text(robot: Robot) -> str:
-    """The robot as URDF, with inertias that Bullet does not set to zero."""
+def write_robot(robot: Robot) -> str:
+    """Return the robot as URDF, with inertias that Bullet does not replace by zero."""
     links = [
-        replace(link, inertia=link.inertia + excess(link) * np.eye(3))
-        if excess(link) > 0.0
+        replace(link, inertia=link.inertia + compute_inertia_excess(link) * np.eye(3))
+        if compute_inertia_excess(link) > 0.0
         else link
         for link in robot.links
     ]
     return urdf_text(replace(robot, links=tuple(links)), visuals=True)
 
 
-def excess(link: Link) -> float:
-    """What to add to each principal moment of inertia so that Bullet does not set them to zero; 0 if they are fine."""
+def compute_inertia_excess(link: Link) -> float:
+    """Return what to add to each principal moment of inertia so that Bullet does not replace them
+    by zero; 0 if they are valid.
+    """
     moments = [float(moment) for moment in principal_axes(link.inertia)[0]]
     low, middle, high = sorted(moments)
     return high if high > low + middle or low < 0.0 else 0.0
 
 
 def require_masses(robot: Robot) -> None:
-    """SimulationError if the last link of a chain has no mass: nothing decides how its joint moves."""
+    """Check that the last link of each chain has mass; without one its joint has no defined motion.
+
+    Raises:
+        SimulationError: a last link has no mass.
+    """
     carriers = {joint.parent for joint in robot.joints}
     links = {link.name: link for link in robot.links}
     for joint in robot.joints:
@@ -241,8 +254,8 @@ def require_masses(robot: Robot) -> None:
 
 
 @contextmanager
-def temporary_file(text: str, files: Mapping[str, bytes]) -> Iterator[str]:
-    """A URDF file with the mesh files that it names beside it."""
+def write_temporary_file(text: str, files: Mapping[str, bytes]) -> Iterator[str]:
+    """Write a URDF file with its mesh files into a temporary folder, and yield its path."""
     with tempfile.TemporaryDirectory(prefix="osimlite-") as folder:
         for name, content in {"robot.urdf": text.encode(), **files}.items():
             path = Path(folder, name)

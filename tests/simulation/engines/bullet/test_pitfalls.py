@@ -39,7 +39,7 @@ def error(mechanism, route="articulated-body", *, q=Q, u=U):
     expected = mechanism.acceleration(q, u)
     with BulletEngine(mechanism, Forces(()), route=route) as engine:
         return (
-            np.abs(np.subtract(engine.acceleration(0.0, q, u), expected)).max()
+            np.abs(np.subtract(engine.compute_accelerations(0.0, q, u), expected)).max()
             / np.abs(expected).max()
         )
 
@@ -121,7 +121,7 @@ def test_an_inertia_that_no_body_has_is_kept(monkeypatch, capfd):
     with monkeypatch.context() as without:
         without.setattr(pack_chain, "list_excesses", lambda *_: [])
         assert error(mechanism, "mass-matrix", **state) > 1e-3
-    monkeypatch.setattr(bullet_world, "excess", lambda link: 0.0)
+    monkeypatch.setattr(bullet_world, "compute_inertia_excess", lambda link: 0.0)
     assert error(mechanism, "articulated-body", **state) > 1e-3
     # Bullet's own complaint stays in the buffer of the C library until then.
     capfd.readouterr()
@@ -132,10 +132,10 @@ def steps(walker, h=1e-3, to=0.3):
     mechanism = build_mechanism(walker)
     with BulletEngine(mechanism, force_elements(walker, mechanism)) as engine:
         y = engine.state.pack(Q, U)
-        euler = SemiImplicitEuler(engine.derivative, 0.0, y, len(y) // 2, h)
-        expected = [state for _, state in euler.steps(to)]
-        own = engine.stepper(0.0, y, Settings(fixed_step=h), lambda t, state: None)
-        return np.array([state for _, state in own.steps(to)]), np.array(expected)
+        euler = SemiImplicitEuler(engine.compute_derivative, 0.0, y, len(y) // 2, h)
+        expected = [state for _, state in euler.iterate_steps(to)]
+        own = engine.make_stepper(0.0, y, Settings(fixed_step=h), lambda t, state: None)
+        return np.array([state for _, state in own.iterate_steps(to)]), np.array(expected)
 
 
 def test_forces_belong_to_the_state_and_act_once(walker, monkeypatch):
@@ -200,9 +200,9 @@ def test_worlds_do_not_disturb_each_other(mechanism):
         BulletEngine(mechanism, Forces(())) as second,
     ):
         assert first.world.client != second.world.client
-        ours = first.acceleration(0.0, Q, U)
-        second.acceleration(0.0, [0.0] * 8, [0.0] * 8)
-        assert first.acceleration(0.0, Q, U) == ours
+        ours = first.compute_accelerations(0.0, Q, U)
+        second.compute_accelerations(0.0, [0.0] * 8, [0.0] * 8)
+        assert first.compute_accelerations(0.0, Q, U) == ours
 
 
 def test_nothing_collides(mechanism):
@@ -228,6 +228,8 @@ def test_bodies_can_be_seen(walker, mechanism):
         # Platform, pelvis, two thighs and two shanks.
         assert len(shapes) == 6
         assert (
-            np.abs(np.subtract(engine.acceleration(0.0, Q, U), mechanism.acceleration(Q, U))).max()
+            np.abs(
+                np.subtract(engine.compute_accelerations(0.0, Q, U), mechanism.acceleration(Q, U))
+            ).max()
             < 1e-9
         )

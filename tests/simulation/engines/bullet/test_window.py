@@ -41,7 +41,7 @@ def keys(monkeypatch):
     """What is pressed at each look at the keyboard, the first first; then nothing."""
     pressed: list[set[int]] = []
     monkeypatch.setattr(
-        module.Window, "pressed_keys", lambda self: pressed.pop(0) if pressed else set()
+        module.Window, "read_pressed_keys", lambda self: pressed.pop(0) if pressed else set()
     )
     return pressed
 
@@ -131,7 +131,7 @@ def test_the_camera_follows_and_stays_as_it_was_turned(clock, keys, monkeypatch)
         targets.append(target)
 
     monkeypatch.setattr(bullet, "resetDebugVisualizerCamera", aim)
-    answers = [module.BULLETS_VIEW] * 5
+    answers = [module.INITIAL_BULLET_VIEW] * 5
     monkeypatch.setattr(
         bullet,
         "getDebugVisualizerCamera",
