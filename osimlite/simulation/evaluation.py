@@ -511,7 +511,7 @@ class StateEvaluator:
             item, path, strength = items[name], -1, -1
             if self.has_quantity(name, STRENGTH):
                 path = item - int(
-                    self.structure[item + ITEM.OWN + self.get_force_type(name).text.heads]
+                    self.structure[item + ITEM.OWN + self.get_force_type(name).text.int_count]
                 )
                 (strength,) = self.find_offsets(name, (STRENGTH,))
             order += item, controls[name], path, strength
