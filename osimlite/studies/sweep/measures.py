@@ -205,7 +205,7 @@ def energy(engine: Any, feet: Sequence[str] | None = None) -> Measure:
         result = []
         for number, (t, start, end) in enumerate(ends):
             one = batch.engine_of(number)
-            result.append(sum(one.energies(t, end)) - sum(one.energies(0.0, start)))
+            result.append(sum(one.compute_energies(t, end)) - sum(one.compute_energies(0.0, start)))
         return np.array(result)
 
     return Measure("energy", gained)
