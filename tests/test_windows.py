@@ -90,7 +90,7 @@ def test_a_script_that_processes_run_anew_is_told_where_a_sweep_begins() -> None
 
     pool = LocalPool(Ending(1), cast(Any, None), 1)
     pool.submit(0, np.zeros(1))
-    with pytest.raises(OsimliteError, match="begins a sweep under if __name__ == '__main__':"):
+    with pytest.raises(OsimliteError, match="start the sweep under if __name__ == '__main__':"):
         pool.result()
 
 

@@ -39,7 +39,7 @@ class MeasuredPath(Silent):
         """Path of the owner."""
         return self.path
 
-    def told(self, record: Sequence[float]) -> str:
+    def describe_failure(self, record: Sequence[float]) -> str:
         """Return the subject of the message for a pose in which the path has no length."""
         return f"'{self.path}': the path has no length in this pose"
 

@@ -105,7 +105,7 @@ def test_includes_show_no_other_files(
 @pytest.mark.parametrize("name", ["pipe.scone", "/dev/zero", "/dev/null"])
 def test_scenarios_are_regular_files(tmp_path: Path, name: str) -> None:
     os.mkfifo(tmp_path / "pipe.scone")
-    with pytest.raises(OsimliteError, match="only files are read"):
+    with pytest.raises(OsimliteError, match="only regular files are read"):
         read_settings(tmp_path / name)
     (tmp_path / "including.scone").write_text(f"<< {name} >>")
     with pytest.raises(OsimliteError):

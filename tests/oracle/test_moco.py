@@ -456,7 +456,7 @@ print(json.dumps(solution.getStatus()))
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        (r"<bounds>(0.6 0.9)<", "nan 1", "bounds is nan, which is no number"),
+        (r"<bounds>(0.6 0.9)<", "nan 1", "bounds is nan, which is not a number"),
         (r"<bounds>(0.6 0.9)<", "-2 -1", "ends at -1 s at the latest, and begins at 0 s"),
         (
             r"<bounds>(0.6 0.9)<",
@@ -466,7 +466,7 @@ print(json.dumps(solution.getStatus()))
         (
             r"(<MocoVariableInfo name=\"/jointset/j0/q0/value.*?</MocoVariableInfo>)",
             '<Constant name="no" />',
-            "its place",
+            "objects of this class are not allowed here",
         ),
         (
             r"<MocoControlTrackingGoalReference name=\"(/forceset/motor0)",

@@ -58,9 +58,9 @@ LEFT, RIGHT = point("/ground", -0.3, 0.01, 0), point("/bodyset/b", 0, 0.01, 0)
 @pytest.mark.parametrize(
     ("elements", "surface", "says"),
     [
-        ((), None, "does not begin and end with a point"),
-        ((LEFT,), None, "does not begin and end with a point"),
-        ((LEFT, over()), ContactSphere(radius=0.1), "does not begin and end with a point"),
+        ((), None, "must begin and end with a point"),
+        ((LEFT,), None, "must begin and end with a point"),
+        ((LEFT, over()), ContactSphere(radius=0.1), "must begin and end with a point"),
         ((LEFT, over((0.1, nan, 0.0)), RIGHT), ContactSphere(radius=0.1), "not a finite number"),
         ((LEFT, over((inf, 0.0, 0.0)), RIGHT), ContactSphere(radius=0.1), "not a finite number"),
         ((LEFT, over(), RIGHT), ContactSphere(radius=0.0), "not positive"),

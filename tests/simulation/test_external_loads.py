@@ -85,7 +85,7 @@ def test_the_same_as_a_prescribed_force(model, tmp_path):
         ),
         ({"force_identifier": ""}, "has no force_identifier and no torque_identifier"),
         ({"force_identifier": "", "torque_identifier": "grf_m"}, "leave it out"),
-        ({"force_identifer": "grf_v"}, "<force_identifer> means nothing"),
+        ({"force_identifer": "grf_v"}, "<force_identifer> is unknown"),
     ],
 )
 def test_misspellings(model, tmp_path, tags, words):
@@ -148,6 +148,6 @@ def test_what_older_versions_asked_for_is_ignored_and_what_is_misspelt_refused(m
     assert len(read_external_loads(build_mechanism(model), path)) == 1
     path.write_text(path.read_text().replace("force_identifier", "force_identifer"))
     with pytest.raises(
-        DocumentError, match=r"<force_identifer> means nothing .* mean <force_identifier>"
+        DocumentError, match=r"<force_identifer> is unknown .* mean <force_identifier>"
     ):
         read_external_loads(build_mechanism(model), path)

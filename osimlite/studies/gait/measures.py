@@ -67,7 +67,7 @@ def progress(engine: Any, feet: Sequence[str] | None = None) -> Measure:
 
 
 @registry.start
-def plant_on_ground(engine: Any, feet: Sequence[str] | None) -> registry.Place:
+def planted(engine: Any, feet: Sequence[str] | None) -> registry.Place:
     """On the ground with the deeper foot, at rest there."""
     if engine.name != "compiled":
         raise SettingError("a walker is planted with --engine compiled only")
