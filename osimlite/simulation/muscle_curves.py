@@ -77,6 +77,10 @@ class MuscleCurves(Tabular):
         columns = {name: rows[:, list(places)] for name, rows in self.columns.items()}
         return MuscleCurves(tuple(self.muscles[k] for k in places), self.values, columns)
 
+    def of(self, indices: Sequence[int]) -> MuscleCurves:
+        """Return the same as :meth:`select_muscles`, under the name that is deprecated."""
+        return self.select_muscles(indices)
+
     @property
     def table(self) -> tuple[Mapping[str, Array], Mapping[str, Array]]:
         """The `columns` over ``muscle`` and the coordinates: a row for each muscle in each pose."""

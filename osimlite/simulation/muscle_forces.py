@@ -56,6 +56,10 @@ class MuscleForces(StoTable):
         assert self.shared is not None
         return self.shared.describe_unsolved()
 
+    def unsolved(self) -> str:
+        """Return the same as :meth:`describe_unsolved`, under the name that is deprecated."""
+        return self.describe_unsolved()
+
     def write(self, folder: str | Path) -> list[Path]:
         """Write activations, forces and controls into a folder, with the file names of OpenSim's analysis.
 

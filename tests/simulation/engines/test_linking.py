@@ -58,7 +58,9 @@ def test_derivatives_in_python_are_those_of_machine_code(make, monkeypatch):
         return model.linear(0.0, model.x, model.u)
 
     machine = linearize()
-    monkeypatch.setattr(tangents, "_load_tangent_code", lambda: linking.PythonTangents(tangents.DIRECTIONS))
+    monkeypatch.setattr(
+        tangents, "_load_tangent_code", lambda: linking.PythonTangents(tangents.DIRECTIONS)
+    )
     for one, other in zip(machine, linearize(), strict=True):
         np.testing.assert_allclose(
             other, one, rtol=1e-12, atol=1e-12 * np.abs(one).max(initial=1.0)
