@@ -57,7 +57,7 @@ def difference(model, found, number, by, to, **choices):
         else:
             for place in find_properties(changed, number):
                 setter = place.make_setter(changed)
-                setter.put(setter.get() + h)
+                setter.set_value(setter.get_value() + h)
         run = osimlite.simulate(
             changed, to, "compiled", **{**choices, "initial": initial, "accuracy": ACCURACY}
         )

@@ -139,7 +139,7 @@ def _measure_joint_power(
     if any(driven):
         state, count = system.state, len(system.order)
         q, u = state.values(y), state.speeds(y)
-        forces = state.spread(
+        forces = state.spread_to_all(
             system.compute_applied_forces(t, y)[count : 2 * count], [0.0] * len(q)
         )
         udot = system.mechanism.acceleration(q, u, forces, time=t)

@@ -95,9 +95,9 @@ def test_every_number_that_is_found_can_be_set_and_read():
         model = dynamic_walker()
         (place,) = find_properties(model, path)
         setter = place.make_setter(model)
-        setter.put(value)
-        assert setter.get() == value
-        assert find_properties(model, path)[0].make_setter(model).get() == value
+        setter.set_value(value)
+        assert setter.get_value() == value
+        assert find_properties(model, path)[0].make_setter(model).get_value() == value
     assert model.gravity == (1.0, -9.80665, 0.0)
 
 
