@@ -32,6 +32,7 @@ than OpenSim converts.
 settings.register_profile(
     "osimlite", deadline=None, derandomize="CI" in os.environ, print_blob=True
 )
+settings.register_profile("osimlite-quick", settings.get_profile("osimlite"), max_examples=40)
 settings.load_profile("osimlite")
 
 
@@ -47,6 +48,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 def pytest_configure(config: pytest.Config) -> None:
     """Let commands that tests start be interrupted: a shell that starts pytest in the background has it ignore that."""
     config.pluginmanager.register(Suite(config.getoption("--full")), "osimlite-suite")
+    if not config.getoption("--full"):
+        settings.load_profile("osimlite-quick")
     if not separate.is_server(config):
         config.pluginmanager.register(separate, "osimlite-check-protocol")
         config.pluginmanager.register(separate.Checks(config), "osimlite-checks")

@@ -48,7 +48,7 @@ def compare(
     assert np.abs(result - known).max() < accuracy
 
 
-@settings(max_examples=choose(20, 80))
+@settings(max_examples=choose(12, 80))
 @given(
     cases(max_bodies=4),
     st.sampled_from(KINDS),

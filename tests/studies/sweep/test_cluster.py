@@ -180,6 +180,7 @@ def test_a_cluster_that_is_not_there_is_told(walker, tmp_path, monkeypatch):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.full
 def test_a_search_finds_the_same_there(cluster, tmp_path):
     pytest.importorskip("cma", reason="needs cma (extra 'optimize')")
     vary = {"m*/control@0:0.03:3": (0.0, 1.0), "mu/max_isometric_force@scale": (0.5, 2.0)}
