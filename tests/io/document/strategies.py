@@ -65,8 +65,10 @@ def objects(draw: st.DrawFn, accepts: type[Object] = Component, depth: int = 2) 
         elif isinstance(kind, Value):
             value = draw(values(kind))
             # A file cannot say that a text is absent where it is there by default: an empty element
-            # is an empty text.
-            if value is not None or kind.scalar != "string" or spec.default is None:
+            # is an empty text. OpenSim keeps the default of a vector whose element is empty.
+            is_absent_text = value is None and kind.scalar == "string" and spec.default is not None
+            is_empty_vector = kind.shape == "vector" and not value and bool(spec.default)
+            if not is_absent_text and not is_empty_vector:
                 given[spec.name] = value
         elif depth and spec.accepts is not None:
             assert isinstance(kind, Held)
