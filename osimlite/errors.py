@@ -92,9 +92,10 @@ class ModelError(OsimliteError):
 class MissingNameError(ModelError, AttributeError):
     """A component has no property or member of that name.
 
-    Args: describe: returns the message. It is called when somebody reads the message: to find the
-        nearest name takes milliseconds, and `hasattr` and `getattr` with a default drop the error
-        unread.
+    Args:
+        describe: returns the message. It is called when somebody reads the message: to find the
+            nearest name takes milliseconds, and `hasattr` and `getattr` with a default drop the
+            error unread.
     """
 
     def __init__(self, describe: Callable[[], str]) -> None:

@@ -88,8 +88,9 @@ def open_atomically(path: str | Path) -> Iterator[BinaryIO]:
     An existing file keeps its owner, its mode and its hard links. A symbolic link stays a link to
     the written file. A pipe or a device receives the text directly.
 
-    Raises: OsimliteError: the folder is missing or cannot be written to, or the path is a link that
-        leads out of its project; nothing has changed then.
+    Raises:
+        OsimliteError: the folder is missing or cannot be written to, or the path is a link that
+            leads out of its project; nothing has changed then.
     """
     target = Path(os.path.realpath(path))
     # Unlike those of Path, these functions accept names that are too long for a file.
@@ -109,8 +110,9 @@ def open_into(folder: str | Path, name: str) -> Iterator[BinaryIO]:
 
     The new file replaces a regular file or a link; the target of the link stays unchanged.
 
-    Raises: OsimliteError: the folder is missing or cannot be written to, or something else than a
-        regular file has the name; nothing has changed then.
+    Raises:
+        OsimliteError: the folder is missing or cannot be written to, or something else than a
+            regular file has the name; nothing has changed then.
     """
     target = Path(os.path.realpath(folder)) / name
     _expect_regular_or_none(target)
@@ -240,8 +242,9 @@ class ResultWriter:
     def resolve(self, path: str | Path) -> Path:
         """Return the real path of a result, after checking all that depends on its name alone.
 
-        Raises: WriteRefusedError: the path leads out of the trees, is hidden, is a link, or its
-            ending is not that of a result.
+        Raises:
+            WriteRefusedError: the path leads out of the trees, is hidden, is a link, or its ending
+                is not that of a result.
         """
         path = Path(path)
         real = Path(os.path.realpath(path.parent)) / path.name

@@ -290,8 +290,9 @@ def quantities(
         option: for messages.
         states: paths of other states, which may be named too.
 
-    Raises: OsimliteError: a word is not of that form, there is no such coordinate, the unit does
-        not fit it, or a value of ``--set`` without a unit can hardly be meant in rad.
+    Raises:
+        OsimliteError: a word is not of that form, there is no such coordinate, the unit does not
+            fit it, or a value of ``--set`` without a unit can hardly be meant in rad.
     """
     from osimlite.base.text import suggest_name
     from osimlite.errors import ModelError, OsimliteError, SettingError

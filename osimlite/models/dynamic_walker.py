@@ -30,9 +30,12 @@ def dynamic_walker(
 ) -> Model:
     """Build the walker of the exercise "Building a Dynamic Walker": passive, with knees, on a slope.
 
-    Args: pelvis_width: distance from the middle of the pelvis to each hip (m); the exercise's
-        pelvisWidth. thigh_length: from hip to knee (m). shank_length: from knee to foot (m). slope:
-        how far the platform falls towards +x (deg).
+    Args:
+        pelvis_width: distance from the middle of the pelvis to each hip (m); the exercise's
+            pelvisWidth.
+        thigh_length: from hip to knee (m).
+        shank_length: from knee to foot (m).
+        slope: how far the platform falls towards +x (deg).
     """
     model = Model(name="DynamicWalkerModel", gravity=(0.0, -9.80665, 0.0))
 

@@ -96,8 +96,9 @@ MUSCLES = {
 def jumper(driven: bool = True) -> Model:
     """Build a human model that squats and jumps with the muscles of its legs.
 
-    Args: driven: whether the controller is there that makes it jump; without it, the muscles are
-        there to be driven.
+    Args:
+        driven: whether the controller is there that makes it jump; without it, the muscles are
+            there to be driven.
     """
     model = Model(name="Jumper", gravity=(0.0, -9.80665, 0.0))
     model.model_visual_preferences.model_display_hints.show_wrap_geometry = False

@@ -28,12 +28,14 @@ _WORDS = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0"
 def make_model(source: str, parameters: Mapping[str, str] | None = None) -> Model:
     """Make the model that `source` describes.
 
-    Args: source: a built-in name (``dynamic-walker``), ``file.py``, ``file.py:function``,
-        ``package.module:function``, or a ``.yaml`` or ``.json`` model. parameters: arguments of the
-        model function, as text; a data file takes none.
+    Args:
+        source: a built-in name (``dynamic-walker``), ``file.py``, ``file.py:function``,
+            ``package.module:function``, or a ``.yaml`` or ``.json`` model.
+        parameters: arguments of the model function, as text; a data file takes none.
 
-    Raises: OsimliteError: there is no such source, it has no such parameter, or it does not return
-        a Model.
+    Raises:
+        OsimliteError: there is no such source, it has no such parameter, or it does not return a
+            Model.
     """
     if source.endswith(SUFFIXES):
         if parameters:

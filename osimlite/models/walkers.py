@@ -98,9 +98,12 @@ def human_walker(
     Winter gives for humans (Biomechanics and Motor Control of Human Movement). The feet are round,
     as McGeer's were.
 
-    Args: slope: how far the platform falls towards +x (deg). foot_radius: of the sphere of each
-        foot (m); its lowest point stays where it is in the exercise. foot_ahead: how far the sphere
-        is in front of the shank's axis (m). knee_stiffness: of what stops the knees (N·m/deg).
+    Args:
+        slope: how far the platform falls towards +x (deg).
+        foot_radius: of the sphere of each foot (m); its lowest point stays where it is in the
+            exercise.
+        foot_ahead: how far the sphere is in front of the shank's axis (m).
+        knee_stiffness: of what stops the knees (N·m/deg).
     """
     model = dynamic_walker(slope=slope)
     model.name = "HumanWalker"

@@ -59,8 +59,9 @@ def rename_component(model: Model, component: Component, name: str) -> None:
 def remove_component(model: Model, component: Component) -> None:
     """Take a component, and all below it, out of the model.
 
-    Raises: ModelError: it is not in the model, has a fixed place (the ground, a set), or others
-        name it; the message lists them.
+    Raises:
+        ModelError: it is not in the model, has a fixed place (the ground, a set), or others name
+            it; the message lists them.
     """
     tree = model.tree()
     path = _path_in(model, component)

@@ -38,26 +38,32 @@ class Facts(NamedTuple):
     initialised and asked for accelerations. Where nothing is said, OpenSim computes with the
     number.
 
-    Attributes: states: names of its state variables, in OpenSim's order; a class that names none
-        has those of its base. A component has ``name?flag`` if that property is true,
-        ``name?!flag`` if it is false. outputs: what it adds to the outputs of its base, as OpenSim
-        lists them: ``[]`` marks an output with channels, and a type follows the name unless it is a
-        number. domains: by property, the numbers that OpenSim takes in this class, where they are
-        fewer than for others that share the property, or than its declaration says. refused:
-        properties for which OpenSim refuses the model where a number is outside its domain.
+    Attributes:
+        states: names of its state variables, in OpenSim's order; a class that names none has those
+            of its base. A component has ``name?flag`` if that property is true, ``name?!flag`` if
+            it is false.
+        outputs: what it adds to the outputs of its base, as OpenSim lists them: ``[]`` marks an
+            output with channels, and a type follows the name unless it is a number.
+        domains: by property, the numbers that OpenSim takes in this class, where they are fewer
+            than for others that share the property, or than its declaration says.
+        refused: properties for which OpenSim refuses the model where a number is outside its
+            domain.
         outside: what else happens with a number outside its domain, with the properties of which
-        this is so. zero: likewise with 0 alone; it goes before the others, and without a text
-        OpenSim computes with 0. missing: likewise without a number where there is no default.
+            this is so.
+        zero: likewise with 0 alone; it goes before the others, and without a text OpenSim computes
+            with 0.
+        missing: likewise without a number where there is no default.
         doubts: by property, what is doubtful about a number outside its domain that OpenSim
-        computes with. mujoco: of a muscle, the properties that numbers of MuJoCo's muscle are read
-        from, by MuJoCo's names (vmax, fvmax) or rise and fall, the time constants; a dot leads into
-        the object that a property holds. What is not named here its base has. scales: by property,
-        what it is multiplied by when the model is scaled: by the factors of a body along its axes,
-        of which the word says whose they are (OWN the frame itself, HOLDER the frame that holds the
-        object, or the socket that leads to a frame, or the coordinate of whose joint it is the
-        parent frame), and a word behind it which one (x, y, z; MEAN; ALONG and ACROSS the Z axis of
-        a surface, AXES of its three); or by how much longer the path has become (PATH), or by
-        nothing. What is not named here its base has.
+            computes with.
+        mujoco: of a muscle, the properties that numbers of MuJoCo's muscle are read from, by
+            MuJoCo's names (vmax, fvmax) or rise and fall, the time constants; a dot leads into the
+            object that a property holds. What is not named here its base has.
+        scales: by property, what it is multiplied by when the model is scaled: by the factors of a
+            body along its axes, of which the word says whose they are (OWN the frame itself, HOLDER
+            the frame that holds the object, or the socket that leads to a frame, or the coordinate
+            of whose joint it is the parent frame), and a word behind it which one (x, y, z; MEAN;
+            ALONG and ACROSS the Z axis of a surface, AXES of its three); or by how much longer the
+            path has become (PATH), or by nothing. What is not named here its base has.
     """
 
     states: str = ""

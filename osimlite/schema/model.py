@@ -154,8 +154,9 @@ class Model(ModelComponent):
     def add(self, *components: C) -> C:
         """Add components to the sets they belong in, in order, and return the first of them.
 
-        Raises: ModelError: the component is of a kind that no set of a model takes, or another
-            beside it has its name.
+        Raises:
+            ModelError: the component is of a kind that no set of a model takes, or another beside
+                it has its name.
         """
         for component in components:
             for spec, holder in self.objects_held():

@@ -219,8 +219,11 @@ class _Compiler:
     def _repeat_part(self, begin: int, start: int, end: int) -> tuple[int, int]:
         """Return a part as often as the quantifier that comes next says.
 
-        Args: begin: index of the part in the text, from which it is compiled again for each
-            repetition. start: its first state. end: its last state.
+        Args:
+            begin: index of the part in the text, from which it is compiled again for each
+                repetition.
+            start: its first state.
+            end: its last state.
         """
         part_end = self.index
         least, most = self._quantifier()

@@ -72,8 +72,10 @@ def list_motions(joint: Joint) -> dict[str, MotionType]:
 def find_variables(tree: Tree, kind: str) -> dict[str, Component]:
     """The components of a model by the names of their variables.
 
-    Args: tree: that of the model. kind: ``state variable``, ``control``, ``state or control
-        variable``, ``generalized force`` or ``output``; of a class of components their paths.
+    Args:
+        tree: that of the model.
+        kind: ``state variable``, ``control``, ``state or control variable``, ``generalized force``
+            or ``output``; of a class of components their paths.
     """
     return tree.named(f"variables: {kind}", lambda: _iterate_variables(tree, kind))
 

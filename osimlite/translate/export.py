@@ -36,11 +36,15 @@ Locked = Literal["fixed", "joint"]
 class Urdf:
     """A model as URDF.
 
-    Attributes: name: of the files. text: the URDF. fidelity: what became of every component, and
-        what URDF cannot say. robot: the neutral robot that was written, which maps links and joints
-        to bodies and coordinates. coordinates: JSON text that tells how coordinates drive joints,
-        and which link carries which body. files: mesh files that the text names, by name relative
-        to it.
+    Attributes:
+        name: of the files.
+        text: the URDF.
+        fidelity: what became of every component, and what URDF cannot say.
+        robot: the neutral robot that was written, which maps links and joints to bodies and
+            coordinates.
+        coordinates: JSON text that tells how coordinates drive joints, and which link carries which
+            body.
+        files: mesh files that the text names, by name relative to it.
     """
 
     name: str
@@ -89,22 +93,30 @@ def to_urdf(
 ) -> Urdf:
     """Translate a model to URDF.
 
-    Args: model: the model. visuals: whether to say what bodies look like. limits: ``"range"``
-        writes coordinate ranges as hard limits; OpenSim itself lets coordinates leave them. locked:
-        whether a locked coordinate becomes a fixed joint at its default value, or a joint that
-        moves. merge: make bodies that do not move relative to each other one link. collision:
-        whether contact geometry becomes collision shapes; a half space becomes a box whose face is
-        its surface. effort: limit (N, N·m) for joints whose coordinate has no actuators with a
-        greatest force. velocity: limit (m/s, rad/s) for all joints. folder: where the model's file
-        is; mesh files are looked for there and in its folder ``Geometry``. geometry: more folders
-        to look for mesh files in; those in the environment variable OSIMLITE_GEOMETRY, separated as
-        in PATH, follow them.
+    Args:
+        model: the model.
+        visuals: whether to say what bodies look like.
+        limits: ``"range"`` writes coordinate ranges as hard limits; OpenSim itself lets coordinates
+            leave them.
+        locked: whether a locked coordinate becomes a fixed joint at its default value, or a joint
+            that moves.
+        merge: make bodies that do not move relative to each other one link.
+        collision: whether contact geometry becomes collision shapes; a half space becomes a box
+            whose face is its surface.
+        effort: limit (N, N·m) for joints whose coordinate has no actuators with a greatest force.
+        velocity: limit (m/s, rad/s) for all joints.
+        folder: where the model's file is; mesh files are looked for there and in its folder
+            ``Geometry``.
+        geometry: more folders to look for mesh files in; those in the environment variable
+            OSIMLITE_GEOMETRY, separated as in PATH, follow them.
 
         name: of the files to write, without ending; that of the model if not given.
 
-    Raises: OsimliteError: a limit is not a positive number, or `limits` is no word of these.
+    Raises:
+        OsimliteError: a limit is not a positive number, or `limits` is no word of these.
         ModelError: the model is not a mechanism: something it names is not there, or a body is not
-        connected. UnsupportedError: it uses a joint or constraint that osimlite cannot compute.
+            connected.
+        UnsupportedError: it uses a joint or constraint that osimlite cannot compute.
     """
     if limits not in ("none", "range"):
         raise OsimliteError(f"--limits is 'none' or 'range', not '{limits}'")

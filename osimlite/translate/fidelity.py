@@ -78,10 +78,14 @@ class Fidelity:
     What stands below a component that has a record shares its fate and may have none of its own;
     containers (the sets) and the axes that viewers draw at a frame are not counted.
 
-    Attributes: model: name of the model. target: the format, e.g. ``"urdf"``. translated: what
-        became of a component, by absolute path: ``"link Pelvis"``, ``"joint RHip_rz"``. records:
-        what the target cannot say. renamed: the names of what a component became, by its path and
-        by kind, where they are not its own.
+    Attributes:
+        model: name of the model.
+        target: the format, e.g. ``"urdf"``.
+        translated: what became of a component, by absolute path: ``"link Pelvis"``, ``"joint
+            RHip_rz"``.
+        records: what the target cannot say.
+        renamed: the names of what a component became, by its path and by kind, where they are not
+            its own.
     """
 
     model: str

@@ -70,13 +70,19 @@ def animate(
     and markers, half spaces as ground, and the contact forces as arrows; the camera follows what
     moves.
 
-    Args: model: what moves. trajectory: how it moves. path: the file to write. fps: frames per
-        second of the film; a GIF shows at most 50. speed: seconds of motion per second of film.
+    Args:
+        model: what moves.
+        trajectory: how it moves.
+        path: the file to write.
+        fps: frames per second of the film; a GIF shows at most 50.
+        speed: seconds of motion per second of film.
         plane: the plane of the picture: ``"xy"`` looks along -Z, ``"yz"`` along -X, ``"xz"`` along
-        -Y. size: width and height in pixels. folders: where the model's mesh files are looked for
-        besides the folder of `file`. file: that the model was read from, if there is one. wrapping:
-        how paths bend around surfaces, see :class:`osimlite.simulation.Options`. progress: called
-        with the number of frames done and of all frames.
+            -Y.
+        size: width and height in pixels.
+        folders: where the model's mesh files are looked for besides the folder of `file`.
+        file: that the model was read from, if there is one.
+        wrapping: how paths bend around surfaces, see :class:`osimlite.simulation.Options`.
+        progress: called with the number of frames done and of all frames.
 
     Raises:
         MissingDependency: pillow is not installed.

@@ -85,10 +85,15 @@ def page_data(
 ) -> dict[str, Any]:
     """Everything the page shows, as data for JSON.
 
-    Args: model: what to show. scene: of that model. motion: how it moves, or None. findings: of the
-        validator. q: coordinate values (n,) at first. server: whether a program answers the page,
-        which then asks it for poses that fulfil the constraints. story: what it tells of the
-        motion.
+    Args:
+        model: what to show.
+        scene: of that model.
+        motion: how it moves, or None.
+        findings: of the validator.
+        q: coordinate values (n,) at first.
+        server: whether a program answers the page, which then asks it for poses that fulfil the
+            constraints.
+        story: what it tells of the motion.
     """
     mechanism = scene.mechanism
     recorded = None if motion is None else _describe_motion(scene, motion)

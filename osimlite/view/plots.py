@@ -49,9 +49,11 @@ def plot_simulation(
 ) -> list[Path]:
     """Draw the coordinates, states of muscles, forces, probes and energy of a motion over time.
 
-    Args: trajectory: the motion. folder: where the pictures go; made if it is not there. mechanism:
-        what moves; the trajectory's own if left out. Without any, coordinates cannot be told into
-        angles and lengths, and there is no picture of the energy.
+    Args:
+        trajectory: the motion.
+        folder: where the pictures go; made if it is not there.
+        mechanism: what moves; the trajectory's own if left out. Without any, coordinates cannot be
+            told into angles and lengths, and there is no picture of the energy.
 
     Returns:
         The PNG files: ``coordinates.png``, and as far as there is something to show ``states.png``,

@@ -69,17 +69,24 @@ class Shown:
     ) -> Shown:
         """Make a model ready.
 
-        Args: model: which. mechanism: of the same model, if it is at hand. folders: where its mesh
-            files are looked for besides the folder of `file`, as of `to_urdf`. file: that the model
-            was read from, so that findings know their lines; None: the model itself is checked.
-            motion: how it moves, or the file (.sto, .mot) that says so. forces: a file with contact
-            forces, for a motion from a file. values: of coordinates by name (rad, m); over a motion
-            from a file they stay so. wrapping: how paths bend around surfaces, see
-            :class:`osimlite.simulation.Options`. left_out: paths of the parts that were taken out
-            of `model` since they cannot be built, with the reasons.
+        Args:
+            model: which.
+            mechanism: of the same model, if it is at hand.
+            folders: where its mesh files are looked for besides the folder of `file`, as of
+                `to_urdf`.
+            file: that the model was read from, so that findings know their lines; None: the model
+                itself is checked.
+            motion: how it moves, or the file (.sto, .mot) that says so.
+            forces: a file with contact forces, for a motion from a file.
+            values: of coordinates by name (rad, m); over a motion from a file they stay so.
+            wrapping: how paths bend around surfaces, see :class:`osimlite.simulation.Options`.
+            left_out: paths of the parts that were taken out of `model` since they cannot be built,
+                with the reasons.
 
-        Raises: OsimliteError: a file is missing or not what it should be; no pose fulfils the
-            constraints. SettingError: there is no such wrapping.
+        Raises:
+            OsimliteError: a file is missing or not what it should be; no pose fulfils the
+                constraints.
+            SettingError: there is no such wrapping.
         """
         if mechanism is None:
             model, mechanism, left_out = build_showable(model)

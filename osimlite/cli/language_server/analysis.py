@@ -57,8 +57,11 @@ class Target(NamedTuple):
 class Analysis:
     """One version of a file; everything is found out when it is first asked for.
 
-    Args: text: of the file. file: its path; it need not exist. recalls: whether findings about
-        paths and muscles that were measured before are among what is found.
+    Args:
+        text: of the file.
+        file: its path; it need not exist.
+        recalls: whether findings about paths and muscles that were measured before are among what
+            is found.
     """
 
     def __init__(self, text: Text, file: str, *, recalls: bool = False) -> None:

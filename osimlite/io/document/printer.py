@@ -29,9 +29,11 @@ DECLARATION = '<?xml version="1.0" encoding="UTF-8" ?>'
 def to_text(top: Object, *, numbers: Numbers = "shortest", comments: bool = True) -> str:
     """The document of a model, or of another object that has one of its own, such as the setup of a tool.
 
-    Args: top: what to print; components given as references must be part of it, if it is a model.
+    Args:
+        top: what to print; components given as references must be part of it, if it is a model.
         numbers: ``"shortest"`` prints the shortest decimal that reads back equal, ``"opensim"`` 17
-        significant digits. comments: whether to print the comments the model was read with.
+            significant digits.
+        comments: whether to print the comments the model was read with.
 
     Raises:
         ModelError: a reference leads to a component outside the model.

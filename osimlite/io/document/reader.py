@@ -159,8 +159,9 @@ def read_document(source: Source, *, of: type[Object] = Model, to_check: bool = 
 
     A text that is `to_check` is also asked whether there is anything between its elements.
 
-    Raises: DocumentError: the text is not an OpenSim document, or holds something else; with line
-        and column.
+    Raises:
+        DocumentError: the text is not an OpenSim document, or holds something else; with line and
+            column.
     """
     try:
         root = parse_source(source)
@@ -188,8 +189,9 @@ def read_tree(
 ) -> Document:
     """The document that an element tree stands for.
 
-    Raises: DocumentError: there is no such object in it, or something that no rule carries over
-        from an older version.
+    Raises:
+        DocumentError: there is no such object in it, or something that no rule carries over from an
+            older version.
     """
     with pause_collector():
         if version < CURRENT_VERSION:

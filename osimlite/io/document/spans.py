@@ -57,8 +57,10 @@ _INSTRUCTION_END = {False: "?>", True: ">"}
 def find_markup(text: str, *, as_opensim: bool = False) -> Iterator[Markup]:
     """Yield the markup of a text in order; it ends where a comment or its like has no end.
 
-    Args: text: the text. as_opensim: whether an instruction ends at its first ``>``, as it does for
-        OpenSim, and not at ``?>``, as it does for XML.
+    Args:
+        text: the text.
+        as_opensim: whether an instruction ends at its first ``>``, as it does for OpenSim, and not
+            at ``?>``, as it does for XML.
     """
     place = 0
     while (match := _MARKUP.search(text, place)) is not None:

@@ -25,8 +25,9 @@ def format_binary_stl(content: bytes, name: str, signs: Sequence[float] = (1.0, 
         name: of the file, for messages.
         signs: (3,) of 1 and -1 that multiply the coordinates; the outside remains outside.
 
-    Raises: OsimliteError: it is not an STL file, is cut off, has no triangle, or a corner without a
-        place.
+    Raises:
+        OsimliteError: it is not an STL file, is cut off, has no triangle, or a corner without a
+            place.
     """
     binary = _from_binary(content, name)
     triangles = binary if binary is not None else _from_text(content, name)

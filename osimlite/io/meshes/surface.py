@@ -68,9 +68,11 @@ triangles; a polygon of a million corners would take years.
 def triangulate(points: Array, corners: Indices, ends: Indices) -> Indices:
     """Triangles (t, 3) that cover polygons, turning the same way.
 
-    Args: points: (n, 3). corners: of all polygons, one after the other (places of points). ends:
-        where each polygon ends in `corners`, increasing; polygons of fewer than three corners are
-        left out.
+    Args:
+        points: (n, 3).
+        corners: of all polygons, one after the other (places of points).
+        ends: where each polygon ends in `corners`, increasing; polygons of fewer than three corners
+            are left out.
     """
     starts = np.concatenate(([0], ends[:-1])).astype(np.int64)
     sizes = ends - starts

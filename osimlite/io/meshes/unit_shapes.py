@@ -81,9 +81,11 @@ def _make_edge(
 def _revolve_profile(strips: Sequence[Array], slices: int = SLICES) -> Surface:
     """The surface that lines in a half plane sweep when they turn about Z.
 
-    Args: strips: lines (k, 4), each row distance from Z, height, and the outward normal in the same
-        two directions. With the distance to the right and the height up, the outside is to the
-        right of the way along a line. slices: how many there are around.
+    Args:
+        strips: lines (k, 4), each row distance from Z, height, and the outward normal in the same
+            two directions. With the distance to the right and the height up, the outside is to the
+            right of the way along a line.
+        slices: how many there are around.
     """
     around = 2.0 * np.pi * np.arange(slices) / slices
     points: list[Array] = []

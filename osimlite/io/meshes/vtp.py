@@ -75,8 +75,9 @@ def read_vtp(content: bytes, name: str) -> Surface:
         content: of the file.
         name: of the file, for messages.
 
-    Raises: OsimliteError: it is not such a file, is damaged, or is compressed in a way that
-        osimlite does not know.
+    Raises:
+        OsimliteError: it is not such a file, is damaged, or is compressed in a way that osimlite
+            does not know.
     """
     with _find_named(name):
         return _File(content).surface()

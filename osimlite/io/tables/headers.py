@@ -123,11 +123,12 @@ class MarkerHeader:
 class StorageHeader:
     """The header of a storage file, and the labels behind it.
 
-    Attributes: lines: its text without ends, up to the line that ends it. end: what ends it,
-        ``endheader`` in whatever letters, and where; before the labels it may be nothing. entries:
-        the first word of each line and the rest, by that word. labels: of all columns, with that of
-        the time. label_line: the number of their line. has_tabs: whether there are tabs in it.
-        rows: the offset behind it. row_line: the number of the line there.
+    Attributes:
+        lines: its text without ends, up to the line that ends it. end: what ends it, ``endheader``
+            in whatever letters, and where; before the labels it may be nothing. entries: the first
+            word of each line and the rest, by that word. labels: of all columns, with that of the
+            time. label_line: the number of their line. has_tabs: whether there are tabs in it.
+            rows: the offset behind it. row_line: the number of the line there.
     """
 
     def __init__(self, data: bytes, file: str = "") -> None:

@@ -92,11 +92,16 @@ def write_sto(
 ) -> None:
     """Write a table to a file, whole or not at all; the rows are taken one by one.
 
-    Args: path: of the file. name: first line of the file. times: s. columns: labels; for another
-        kind than ``double`` one for each value. rows: numbers, of one value after the other.
-        in_degrees: whether rotational values are in degrees. kind: of the values: ``Vec3``,
-        ``Quaternion`` and whatever else OpenSim knows. has_missing: whether NaN stands for what was
-        not measured, such as a marker that was not seen.
+    Args:
+        path: of the file.
+        name: first line of the file.
+        times: s.
+        columns: labels; for another kind than ``double`` one for each value.
+        rows: numbers, of one value after the other.
+        in_degrees: whether rotational values are in degrees.
+        kind: of the values: ``Vec3``, ``Quaternion`` and whatever else OpenSim knows.
+        has_missing: whether NaN stands for what was not measured, such as a marker that was not
+            seen.
 
     Raises:
         SimulationError: a number is NaN or infinite.

@@ -169,8 +169,9 @@ def find_compiler() -> Compiler | None:
 def find_cross_compiler(platform: str) -> Compiler | None:
     """Return the compiler of the variable CXX, which compiles for another platform.
 
-    Args: platform: as in the tag of a wheel, such as "manylinux_2_17_x86_64", "macosx_11_0_arm64"
-        or "win_amd64".
+    Args:
+        platform: as in the tag of a wheel, such as "manylinux_2_17_x86_64", "macosx_11_0_arm64" or
+            "win_amd64".
     """
     compiler = find_compiler()
     if compiler is None:

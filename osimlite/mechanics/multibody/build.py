@@ -55,19 +55,23 @@ def build_mechanism(
     gives the half a wrong inertia: so it is with `opensim_derivatives`.) Forces and geometry play
     no part.
 
-    Args: model: the model. opensim_derivatives: compute two second derivatives as OpenSim 4.6 does,
-        which are wrong. Simbody differentiates the angular velocity of a CustomJoint as if its
-        first coordinate alone drove the first rotation and the first two alone the first two, so
-        accelerations are off where one coordinate drives several rotations (the knee of Rajagopal's
+    Args:
+        model: the model.
+        opensim_derivatives: compute two second derivatives as OpenSim 4.6 does, which are wrong.
+            Simbody differentiates the angular velocity of a CustomJoint as if its first coordinate
+            alone drove the first rotation and the first two alone the first two, so accelerations
+            are off where one coordinate drives several rotations (the knee of Rajagopal's
         model: up to 1 % at usual speeds) and energy is not conserved. And OpenSim takes the
-        gradient of a MultivariatePolynomialFunction for each column of its Hessian. Without this
-        switch both are right. rolling: let every RollingOnSurfaceConstraint act. OpenSim leaves
-        them off until a program turns them on.
+            gradient of a MultivariatePolynomialFunction for each column of its Hessian. Without
+            this switch both are right.
+        rolling: let every RollingOnSurfaceConstraint act. OpenSim leaves them off until a program
+            turns them on.
 
-    Raises: ModelError: something names what does not exist, a joint connects a body with itself or
-        has the wrong number of coordinates, a mass, an inertia, a function is impossible.
+    Raises:
+        ModelError: something names what does not exist, a joint connects a body with itself or has
+            the wrong number of coordinates, a mass, an inertia, a function is impossible.
         UnsupportedError: a joint, a constraint, a frame or a function of another class; a loop
-        closed by a FreeJoint or by a joint whose child is ground.
+            closed by a FreeJoint or by a joint whose child is ground.
     """
     expect_model(model)
     return _Builder(model, opensim_derivatives, rolling).build()

@@ -209,8 +209,9 @@ class _Reader:
     def ending_with(self, result: int) -> tuple[Step, ...]:
         """Return the steps that a result needs, of which the last gives it.
 
-        Raises: _Wrong: one of them stands for a name that nothing has, or is NaN whatever the
-            variables are.
+        Raises:
+            _Wrong: one of them stands for a name that nothing has, or is NaN whatever the variables
+                are.
         """
         needed, waiting = set[int](), [result]
         while waiting:

@@ -139,9 +139,11 @@ class Tree(NamedTuple):
 def tree_of(mechanism: Mechanism, free: Collection[int], *, apart: bool = False) -> Tree:
     """The links of a mechanism.
 
-    Args: mechanism: what moves. free: places of the coordinates that are degrees of freedom; the
-        others stay at their defaults. apart: whether bodies that never move in one another are
-        links of their own.
+    Args:
+        mechanism: what moves.
+        free: places of the coordinates that are degrees of freedom; the others stay at their
+            defaults.
+        apart: whether bodies that never move in one another are links of their own.
 
     Raises:
         UnsupportedError: a joint that the kernels do not know.

@@ -65,12 +65,16 @@ class Mechanism:
     exist and for values of the wrong number. A `time` (s) matters only where coordinates are
     prescribed.
 
-    Attributes: bodies: carriers before the carried. coordinates: in the order of all arrays.
-        gravity: acceleration (3,) in ground (m/s²). frames: every frame fixed to a body or to
-        ground, by absolute path. constraints: what holds besides the joints; what locked and
-        prescribed coordinates need is put before them. stations: every marker and other station, by
-        absolute path. assembly_accuracy: ten times what position errors of constraints may be in an
-        assembled pose (m or rad).
+    Attributes:
+        bodies: carriers before the carried.
+        coordinates: in the order of all arrays.
+        gravity: acceleration (3,) in ground (m/s²).
+        frames: every frame fixed to a body or to ground, by absolute path.
+        constraints: what holds besides the joints; what locked and prescribed coordinates need is
+            put before them.
+        stations: every marker and other station, by absolute path.
+        assembly_accuracy: ten times what position errors of constraints may be in an assembled pose
+            (m or rad).
     """
 
     name: str
@@ -304,11 +308,13 @@ class Mechanism:
     ) -> Array:
         """Derivatives of the generalized speeds (n,) under gravity, the given forces and the constraints.
 
-        Args: q: coordinate values, which must obey the constraints already. u: generalized speeds,
-            which must obey them too (that of a locked coordinate is zero). generalized_forces:
-            conjugate to the generalized speeds (N, N·m); zero for names left out. body_wrenches: by
-            body or frame, applied at its origin, along ground's axes. time: what prescribed
-            coordinates go by (s).
+        Args:
+            q: coordinate values, which must obey the constraints already.
+            u: generalized speeds, which must obey them too (that of a locked coordinate is zero).
+            generalized_forces: conjugate to the generalized speeds (N, N·m); zero for names left
+                out.
+            body_wrenches: by body or frame, applied at its origin, along ground's axes.
+            time: what prescribed coordinates go by (s).
 
         Raises:
             SimulationError: a coordinate moves no mass, or a number is not finite.

@@ -33,8 +33,10 @@ class ConstraintReader:
     def build_constraint(self, constraint: SchemaConstraint) -> Constraint:
         """The equations of an enforced constraint.
 
-        Raises: ModelError: it names what does not exist, or its function, a direction or a distance
-            is impossible. UnsupportedError: a constraint of another class.
+        Raises:
+            ModelError: it names what does not exist, or its function, a direction or a distance is
+                impossible.
+            UnsupportedError: a constraint of another class.
         """
         make = _READERS.get(type(constraint))
         path = self.placements.path(constraint)

@@ -30,8 +30,10 @@ class Placements:
     def resolve_frame(self, frame: PhysicalFrame) -> tuple[str, Array]:
         """The body (or ground) that a frame is fixed to, and the frame's transform (4, 4) there.
 
-        Raises: ModelError: frames are fixed to each other in a circle, or stations do not define a
-            frame. UnsupportedError: a frame of another class.
+        Raises:
+            ModelError: frames are fixed to each other in a circle, or stations do not define a
+                frame.
+            UnsupportedError: a frame of another class.
         """
         # Each frame that waits is fixed to the next one; a chain of them may be of any length.
         wanted = self.path(frame)

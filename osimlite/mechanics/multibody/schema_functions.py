@@ -20,12 +20,17 @@ def convert_function(
 ) -> f.Function:
     """The function that a component of a model describes.
 
-    Args: function: one of OpenSim's functions. arguments: how many arguments it will get. where:
-        the path and property it stands in, for messages. opensim_derivatives: give a multivariate
-        polynomial the second derivatives that OpenSim takes for them.
+    Args:
+        function: one of OpenSim's functions.
+        arguments: how many arguments it will get.
+        where: the path and property it stands in, for messages.
+        opensim_derivatives: give a multivariate polynomial the second derivatives that OpenSim
+            takes for them.
 
-    Raises: ModelError: there is no function, or it is not a function of this many arguments, or has
-        impossible values. UnsupportedError: a function of another class.
+    Raises:
+        ModelError: there is no function, or it is not a function of this many arguments, or has
+            impossible values.
+        UnsupportedError: a function of another class.
     """
     if function is None:
         raise ModelError(f"{where} is missing; give one, for instance a LinearFunction")

@@ -42,8 +42,10 @@ def joint_motions(
 ) -> tuple[tuple[Motion, ...], Sequence[Coordinate]]:
     """The factors of X_FM of a joint, and its coordinates in the order that the factors count them in.
 
-    Raises: ModelError: a wrong number of coordinates, an axis or a function that cannot be, radii
-        that are no numbers. UnsupportedError: a joint or a function of another class.
+    Raises:
+        ModelError: a wrong number of coordinates, an axis or a function that cannot be, radii that
+            are no numbers.
+        UnsupportedError: a joint or a function of another class.
     """
     kind, coordinates = type(joint).__name__, list(joint.coordinates)
     if isinstance(joint, schema.CustomJoint):

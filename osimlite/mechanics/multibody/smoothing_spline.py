@@ -45,9 +45,13 @@ def smoothing_spline(
 ) -> PiecewisePolynomial:
     """The natural spline of degree 2 `half_order` - 1 for n points (n,) that increase, n >= 2 `half_order`.
 
-    Args: x: abscissae (n,). y: ordinates (n,). half_order: m. error_variance: of the ordinates; the
-        smoothing is chosen to leave it in the residuals. Zero goes through the points, a negative
-        number chooses the smoothing by generalized cross validation.
+    Args:
+        x: abscissae (n,).
+        y: ordinates (n,).
+        half_order: m.
+        error_variance: of the ordinates; the smoothing is chosen to leave it in the residuals. Zero
+            goes through the points, a negative number chooses the smoothing by generalized cross
+            validation.
     """
     points, values = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
     if error_variance != 0.0:
@@ -189,8 +193,9 @@ def _compute_knot_derivatives(points: Array, values: Array, half_order: int) -> 
 def _unit_interval(half_order: int) -> tuple[Array, Array]:
     """Of the polynomial of degree 2 m - 1 by its derivatives up to m - 1 at 0 and, behind these, at 1.
 
-    Returns: Its coefficients from the constant up (2 m, 2 m), and half the second derivatives of
-        the integral of its squared m-th derivative (2 m, 2 m); all are fractions of whole numbers.
+    Returns:
+        Its coefficients from the constant up (2 m, 2 m), and half the second derivatives of the
+        integral of its squared m-th derivative (2 m, 2 m); all are fractions of whole numbers.
     """
     size, parts = 2 * half_order, math.factorial(half_order - 1)
     ends = np.zeros((size, size))

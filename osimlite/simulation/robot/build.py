@@ -32,15 +32,17 @@ def build_robot(
 ) -> Robot:
     """Spread a mechanism out into one-axis joints.
 
-    Args: mechanism: what to spread out. locked: whether a locked coordinate becomes a fixed joint
-        or stays a joint that moves; or which coordinates become fixed joints, by their places in
-        the mechanism. body_frames: give every body a link whose frame is the body's own. Where the
-        body's frame is off the axis of its joint, that takes a massless link at the axis and a
-        fixed joint; without it the body's link has its frame at the joint, which saves a link, and
-        `Link.bodies` tells where the body is. at: coordinate values at which locked coordinates are
-        fixed; their defaults if left out. visuals: shapes by absolute path of the body (or
-        ``"/ground"``), placed in the body's frame. collisions: what bodies touch others with,
-        likewise.
+    Args:
+        mechanism: what to spread out.
+        locked: whether a locked coordinate becomes a fixed joint or stays a joint that moves; or
+            which coordinates become fixed joints, by their places in the mechanism.
+        body_frames: give every body a link whose frame is the body's own. Where the body's frame is
+            off the axis of its joint, that takes a massless link at the axis and a fixed joint;
+            without it the body's link has its frame at the joint, which saves a link, and
+            `Link.bodies` tells where the body is.
+        at: coordinate values at which locked coordinates are fixed; their defaults if left out.
+        visuals: shapes by absolute path of the body (or ``"/ground"``), placed in the body's frame.
+        collisions: what bodies touch others with, likewise.
     """
     values = mechanism.values({} if at is None else at)
     if isinstance(locked, str):

@@ -127,11 +127,17 @@ def find_basin(
 ) -> Basin:
     """Let walkers start on a grid around a cycle.
 
-    Args: step_map: of the walker. cycle: its cycle. x: what changes along the columns: a
-        coordinate, or with ``/speed`` behind its name its speed. By default the speed of the first
-        joint of the leg that strikes. y: likewise along the rows; by default of the other leg.
-        reach: how far from the cycle, rad, m or per second. grid: values of each. wanted: steps
-        after which a walker walks. accuracy: of the integrator. progress: called now and then.
+    Args:
+        step_map: of the walker.
+        cycle: its cycle.
+        x: what changes along the columns: a coordinate, or with ``/speed`` behind its name its
+            speed. By default the speed of the first joint of the leg that strikes.
+        y: likewise along the rows; by default of the other leg.
+        reach: how far from the cycle, rad, m or per second.
+        grid: values of each.
+        wanted: steps after which a walker walks.
+        accuracy: of the integrator.
+        progress: called now and then.
 
     Raises:
         OsimliteError: there is no such coordinate, or nothing to take by default.

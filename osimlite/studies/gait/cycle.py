@@ -73,8 +73,12 @@ def find_cycle(
 ) -> Cycle:
     """Find a fixed point of the step map by Newton's method, with steps halved until they help.
 
-    Args: step_map: of the walker. state: where to begin (y,), at a heel strike of the first foot;
-        by default where the map was made. converged: largest residual. most_steps: Newton steps.
+    Args:
+        step_map: of the walker.
+        state: where to begin (y,), at a heel strike of the first foot; by default where the map was
+            made.
+        converged: largest residual.
+        most_steps: Newton steps.
         settle: walk so many steps first.
 
     Raises:

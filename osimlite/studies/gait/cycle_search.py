@@ -106,11 +106,14 @@ class Found:
 class CycleSearch:
     """Looks for cycles of the models of a plan.
 
-    Args: plan: what is varied: starts, from which the walkers are drawn, and numbers of the model,
-        which are searched. feet: contacts of each foot; found by the structure of the model if left
-        out. stable: largest multiplier that is small enough; below it, what counts is how many walk
-        from near the cycle. perturb: how near: every value and speed is changed by this part at
-        most. threads: how many work.
+    Args:
+        plan: what is varied: starts, from which the walkers are drawn, and numbers of the model,
+            which are searched.
+        feet: contacts of each foot; found by the structure of the model if left out.
+        stable: largest multiplier that is small enough; below it, what counts is how many walk from
+            near the cycle.
+        perturb: how near: every value and speed is changed by this part at most.
+        threads: how many work.
 
     Attributes:
         footing: the feet.

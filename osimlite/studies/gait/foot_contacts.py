@@ -48,8 +48,10 @@ def find_footing(engine: BatchEngine, feet: Sequence[str] | None = None) -> Foot
     farther up whose name is that of a part of the foot) do names decide. Every other contact with
     the ground ends the walk.
 
-    Args: engine: of the model. feet: the contacts of each foot, with + between those of one foot,
-        instead of looking for them.
+    Args:
+        engine: of the model.
+        feet: the contacts of each foot, with + between those of one foot, instead of looking for
+            them.
 
     Raises:
         OsimliteError: a contact does not exist or is named twice, or the model has no two legs.

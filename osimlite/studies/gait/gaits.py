@@ -74,22 +74,31 @@ def find_gait(
 ) -> Gait:
     """Look for numbers of a model, and a start, with which it walks in the most stable cycle that is found.
 
-    Args: plan: what is varied: values and speeds of coordinates, from which random starts are
-        drawn, and numbers of the model. folder: where `best.osim`, `cycles.csv` and `summary.json`
-        are written. feet: contacts of each foot; found by the structure of the model if left out.
-        samples: random walkers. tries: how many of the best are led to a cycle. enough: cycles
-        after which no more of them are. budget: sets of numbers that are tried on the way to the
-        most stable cycle. stable: largest multiplier that is small enough; below it, what counts is
-        how many walk from near the cycle. perturb: how near: every value and speed is changed by
-        this part at most. digits: that the numbers of the model are rounded to. start_digits: that
-        the start is rounded to; None for all of them. seed: what makes the search the same again.
-        force: replace what another search has left in the folder. threads: how many work. stage:
-        called as work is done.
+    Args:
+        plan: what is varied: values and speeds of coordinates, from which random starts are drawn,
+            and numbers of the model.
+        folder: where `best.osim`, `cycles.csv` and `summary.json` are written.
+        feet: contacts of each foot; found by the structure of the model if left out.
+        samples: random walkers.
+        tries: how many of the best are led to a cycle.
+        enough: cycles after which no more of them are.
+        budget: sets of numbers that are tried on the way to the most stable cycle.
+        stable: largest multiplier that is small enough; below it, what counts is how many walk from
+            near the cycle.
+        perturb: how near: every value and speed is changed by this part at most.
+        digits: that the numbers of the model are rounded to.
+        start_digits: that the start is rounded to; None for all of them.
+        seed: what makes the search the same again.
+        force: replace what another search has left in the folder.
+        threads: how many work.
+        stage: called as work is done.
 
-    Raises: SettingError: a number has no meaning, or the folder has files of another search.
+    Raises:
+        SettingError: a number has no meaning, or the folder has files of another search.
         SimulationError: no cycle was found, or the best is lost when the numbers are rounded.
-        UnsupportedError: constraints act on the model. OsimliteError: the plan cannot be run, the
-        model has no two feet, or the folder cannot be written to.
+        UnsupportedError: constraints act on the model.
+        OsimliteError: the plan cannot be run, the model has no two feet, or the folder cannot be
+            written to.
     """
     settings = {
         **plan.settings(),

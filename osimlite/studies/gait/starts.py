@@ -61,10 +61,14 @@ def lift_to_depth(
 ) -> Floats:
     """States (W, y) lifted or lowered until one foot is so deep (m) in the ground.
 
-    Args: engine: of the model. footing: its feet. states: what to lift; as they are if no
-        coordinate lifts the walker. depth: of the deepest contact of the foot. foot: which one; -1
-        for the deeper. numbers: of models of the same structure, one row for each state; by default
-        the engine's own.
+    Args:
+        engine: of the model.
+        footing: its feet.
+        states: what to lift; as they are if no coordinate lifts the walker.
+        depth: of the deepest contact of the foot.
+        foot: which one; -1 for the deeper.
+        numbers: of models of the same structure, one row for each state; by default the engine's
+            own.
     """
     lift = find_carriers(engine, footing).lift
     if lift is None:

@@ -117,9 +117,11 @@ class StepMap:
     ) -> StepMap:
         """The step map of a model with other numbers, whose reduced states are as near to these as they can be.
 
-        Args: engine: of that model, of the same structure. near: a state from which it makes a
-            step, and where reduced states are along the neutral directions (y,). accuracy: of the
-            integrator; by default the same.
+        Args:
+            engine: of that model, of the same structure.
+            near: a state from which it makes a step, and where reduced states are along the neutral
+                directions (y,).
+            accuracy: of the integrator; by default the same.
 
         Raises:
             OsimliteError: it makes no step from there, or has more or fewer neutral directions.

@@ -77,8 +77,11 @@ def leg_exchange(engine: BatchEngine, footing: FootContacts, states: ArrayLike) 
 def exchange_auxiliary(engine: BatchEngine, source: Ints, states: Floats) -> None:
     """Complete the places (y,) that the legs exchange, which are known for values and speeds.
 
-    Args: engine: of the model. source: changed where an auxiliary state does what another does when
-        the legs have changed parts. states: at which to try (k, y).
+    Args:
+        engine: of the model.
+        source: changed where an auxiliary state does what another does when the legs have changed
+            parts.
+        states: at which to try (k, y).
     """
     first = 2 * len(engine.order)
     if first == engine.state.size:

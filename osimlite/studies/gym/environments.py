@@ -129,11 +129,14 @@ def _check_render_mode(mode: str | None) -> str | None:
 class MuscleEnv(gymnasium.Env[Any, Any]):
     """One copy of a model that is to learn something.
 
-    Args: task: what, or the function that makes it. model: instead, a model or its file, with
-        `reward`, a function of what was seen before and after a step
-        (:class:`osimlite.studies.gym.tasks.Seen`), and attributes of
-        :class:`osimlite.studies.gym.tasks.Task` as `choices`. reward: as said. render_mode:
-        "rgb_array" or None. choices: as said.
+    Args:
+        task: what, or the function that makes it.
+        model: instead, a model or its file, with `reward`, a function of what was seen before and
+            after a step (:class:`osimlite.studies.gym.tasks.Seen`), and attributes of
+            :class:`osimlite.studies.gym.tasks.Task` as `choices`.
+        reward: as said.
+        render_mode: "rgb_array" or None.
+        choices: as said.
 
     Observations are the values of coordinates (rad, m), generalized speeds, and states of muscles,
     named by `labels`; actions are the controls of the actuators, named by `controls`.

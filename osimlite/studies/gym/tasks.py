@@ -35,11 +35,17 @@ class Seen:
 class Task:
     """A task for learners.
 
-    Attributes: model: makes what moves. reward: of a step (w,), given what was seen before and
-        after it. is_over: which copies (w,) have failed. hidden: coordinates whose values are not
-        observed, such as how far a walker has come. start: makes the state of a copy (y,) from the
-        default one, the names of the states and a random generator. seconds: of an episode. step:
-        for which controls are held, s. accuracy: of the integrator. integrator: which.
+    Attributes:
+        model: makes what moves.
+        reward: of a step (w,), given what was seen before and after it.
+        is_over: which copies (w,) have failed.
+        hidden: coordinates whose values are not observed, such as how far a walker has come.
+        start: makes the state of a copy (y,) from the default one, the names of the states and a
+            random generator.
+        seconds: of an episode.
+        step: for which controls are held, s.
+        accuracy: of the integrator.
+        integrator: which.
     """
 
     model: Callable[[], Model]

@@ -35,11 +35,14 @@ class Feedback:
     It computes the controls of the actuators that its reflexes name at every control step, and
     holds them between; what else drives these adds to it.
 
-    Args: given: file with a ReflexController, GaitStateController, FeedForwardController or
-        CompositeController, alone or in a scenario: SCONE's or YAML; or the same as data of Python.
-        Beside one that stands alone there may be an `init`, and `fixed_control_step_size` and what
-        legs are called, which a scenario has in its ModelOpenSim4. values: of its parameters, or a
-        file of them (.par); others stand for the best that `init` has, or their means.
+    Args:
+        given: file with a ReflexController, GaitStateController, FeedForwardController or
+            CompositeController, alone or in a scenario: SCONE's or YAML; or the same as data of
+            Python. Beside one that stands alone there may be an `init`, and
+            `fixed_control_step_size` and what legs are called, which a scenario has in its
+            ModelOpenSim4.
+        values: of its parameters, or a file of them (.par); others stand for the best that `init`
+            has, or their means.
 
     Attributes:
         step: for which controls are held, s.
@@ -119,8 +122,9 @@ class Feedback:
     def compile_for(self, model: Model, engine: Any) -> KernelController:
         """What the kernels go by, for a model with its engine.
 
-        Raises: OsimliteError: the model has not what a reflex names, or a value belongs to no
-            parameter.
+        Raises:
+            OsimliteError: the model has not what a reflex names, or a value belongs to no
+                parameter.
         """
         felt, reflexes, parameters = self._read(model, engine)
         plan, numbers = reflexes.pack()

@@ -22,12 +22,17 @@ BRIEF = 0.05
 class Strides(NamedTuple):
     """Of whole strides, from one foot's touch to the next of the same, without the first ones of a walk.
 
-    Attributes: number: of strides of both legs. touches: of the ground by both feet, the first ones
-        included; SCONE counts scuffs among its steps, too. time, length: of one, s and m, on
-        average. stance: part of a stride in which a foot is on the ground; left, right. both: part
-        of the time in which both are. humps: largest force in the first half of a stance, least
-        between, and largest in the second half; over the weight, on average. peak: largest force on
-        a foot, over the weight.
+    Attributes:
+        number: of strides of both legs.
+        touches: of the ground by both feet, the first ones included; SCONE counts scuffs among its
+            steps, too.
+        time,
+        length: of one, s and m, on average.
+        stance: part of a stride in which a foot is on the ground; left, right.
+        both: part of the time in which both are.
+        humps: largest force in the first half of a stance, least between, and largest in the second
+            half; over the weight, on average.
+        peak: largest force on a foot, over the weight.
     """
 
     number: int
@@ -43,9 +48,13 @@ class Strides(NamedTuple):
 class Gait(NamedTuple):
     """The walk of a first candidate.
 
-    Attributes: distance: that the mass centre went, m. speed: of it, m/s. centre, pelvis: height on
-        average, least, and largest, m; of the mass centre, and of the origin of the body that the
-        legs hang on. strides: None of a walk that has not three of each leg.
+    Attributes:
+        distance: that the mass centre went, m.
+        speed: of it, m/s.
+        centre,
+        pelvis: height on average, least, and largest, m; of the mass centre, and of the origin of
+            the body that the legs hang on.
+        strides: None of a walk that has not three of each leg.
     """
 
     distance: float

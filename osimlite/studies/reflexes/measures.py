@@ -85,10 +85,11 @@ class Measure(ABC):
         above: that it is a part of.
         side: ending of the names of what it is about, if it is about one side.
 
-    Attributes: name: of it. start, stop: between which it is on, s. report: what it says besides;
-        of efforts by power that (W/kg), and what a way takes (J/(kg m)). terms: what it and those
-        that it is made of add, by their names. minimize: whether it is to become small; of a class,
-        what it is without a setting.
+    Attributes:
+        name: of it. start, stop: between which it is on, s. report: what it says besides; of
+            efforts by power that (W/kg), and what a way takes (J/(kg m)). terms: what it and those
+            that it is made of add, by their names. minimize: whether it is to become small; of a
+            class, what it is without a setting.
     """
 
     minimize = True

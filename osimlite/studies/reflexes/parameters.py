@@ -41,8 +41,10 @@ class Parameter(NamedTuple):
 class Parameters:
     """The values of the parameters of some candidates, and which parameters there are.
 
-    Args: values: by name, of each candidate (w,), or one for all; those without stand for their
-        means. count: of candidates.
+    Args:
+        values: by name, of each candidate (w,), or one for all; those without stand for their
+            means.
+        count: of candidates.
 
     Attributes:
         found: all that were asked for.

@@ -86,13 +86,16 @@ class Walked:
 class Scenario:
     """What walks, by which reflexes, and how it is judged.
 
-    Args: given: file of a scenario, SCONE's or YAML; or the same as data of Python, whose files are
-        in the folder that the program runs in. model: that walks, in the place of a `model_file`.
+    Args:
+        given: file of a scenario, SCONE's or YAML; or the same as data of Python, whose files are
+            in the folder that the program runs in.
+        model: that walks, in the place of a `model_file`.
 
-    Attributes: model: that walks. controller: name and part of what excites the muscles. measure:
-        name and part of what judges. begun: parameters that a file of the scenario begins with:
-        best, mean and standard deviation. duration: of a walk, s. population, generations, seed: of
-        a search.
+    Attributes:
+        model: that walks. controller: name and part of what excites the muscles. measure: name and
+            part of what judges. begun: parameters that a file of the scenario begins with: best,
+            mean and standard deviation. duration: of a walk, s. population, generations, seed: of a
+            search.
 
     Raises:
         DocumentError: it has something that is not done here; its name and line are told.

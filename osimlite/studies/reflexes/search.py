@@ -67,8 +67,10 @@ def search_parameters(
     Returns:
         The best parameters.
 
-    Raises: MissingDependency: cma is not installed. SettingError: nothing is looked for, there are
-        too few candidates, or the folder has the best of another search.
+    Raises:
+        MissingDependency: cma is not installed.
+        SettingError: nothing is looked for, there are too few candidates, or the folder has the
+            best of another search.
     """
     generations = scenario.generations if generations is None else generations
     population = scenario.population if population is None else population

@@ -49,8 +49,12 @@ that is the `source`, and the side that the reflex is on, if any.
 class Channel(NamedTuple):
     """A part of a reflex: ``K`` and a letter are its gain, the letter and ``0`` its offset.
 
-    Attributes: letter: of it. feel: makes the source. rest: offset without a setting. is_free:
-        whether it may be negative without a setting; None where there is no setting for that.
+    Attributes:
+        letter: of it.
+        feel: makes the source.
+        rest: offset without a setting.
+        is_free: whether it may be negative without a setting; None where there is no setting for
+            that.
     """
 
     letter: str
@@ -62,10 +66,14 @@ class Channel(NamedTuple):
 class Kind(NamedTuple):
     """A kind of reflexes.
 
-    Attributes: names: what a source is called, in the order of its numbers. channels: which are
-        added up. corrects: whether it is a gain times what is missing to the offset, instead of
-        what is beyond it. is_own: whether without a source the target is that. settings: of the
-        sources. refused: settings of SCONE that are not done here.
+    Attributes:
+        names: what a source is called, in the order of its numbers.
+        channels: which are added up.
+        corrects: whether it is a gain times what is missing to the offset, instead of what is
+            beyond it.
+        is_own: whether without a source the target is that.
+        settings: of the sources.
+        refused: settings of SCONE that are not done here.
     """
 
     names: Callable[[Felt], list[str]]

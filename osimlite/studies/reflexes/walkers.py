@@ -51,11 +51,14 @@ LAGGING = "euler2", "merson"
 class Felt:
     """What is felt of a model, and what is driven: names, legs, and the plan of a row.
 
-    Args: model: whose. engine: of it. count: of its copies, each of which has numbers of its own.
-        step: for which controls are held, s. lags: whether control steps begin with the derivative
-        that the one before has ended with. legs: without the side the names of the bodies of upper
-        legs (`upper`), of feet (`lower`; empty for those two below), and of the forces of feet
-        (`contact`).
+    Args:
+        model: whose.
+        engine: of it.
+        count: of its copies, each of which has numbers of its own.
+        step: for which controls are held, s.
+        lags: whether control steps begin with the derivative that the one before has ended with.
+        legs: without the side the names of the bodies of upper legs (`upper`), of feet (`lower`;
+            empty for those two below), and of the forces of feet (`contact`).
 
     Attributes:
         names: of the actuators, muscles first.

@@ -134,8 +134,9 @@ def check_nodes(controls: Mapping[int, Control], interpolation: str, to: float) 
         interpolation: one of `INTERPOLATIONS`.
         to: how long the runs last, s.
 
-    Raises: SettingError: there is no such interpolation, or a cubic has too few nodes, or goes on
-        beyond them.
+    Raises:
+        SettingError: there is no such interpolation, or a cubic has too few nodes, or goes on
+            beyond them.
     """
     if interpolation not in INTERPOLATIONS:
         raise SettingError(

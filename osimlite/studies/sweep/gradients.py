@@ -56,8 +56,10 @@ class Gradients:
     Args:
         plan: its first measure is meant.
 
-    Raises: SettingError: the plan has other steps than Merson's, or something that ends a run
-        before its time. UnsupportedError: the measure is of events.
+    Raises:
+        SettingError: the plan has other steps than Merson's, or something that ends a run before
+            its time.
+        UnsupportedError: the measure is of events.
     """
 
     def __init__(self, plan: Plan) -> None:

@@ -127,8 +127,11 @@ class Run:
 def measure(spec: Any, engine: Any, feet: Sequence[str] | None = None) -> Measure:
     """The measure that is meant by a name, ``NAME/value`` or ``NAME/speed`` at the end, an expression or a function.
 
-    Args: spec: what is meant. engine: of the model. feet: contacts of each foot, for the measures
-        of a walker; found by the structure of the model if left out.
+    Args:
+        spec: what is meant.
+        engine: of the model.
+        feet: contacts of each foot, for the measures of a walker; found by the structure of the
+            model if left out.
 
     Raises:
         SettingError: there is none of that name, or the model has nothing of the kind.

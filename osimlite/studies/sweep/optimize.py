@@ -117,18 +117,27 @@ def optimize(
 ) -> Optimum:
     """Look for the values of the variables that serve an objective best.
 
-    Args: plan: what is run; its measures are kept in the history too. objective: what is wanted.
+    Args:
+        plan: what is run; its measures are kept in the history too.
+        objective: what is wanted.
         folder: where `history.parquet`, `best.osim`, `summary.json`, and of a controller
-        `best.par`, are written. method: one of `METHODS` in :mod:`osimlite.studies.sweep.search`.
-        budget: runs that are allowed. popsize: runs between two decisions of the method. seed: what
-        makes the search the same again. sigma: how far from where it begins the method looks at
-        first, as a fraction of the ranges; `sobol-cma` has looked all over them before. tolerance:
-        of the cost and of the points (as fractions of the ranges), at which the search ends.
-        is_bounded: whether the ranges are bounds, or say only where to begin. start: values to
-        begin at, of all variables or by name; for others those of the model where they are within
-        the ranges, else the middle. resume: go on with an interrupted search, or with a finished
-        one and a larger budget. force: replace what another search has left in the folder. workers:
-        as of a sweep. cluster: as of a sweep. progress: called as runs are done.
+            `best.par`, are written.
+        method: one of `METHODS` in :mod:`osimlite.studies.sweep.search`.
+        budget: runs that are allowed.
+        popsize: runs between two decisions of the method.
+        seed: what makes the search the same again.
+        sigma: how far from where it begins the method looks at first, as a fraction of the ranges;
+            `sobol-cma` has looked all over them before.
+        tolerance: of the cost and of the points (as fractions of the ranges), at which the search
+            ends.
+        is_bounded: whether the ranges are bounds, or say only where to begin.
+        start: values to begin at, of all variables or by name; for others those of the model where
+            they are within the ranges, else the middle.
+        resume: go on with an interrupted search, or with a finished one and a larger budget.
+        force: replace what another search has left in the folder.
+        workers: as of a sweep.
+        cluster: as of a sweep.
+        progress: called as runs are done.
 
     Raises:
         Interrupted: by the keyboard; the search can be resumed.
@@ -339,8 +348,9 @@ class _Evaluations:
     def slopes(self, gradients: Any) -> Callable[[Floats], Floats]:
         """The derivatives of the cost by points (d,) of the cube.
 
-        Args: gradients: what finds those of the objective, see
-            :func:`osimlite.studies.sweep.registry.gradients`.
+        Args:
+            gradients: what finds those of the objective, see
+                :func:`osimlite.studies.sweep.registry.gradients`.
         """
 
         def at(point: Floats) -> Floats:

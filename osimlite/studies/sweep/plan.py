@@ -173,13 +173,17 @@ def plan(
 ) -> Plan:
     """Make a plan.
 
-    Args: source: the model, or what makes it from the parameters that it is given. vary: ranges by
-        name, see :mod:`osimlite.studies.sweep.variables`; if nothing differs by them, all other
-        parameters of a controller do, between their bounds. parameters: that `source` takes, with
-        their defaults. below: levels that end a run when a coordinate falls below them: rad, m, or
-        a text such as "30deg". above: levels that end a run when a coordinate rises above them,
-        likewise. controls: that every run has: by the name or path of an actuator a number, or
-        ``(times, values)``. choices: further attributes of :class:`Plan`.
+    Args:
+        source: the model, or what makes it from the parameters that it is given.
+        vary: ranges by name, see :mod:`osimlite.studies.sweep.variables`; if nothing differs by
+            them, all other parameters of a controller do, between their bounds.
+        parameters: that `source` takes, with their defaults.
+        below: levels that end a run when a coordinate falls below them: rad, m, or a text such as
+            "30deg".
+        above: levels that end a run when a coordinate rises above them, likewise.
+        controls: that every run has: by the name or path of an actuator a number, or ``(times,
+            values)``.
+        choices: further attributes of :class:`Plan`.
 
     Raises:
         SettingError: a name means nothing, or a number has no meaning.

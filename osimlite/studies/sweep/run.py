@@ -119,8 +119,10 @@ def sweep(
         cluster: address of a Dask scheduler whose workers do it instead.
         progress: called as runs are done.
 
-    Raises: Interrupted: by the keyboard; the sweep can be resumed. OsimliteError: the model cannot
-        be simulated, there are results of other settings, or the cluster cannot be reached.
+    Raises:
+        Interrupted: by the keyboard; the sweep can be resumed.
+        OsimliteError: the model cannot be simulated, there are results of other settings, or the
+            cluster cannot be reached.
     """
     path, started = Path(output), time.perf_counter()
     if path.suffix.lower() in OTHER_TABLES:

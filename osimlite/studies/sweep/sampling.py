@@ -81,9 +81,12 @@ def choose_samples(
 ) -> Samples:
     """Choose the runs.
 
-    Args: variables: what varies. sampler: by default a grid if every variable has a number of
-        values and no `count` is given, else Sobol's. count: how many runs; of a grid, as many as it
-        has. seed: of random samples.
+    Args:
+        variables: what varies.
+        sampler: by default a grid if every variable has a number of values and no `count` is given,
+            else Sobol's.
+        count: how many runs; of a grid, as many as it has.
+        seed: of random samples.
 
     Raises:
         SettingError: what is asked for does not go together.

@@ -43,8 +43,11 @@ class Search(NamedTuple):
 def cma(ask: Ask, search: Search, *, keeps_best: bool = False) -> str:
     """Covariance matrix adaptation (Hansen's pycma); why it ended.
 
-    Args: ask: tells costs. search: how. keeps_best: let the first point be one of the first
-        population, and the best so far a parent of every other.
+    Args:
+        ask: tells costs.
+        search: how.
+        keeps_best: let the first point be one of the first population, and the best so far a parent
+            of every other.
     """
     strategy = require("cma", extra="optimize", purpose="the search by cma")
     _needs_two(search)

@@ -186,8 +186,9 @@ def resolve_variables(
         parameters: of the function that makes it, with their defaults.
         gains: of a controller.
 
-    Raises: SettingError: a name means nothing (the nearest is told), a range is none, or a unit
-        does not fit.
+    Raises:
+        SettingError: a name means nothing (the nearest is told), a range is none, or a unit does
+            not fit.
     """
     result: list[Variable] = []
     for names, given in ranges.items():

@@ -127,8 +127,9 @@ class Variants:
     def start(self, variant: Variant, values: Sequence[float]) -> Floats:
         """Initial state of a sample (y,).
 
-        Raises: OsimliteError: the model has no such coordinate, or holds it, or a muscle has no
-            equilibrium.
+        Raises:
+            OsimliteError: the model has no such coordinate, or holds it, or a muscle has no
+                equilibrium.
         """
         # An engine of its own is only made where the coordinates may be others.
         engine = (self.given if variant.structure == self.given.structure else variant).engine

@@ -214,8 +214,10 @@ class Draft:
     def name(self, kind: str, path: str) -> str:
         """A name for a component, unlike any other of this kind: its own, or its path with dots where that is taken.
 
-        Args: kind: MuJoCo's name space: ``geom``, ``site``, ``tendon``, ``actuator``, ``equality``
-            ... path: absolute path of the component, or any name.
+        Args:
+            kind: MuJoCo's name space: ``geom``, ``site``, ``tendon``, ``actuator``, ``equality``
+                ...
+            path: absolute path of the component, or any name.
         """
         taken = self._names.setdefault(kind, set())
         own = path.rsplit("/", 1)[-1]

@@ -66,16 +66,21 @@ class Driver:
     MuJoCo's callbacks are one set for the whole process: they are the driver's while it steps, and
     put back after.
 
-    Args: model: what moves. timestep: of MuJoCo (s). integrator: of MuJoCo. equilibrate: start
-        muscles in equilibrium of fibers and tendon. file: what ``osimlite translate --driver``
-        wrote of the model, with what you added: a scene, sensors, cameras. folder: where the
-        model's file is, and the files that it names. geometry: more folders to look for mesh files
-        in.
+    Args:
+        model: what moves.
+        timestep: of MuJoCo (s).
+        integrator: of MuJoCo.
+        equilibrate: start muscles in equilibrium of fibers and tendon.
+        file: what ``osimlite translate --driver`` wrote of the model, with what you added: a scene,
+            sensors, cameras.
+        folder: where the model's file is, and the files that it names.
+        geometry: more folders to look for mesh files in.
 
-    Attributes: mjcf: the translation, which has the account of what the driver does not compute.
+    Attributes:
+        mjcf: the translation, which has the account of what the driver does not compute.
         model: MuJoCo's ``MjModel``; ``ctrl`` of its actuators are the controls of the model's,
-        added to what the model's controllers make of them. data: MuJoCo's ``MjData``. system: the
-        forces.
+            added to what the model's controllers make of them. data: MuJoCo's ``MjData``. system:
+            the forces.
 
     Raises:
         MissingDependency: mujoco is not installed.

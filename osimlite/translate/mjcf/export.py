@@ -60,12 +60,16 @@ LOOKS: tuple[Pass, ...] = (add_shapes, add_camera, add_markers, add_frames, add_
 class Mjcf:
     """A model as MJCF.
 
-    Attributes: name: of the files. text: the MJCF. fidelity: what became of every component, exact
-        where there is no record of it. robot: the neutral robot that was written; its joints and
-        links have MuJoCo's names. files: mesh files that the text names, and what the driver needs,
-        by name relative to it. followers: what equality constraints make of joints, by name.
-        start_note: where simulations have to start, if that is not everywhere. leads: the joint
-        that is a straight line of a coordinate, by the coordinate's place in the mechanism.
+    Attributes:
+        name: of the files.
+        text: the MJCF.
+        fidelity: what became of every component, exact where there is no record of it.
+        robot: the neutral robot that was written; its joints and links have MuJoCo's names.
+        files: mesh files that the text names, and what the driver needs, by name relative to it.
+        followers: what equality constraints make of joints, by name.
+        start_note: where simulations have to start, if that is not everywhere.
+        leads: the joint that is a straight line of a coordinate, by the coordinate's place in the
+            mechanism.
     """
 
     name: str
@@ -124,22 +128,30 @@ def to_mjcf(
     Bodies keep their names and frames. Joints are named by their coordinates, whose values are
     theirs (rad, m).
 
-    Args: model: the model. mujoco: the version to write for, 3 or 4. visuals: whether to say what
-        bodies look like. contact: ``"native"`` writes contact forces as contacts of MuJoCo's own
-        law, ``"none"`` leaves them out. fit: ``"wraps"`` moves and resizes what tendons go around
-        until they do what the paths do, ``"force"`` fits the curves and lengths of muscles to their
-        isometric forces too; ``"none"`` keeps all numbers of the model. spline: ``"quartic"`` fits
-        one quartic to a function that is none, ``"series"`` a quartic of a quartic, which takes a
-        helper joint for each and is about twice as close. driver: write the file that
-        `osimlite.mjcf.Driver` moves, which has no forces: the driver computes them from the model,
-        of which a copy is among the files. folder: where the model's file is; mesh files are looked
-        for there and in its folder ``Geometry``. geometry: more folders to look for mesh files in;
-        those in the environment variable OSIMLITE_GEOMETRY, separated as in PATH, follow them.
+    Args:
+        model: the model.
+        mujoco: the version to write for, 3 or 4.
+        visuals: whether to say what bodies look like.
+        contact: ``"native"`` writes contact forces as contacts of MuJoCo's own law, ``"none"``
+            leaves them out.
+        fit: ``"wraps"`` moves and resizes what tendons go around until they do what the paths do,
+            ``"force"`` fits the curves and lengths of muscles to their isometric forces too;
+            ``"none"`` keeps all numbers of the model.
+        spline: ``"quartic"`` fits one quartic to a function that is none, ``"series"`` a quartic of
+            a quartic, which takes a helper joint for each and is about twice as close.
+        driver: write the file that `osimlite.mjcf.Driver` moves, which has no forces: the driver
+            computes them from the model, of which a copy is among the files.
+        folder: where the model's file is; mesh files are looked for there and in its folder
+            ``Geometry``.
+        geometry: more folders to look for mesh files in; those in the environment variable
+            OSIMLITE_GEOMETRY, separated as in PATH, follow them.
         name: of the files to write, without ending; that of the model if not given.
 
-    Raises: SettingError: an option has a value that it does not take. ModelError: the model is not
-        a mechanism: something it names is not there, or a body is not connected. UnsupportedError:
-        it uses a joint or constraint that osimlite cannot compute.
+    Raises:
+        SettingError: an option has a value that it does not take.
+        ModelError: the model is not a mechanism: something it names is not there, or a body is not
+            connected.
+        UnsupportedError: it uses a joint or constraint that osimlite cannot compute.
     """
     if mujoco not in (3, 4):
         raise SettingError(f"MJCF is written for MuJoCo 3 or 4, not {mujoco}")

@@ -42,10 +42,13 @@ Types = Sequence[Type]
 class Intrinsic(NamedTuple):
     """How a function that is no kernel is written.
 
-    Attributes: infer: returns the type of the result from the arguments and their types. write:
-        returns the text from those of the arguments, their types, and the type of the result.
+    Attributes:
+        infer: returns the type of the result from the arguments and their types.
+        write: returns the text from those of the arguments, their types, and the type of the
+            result.
         early: type of the result while the types of the arguments are not known yet, if it depends
-        on none. has_effects: whether it may read and write memory.
+            on none.
+        has_effects: whether it may read and write memory.
     """
 
     infer: Callable[[Reader, Nodes, Types], Type]

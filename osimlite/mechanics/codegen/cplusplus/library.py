@@ -75,8 +75,9 @@ class Library:
             function: the function.
             directions: how many derivatives its numbers carry; 0 for plain numbers.
 
-        Raises: TranslationError: the function, or one that it calls, uses something that has no
-            counterpart in C++.
+        Raises:
+            TranslationError: the function, or one that it calls, uses something that has no
+                counterpart in C++.
         """
         number = dual(directions) if directions else FLOAT
         try:
@@ -118,8 +119,9 @@ class Library:
     def specialise(self, function: FunctionType, kinds: Sequence[Type]) -> Specialisation:
         """Return a function for given types of its arguments.
 
-        Raises: TranslationError: the function calls itself, or uses something that has no
-            counterpart in C++.
+        Raises:
+            TranslationError: the function calls itself, or uses something that has no counterpart
+                in C++.
         """
         key = function, tuple(kinds)
         if key not in self._specialisations:
@@ -240,8 +242,9 @@ class Library:
 def write_library(kernels: Kernels) -> str:
     """Return kernels as the text of one C++ translation unit.
 
-    Args: kernels: by the name of the exported symbol, the function and how many derivatives its
-        numbers carry; 0 for plain numbers.
+    Args:
+        kernels: by the name of the exported symbol, the function and how many derivatives its
+            numbers carry; 0 for plain numbers.
 
     Returns:
         The whole text but the header, which it includes as `kernel_runtime.h`.
@@ -258,8 +261,10 @@ def write_units(kernels: Kernels, count: int) -> list[str]:
     Functions that kernels of two units call are repeated. Fewer units are returned where there are
     fewer kernels.
 
-    Args: kernels: by the name of the exported symbol, the function and how many derivatives its
-        numbers carry. count: the largest number of units.
+    Args:
+        kernels: by the name of the exported symbol, the function and how many derivatives its
+            numbers carry.
+        count: the largest number of units.
 
     Raises:
         TranslationError: a kernel uses something that has no counterpart in C++.
@@ -280,8 +285,9 @@ def write_units(kernels: Kernels, count: int) -> list[str]:
 def make_library(kernels: Kernels) -> Library:
     """Return a library that exports kernels.
 
-    Args: kernels: by the name of the exported symbol, the function and how many derivatives its
-        numbers carry.
+    Args:
+        kernels: by the name of the exported symbol, the function and how many derivatives its
+            numbers carry.
     """
     library = Library()
     for symbol, (function, directions) in kernels.items():
