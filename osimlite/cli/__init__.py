@@ -200,7 +200,7 @@ def _tell(error: BaseException, words: list[str]) -> NoReturn:
     from osimlite.cli._console import complain
 
     if isinstance(error, OSError):
-        # Whoever read our output has gone, which Windows tells as an invalid argument of no file.
+        # The reader of the output has closed its end; Windows reports that as an invalid argument.
         if not isinstance(error, BrokenPipeError) and (
             error.errno != errno.EINVAL or error.filename is not None
         ):

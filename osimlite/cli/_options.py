@@ -321,7 +321,7 @@ def quantities(
 
 
 def read_source(source: str, parameter: Iterable[str] | None) -> tuple[Model, Path | None]:
-    """The model that a command is given, and the folder of its file if it is in one.
+    """Return the model that a command names, and the folder of its file, None without a file.
 
     Raises:
         OsimliteError: there is none, or it does not take the parameters of ``-p``.

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @contextmanager
 def progress_bar(title: str, total: float | None) -> Iterator[Callable[..., None]]:
-    """A progress bar on standard error, if that is a terminal, once the work has taken a second.
+    """Show a progress bar on standard error, in a terminal only, after the first second of work.
 
     What is yielded takes how much is done, of how much if that has become known, and what tells
     more of it, which takes how much is done in a second. The library that draws the bar is loaded

@@ -97,7 +97,7 @@ def run(
 
 
 def expect_known(format: str, fail_on: str | None) -> None:
-    """Refuse words of --format and --fail-on that are none.
+    """Raise an error for an unknown value of --format or --fail-on.
 
     Raises:
         OsimliteError: one is not.
@@ -217,7 +217,7 @@ def _show_diff(path: str, given: Config, unsafe: bool) -> tuple[int, int, bool]:
 
 
 def terminal_width() -> int:
-    """Columns of the terminal; 80 if there is none."""
+    """Return the number of columns of the terminal, by default 80."""
     if not sys.stdout.isatty():
         return 80
     import shutil

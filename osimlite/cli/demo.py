@@ -360,7 +360,7 @@ MOTIONS = (
 
 
 def _has_display() -> bool:
-    """Whether somebody sits here who can see a page: elsewhere, a browser for terminals would take this one."""
+    """Return whether a browser can show a page here, rather than one that runs in the terminal."""
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
         return False
     return sys.platform != "linux" or any(map(os.environ.get, ("DISPLAY", "WAYLAND_DISPLAY")))

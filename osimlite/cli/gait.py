@@ -172,7 +172,7 @@ def _check_numbers(
 
 @dataclass
 class Nearby:
-    """Of random starts that differ from the given one by a part at most: how many made so many steps."""
+    """Count of random starts, each within `part` of the given one, of which `walked` make `steps` steps."""
 
     part: float
     walked: int
