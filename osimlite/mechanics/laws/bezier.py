@@ -1,11 +1,13 @@
-"""Smooth curves of quintic Bezier sections, as in OpenSim's SmoothSegmentedFunction; linear outside.
+"""Smooth curves of quintic Bezier sections, as in OpenSim's SmoothSegmentedFunction.
 
 A section is a corner: it leaves its first end along one line and reaches its last end along
-another; the greater its curviness, the nearer it comes to the intersection of the lines (M. Millard
-et al., Journal of Biomechanical Engineering 135, 2013, appendix A). Along it, x and y are
-polynomials in u, from 0 to 1. To evaluate y at x, u is found by Halley's method.
+another; the greater its curviness (0 to 1), the nearer it comes to the intersection of the lines
+(M. Millard et al., Journal of Biomechanical Engineering 135, 2013, appendix A). Its control points
+are p, q, q, r, r, s, so that x(u) and y(u) are polynomials of degree 5 in u, from 0 to 1. To
+evaluate y at x, u is found by Halley's method. Beyond the ends of a curve it continues linearly.
 
-A curve is an array of numbers: HEAD of all, the end of each section, and SECTION of each section.
+A packed curve is an array of numbers: a head of HEAD numbers, x at the end of each section, and
+SECTION numbers of each section (coefficients of x and y, and start values of the search for u).
 """
 
 from __future__ import annotations
@@ -59,6 +61,7 @@ def make_curve(points: Sequence[Point], curviness: Sequence[float]) -> Numbers:
 
     Args:
         points: points of the curve.
+        # zip stops at the shortest sequence: n points have n - 1 sections.
         curviness: curviness of the sections between them, each from 0 to 1.
 
     Raises:
@@ -77,19 +80,35 @@ def make_curve(points: Sequence[Point], curviness: Sequence[float]) -> Numbers:
 
 @lru_cache(maxsize=1024)
 def _make_section(first: Point, last: Point, curviness: float) -> Numbers:
-    """Return the numbers of a section."""
+    """Return the numbers of a section.
+
+    Args:
+        first: first end (x, y, slope).
+        last: last end (x, y, slope).
+        curviness: curviness, from 0 to 1.
+
+    Returns:
+        SECTION numbers, in the order of START, SCALE, X, Y and STARTS.
+
+    Raises:
+        ValueError: the curviness is not from 0 to 1, or the slopes make no corner.
+    """
     (x0, y0, slope0), (x1, y1, slope1) = first, last
     if not 0.0 <= curviness <= 1.0:
         raise ValueError("its curviness is not from 0 to 1")
-    # Intersection of the lines.
+    # Intersection of the lines; for parallel lines OpenSim takes the middle. 2^-26 is the square
+    # root of the machine precision, OpenSim's limit for equal slopes.
     x = (
         (y1 - y0 - x1 * slope1 + x0 * slope0) / (slope0 - slope1)
         if abs(slope0 - slope1) > 2.0**-26
         else (x1 + x0) / 2
     )
     y = (x - x1) * slope1 + y1
+    # The corner must be nearer to both ends than these are to each other, else the curve would bend
+    # back.
     if not max(hypot(x - x0, y - y0), hypot(x - x1, y - y1)) < hypot(x1 - x0, y1 - y0):
         raise ValueError(f"its slopes at {x0:g} and {x1:g} make no corner between these")
+    # OpenSim maps curviness 0 to 1 onto 0.1 to 0.9, so that x(u) stays strictly increasing.
     c = 0.1 + 0.8 * curviness
     _, *of_x = _section_coefficients(x0, x0 + c * (x - x0), x1 + c * (x - x1), x1)
     of_y = _section_coefficients(y0, y0 + c * (y - y0), y1 + c * (y - y1), y1)
@@ -97,15 +116,35 @@ def _make_section(first: Point, last: Point, curviness: float) -> Numbers:
 
 
 def _section_coefficients(p: float, q: float, r: float, s: float) -> tuple[float, ...]:
-    """Return coefficients, by rising powers, for the control points p, q, q, r, r, s."""
+    """Return coefficients, by rising powers, for the control points p, q, q, r, r, s.
+
+    Args:
+        p: coordinate (x or y) of the first end.
+        q: coordinate of the control point on the line through the first end.
+        r: coordinate of the control point on the line through the last end.
+        s: coordinate of the last end.
+
+    Returns:
+        Six coefficients, from power 0 to power 5.
+    """
     return p, 5 * (q - p), 10 * (p - q), 10 * (r - p), 5 * (p + 2 * q - 3 * r), s - p + 5 * (r - q)
 
 
 def _list_starts(x: Sequence[float], width: float) -> list[float]:
-    """Return the start values of the search for u; they need not be exact."""
+    """Return the start values of the search for u; they need not be exact.
+
+    Args:
+        x: coefficients of x from power 1 on.
+        width: difference of x between both ends.
+
+    Returns:
+        u and its increment to the next of NODES + 1 equidistant x, alternately.
+    """
     result: list[float] = []
     u = step = 0.0
     for node in range(NODES + 1):
+        # u rises with x, so the root lies between the last node's u and 1; the line through the
+        # last node is a good first guess.
         low, high, u = u, 1.0, min(u + step, 1.0)
         for _ in range(ROUNDS):
             # Newton's method, or bisection where it would leave the interval.
@@ -117,6 +156,7 @@ def _list_starts(x: Sequence[float], width: float) -> list[float]:
             before, u = u, u - off / slope if slope > 0.0 else -1.0
             if not low <= u <= high:
                 u = 0.5 * (low + high)
+            # Newton's method converges quadratically; 1e-11 is far below what the search needs.
             if abs(u - before) < NEAR * NEAR:
                 break
         slope = _evaluate_derivative(x, u)
@@ -136,13 +176,20 @@ def _evaluate_derivative(x: Sequence[float], u: float) -> float:
 def curve_value(c: Sequence[float], x: float) -> tuple[float, float]:
     """Return y and slope of a curve; if x carries derivatives, so does y.
 
+    Args:
+        c: numbers of the curve.
+        x: argument.
+
     Returns:
         y and slope.
     """
+    # Written with `not`, so that NaN takes this branch and gives NaN instead of an index out of
+    # range.
     if not x >= c[FIRST]:
         return c[FIRST + 1] + c[FIRST + 2] * (x - c[FIRST]), c[FIRST + 2]
     if x > c[LAST]:
         return c[LAST + 1] + c[LAST + 2] * (x - c[LAST]), c[LAST + 2]
+    # Search without derivatives, then add them once by the implicit function theorem.
     known = plain(x)
     k, rest, u = find_section(c, known)
     _, _, y, slope = search_section(c, k + X, 1, u, rest, ROUNDS)
@@ -169,6 +216,7 @@ def find_section(c: Sequence[float], x: float) -> tuple[int, float, float]:
     part -= node
     s = k + STARTS + 2 * node
     u0, d0, u1, d1 = c[s], c[s + 1], c[s + 2], c[s + 3]
+    # Cubic Hermite interpolation of u between two nodes: most searches then need one step.
     u = u0 + part * (
         d0 + part * (3.0 * (u1 - u0) - 2.0 * d0 - d1 + part * (2.0 * (u0 - u1) + d0 + d1))
     )
@@ -205,6 +253,13 @@ def take_halley_step(
 ) -> tuple[float, bool]:
     """Take one step of Halley's method; the arguments are those of `search_section`.
 
+    Args:
+        c: array that contains the coefficients of x and y.
+        p: offset of the first coefficient.
+        apart: distance between coefficients.
+        u: start of the step.
+        rest: distance of x from the start of the section.
+
     Returns:
         u, and whether more steps are necessary.
     """
@@ -214,6 +269,8 @@ def take_halley_step(
     off = u * ((a + u * b) + v * ((d + u * e) + v * f)) - rest
     run = (a + u * (2.0 * b)) + v * ((3.0 * d + u * (4.0 * e)) + v * (5.0 * f))
     bend = (b + u * (3.0 * d)) + v * (6.0 * e + u * (10.0 * f))
+    # Halley's step f f' / (f'^2 - f f'' / 2). `bend` is half of the second derivative. Where the
+    # divisor is not positive, x(u) is too flat for a step, and the search ends.
     divisor = run * run - off * bend
     leads_on = divisor > 0.0
     step = off * run / (divisor if leads_on else 1.0)
@@ -223,6 +280,12 @@ def take_halley_step(
 
 def evaluate_section(c: Sequence[float], p: int, apart: int, u: float) -> tuple[float, float]:
     """Return y and slope at u; the arguments are those of `search_section`.
+
+    Args:
+        c: array that contains the coefficients of x and y.
+        p: offset of the first coefficient.
+        apart: distance between coefficients.
+        u: parameter of the section, from 0 to 1.
 
     Returns:
         y and slope.
@@ -237,13 +300,14 @@ def evaluate_section(c: Sequence[float], p: int, apart: int, u: float) -> tuple[
         c[q + 4 * apart],
         c[q + 5 * apart],
     )
+    # The slope dy/dx is (dy/du) / (dx/du); `run` and `rise` are these derivatives.
     run = (a + u * (2.0 * b)) + v * ((3.0 * d + u * (4.0 * e)) + v * (5.0 * f))
     rise = (h + u * (2.0 * i)) + v * ((3.0 * j + u * (4.0 * k)) + v * (5.0 * m))
     return (g + u * h) + v * ((i + u * j) + v * (k + u * m)), rise / run
 
 
 def search_residual(c: Sequence[float], p: int, apart: int, u: float, rest: float) -> float:
-    """Return the residual of the search; the arguments are those of `search_section`."""
+    """Return x(u) less the requested x, the residual of the search."""
     a, b, d, e, f = c[p], c[p + apart], c[p + 2 * apart], c[p + 3 * apart], c[p + 4 * apart]
     v = u * u
     return u * ((a + u * b) + v * ((d + u * e) + v * f)) - rest
@@ -254,6 +318,10 @@ def solve_sum(c: Sequence[float], of_y: float, of_x: float, total: float) -> tup
 
     On a section the sum is a polynomial in u, too, which is increasing for an increasing curve and
     positive factors.
+
+    Note:
+        The velocity of damped fibers is such a root: y is the force-velocity factor, x the
+        velocity.
 
     Args:
         c: numbers of the curve.
@@ -287,14 +355,29 @@ def solve_sum(c: Sequence[float], of_y: float, of_x: float, total: float) -> tup
 
 
 def end_beyond_sum(c: Sequence[float], of_y: float, of_x: float, total: float) -> int:
-    """Return the end of a curve that a sum is beyond, FIRST or LAST; 0 if neither."""
+    """Return the end of a curve that a sum is beyond, FIRST or LAST; 0 if neither.
+
+    Args:
+        c: numbers of the curve.
+        of_y: factor of y.
+        of_x: factor of x.
+        total: value of the sum.
+    """
     if not total >= of_y * c[FIRST + 1] + of_x * c[FIRST]:
         return FIRST
     return LAST if total > of_y * c[LAST + 1] + of_x * c[LAST] else 0
 
 
 def extrapolate_sum(c: Sequence[float], of_y: float, of_x: float, total: float, end: int) -> float:
-    """Return y beyond an end of a curve, where a sum has a total."""
+    """Return y beyond an end of a curve, where a sum has a total.
+
+    Args:
+        c: numbers of the curve.
+        of_y: factor of y.
+        of_x: factor of x.
+        total: value of the sum.
+        end: FIRST or LAST, from `end_beyond_sum`.
+    """
     x, y, slope = c[end], c[end + 1], c[end + 2]
     return y + slope * ((total - (of_y * y + of_x * x)) / (of_y * slope + of_x))
 
@@ -304,6 +387,12 @@ def find_section_of_sum(
 ) -> tuple[int, float, float]:
     """Find the section that contains a sum, and a rough start value of u.
 
+    Args:
+        c: numbers of the curve.
+        of_y: factor of y.
+        of_x: factor of x.
+        total: value of the sum, between those at the ends of the curve.
+
     Returns:
         Offset of the section, difference of the sum from its value at the start, and u.
     """
@@ -312,6 +401,8 @@ def find_section_of_sum(
     start = of_y * c[k + Y] + of_x * c[k + START]
     end = of_y * c[LAST + 1] + of_x * c[LAST]
     while number < count - 1:
+        # Compare with the sum at the first end of the following section; the sum increases along
+        # the curve.
         following = k + SECTION
         knot = of_y * c[following + Y] + of_x * c[following + START]
         if not total >= knot:
@@ -325,8 +416,13 @@ def curve_integral(c: Sequence[float], x: float) -> float:
     """Return the integral of a curve from its first end to x.
 
     It is exact, while OpenSim's is a spline with an error of about 1e-9.
+
+    Args:
+        c: numbers of the curve.
+        x: upper limit.
     """
     total, off = 0.0, x - c[FIRST]
+    # Before the first end the curve is a line through it, so the integral is that of a trapezoid.
     if off <= 0.0:
         return (c[FIRST + 1] + 0.5 * c[FIRST + 2] * off) * off
     at, rest, u = find_section(c, min(x, c[LAST]))
@@ -339,8 +435,15 @@ def curve_integral(c: Sequence[float], x: float) -> float:
 
 
 def _section_integral(c: Sequence[float], k: int, u: float) -> float:
-    """Return the integral of y over x of a section up to u."""
+    """Return the integral of y over x of a section up to u.
+
+    Args:
+        c: numbers of the curve.
+        k: offset of the section.
+        u: upper limit of the parameter.
+    """
     x, y = c[k + X : k + Y], c[k + Y : k + STARTS]
+    # The integral of y dx = y(u) x'(u) du, term by term: u^i times j u^(j - 1).
     return sum(
         b * j * a * u ** (i + j) / (i + j) for i, b in enumerate(y) for j, a in enumerate(x, 1)
     )

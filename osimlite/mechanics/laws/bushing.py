@@ -31,8 +31,12 @@ def xyz_angles(
     Returns:
         (a, b, c).
     """
+    # The four entries without sin b or one of the outer angles' mixed terms give cos b twice over:
+    # their mean keeps full precision near a right angle, where asin(R02) would lose half of the
+    # digits.
     cosine = sqrt(0.5 * (R00 * R00 + R01 * R01 + R12 * R12 + R22 * R22))
     b = atan2(R02, cosine)
+    # Gimbal lock: only the sum (or difference) of a and c is determined.
     if cosine < 1e-12:
         return atan2(R10 if R02 > 0.0 else -R10, R11), b, 0.0
     return atan2(-R12, R22), b, atan2(-R01, R00)
@@ -51,6 +55,7 @@ def xyz_rates(b: float, c: float, wx: float, wy: float, wz: float) -> tuple[floa
     Returns:
         Rates of a, b and c.
     """
+    # `first` is the rate of a; cos b = 0 is the singularity of body-fixed X-Y-Z angles.
     first = (cos(c) * wx - sin(c) * wy) / cos(b)
     return first, sin(c) * wx + cos(c) * wy, wz - sin(b) * first
 
@@ -68,6 +73,7 @@ def xyz_moment(b: float, c: float, fa: float, fb: float, fc: float) -> tuple[flo
     Returns:
         Components x, y and z.
     """
+    # Transpose of the matrix in `xyz_rates`, so that moment w equals force times angle rates.
     across = (fa - sin(b) * fc) / cos(b)
     return cos(c) * across + sin(c) * fb, cos(c) * fb - sin(c) * across, fc
 

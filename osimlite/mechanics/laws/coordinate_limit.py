@@ -35,6 +35,8 @@ def limit_constants(
     Returns:
         (Ku, qu, Kl, ql, D, t) in rad and N m, or m and N, as the functions below take them.
     """
+    # Stiffness and damping are per degree in the file, so they are divided by the factor that
+    # limits are multiplied with.
     w = pi / 180.0 if rotational else 1.0
     return (
         upper_stiffness / w,
@@ -69,9 +71,12 @@ def limit_force(
     """
     if ql <= q <= qu:
         return 0.0
+    # With crossed limits (ql > qu) both sides can act at once, hence two separate conditions.
     Q = 0.0
     if q > qu:
         delta = q - qu
+        # S(x) = x^3 (10 - 15 x + 6 x^2) in Horner form; it starts and ends with zero slope and
+        # curvature.
         if delta < t:
             x = delta / t
             Q -= x * x * x * (10.0 + x * (6.0 * x - 15.0)) * (Ku * delta + D * u)
@@ -91,7 +96,16 @@ def limit_dissipation(q: float, u: float, qu: float, ql: float, D: float, t: flo
     """Return the power (su + sl) D u^2 that the damper dissipates (W).
 
     The arguments are those of `limit_force`.
+
+    Args:
+        q: coordinate, rad (m).
+        u: its speed, rad/s (m/s).
+        qu: upper limit, rad (m).
+        ql: lower limit, rad (m).
+        D: damping, N m/(rad/s) (N/(m/s)).
+        t: width of the transition zone, rad (m).
     """
+    # Without stiffness the law leaves only the damper, whose power on the coordinate is u Q.
     return -u * limit_force(q, u, 0.0, qu, 0.0, ql, D, t)
 
 
@@ -102,6 +116,14 @@ def limit_energy(q: float, Ku: float, qu: float, Kl: float, ql: float, t: float)
     x / 2 + 6 x^2 / 7) with x = delta / t before. Where ql > qu, both springs act between the limits,
     but the energy is that of the upper one alone, as OpenSim reports it. The arguments are those of
     `limit_force`.
+
+    Args:
+        q: coordinate, rad (m).
+        Ku: stiffness beyond the upper limit, N m/rad (N/m).
+        qu: upper limit, rad (m).
+        Kl: stiffness beyond the lower limit, N m/rad (N/m).
+        ql: lower limit, rad (m).
+        t: width of the transition zone, rad (m).
     """
     if q > qu:
         K = Ku
@@ -114,6 +136,7 @@ def limit_energy(q: float, Ku: float, qu: float, Kl: float, ql: float, t: float)
     if delta < t:
         x = delta / t
         return K * delta * delta * x * x * x * (2.0 + x * (6.0 / 7.0 * x - 2.5))
+    # Beyond the zone the spring is linear; t^2 / 7 is what the weaker zone stores less.
     if t > 0.0:
         return K * (0.5 * delta * delta - t * t / 7.0)
     return K * 0.5 * delta * delta

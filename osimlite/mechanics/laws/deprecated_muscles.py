@@ -50,16 +50,25 @@ class Guess(NamedTuple):
 
 
 def cos_upright(length: float, height: float) -> float:
-    """Return the cosine of the pennation angle of fibers of a length (m) and a height (m)."""
+    """Return the cosine of the pennation angle of fibers of a length (m) and a height (m).
+
+    Args:
+        length: fiber length (m).
+        height: constant height of the fibers across the tendon (m).
+    """
     if length < SMALLEST:
         return 1.0
+    # (l - h) (l + h) instead of l^2 - h^2 avoids cancellation for steep fibers.
     return sqrt((length - height) * (length + height)) / length if height < length else UPRIGHT
 
 
 def scaled_activation_rate(
     excitation: float, activation: float, more: float, least: float, time: float
 ) -> float:
-    """Return the rate of activation (1/s).
+    """Return the rate of activation of Schutte's muscle (1/s).
+
+    It is (e - a) (k1 e + k2) / t for an excitation e >= a, the activation, and (e - a) k2 / t
+    below.
 
     Args:
         excitation: excitation.
@@ -73,16 +82,30 @@ def scaled_activation_rate(
 
 
 def rigid_cos(path_length: float, m: OldMuscle) -> float:
-    """Return OpenSim's cosine of pennation where fibers are perpendicular to a tendon that pulls.
+    """Return the cosine of pennation with a rigid tendon, as these classes of OpenSim compute it.
 
-    OpenSim subtracts the slack length in m from a normalized length.
+    It is x / sqrt(x^2 + h^2), where h is the height of the fibers and x their length along the
+    tendon. As there, x is the normalized path length less the slack length in m, which mixes units.
+
+    Args:
+        path_length: length of the path (m).
+        m: muscle.
     """
     along = path_length / m.optimal - m.slack
     return cos_upright(sqrt(along * along + m.height * m.height), m.height)
 
 
 def generic_velocity_factor(rate: float, m: OldMuscle) -> float:
-    """Return the factor by which OpenSim scales isometric forces of these muscles, for a path speed (m/s)."""
+    """Return the factor by which OpenSim scales isometric forces of these muscles.
+
+    It is 1.8 - 1.8 / (1 + exp((0.04 - v) / 0.18)) at the normalized velocity v = -cos(phi) rate /
+    (fastest optimal), where phi is the pennation angle at the optimal length; v is positive for
+    shortening.
+
+    Args:
+        rate: lengthening speed of the path (m/s).
+        m: muscle.
+    """
     sin = m.height / m.optimal
     velocity = -sqrt(1.0 - sin * sin) * rate / (m.fastest * m.optimal)
     return 1.8 - 1.8 / (1.0 + exp((0.04 - velocity) / 0.18))
@@ -94,12 +117,16 @@ def schutte_passive_force(length: float) -> float:
 
 
 def schutte_velocity(activation: float, active: float, borne: float, damping: float) -> float:
-    """Return the fiber velocity (optimal fiber lengths per time scale), a root of a quadratic equation.
+    """Return the fiber velocity v, in optimal fiber lengths per time scale, from the force balance.
+
+    The balance is active f(v) + damping v = borne, with Hill's curves f = 0.15 (1 + v) / (0.15 - v)
+    for shortening and f = (1.4 v + s) / (v + s), s = 0.13 0.15 / 1.15, for lengthening. Each gives
+    a quadratic equation in v. Faster than v = -1 the fibers bear no active force.
 
     Args:
         activation: activation.
         active: isometric force, fully activated.
-        borne: force that depends on the velocity.
+        borne: force that depends on the velocity: that of the tendon without the passive one.
         damping: damping force at a velocity of 1.
     """
     isometric = activation * active
@@ -108,15 +135,24 @@ def schutte_velocity(activation: float, active: float, borne: float, damping: fl
     if borne < isometric:
         b = -(borne + 0.15 * (isometric + damping)) / damping
         c = 0.15 * (borne - isometric) / damping
+        # The smaller root: v must be between -1 and 0.
         return 0.5 * (-b - sqrt(b * b - 4.0 * c))
     slope = 0.13 * 0.15 / 1.15
     b = slope - (borne - 1.4 * isometric) / damping
     c = slope * (isometric - borne) / damping
+    # The larger root: v must not be negative.
     return 0.5 * (-b + sqrt(b * b - 4.0 * c))
 
 
 def thelen_tendon_force(strain: float, strain_at_one: float) -> float:
-    """Return the tendon force: an exponential toe and a line, plus 0.001 (1 + strain)."""
+    """Return the tendon force: an exponential toe and a line, plus 0.001 (1 + strain).
+
+    Args:
+        strain: strain of the tendon.
+        strain_at_one: strain at the maximum isometric force.
+    """
+    # The toe ends at 0.609 of the strain at one, where the force is 1/3; OpenSim rounds the
+    # constants.
     toe = 0.609 * strain_at_one
     force = 0.001 * (1.0 + strain)
     if strain > toe:
@@ -129,12 +165,15 @@ def thelen_tendon_force(strain: float, strain_at_one: float) -> float:
 
 
 def thelen_passive_force(length: float, strain_at_one: float, shape: float) -> float:
-    """Return the passive force of fibers of a normalized length: an exponential, and a line beyond strain 1.
+    """Return the passive force of fibers: an exponential, and a line beyond its force of 1.
+
+    With e the strain at a force of 1 and k the shape, it is exp(k (l - 1) / e - k) up to l = 1 + e,
+    and 1 + k (l - 1 - e) / e beyond. It does not vanish for short fibers.
 
     Args:
-        length: normalized fiber length.
-        strain_at_one: strain at a force of 1.
-        shape: exponent.
+        length: normalized fiber length l.
+        strain_at_one: strain e at a force of 1.
+        shape: exponent k.
     """
     beyond = length - (1.0 + strain_at_one)
     return (
@@ -145,7 +184,14 @@ def thelen_passive_force(length: float, strain_at_one: float, shape: float) -> f
 
 
 def thelen_active_force(length: float, width: float) -> float:
-    """Return the isometric force of fully activated fibers of a normalized length."""
+    """Return the isometric force of fully activated fibers of a normalized length.
+
+    It is exp(-(l - 1)^2 / width).
+
+    Args:
+        length: normalized fiber length l.
+        width: KshapeActive.
+    """
     return exp(-(length - 1.0) * (length - 1.0) / width)
 
 
@@ -162,14 +208,18 @@ def thelen_velocity(
         shape: Af.
         most: Flen.
     """
+    # Without activation the isometric force would be 0 and the curve degenerate.
     isometric, near = max(activation, 1e-6) * active, 1e-6
     if borne < isometric:
         if borne >= 0.0:
             return thelen_shortening(borne, isometric, damping, shape)
+        # Continue below zero force with the slope of a secant over `near` at the end, as OpenSim
+        # does.
         at_end = thelen_shortening(0.0, isometric, damping, shape)
         return at_end + borne / (
             near / (thelen_shortening(near, isometric, damping, shape) - at_end)
         )
+    # The hyperbola has its asymptote at `most`; beyond 95 % of it the curve continues as a line.
     end = 0.95 * isometric * most
     if borne < end:
         return thelen_lengthening(borne, isometric, damping, shape, most)
@@ -180,21 +230,46 @@ def thelen_velocity(
 
 
 def thelen_shortening(borne: float, isometric: float, damping: float, shape: float) -> float:
-    """Return the fiber velocity below the isometric force, see `thelen_velocity`."""
+    """Return the fiber velocity below the isometric force, see `thelen_velocity`.
+
+    Args:
+        borne: force that depends on the velocity.
+        isometric: isometric force at the present activation.
+        damping: constant that is added to the denominator.
+        shape: Af.
+    """
     return (borne - isometric) / (isometric + borne / shape + damping)
 
 
 def thelen_lengthening(
     borne: float, isometric: float, damping: float, shape: float, most: float
 ) -> float:
-    """Return the fiber velocity above the isometric force, see `thelen_velocity`."""
+    """Return the fiber velocity above the isometric force, see `thelen_velocity`.
+
+    Args:
+        borne: force that depends on the velocity.
+        isometric: isometric force at the present activation.
+        damping: constant that is added to the denominator.
+        shape: Af.
+        most: Flen, the largest force of lengthening fibers over the isometric one.
+    """
     return (borne - isometric) / (
         (2.0 + 2.0 / shape) * (isometric * most - borne) / (most - 1.0) + damping
     )
 
 
 def make_guess(path_length: float, length: float, m: OldMuscle) -> Guess:
-    """Return a guess with a fiber length (m), which is adjusted so that the tendon is not shorter than slack."""
+    """Return a guess with a fiber length that leaves the tendon at least as long as slack.
+
+    Args:
+        path_length: length of the path (m).
+        length: fiber length to try (m).
+        m: muscle.
+
+    Returns:
+        Guess. Where the tendon would be shorter than slack, the fibers span what remains of the
+        path.
+    """
     cos = cos_upright(length, m.height)
     tendon = path_length - length * cos
     if not tendon >= m.slack:
@@ -214,11 +289,11 @@ def next_length(
     tendon: float,
     m: OldMuscle,
 ) -> float:
-    """Return the fiber length to try next (m).
+    """Return the fiber length that the search tries next (m).
 
-    It is interpolated between two lengths of which one is too short and the other too long; else it
-    follows from the stiffness of fibers and tendon, estimated as their forces over their lengths, with
-    a step of at most half an optimal fiber length.
+    It is interpolated between two lengths if one of them is too short and the other too long; else
+    it follows from the stiffness of fibers and tendon, estimated as their forces over their
+    lengths, with a step of at most half an optimal fiber length.
 
     Args:
         guess: last guess.
@@ -230,10 +305,13 @@ def next_length(
         tendon: tendon force.
         m: muscle.
     """
+    # A change of sign brackets the equilibrium: regula falsi. Without it, take a damped Newton
+    # step.
     if (error >= 0.0) != (error_before >= 0.0):
         return guess.length + abs(error) / (abs(error) + abs(error_before)) * (
             before - guess.length
         )
+    # A slack tendon has no stiffness; its modulus over its strength bounds the estimate from below.
     of_tendon = max(tendon, fibers * TENDON_MODULUS / TENDON_STRENGTH) * m.strength / m.slack
     step = min(
         abs(error / (m.strength / m.optimal * fully / guess.cos + of_tendon)), 0.5 * m.optimal

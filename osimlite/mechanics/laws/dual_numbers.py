@@ -20,11 +20,14 @@ def settled(root: float, error: float, slope: float) -> float:
         error: residual of the equation at the root, with derivatives by the parameters.
         slope: derivative of the residual by the unknown.
     """
+    # The derivative is that of root - error / slope; floats have none, so the value is returned as
+    # it is.
     return root
 
 
 def is_nothing(number: float) -> bool:
     """Return whether a number and all its derivatives are 0, so that multiplication by it can be skipped."""
+    # A dual number counts as nothing only if its derivatives vanish too; see the replacements.
     return number == 0.0
 
 
@@ -34,15 +37,31 @@ def plain(number: float) -> float:
 
 
 def carrying(number: float, direction: int, directions: int) -> float:
-    """Return a number that carries derivatives along `directions` directions, and is number `direction`."""
+    """Return a number that carries derivatives: 1 along `direction`, 0 along the others.
+
+    Args:
+        number: value.
+        direction: index of the direction along which the number has derivative 1.
+        directions: number of directions.
+    """
     return number
 
 
 def carrying_room(vector: Any, directions: int) -> Any:
-    """Return workspace of floats as workspace of dual numbers, each of 1 + `directions` floats."""
+    """Return workspace of floats as workspace of dual numbers, each of 1 + `directions` floats.
+
+    Args:
+        vector: array of floats.
+        directions: number of directions.
+    """
     return vector
 
 
 def slope_of(number: float, direction: int) -> float:
-    """Return the derivative of a number along a direction."""
+    """Return the derivative of a number along a direction.
+
+    Args:
+        number: number that may carry derivatives.
+        direction: index of the direction.
+    """
     return 0.0

@@ -56,6 +56,7 @@ def spring_in_sphere(center: Vector, r: float, middle: Vector) -> tuple[float, V
     """
     way = minus(middle, center)
     distance = norm(way)
+    # Scale the radius vector to the surface; at the centre its direction is undefined.
     return (
         (r - distance, add_scaled(center, r / distance, way)) if distance > 0.0 else (0.0, center)
     )
@@ -76,14 +77,14 @@ def spring_load(
 ) -> tuple[Vector, Vector, float]:
     """Return the load of one spring on the mesh at the nearest point of the other surface.
 
-    With d the vector from the middle to the end and vn the component along d of the velocity there: f =
-    k |d| (1 + c vn) along d, zero where that is not positive; and f mu along the slip, where mu is its
-    `friction`. The energy is k |d|^2 / 2.
+    With d the vector from the middle to the end and vn the component along d of the velocity there:
+    f = k |d| (1 + c vn) along d, zero where that is not positive; and f mu along the slip, where mu
+    is its `friction_coefficient`. The energy is k |d|^2 / 2.
 
     Args:
         k: stiffness of the layer times area of the triangle (N/m).
         c: dissipation (s/m).
-        us: coefficient of static friction, see `hunt_crossley.friction`.
+        us: coefficient of static friction, see `hunt_crossley.friction_coefficient`.
         ud: coefficient of dynamic friction.
         uv: coefficient of viscous friction (s/m).
         vt: transition velocity (m/s).
@@ -101,13 +102,16 @@ def spring_load(
     if d == 0.0:
         return ZERO, ZERO, 0.0
     energy, n, arm = 0.5 * k * d * d, divide(way, d), minus(end, about)
+    # Velocity of the material of the other surface at the nearest point, relative to the mesh.
     here = plus(v, cross(turning, arm))
     vn = dot(here, n)
     f = k * d * (1.0 + c * vn)
+    # A fast separation would make the contact pull; only the stored energy remains.
     if f <= 0.0:
         return ZERO, ZERO, energy
     slip = add_scaled(here, -vn, n)
     w = norm(slip)
+    # Without slip the direction of friction is undefined, and its size is 0.
     force = add_scaled(
         times(f, n), f * friction_coefficient(w, us, ud, uv, vt) / w if w > 0.0 else 0.0, slip
     )

@@ -46,20 +46,24 @@ def half_space_ellipsoid(
     rx, ry, rz = radii
     # The normal along the axes of the ellipsoid, times the half axes.
     u = dot(n, one) * rx, dot(n, two) * ry, dot(n, three) * rz
+    # Support function: the distance from the centre to the tangent plane that is perpendicular to
+    # n.
     reach = norm(u)
     d = reach - dot(minus(center, o), n)
     if d <= 0.0:
         return d, 0.0, ZERO
+    # Lowest point of the ellipsoid, along its axes: -B n / reach.
     lx, ly, lz = divide(times(-1.0, multiply_elementwise(u, radii)), reach)
     point = add_scaled(add_scaled(add_scaled(center, lx, one), ly, two), lz, three)
-    # The product of the curvatures of the section is (reach / (rx ry rz))^2.
+    # The product of the curvatures of the section is (reach / (rx ry rz))^2; for a sphere the
+    # effective radius is its radius.
     return d, sqrt(rx * ry * rz / reach), add_scaled(point, d * (1.0 - a), n)
 
 
 def ellipsoid_ellipsoid(
     c1: Vector, axes1: Axes, radii1: Vector, c2: Vector, axes2: Axes, radii2: Vector, a: float
 ) -> tuple[float, float, Vector, Vector]:
-    """Compute the contact of two ellipsoids, of which one may be a sphere.
+    """Compute the contact of two ellipsoids; both may be spheres as well.
 
     The normal n minimizes the overlap h(n) = s1 + s2 - n (c2 - c1), where c are the centres and s the
     distances from them to the planes perpendicular to n that touch the ellipsoids. It is found by
@@ -95,6 +99,8 @@ def ellipsoid_ellipsoid(
             # A plane perpendicular to n separates the ellipsoids.
             return h, 0.0, ZERO, ZERO
         tries += 1
+        # The tolerance of 1e-12 lets rounding near the minimum pass. 100 evaluations bound the
+        # search.
         if h > least * (1.0 + 1e-12) and tries < 100:
             # The step is too long: halve it.
             step = times(0.5, step)
@@ -110,17 +116,21 @@ def ellipsoid_ellipsoid(
         fu, fv = gu1 + gu2 - dot(centre_line, u), gv1 + gv2 - dot(centre_line, v)
         if fu * fu + fv * fv <= 1e-26 * (s1 + s2) * (s1 + s2) or tries >= 100:
             break
+        # Second derivatives on the unit sphere: n turns, so h itself is subtracted on the diagonal.
         huu, huv, hvv = huu1 + huu2 - h, huv1 + huv2, hvv1 + hvv2 - h
         if huu <= 0.0 or huu * hvv - huv * huv <= 0.0:
             # At deep overlap the Hessian is indefinite; without its negative part it is positive.
             huu += h
             hvv += h
         determinant = huu * hvv - huv * huv
+        # Newton's step along u and v: the inverse of a symmetric 2 x 2 matrix by its determinant.
         step = add_scaled(
             times((huv * fv - hvv * fu) / determinant, u), (huv * fu - huu * fv) / determinant, v
         )
         n = plus(known, step)
         n = divide(n, norm(n))
+    # The determinants are the inverse Gaussian curvatures of both surfaces; the relative curvature
+    # follows from their sum.
     one, two = huu1 * hvv1 - huv1 * huv1, huu2 * hvv2 - huv2 * huv2
     huv = huv1 + huv2
     R = sqrt(one * two / ((huu1 + huu2) * (hvv1 + hvv2) - huv * huv))
@@ -152,6 +162,7 @@ def make_perpendiculars(n: Vector) -> tuple[Vector, Vector]:
         u and v.
     """
     nx, ny, nz = n
+    # Cross n with the axis from which it deviates clearly; 0.6 is above 1 / sqrt(3).
     u = (0.0, nz, -ny) if abs(nx) < 0.6 else (-nz, 0.0, nx)
     u = divide(u, norm(u))
     return u, cross(n, u)

@@ -61,24 +61,37 @@ OF_TWO = ("min", "max")
 
 
 def divide(a: float, b: float) -> float:
-    """Return a / b, infinite for b = 0."""
+    """Return a / b as C does: infinite for b = 0, not a number for 0 / 0.
+
+    Args:
+        a: numerator.
+        b: denominator.
+    """
     if b != 0.0:
         return a / b
+    # IEEE division: 0/0 is NaN, and the sign of an infinite result includes the sign of zero.
     if a == 0.0 or a != a:
         return nan
     return copysign(inf, a) * copysign(1.0, b)
 
 
 def power(a: float, b: float) -> float:
-    """Return a to the power b; not a number for negative a and a fractional b."""
+    """Return a to the power b; not a number for negative a and a fractional b.
+
+    Args:
+        a: base.
+        b: exponent.
+    """
+    # 0^b needs no logarithm.
     if a == 0.0:
         return 1.0 if b == 0.0 else inf if b < 0.0 else 0.0
     if a != a or b != b:
         return nan
     # The remainder stays a float: where floor() gives an integer of 64 bits, b may be too large for
-    # it.
+    # it. b - b is not 0 for an infinite b.
     if a < 0.0 and (b - b != 0.0 or b % 1.0 != 0.0):
         return nan
+    # Python raises OverflowError where C returns infinity, hence the test by logarithms.
     size = inf if b * log(abs(a)) > 709.78 else abs(a) ** b
     return -size if a < 0.0 and b % 2.0 == 1.0 else size
 
@@ -100,6 +113,7 @@ def logarithm(x: float) -> float:
 
 def sine(x: float) -> float:
     """Return the sine of x (rad)."""
+    # x - x is not 0 for infinite and undefined x, where Python's sin raises ValueError.
     return sin(x) if x - x == 0.0 else nan
 
 
@@ -120,6 +134,7 @@ def secant(x: float) -> float:
 
 def cosecant(x: float) -> float:
     """Return 1 / sin x, infinite at 0."""
+    # 1 / 0 raises in Python; the sign of zero decides between both infinities.
     return 1.0 / sin(x) if x != 0.0 and x - x == 0.0 else copysign(inf, x) if x == 0.0 else nan
 
 
@@ -145,6 +160,7 @@ def arctangent(x: float) -> float:
 
 def hyperbolic_sine(x: float) -> float:
     """Return (e^x - e^-x) / 2."""
+    # Python's sinh overflows beyond 709.78 with an exception.
     return sinh(x) if abs(x) < 709.78 or x != x else copysign(inf, x)
 
 
@@ -179,12 +195,12 @@ def is_zero(x: float) -> float:
 
 
 def square(x: float) -> float:
-    """Return x^2."""
+    """Return the square x^2 of a number."""
     return x * x
 
 
 def cube(x: float) -> float:
-    """Return x^3."""
+    """Return the cube x^3 of a number."""
     return x * x * x
 
 
@@ -194,15 +210,29 @@ def reciprocal(x: float) -> float:
 
 
 def smaller(a: float, b: float) -> float:
-    """Return the smaller of two numbers."""
+    """Return the smaller of two numbers.
+
+    If one of them is not a number, the first one is returned, as C++ std::min does.
+
+    Args:
+        a: first number.
+        b: second number.
+    """
     return b if b < a else a
 
 
 def larger(a: float, b: float) -> float:
-    """Return the larger of two numbers."""
+    """Return the larger of two numbers.
+
+    If one of them is not a number, the first one is returned, as C++ std::max does.
+
+    Args:
+        a: first number.
+        b: second number.
+    """
     return b if a < b else a
 
 
 def magnitude(x: float) -> float:
-    """Return |x|."""
+    """Return the absolute value of a number."""
     return abs(x)

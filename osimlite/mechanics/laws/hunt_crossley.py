@@ -70,9 +70,12 @@ def combine_materials(
     """
     if K1 < 0.0 or K2 < 0.0:
         raise ValueError("a contact stiffness must not be negative")
+    # Simbody combines springs in series in this form, because Hertz' force scales with K d^(3/2).
     k1 = K1 ** (2.0 / 3.0)
     k2 = K2 ** (2.0 / 3.0)
+    # Without any stiffness the split of the depth does not matter.
     a = k2 / (k1 + k2) if k1 + k2 > 0.0 else 0.5
+    # Harmonic means; the sum is tested because 0 / 0 must give 0.
     us = 2.0 * us1 * us2 / (us1 + us2) if us1 + us2 != 0.0 else 0.0
     ud = 2.0 * ud1 * ud2 / (ud1 + ud2) if ud1 + ud2 != 0.0 else 0.0
     uv = 2.0 * uv1 * uv2 / (uv1 + uv2) if uv1 + uv2 != 0.0 else 0.0
@@ -100,6 +103,8 @@ def half_space_sphere(
     """
     s = dot(minus(center, o), n)
     d = r - s
+    # Both surfaces are deformed to the same point, which lies between the sphere's lowest point and
+    # the plane: by a d below the plane.
     return (d, add_scaled(center, -(s + a * d), n)) if d > 0.0 else (d, ZERO)
 
 
@@ -126,24 +131,26 @@ def sphere_sphere(
     distance = norm(centre_line)
     d = r1 + r2 - distance
     if d <= 0.0 or distance == 0.0:
+        # Concentric spheres report depth 0, because there is no normal to push along.
         return min(d, 0.0), 0.0, ZERO, ZERO
     n = divide(centre_line, distance)
     return d, r1 * r2 / (r1 + r2), n, add_scaled(c1, r1 - a * d, n)
 
 
 def friction_coefficient(w: float, us: float, ud: float, uv: float, vt: float) -> float:
-    """Return the coefficient of friction min(r, 1) (ud + 2 (us - ud) / (1 + r^2)) + uv w, with r = w / vt.
+    """Return the coefficient of friction at a slip velocity.
 
-    At w = vt it is us + uv vt and has a kink. With us < ud / 2 it is negative for small r: friction
-    then drives the slip instead of opposing it.
+    It is min(r, 1) (ud + 2 (us - ud) / (1 + r^2)) + uv w, with r = w / vt. At w = vt it is us + uv
+    vt and has a kink. With us < ud / 2 it is negative for small r: friction then drives the slip
+    instead of opposing it.
 
     Args:
         w: slip velocity, greater than 0 (m/s).
         us: coefficient of static friction.
         ud: coefficient of dynamic friction.
         uv: coefficient of viscous friction (s/m).
-        vt: transition velocity (m/s). Where it is 0 or less, the coefficient is ud + uv w, the limit
-            for vt -> 0.
+        vt: transition velocity (m/s). Where it is 0 or less, the coefficient is ud + uv w, the
+            limit for vt -> 0.
     """
     if not vt > 0.0:
         return ud + uv * w
@@ -184,12 +191,15 @@ def contact_force(
     Returns:
         Force (N). A depth or velocity that is not a number gives a force that is not a number.
     """
+    # Written without `not`: NaN passes and shows in the force, instead of silently giving none.
     if d <= 0.0:
         return ZERO
     vn = dot(v, n)
     f = (4.0 / 3.0) * k * d * sqrt(R * k * d) * (1.0 + 1.5 * c * vn)
     if f <= 0.0:
         return ZERO
+    # v = v1 - v2 is the slip of surface 1; friction drags surface 2 along with it, hence no minus
+    # sign.
     slip = add_scaled(v, -vn, n)
     w = norm(slip)
     if w == 0.0:
@@ -211,6 +221,18 @@ def contact_derivatives(
 ) -> tuple[float, float, float]:
     """Return the derivatives of the force of `contact_force`, which has the same arguments.
 
+    Args:
+        d: depth (m).
+        R: effective radius of curvature (m).
+        k: effective stiffness from `combine_materials` (Pa^(2/3)).
+        c: effective dissipation (s/m).
+        us: effective coefficient of static friction.
+        ud: effective coefficient of dynamic friction.
+        uv: effective coefficient of viscous friction (s/m).
+        vt: transition velocity (m/s).
+        n: unit normal from surface 1 to surface 2.
+        v: velocity of surface 1 relative to surface 2 at the point of application (m/s).
+
     Returns:
         Derivatives of the normal force by the depth (N/m) and by the approach velocity v n (N s/m),
         and tangential force over slip (N s/m); all 0 where there is no force.
@@ -224,6 +246,7 @@ def contact_derivatives(
         return 0.0, 0.0, 0.0
     # Without slip use the limit, as the coefficient is proportional to small slip.
     w = max(norm(add_scaled(v, -vn, n)), 1e-6 * vt, 1e-12)
+    # The elastic force grows with d^(3/2), so that its derivative is 3/2 of force over depth.
     return 1.5 * f / d, 1.5 * c * elastic, f * friction_coefficient(w, us, ud, uv, vt) / w
 
 

@@ -1,8 +1,15 @@
-"""Muscle of M. Millard et al. with a mass between fibers and tendon, as in Millard2012AccelerationMuscle.
+"""Millard's muscle with a mass between fibers and tendon, as in Millard2012AccelerationMuscle.
 
-Forces are normalized by the maximum isometric force F; the curves are those of
-:mod:`osimlite.mechanics.laws.muscle_curves`. Each elastic force f is damped to f max(1 + c v, 0),
-where v is the normalized velocity and c a damping constant, so that its sign does not change.
+Source: M. Millard et al., Journal of Biomechanical Engineering 135, 2013. Forces are normalized by
+the maximum isometric force F; the curves are those of :mod:`osimlite.mechanics.laws.muscle_curves`.
+Each elastic force f is damped to f max(1 + c v, 0), where v is the normalized velocity and c a
+damping constant, so that its sign does not change. The mass m accelerates the fibers of length l
+and pennation phi:
+
+l'' = (ft - (a fl fv + fp) cos(phi) + fs) F cos(phi) / m + l phi'^2
+
+where a is the activation, fl, fv and fp are the factors by length and velocity and the passive
+force, ft is the tendon force and fs the force against steep fibers.
 """
 
 from __future__ import annotations
@@ -34,19 +41,19 @@ class Millard2012Acceleration(NamedTuple):
     slack: float  # tendon_slack_length, m
     fastest: float  # max_contraction_velocity, 1/s
     mass: float  # kg
-    tendon_damping: float  # tendon_force_length_damping, s, as all of them
-    short_damping: float  # fiber_compressive_force_length_damping
-    passive_damping: float  # fiber_force_length_damping
-    steep_damping: float  # fiber_compressive_force_cos_pennation_damping
-    fiber_damping: float  # over F
+    tendon_damping: float  # tendon_force_length_damping, s
+    short_damping: float  # fiber_compressive_force_length_damping, s
+    passive_damping: float  # fiber_force_length_damping, s
+    steep_damping: float  # fiber_compressive_force_cos_pennation_damping, s
+    fiber_damping: float  # of the fibers in parallel to the active force, over F, s
     rising: float  # activation time constant, s
     falling: float  # deactivation time constant, s
-    least: float  # activation that the rate knows
-    height: float  # as of `pennation`, with the three that follow
-    shortest: float
-    largest_sin: float
-    least_cos: float
-    optimal_cos: float  # of pennation at optimal length
+    least: float  # smallest activation in the formula of its rate
+    height: float  # constant height of the fibers, see `pennation_constants`, m
+    shortest: float  # smallest fiber length by the largest pennation angle, m
+    largest_sin: float  # sine of the largest pennation angle
+    least_cos: float  # cosine of the largest pennation angle
+    optimal_cos: float  # cosine of pennation at optimal length
 
 
 class AccelerationCurves(NamedTuple):
@@ -95,11 +102,18 @@ def evaluate_dynamics(
         tendon: tendon length (m).
         rate: tendon velocity (m/s).
         curves: curves of the muscle.
+
+    Returns:
+        Forces, accelerations and stiffnesses.
     """
     cos = cos_pennation(fiber, m.height, m.shortest, m.largest_sin, m.least_cos)
     sin = m.height / fiber
     tan = sin / cos
+    # Rates of the pennation angle phi, as l sin(phi) is constant: phi' = -(v / l) tan(phi) and
+    # dphi/dl = -tan(phi) / l.
     turning, turn = -velocity / fiber * tan, -tan / fiber
+    # Fiber velocity along the tendon, and derivatives by the fiber length at the same fiber
+    # velocity.
     along = velocity * cos - fiber * sin * turning
     turning_slope = velocity / (fiber * fiber) * tan - velocity / fiber * (1.0 + tan * tan) * turn
     along_slope = (
@@ -112,6 +126,7 @@ def evaluate_dynamics(
     by_velocity, _ = curve_value(curves.velocity, velocity / (m.fastest * m.optimal))
 
     pull, pull_slope = curve_value(curves.tendon, tendon / m.slack)
+    # The factor of damping is not negative, so that a tendon never pushes.
     damped = max(1.0 + m.tendon_damping * rate / m.slack, 0.0)
     tension, tendon_stiffness = (
         m.strength * pull * damped,
@@ -122,12 +137,15 @@ def evaluate_dynamics(
     stretched = max(1.0 + m.passive_damping * velocity / m.optimal, 0.0)
     shortened = max(1.0 - m.short_damping * velocity / m.optimal, 0.0)
     steep, steep_slope = curve_value(curves.steep, cos)
+    # The damping of steep fibers acts on their velocity along the tendon, normalized by the optimal
+    # length along it.
     normal = m.steep_damping / (m.optimal * m.optimal_cos)
     steepened = max(1.0 - normal * along, 0.0)
     steep_slope = -steep_slope * sin * turn * steepened - (
         steep * normal * along_slope if steepened > 0.0 else 0.0
     )
 
+    # Short fibers push, stretched ones pull; the damping in parallel is linear in the velocity.
     passive = stretch * stretched - short * shortened + m.fiber_damping * velocity / m.optimal
     borne = active * by_length * by_velocity + passive
     borne_slope = (
@@ -135,7 +153,9 @@ def evaluate_dynamics(
     )
     net = tension - m.strength * (borne * cos - steep * steepened)
     stiffness = m.strength * (borne_slope / m.optimal * cos - borne * sin * turn - steep_slope)
+    # The second term is the centripetal acceleration of fibers that rotate by pennation.
     acceleration = net * cos / m.mass + fiber * turning * turning
+    # A longer fiber shortens the tendon by d(l cos phi)/dl.
     net_slope = tendon_stiffness * (fiber * sin * turn - cos) - stiffness
     slope = (
         (net_slope * cos - net * sin * turn) / m.mass
@@ -144,6 +164,7 @@ def evaluate_dynamics(
     )
     # OpenSim does not count the fibers' own damping as a passive force.
     told = m.strength * (stretch * stretched - short * shortened - steep * steepened * cos)
+    # From stiffness by fiber length to stiffness by length along the tendon.
     stiffness /= cos - fiber * sin * turn
     return MuscleDynamics(
         cos, by_length, by_velocity, told, tension, acceleration, slope, stiffness, tendon_stiffness
@@ -157,6 +178,11 @@ def millard2012_acceleration(
 
     Only the rate of activation is bounded, and no fiber length.
 
+    Args:
+        now: inputs of the muscle.
+        m: muscle.
+        curves: curves of the muscle.
+
     Returns:
         Tension (N), activation, fiber length (m), cosine of pennation, factors of the active force by
         length and by velocity, active and passive fiber force (N), whether the fibers are longer than
@@ -164,6 +190,7 @@ def millard2012_acceleration(
     """
     fiber_length, velocity = now.fiber_length, now.fiber_velocity
     cos = cos_pennation(fiber_length, m.height, m.shortest, m.largest_sin, m.least_cos)
+    # With constant height the rate of the length along the tendon is v / cos(phi).
     tendon, rate = now.length - fiber_length * cos, now.rate - velocity / cos
     at = evaluate_dynamics(m, now.activation, fiber_length, velocity, tendon, rate, curves)
     pull = now.activation * at.by_length * at.by_velocity * m.strength
@@ -192,7 +219,13 @@ def millard2012_acceleration_rigid(
     """Return the force of fully active fibers along a rigid tendon (N).
 
     See OpenSim's calcInextensibleTendonActiveFiberForce.
+
+    Args:
+        now: inputs of the muscle.
+        m: muscle.
+        curves: curves of the muscle.
     """
+    # Fibers clamped to their smallest length bear no force along a rigid tendon.
     fiber = fiber_length_along(now.length - m.slack, m.height, m.shortest, m.least_cos)
     if not fiber > m.shortest:
         return 0.0
@@ -212,10 +245,17 @@ def millard2012_acceleration_equilibrium(
     continues at a random length; here the search ends. It ends, as there, where a tendon without
     stiffness becomes taut.
 
+    Args:
+        now: inputs of the muscle; only length, rate, activation and fiber velocity are used.
+        m: muscle.
+        curves: curves of the muscle.
+
     Returns:
         Whether there is one, the fiber length (m), and its velocity (m/s).
     """
     length, rate = now.length, now.rate
+    # OpenSim starts with a tendon strained by 1 % and at rest. Its tolerance is that of a force,
+    # but bounds the acceleration.
     tolerance, tendon, tendon_rate = max(1e-8 * m.strength, 10.0 * SIGNIFICANT), 1.01 * m.slack, 0.0
     fiber = fiber_length_along(length - tendon, m.height, m.shortest, m.least_cos)
     for _ in range(ROUNDS):
@@ -226,12 +266,15 @@ def millard2012_acceleration_equilibrium(
         at = evaluate_dynamics(m, now.activation, fiber, velocity, tendon, tendon_rate, curves)
         if abs(at.acceleration) <= tolerance:
             return True, fiber, velocity
+        # Also false for NaN: an undefined slope ends the search.
         if not SIGNIFICANT < abs(at.slope) < inf:
             break
         fiber = max(fiber - STEP * at.acceleration / at.slope, m.shortest)
         tendon = length - fiber * cos_pennation(
             fiber, m.height, m.shortest, m.largest_sin, m.least_cos
         )
+        # A slack tendon takes the complete rate; a taut one its part by the stiffness of the
+        # fibers.
         both, tendon_rate = at.stiffness + at.tendon_stiffness, rate
         if tendon > m.slack and abs(both) > SIGNIFICANT:
             if at.tendon_stiffness == 0.0:

@@ -1,14 +1,19 @@
-"""Muscle of M. Millard et al. without a mass, as in OpenSim's Millard2012EquilibriumMuscle.
+"""Millard's muscle without a mass, as in OpenSim's Millard2012EquilibriumMuscle.
 
-Source: Journal of Biomechanical Engineering 135, 2013. The fibers may be damped or not, the tendon
-elastic or rigid, with or without activation dynamics. Forces are normalized by the maximum
-isometric force F, fiber lengths by the optimal fiber length, fiber velocities by the maximum
-contraction velocity times that length, tendon lengths by the tendon slack length. The curves are
-those of :mod:`osimlite.mechanics.laws.muscle_curves`.
+Source: M. Millard et al., Journal of Biomechanical Engineering 135, 2013. The fibers may be damped
+or not, the tendon elastic or rigid, with or without activation dynamics. Forces are normalized by
+the maximum isometric force F, fiber lengths by the optimal fiber length, fiber velocities by the
+maximum contraction velocity times that length, tendon lengths by the tendon slack length. The
+curves are those of :mod:`osimlite.mechanics.laws.muscle_curves`.
 
-With an elastic tendon, the fiber velocity v follows from (a fl(l) fv(v) + fp(l) + beta v) cos(phi)
-= ft, where a is the activation, fl, fv, fp, ft are the curves, beta is the damping, and phi the
-pennation angle.
+With an elastic tendon, the fiber velocity v follows from the equilibrium
+
+(a fl(l) fv(v) + fp(l) + beta v) cos(phi) = ft
+
+where a is the activation, fl, fv, fp, ft are the curves, beta is the damping, and phi the pennation
+angle. The computation is divided into `fibers_at`, `fibers_loaded` and `fibers_moved`, between
+which curves are evaluated, so that machine code can evaluate the curves of several muscles
+together.
 """
 
 from __future__ import annotations
@@ -57,11 +62,11 @@ class Millard2012Equilibrium(NamedTuple):
     is_rigid: float  # ignore_tendon_compliance, 1 or 0
     is_excited: float  # ignore_activation_dynamics, 1 or 0: the excitation is the activation
     damping: float  # of the fibers, over F; 0 if they have none
-    least: float  # activation
-    height: float  # as of `pennation`, with the three that follow
-    shortest: float
-    largest_sin: float
-    least_cos: float
+    least: float  # smallest activation
+    height: float  # constant height of the fibers, see `pennation_constants`, m
+    shortest: float  # smallest fiber length by the largest pennation angle, m
+    largest_sin: float  # sine of the largest pennation angle
+    least_cos: float  # cosine of the largest pennation angle
     smallest: float  # fiber length that the curves and pennation allow, m
 
 
@@ -81,15 +86,15 @@ class MillardFibers(NamedTuple):
     Before a curve is evaluated, its argument is in place of its value.
     """
 
-    told_by: float  # see NONE
-    velocity: float
+    told_by: float  # what determines the velocity: NONE, DAMPED, INVERSE, RIGID or SLACK
+    velocity: float  # normalized, or what determines it
     by_velocity: float  # factor of the active force
     active: float  # activation
     length: float  # of the fibers, m
     cos: float  # of pennation
     by_length: float  # active force at rest, fully activated
     elastic: float  # passive force
-    tendon: float  # its force
+    tendon: float  # tendon force
     change: float  # rate of activation, 1/s
 
 
@@ -103,6 +108,11 @@ def millard2012_equilibrium(
     Fibers at their smallest length stay there as long as they would shorten, and then bear no force. A
     rigid tendon bears no pressure: the damping of fast fibers is bounded instead.
 
+    Args:
+        now: inputs of the muscle.
+        m: muscle.
+        curves: curves of the muscle.
+
     Returns:
         Tension (N), activation, fiber length (m), cosine of pennation, factors of the active force by
         length and by velocity, active and passive fiber force (N), whether a fiber velocity exists,
@@ -110,6 +120,7 @@ def millard2012_equilibrium(
     """
     fibers = fibers_resting(now, m, curves)
     is_found, velocity, by_velocity = fibers.told_by != NONE, fibers.velocity, fibers.by_velocity
+    # Only the branch that applies evaluates a curve over velocity.
     if fibers.told_by == RIGID:
         by_velocity, _ = curve_value(curves.velocity, velocity)
     elif fibers.told_by == DAMPED:
@@ -126,7 +137,16 @@ def millard2012_equilibrium(
 def millard2012_again(
     now: MuscleInputs, m: Millard2012Equilibrium, curves: MillardCurves, fiber_velocity: float
 ) -> tuple[float, float, float, float, float, float, float, float, bool, float, float, float]:
-    """Compute the muscle with a known velocity (m/s) of damped fibers, to obtain all its derivatives.
+    """Compute the muscle with a known velocity of damped fibers, to obtain all derivatives.
+
+    The search for the velocity is not differentiated: its result is refined once, by the implicit
+    function theorem, with the derivatives of the other quantities.
+
+    Args:
+        now: inputs of the muscle.
+        m: muscle.
+        curves: curves of the muscle.
+        fiber_velocity: known fiber velocity (m/s).
 
     Returns:
         The results of `millard2012_equilibrium`.
@@ -143,6 +163,8 @@ def millard2012_again(
     else:
         by_velocity, slope = curve_value(curves.velocity, velocity)
     if fibers.told_by == DAMPED:
+        # Residual of the equilibrium; its derivative by the velocity gives the derivatives of the
+        # root.
         share = fibers.active * fibers.by_length
         off = share * by_velocity + m.damping * velocity - fibers.velocity
         velocity = settled(velocity, off, share * slope + m.damping)
@@ -153,7 +175,16 @@ def millard2012_again(
 def fibers_resting(
     now: MuscleInputs, m: Millard2012Equilibrium, curves: MillardCurves
 ) -> MillardFibers:
-    """Evaluate the curves over length, but not those over velocity."""
+    """Evaluate the curves over length, but not those over velocity.
+
+    Args:
+        now: inputs of the muscle.
+        m: muscle.
+        curves: curves of the muscle.
+
+    Returns:
+        Fibers, with the values of the curves over length and what determines the velocity.
+    """
     fibers, tendon = fibers_at(now, m), 0.0
     by_length, _ = curve_value(curves.active, fibers.by_length)
     elastic, _ = curve_value(curves.passive, fibers.by_length)
@@ -175,7 +206,17 @@ def fibers_resting(
 
 
 def fibers_at(now: MuscleInputs, m: Millard2012Equilibrium) -> MillardFibers:
-    """Compute the arguments of all curves."""
+    """Compute the arguments of all curves.
+
+    Args:
+        now: inputs of the muscle.
+        m: muscle.
+
+    Returns:
+        Fibers, where `by_length` and `elastic` are the normalized fiber length and `tendon` the
+        normalized tendon length.
+    """
+    # OpenSim clamps the activation before it enters the equilibrium.
     active = min(max(now.excitation if m.is_excited else now.activation, m.least), 1.0)
     fiber = now.fiber_length
     if m.is_rigid:
@@ -186,10 +227,13 @@ def fibers_at(now: MuscleInputs, m: Millard2012Equilibrium) -> MillardFibers:
     told_by, velocity, tendon = DAMPED if m.damping > 0.0 else INVERSE, 0.0, 0.0
     if m.is_rigid:
         told_by = SLACK
+        # A rigid tendon is slack where the path is too short for it; SIGNIFICANT allows for
+        # rounding.
         if along_tendon >= m.slack - SIGNIFICANT:
             told_by, velocity = RIGID, now.rate * cos / (m.optimal * m.fastest)
     else:
         tendon = along_tendon / m.slack
+    # Perpendicular fibers cannot balance a tendon.
     if not cos > SIGNIFICANT:
         told_by = NONE
     change = first_order_activation_rate(
@@ -208,6 +252,13 @@ def fibers_loaded(
 ) -> tuple[float, float, float, float, float]:
     """Combine the values of the curves over length.
 
+    Args:
+        fibers: fibers from `fibers_at`.
+        m: muscle.
+        by_length: value of the active force-length curve.
+        elastic: value of the passive force-length curve.
+        tendon: value of the tendon force-length curve.
+
     Returns:
         Velocity or what determines it, factor of the active force by velocity, and the factor by
         length, passive force and tendon force.
@@ -216,8 +267,11 @@ def fibers_loaded(
     if m.is_rigid or fibers.told_by == NONE:
         tendon = 0.0
     elif m.damping > 0.0:
+        # The equation with damping needs the force that active fibers and dampers must bear.
         velocity = tendon / fibers.cos - elastic
     else:
+        # Without damping the equilibrium gives the force-velocity factor directly; its inverse
+        # curve gives the velocity.
         velocity = by_velocity = (tendon / fibers.cos - elastic) / (fibers.active * by_length)
     return velocity, by_velocity, by_length, elastic, tendon
 
@@ -225,12 +279,18 @@ def fibers_loaded(
 def fibers_asking(
     fibers: MillardFibers, m: Millard2012Equilibrium
 ) -> tuple[int, float, float, float]:
-    """Return which of the curves of velocity (0) and its inverse (1) is requested, and for what sum.
+    """Return which curve over velocity must be evaluated, and for what sum.
 
-    The curve itself is requested where the first factor is 0 and the second 1.
+    The sum is of_y y + of_x x, as in `solve_sum`; with factors 0 and 1 it is just the argument x,
+    and the curve is evaluated.
+
+    Args:
+        fibers: fibers after `fibers_loaded`.
+        m: muscle.
 
     Returns:
-        Number of the curve, factors of it and of its argument, and the value of their sum.
+        Number of the curve (0 for the factor by velocity, 1 for its inverse), factors of its value
+        and of its argument, and the value of their sum.
     """
     if fibers.told_by == DAMPED:
         return 0, fibers.active * fibers.by_length, m.damping, fibers.velocity
@@ -241,6 +301,12 @@ def fibers_moved(
     fibers: MillardFibers, m: Millard2012Equilibrium, value: float, missed: float
 ) -> tuple[float, float, float]:
     """Combine the value of the requested curve.
+
+    Args:
+        fibers: fibers after `fibers_loaded`.
+        m: muscle.
+        value: value of the curve.
+        missed: residual of the search.
 
     Returns:
         What determines the velocity, the velocity, and the factor of the active force.
@@ -259,6 +325,10 @@ def muscle_of(
     fibers: MillardFibers, m: Millard2012Equilibrium
 ) -> tuple[float, float, float, float, float, float, float, float, bool, float, float, float]:
     """Return the results of `millard2012_equilibrium`, after all curves have been evaluated.
+
+    Args:
+        fibers: fibers with the values of all curves.
+        m: muscle.
 
     Returns:
         The results of `millard2012_equilibrium`.
@@ -279,7 +349,17 @@ def muscle_with(
     elastic: float,
     tendon: float,
 ) -> tuple[float, float, float, float, float, float, float, float, bool, float, float, float]:
-    """Return the results of `millard2012_equilibrium` for given values of the curves.
+    """Return the results of `millard2012_equilibrium` for known values of the curves.
+
+    Args:
+        fibers: fibers, of which activation, length, cosine and rate are used.
+        m: muscle.
+        is_found: whether a fiber velocity exists.
+        velocity: normalized fiber velocity.
+        by_velocity: factor of the active force by velocity.
+        by_length: factor of the active force by length.
+        elastic: passive force.
+        tendon: tendon force.
 
     Returns:
         The results of `millard2012_equilibrium`.
@@ -288,9 +368,11 @@ def muscle_with(
     pull = m.strength * (active * by_length * by_velocity)
     spring = m.strength * elastic
     passive = spring + m.strength * m.damping * velocity
+    # OpenSim holds fibers at their smallest length, where they bear no force.
     if fiber <= m.smallest and velocity <= 0.0:
         velocity, by_velocity, pull, spring, passive = 0.0, 1.0, 0.0, 0.0, 0.0
     if m.is_rigid:
+        # Fast shortening would make the dampers push on a rigid tendon: bound the passive force.
         passive = max(passive, -pull)
         tension = (pull + passive) * cos
     else:
@@ -317,6 +399,11 @@ def millard2012_rigid(now: MuscleInputs, m: Millard2012Equilibrium, curves: Mill
 
     See OpenSim's calcInextensibleTendonActiveFiberForce. As there, the pennation that projects the
     force onto the tendon is that of fibers with their normalized length in m: next to none.
+
+    Args:
+        now: inputs of the muscle.
+        m: muscle.
+        curves: curves of the muscle.
     """
     fiber = fiber_length_along(now.length - m.slack, m.height, m.shortest, m.least_cos)
     if fiber <= m.smallest:
@@ -406,6 +493,11 @@ def millard2012_equilibrium_length(
     Newton's method with halved steps, step for step as in estimateMuscleFiberState of OpenSim's class,
     which ignores the rate of the path. A length below the smallest one is replaced by it.
 
+    Args:
+        now: inputs of the muscle.
+        m: muscle.
+        curves: curves of the muscle.
+
     Returns:
         Whether there is one, and the fiber length (m).
     """
@@ -413,6 +505,7 @@ def millard2012_equilibrium_length(
         now.length,
         min(max(now.excitation if m.is_excited else now.activation, m.least), 1.0),
     )
+    # OpenSim's tolerance, and its start with a tendon strained by 1 %.
     tolerance = max(1e-8 * m.strength, 10.0 * SIGNIFICANT)
     fiber = max(
         fiber_length_along(length - 1.01 * m.slack, m.height, m.shortest, m.least_cos), m.smallest
@@ -422,8 +515,10 @@ def millard2012_equilibrium_length(
         if not abs(error) > tolerance:
             break
         before, last, part, direction = error, fiber, 1.0, error / slope
+        # Halve the step until the residual decreases.
         while abs(error) >= abs(before):
             step = -part * direction
+            # A vanishing step cannot help; OpenSim then tries a tiny step the other way.
             if not abs(step) > SIGNIFICANT:
                 # Try the opposite direction.
                 step, part = -SMALLEST if step > 0.0 else SMALLEST if step < 0.0 else 0.0, 0.0
@@ -432,6 +527,7 @@ def millard2012_equilibrium_length(
             if part <= SMALLEST:
                 break
             part *= 0.5
+    # At the smallest length any residual is accepted, because the fibers cannot shorten further.
     return abs(error) < tolerance or (fiber <= m.smallest and not isnan(error)), fiber
 
 
@@ -450,6 +546,7 @@ def force_imbalance(
     Returns:
         Residual (N) and derivative by the fiber length (N/m).
     """
+    # Fibers no longer than high have no pennation angle.
     if fiber <= m.height:
         return nan, nan
     cos = cos_pennation(fiber, m.height, m.shortest, m.largest_sin, m.least_cos)
@@ -458,6 +555,7 @@ def force_imbalance(
     tendon, tendon_slope = curve_value(curves.tendon, (length - fiber * cos) / m.slack)
     borne = m.strength * (active * by_length) + m.strength * elastic
     sin = m.height / fiber
+    # d(cos phi)/dl = sin^2(phi) / (l cos(phi)), because l sin(phi) is constant.
     turn = sin * sin / cos
     along = (
         m.strength * (active * active_slope + passive_slope) / m.optimal * cos

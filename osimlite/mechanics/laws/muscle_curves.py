@@ -4,8 +4,10 @@ Source: M. Millard et al., Journal of Biomechanical Engineering 135, 2013, secti
 normalized by the optimal fiber length or the tendon slack length, velocities by the maximum
 contraction velocity, forces by the maximum isometric force. Each function takes the properties of
 the OpenSim class with its name, in their order, and returns the numbers of a Bezier curve; None
-stands for an omitted property. It raises a ValueError if there is no such curve, whose message
-begins with "its" and a property, or tells which slopes make no corner.
+stands for an omitted property.
+
+The ValueError of properties that give no curve has a message that begins with "its" and a property,
+or says which slopes make no corner; the caller adds the component.
 """
 
 from __future__ import annotations
@@ -54,6 +56,8 @@ def active_force_length(
     )
     _require(least >= 0.0, "its minimum_value is negative")
     _require_below(slope, (1.0 - least) / (1.0 - transition), "shallow_ascending_slope")
+    # OpenSim's constants: the plateau is 0.05 to each side of the optimal length, and the curve is
+    # steepest halfway between the smallest active length and the transition.
     half = 0.05
     knee = 1.0 - slope * (1.0 - half - transition)
     top = 1.0 + half
@@ -63,6 +67,7 @@ def active_force_length(
             (
                 shortest + 0.5 * (transition - shortest),
                 0.5 * knee,
+                # 1.25 is OpenSim's ratio of the slope in the steep part to the mean slope.
                 1.25 * knee / (transition - shortest),
             ),
             (transition + 0.5 * (1.0 - half - transition), knee + 0.5 * (1.0 - knee), slope),
@@ -103,8 +108,10 @@ def force_velocity(
     Raises:
         ValueError: there is no such curve.
     """
+    # The conditions are OpenSim's; outside them its curve has no corner or does not rise.
     _require(most > 1.0, "its max_eccentric_velocity_force_multiplier is not above 1")
     _require_below(concentric_end, concentric_near, "concentric_slope_at_vmax")
+    # OpenSim accepts a slope of 1 for this curve, but not for the inverse one.
     _require(
         concentric_near < 1.0 or (concentric_near == 1.0 and not inverse),
         "its concentric_slope_near_vmax is not less than 1",
@@ -116,6 +123,8 @@ def force_velocity(
     )
     _require(eccentric_near >= NEAREST, f"its eccentric_slope_near_vmax is less than {NEAREST:.2e}")
     _require_below(eccentric_near, most - 1.0, "eccentric_slope_near_vmax")
+    # OpenSim places the corners near the maximum velocities at 90 % of them; each point lies on a
+    # line with the mean of both slopes.
     points = [
         (-1.0, 0.0, concentric_end),
         (
@@ -131,6 +140,7 @@ def force_velocity(
         ),
         (1.0, most, eccentric_end),
     ]
+    # The inverse swaps the axes of the control points. It is not the exact inverse between them.
     if inverse:
         points = [(y, x, 1.0 / slope) for x, y, slope in points]
     return make_curve(points, [concentric_curviness] * 2 + [eccentric_curviness] * 2)
@@ -145,6 +155,8 @@ def fiber_force_length(
     curviness: float | None = None,
 ) -> Numbers:
     """Return the passive force over the fiber length.
+
+    Where they are omitted, low is 0.2, stiffness 2 / (one - zero), curviness 0.75, as in OpenSim.
 
     Args:
         zero: strain at zero force.
@@ -167,6 +179,8 @@ def fiber_force_length(
     _require_above(stiffness, mean, "stiffness_at_one_norm_force")
     _require_below(low, mean, "stiffness_at_low_force")
     start, end = 1.0 + zero, 1.0 + one
+    # OpenSim's toe: the foot lies a tenth along, but not further than the line of the final slope
+    # rises by a tenth.
     foot = start + min(0.1 / stiffness, 0.1 * (end - start))
     middle = start + 0.5 * (foot - start)
     return make_curve(
@@ -184,6 +198,8 @@ def tendon_force_length(
 ) -> Numbers:
     """Return the force over the tendon length.
 
+    Where they are omitted, stiffness is 1.375 / one, toe 2/3, curviness 0.5, as in OpenSim.
+
     Args:
         one: strain at the maximum isometric force.
         stiffness: stiffness there.
@@ -199,7 +215,10 @@ def tendon_force_length(
     )
     _require(0.0 < toe < 1.0, "its norm_force_at_toe_end is not between 0 and 1")
     _require_above(stiffness, 1.0 / one, "stiffness_at_one_norm_force")
+    # The linear region begins where its line has the force `toe`.
     end = (toe - 1.0) / stiffness + 1.0 + one
+    # OpenSim's control points of the toe: a foot at a tenth of the toe, and the line to half of its
+    # force.
     foot, middle = 1.0 + (end - 1.0) / 10.0, (0.5 * toe - 1.0) / stiffness + 1.0 + one
     slope = 0.5 * toe / (middle - foot)
     control = foot + 0.5 * (middle - foot)
@@ -214,6 +233,8 @@ def fiber_compressive_force_length(
     zero: float, stiffness: float | None = None, curviness: float | None = None
 ) -> Numbers:
     """Return the force against short fibers over their length.
+
+    Where they are omitted, stiffness is -2 / zero and curviness 0.5, as in OpenSim.
 
     Args:
         zero: fiber length at zero force.
@@ -239,6 +260,8 @@ def fiber_compressive_force_cos_pennation(
 ) -> Numbers:
     """Return the force against steep fibers over the cosine of pennation.
 
+    Where they are omitted, stiffness is -2 / cos(angle) and curviness 0.1, as in OpenSim.
+
     Args:
         angle: pennation angle at zero force (degrees).
         stiffness: stiffness at a right angle.
@@ -253,6 +276,7 @@ def fiber_compressive_force_cos_pennation(
         (stiffness, curviness), (-2.0 / zero, 0.1), "stiffness_at_perpendicular"
     )
     _require(
+        # The curve must bend upwards: steeper at its upper end than the straight line.
         stiffness < -1.0 / zero,
         f"its stiffness_at_perpendicular is not less than {-1.0 / zero:.4g}",
     )
@@ -278,6 +302,14 @@ def _complete_properties(
     """Return optional properties, or their defaults if all are omitted.
 
     `first` is the name of the first.
+
+    Args:
+        given: properties, None where omitted.
+        usual: their defaults.
+        first: name of the first property, for the message.
+
+    Raises:
+        ValueError: some are omitted and others are not, which OpenSim does not accept.
     """
     result = [x for x in given if x is not None]
     _require(

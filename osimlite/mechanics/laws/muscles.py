@@ -46,6 +46,8 @@ def first_order_activation_rate(
         falling: deactivation time constant (s).
         least: smallest activation.
     """
+    # OpenSim clamps only the activation, so that the excitation may be below the smallest
+    # activation.
     active = min(max(activation, least), 1.0)
     slow = 0.5 + 1.5 * active
     return (excitation - active) / (rising * slow if excitation > active else falling / slow)
@@ -65,7 +67,9 @@ def pennation_constants(
         Height (m), smallest fiber length (m), and sine and cosine of the largest angle.
     """
     height = optimal_length * sin(optimal_angle)
+    # OpenSim takes 1 % of the optimal length where no angle bounds the length.
     shortest = height / sin(largest_angle) if largest_angle > SIGNIFICANT else 0.01 * optimal_length
+    # Parallel fibers: every length has the cosine 1.
     if optimal_angle <= NO_ANGLE:
         return height, shortest, 0.0, 1.0
     return height, shortest, sin(largest_angle), cos(largest_angle)
@@ -74,18 +78,36 @@ def pennation_constants(
 def cos_pennation(
     length: float, height: float, shortest: float, largest_sin: float, least_cos: float
 ) -> float:
-    """Return the cosine of the pennation angle of fibers of a length (m).
+    """Return the cosine of the pennation angle of fibers of a length.
+
+    It is sqrt(1 - (h / l)^2), not less than the cosine of the largest angle.
 
     The other arguments are those of `pennation_constants`.
+
+    Args:
+        length: fiber length (m).
+        height: height of the fibers (m), from `pennation_constants` as all that follow.
+        shortest: smallest fiber length (m).
+        largest_sin: sine of the largest angle.
+        least_cos: cosine of the largest angle.
     """
     if length <= shortest or height >= largest_sin * length:
         return least_cos
+    # (l - h) (l + h) instead of l^2 - h^2 avoids cancellation for steep fibers.
     return sqrt((length - height) * (length + height)) / length
 
 
 def fiber_length_along(along: float, height: float, shortest: float, least_cos: float) -> float:
-    """Return the fiber length (m) for a length along the tendon (m).
+    """Return the fiber length for a length along the tendon (m).
+
+    It is sqrt(h^2 + along^2), not less than the smallest fiber length.
 
     The other arguments are those of `pennation_constants`.
+
+    Args:
+        along: length of the fibers along the tendon (m).
+        height: height of the fibers (m), from `pennation_constants` as all that follow.
+        shortest: smallest fiber length (m).
+        least_cos: cosine of the largest angle.
     """
     return sqrt(height * height + along * along) if along >= shortest * least_cos else shortest

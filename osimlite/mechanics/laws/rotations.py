@@ -22,7 +22,12 @@ Z = (0.0, 0.0, 1.0)
 
 
 def combine_axes(axes: Axes, a: Vector) -> Vector:
-    """Return the vector with these components along axes."""
+    """Return the vector with these components along axes.
+
+    Args:
+        axes: axes, usually those of a frame in another one.
+        a: components along them.
+    """
     x, y, z = a
     one, two, three = axes
     return (
@@ -33,19 +38,35 @@ def combine_axes(axes: Axes, a: Vector) -> Vector:
 
 
 def multiply_rotations(axes: Axes, others: Axes) -> Axes:
-    """Return axes whose components along `axes` are `others`: the product of both rotations."""
+    """Return axes whose components along `axes` are `others`: the product of both rotations.
+
+    Args:
+        axes: axes of a frame B in A.
+        others: axes of a frame C in B.
+
+    Returns:
+        Axes of C in A.
+    """
     one, two, three = others
     return combine_axes(axes, one), combine_axes(axes, two), combine_axes(axes, three)
 
 
 def transpose_rotation(axes: Axes) -> Axes:
-    """Return the inverse rotation."""
+    """Return the inverse of a rotation, the transpose of its matrix."""
     one, two, three = axes
     return (one[0], two[0], three[0]), (one[1], two[1], three[1]), (one[2], two[2], three[2])
 
 
 def rotation_about_axis(axis: Vector, s: float, c: float) -> Axes:
-    """Return the rotation about a unit vector by Rodrigues' formula, from sine s and cosine c."""
+    """Return the rotation about a unit vector by Rodrigues' formula, from sine s and cosine c.
+
+    It is R = c I + (1 - c) a a' + s [a x].
+
+    Args:
+        axis: unit vector a.
+        s: sine of the angle.
+        c: cosine of the angle.
+    """
     x, y, z = axis
     d = 1.0 - c
     return (
@@ -56,7 +77,16 @@ def rotation_about_axis(axis: Vector, s: float, c: float) -> Axes:
 
 
 def rotation_from_xyz(s1: float, c1: float, s2: float, c2: float, s3: float, c3: float) -> Axes:
-    """Return the rotation Rx(a) Ry(b) Rz(c) from sines and cosines of body-fixed X-Y-Z angles a, b, c."""
+    """Return the rotation Rx(a) Ry(b) Rz(c) of body-fixed X-Y-Z angles a, b, c.
+
+    Args:
+        s1: sine of a.
+        c1: cosine of a.
+        s2: sine of b.
+        c2: cosine of b.
+        s3: sine of c.
+        c3: cosine of c.
+    """
     return (
         (c2 * c3, c1 * s3 + s1 * s2 * c3, s1 * s3 - c1 * s2 * c3),
         (-c2 * s3, c1 * c3 - s1 * s2 * s3, s1 * c3 + c1 * s2 * s3),
@@ -68,7 +98,8 @@ QUARTERS = 0.6366197723675814
 """2 / pi, the number of quarter turns per radian."""
 LARGEST = 1e6
 """Largest angle (rad) for which the reduction of the argument is accurate enough."""
-# pi / 2 in three parts, of which the first two have few enough digits for exact products.
+# pi / 2 in three parts (Cody and Waite): the digits of the first two are so few that their products
+# with a number of quarter turns are exact.
 HIGH, MIDDLE, LOW = 1.5707962512969971, 7.549789415861596e-8, 5.390302858158119e-15
 
 
@@ -78,10 +109,12 @@ def sine_cosine(angle: float) -> tuple[float, float]:
     Returns:
         Sine and cosine.
     """
+    # Also true for NaN. Large angles are rare, and the C library reduces them with more digits.
     if not abs(angle) < LARGEST:
         return sin(angle), cos(angle)
     quarters = floor(angle * QUARTERS + 0.5)
     z = ((angle - quarters * HIGH) - quarters * MIDDLE) - quarters * LOW
+    # z is between -pi/4 and pi/4; polynomials of Cephes in z^2.
     a = z * z
     s = 1.58962301576546568060e-10 * a - 2.50507477628578072866e-8
     s = (s * a + 2.75573136213857245213e-6) * a - 1.98412698295895385996e-4
@@ -94,6 +127,8 @@ def sine_cosine(angle: float) -> tuple[float, float]:
     t = 1.0 - h
     # Add the rounding error of t.
     c = t + ((1.0 - t) - h + a * a * c)
+    # The quadrant says which of both is which, and with what signs. Two bits of the integer
+    # suffice, for negative numbers too.
     quadrant = int(quarters) & 3
     if quadrant & 1:
         s, c = c, -s

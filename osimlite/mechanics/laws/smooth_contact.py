@@ -20,7 +20,10 @@ from osimlite.mechanics.laws.vectors import Vector, add_scaled, dot, times
 
 
 def smooth_hertz(d: float, R: float, E: float, cf: float, bd: float) -> float:
-    """Return the elastic force (4/3) k sqrt(R k) (d^2 + cf)^(3/4) (1 + tanh(bd d)) / 2, k = E^(2/3) / 2 (N).
+    """Return the elastic force of a sphere on a half space (N).
+
+    It is (4/3) k sqrt(R k) (d^2 + cf)^(3/4) (1 + tanh(bd d)) / 2 with k = E^(2/3) / 2: Hertz'
+    force, smoothed at d = 0.
 
     Args:
         d: depth (m), negative for a gap.
@@ -29,6 +32,8 @@ def smooth_hertz(d: float, R: float, E: float, cf: float, bd: float) -> float:
         cf: constant that keeps the force differentiable (m²).
         bd: steepness of the transition at contact (1/m).
     """
+    # Sphere and half space have the same stiffness, so that both springs in series are half as
+    # stiff.
     k: float = 0.5 * E ** (2.0 / 3.0)
     s = sqrt(d * d + cf)
     return (4.0 / 3.0) * k * sqrt(R * k) * s * sqrt(s) * (0.5 + 0.5 * tanh(bd * d))
@@ -49,12 +54,12 @@ def smooth_contact_force(
     """Return the force on the sphere at the point midway between the two surfaces (N).
 
     f = fh (1 + (3/2) c vn) (1 + tanh(bv (vn + 2 / (3 c)))) / 2 along n, and along the slip vT f mu / w
-    with w = sqrt(|vT|^2 + cf) and mu its `friction`.
+    with w = sqrt(|vT|^2 + cf) and mu its `friction_coefficient`.
 
     Args:
         hertz: elastic force fh from `smooth_hertz` (N).
         c: dissipation (s/m); with 0, f = fh.
-        us: coefficient of static friction, see `hunt_crossley.friction`.
+        us: coefficient of static friction, see `hunt_crossley.friction_coefficient`.
         ud: coefficient of dynamic friction.
         uv: coefficient of viscous friction (s/m).
         vt: transition velocity (m/s).
@@ -65,6 +70,7 @@ def smooth_contact_force(
     """
     vn = dot(v, n)
     f = hertz * (1.0 + 1.5 * c * vn)
+    # The transition is centred where the factor of damping vanishes, vn = -2 / (3 c).
     if c != 0.0:
         f *= 0.5 + 0.5 * tanh(bv * (vn + 2.0 / (3.0 * c)))
     slip = add_scaled(v, -vn, n)
@@ -76,7 +82,22 @@ def smooth_contact_derivatives(
     d: float, R: float, E: float, cf: float, bd: float, c: float, us: float, ud: float, uv: float, vt: float,
     bv: float, n: Vector, v: Vector,
 ) -> tuple[float, float, float, float]:  # fmt: skip
-    """Return the derivatives of the force; the arguments are those of both functions above.
+    """Return the derivatives of the force of `smooth_contact_force`.
+
+    Args:
+        d: depth (m), negative for a gap.
+        R: radius of the sphere (m).
+        E: stiffness property (Pa).
+        cf: constant of smoothing (m², m²/s²).
+        bd: steepness of the transition at contact (1/m).
+        c: dissipation (s/m).
+        us: coefficient of static friction.
+        ud: coefficient of dynamic friction.
+        uv: coefficient of viscous friction (s/m).
+        vt: transition velocity (m/s).
+        bv: steepness of the transition as the surfaces separate (s/m).
+        n: outward unit normal of the half space.
+        v: velocity of the half space relative to the sphere at the point (m/s).
 
     Returns:
         Derivatives of the normal force by the depth (N/m) and by the approach velocity v n (N s/m),
@@ -84,6 +105,7 @@ def smooth_contact_derivatives(
         all 0 where there is no force.
     """
     hertz, vn = smooth_hertz(d, R, E, cf, bd), dot(v, n)
+    # Deep in a gap tanh underflows to -1 and the force is exactly 0.
     if hertz <= 0.0:
         return 0.0, 0.0, 0.0, 0.0
     # 1 - tanh^2 over (1 + tanh) / 2 is 2 (1 - tanh).
@@ -147,11 +169,14 @@ def station_contact_force(
     Returns:
         (fx, fy, fz), N.
     """
+    # 0.7 tanh(x / 0.7) bounds the deflection, so that cosh cannot overflow.
     h = 0.7 * tanh((y - l0) / 0.7)
     s = 0.5 * (k - 0.1)
     v = (k + 0.1) / (k - 0.1)
+    # log cosh is the smooth transition from the small stiffness k0 above the ground to k below it.
     elastic = s * (v * (0.01 - h) - 0.001 * (log(cosh(11.0)) - log(cosh((h + 0.001) / 0.001))))
     fy = elastic * (1.0 - c * vy)
     w = sqrt(vx * vx + vz * vz)
+    # 1e-4 m/s keeps the direction of friction defined at rest.
     g = -fy * (ud * tanh(w / vl) + uv * w) / (w + 1e-4)
     return g * vx, fy, g * vz

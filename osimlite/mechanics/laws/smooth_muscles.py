@@ -40,23 +40,25 @@ class SmoothMuscle(NamedTuple):
     scale: float  # active_force_width_scale
     damping: float  # fiber_damping
     height: float  # of the fibers, optimal sin(pennation_angle_at_optimal), m
-    passive: float  # whether passive fibers bear a force
-    follows: float  # whether activation is a state of its own, and not the excitation
+    passive: float  # 1 if passive fibers bear a force, else 0
+    follows: float  # 1 if activation is a state, 0 if it equals the excitation
     rising: float  # activation_time_constant, s
     falling: float  # deactivation_time_constant, s
     sharpness: float  # activation_dynamics_smoothing
 
 
 class SmoothTendon(NamedTuple):
-    """Further parameters of De Groote's muscle."""
+    """Further parameters of De Groote's muscle.
+
+    The tendon force at a normalized length l is 0.2 (exp(k (l - 1)) - 1), where `growth` is k. If
+    it is not `explicit`, a solver prescribes the rate of the tendon force, which otherwise follows
+    from the equilibrium with the fibers.
+    """
 
     passive_strain: float  # passive_fiber_strain_at_one_norm_force
-    # exponent k of the tendon force 0.2 (exp(k (l - 1)) - 1) at a length l, see `tendon_growth`
-    growth: float
-    elastic: float  # whether the tendon is
-    # whether its force follows from the equilibrium with the fibers; if not, a solver
-    # prescribes its rate
-    explicit: float
+    growth: float  # exponent k, see `tendon_growth`
+    elastic: float  # 1 for an elastic tendon, 0 for a rigid one
+    explicit: float  # 1 if equilibrium determines the rate of the tendon force, else 0
 
 
 def smooth_activation_rate(
@@ -73,13 +75,22 @@ def smooth_activation_rate(
         falling: deactivation time constant (s).
         sharpness: steepness of the transition.
     """
+    # Unlike Thelen's rate this one is smooth at e = a, which collocation needs.
     lacking = excitation - activation
     z, f = 0.5 + 1.5 * activation, 0.5 * tanh(sharpness * lacking)
     return ((0.5 + f) / (rising * z) + (0.5 - f) * z / falling) * lacking
 
 
 def skewed_gaussian(x: float, height: float, middle: float, width: float, growth: float) -> float:
-    """Return height exp(-d^2 / 2) with d = (x - middle) / (width + growth x), a skewed Gaussian."""
+    """Return a skewed Gaussian: height exp(-d^2 / 2) with d = (x - middle) / (width + growth x).
+
+    Args:
+        x: argument, a normalized fiber length.
+        height: value at the middle.
+        middle: argument of the maximum.
+        width: constant part of the standard deviation.
+        growth: part of the standard deviation that is proportional to x.
+    """
     distance = (x - middle) / (width + growth * x)
     return height * exp(-0.5 * distance * distance)
 
@@ -91,6 +102,7 @@ def degroote_active(length: float, scale: float) -> float:
         length: normalized fiber length.
         scale: factor of the width of the curve.
     """
+    # OpenSim scales the curve about the optimal length. The sum of three Gaussians is 1 there.
     x = (length - 1.0) / scale + 1.0
     return (
         skewed_gaussian(
@@ -106,6 +118,10 @@ def degroote_active(length: float, scale: float) -> float:
 def degroote_passive(length: float, strain: float) -> tuple[float, float]:
     """Return the passive force of fibers of a normalized length, and its integral over the length.
 
+    With k = 4 and the strain e at a force of 1, the force is (exp(k (l - 1) / e) - exp(k (l0 - 1) /
+    e)) / (exp(k) - exp(k (l0 - 1) / e)), which vanishes at l0 = 0.2, the shortest length of
+    OpenSim.
+
     Args:
         length: normalized fiber length.
         strain: strain at a force of 1.
@@ -113,13 +129,18 @@ def degroote_passive(length: float, strain: float) -> tuple[float, float]:
     Returns:
         Force and integral.
     """
+    # Without this offset the force of short fibers would stay positive.
     none = exp(PASSIVE_SHAPE * (SHORTEST - 1.0) / strain)
     rise, full = exp(PASSIVE_SHAPE * (length - 1.0) / strain) - none, exp(PASSIVE_SHAPE) - none
     return rise / full, (strain / PASSIVE_SHAPE * rise - none * (length - SHORTEST)) / full
 
 
 def degroote_factor(velocity: float) -> float:
-    """Return the factor of the active force at a normalized velocity."""
+    """Return the factor of the active force at a normalized velocity v.
+
+    It is d1 log(d2 v + d3 + sqrt((d2 v + d3)^2 + 1)) + d4, with d1 = -0.321..., d2 = -8.149, d3 =
+    -0.374 and d4 = 0.883....
+    """
     x = -8.149 * velocity - 0.374
     return -0.3211346127989808 * log(x + sqrt(x * x + 1.0)) + 0.8825327733249912
 
@@ -132,12 +153,17 @@ def degroote_velocity(factor: float) -> float:
 
 
 def tendon_growth(strain: float) -> float:
-    """Return the exponent of the tendon force from its strain at a force of 1."""
+    """Return the exponent k of the tendon force: 0.2 (exp(k e) - 1) is 1 at the strain e."""
     return log((1.0 + BELOW) / BELOW) / strain
 
 
 def smooth_tendon_length(force: float, growth: float) -> float:
-    """Return the normalized tendon length at a force, NaN for forces of -0.2 or less."""
+    """Return the normalized tendon length at a force, NaN for forces of -0.2 or less.
+
+    Args:
+        force: normalized tendon force.
+        growth: exponent of the tendon force.
+    """
     return log((force + BELOW) / BELOW) / growth + 1.0 if force > -BELOW else nan
 
 
@@ -151,6 +177,11 @@ def degroote(
     As in OpenSim, the damping of the fibers is not contained in the rate of the tendon force: with an
     elastic tendon it changes only what is reported of the fibers.
 
+    Args:
+        now: inputs of the muscle.
+        m: muscle.
+        tendon: further parameters.
+
     Returns:
         Tension (N), activation, fiber length (m), cosine of pennation, factors of the active force by
         length and by velocity, active and passive fiber force (N), rates of activation and of the
@@ -159,6 +190,7 @@ def degroote(
     """
     a = now.activation if m.follows else now.excitation
     force = now.normalized_tendon_force
+    # The tendon force is the state, so its curve is inverted instead of the equilibrium solved.
     tendon_length = smooth_tendon_length(force, tendon.growth) if tendon.elastic else 1.0
     along = now.length - m.slack * tendon_length
     fiber_length = sqrt(along * along + m.height * m.height)
@@ -172,11 +204,16 @@ def degroote(
     energy *= m.strength * m.optimal
     fastest, force_rate = m.fastest * m.optimal, 0.0
     if tendon.elastic and tendon.explicit:
+        # Equilibrium along the tendon gives the factor; the inverse force-velocity curve gives the
+        # velocity.
         factor = (force / cos - passive) / (a * active)
         velocity = degroote_velocity(factor)
+        # Derivative of the tendon force by the normalized tendon length.
         slope = tendon.growth * (force + BELOW)
         force_rate = (now.rate - velocity * fastest / cos) / m.slack * slope
     else:
+        # With a rigid tendon, or a tendon force that is constant here, fibers take the rate of the
+        # path.
         velocity = now.rate * cos / fastest
         factor = degroote_factor(velocity)
     active_force = m.strength * a * active * factor
@@ -185,6 +222,7 @@ def degroote(
     tension = (active_force + passive_force) * cos
     if tendon.elastic:
         tension = m.strength * force
+        # Integral of the tendon force over the stretch of the tendon.
         energy += m.strength * m.slack * (force / tendon.growth - BELOW * (tendon_length - 1.0))
     activation_rate = smooth_activation_rate(now.excitation, a, m.rising, m.falling, m.sharpness)
     fibers = fiber_length, cos, active, factor, active_force, passive_force
@@ -192,13 +230,25 @@ def degroote(
 
 
 def degroote_rigid(now: MuscleInputs, m: SmoothMuscle, tendon: SmoothTendon) -> float:
-    """Return the force of fully active fibers with a rigid tendon, along the fibers as in OpenSim (N)."""
+    """Return the force of fully active fibers with a rigid tendon, along the fibers (N).
+
+    As in OpenSim it is not projected onto the tendon.
+
+    Args:
+        now: inputs of the muscle.
+        m: muscle.
+        tendon: further parameters, without effect.
+    """
     fiber_length, velocity = rigid_fibers(now, m)
     return m.strength * degroote_active(fiber_length, m.scale) * degroote_factor(velocity)
 
 
 def rigid_fibers(now: MuscleInputs, m: SmoothMuscle) -> tuple[float, float]:
     """Return normalized length and velocity of the fibers with a rigid tendon.
+
+    Args:
+        now: inputs of the muscle.
+        m: muscle.
 
     Returns:
         Length and velocity.
@@ -215,11 +265,17 @@ def degroote_equilibrium(
 
     The steps are those of OpenSim's solveBisection.
 
+    Args:
+        now: inputs of the muscle; the tendon force is not used.
+        m: muscle.
+        tendon: further parameters.
+
     Returns:
         Whether there is one, and the force.
     """
     low, high = 0.0, LARGEST_FORCE
     at_low = degroote_residual(low, now, m, tendon)
+    # OpenSim requires a change of sign between both ends. The search runs in any case.
     result = at_low * degroote_residual(high, now, m, tendon) < 0.0
     middle = low
     for _ in range(ROUNDS):
@@ -237,10 +293,21 @@ def degroote_equilibrium(
 def degroote_residual(
     force: float, now: MuscleInputs, m: SmoothMuscle, tendon: SmoothTendon
 ) -> float:
-    """Return the tendon force less the force of the fibers along it, for a constant tendon force."""
+    """Return the tendon force less the force of the fibers along it, for a constant tendon force.
+
+    Args:
+        force: normalized tendon force.
+        now: inputs of the muscle.
+        m: muscle.
+        tendon: further parameters.
+    """
+    # A constant tendon force: the velocity of the fibers is that of the path, not that of the
+    # equilibrium.
     still = SmoothTendon(tendon.passive_strain, tendon.growth, tendon.elastic, 0.0)
     pulled = MuscleInputs(now.length, now.rate, now.excitation, now.activation, 0.0, 0.0, force)
     result = degroote(pulled, m, still)
+    # Fields 3, 6 and 7 of the result are the cosine of pennation and the active and passive fiber
+    # force.
     return force - (result[6] + result[7]) / m.strength * result[3]
 
 
@@ -264,13 +331,20 @@ def meyer_active(length: float, scale: float) -> float:
 
 
 def meyer_passive(length: float) -> float:
-    """Return Meyer's passive force of fibers of a normalized length."""
+    """Return Meyer's passive force of fibers of a normalized length l.
+
+    It is e1 log(exp(e2 (l - e3)) + 1) with OpenSim's constants, a smooth ramp.
+    """
     x = 12.438535493526128 * (length - 1.329470475731338)
+    # Beyond 50 the logarithm equals its argument in double precision, and exp would overflow later.
     return 0.232000797810576 * (log(exp(x) + 1.0) if x < 50.0 else x)
 
 
 def meyer_factor(velocity: float) -> float:
-    """Return Meyer's factor of the active force at a normalized velocity."""
+    """Return Meyer's factor of the active force at a normalized velocity v.
+
+    It is d1 + d2 atan(d3 + d4 atan(d5 + d6 v)) with OpenSim's constants.
+    """
     inner = atan(-0.27671677680513945 + 8.053304562566995 * velocity)
     return -32.51401019139919 + 22.160392466960214 * atan(
         18.7932134796918 + 6.320952269683997 * inner
@@ -284,12 +358,17 @@ def meyer(
 
     OpenSim defines no energy for it.
 
+    Args:
+        now: inputs of the muscle.
+        m: muscle.
+
     Returns:
         Tension (N), activation, fiber length (m), cosine of pennation, factors of the active force by
         length and by velocity, active and passive fiber force (N), rate of activation (1/s), fiber
         velocity (m/s), elastic part of the passive force (N).
     """
     a = now.activation if m.follows else now.excitation
+    # The tendon is rigid: its length is always the slack length.
     along = now.length - m.slack
     fiber_length = sqrt(along * along + m.height * m.height)
     cos = along / fiber_length
@@ -306,6 +385,13 @@ def meyer(
 
 
 def meyer_rigid(now: MuscleInputs, m: SmoothMuscle) -> float:
-    """Return the force of fully active fibers with a rigid tendon, along the fibers as in OpenSim (N)."""
+    """Return the force of fully active fibers with a rigid tendon, along the fibers (N).
+
+    As in OpenSim it is not projected onto the tendon.
+
+    Args:
+        now: inputs of the muscle.
+        m: muscle.
+    """
     fiber_length, velocity = rigid_fibers(now, m)
     return m.strength * meyer_active(fiber_length, m.scale) * meyer_factor(velocity)

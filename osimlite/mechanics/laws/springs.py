@@ -63,9 +63,12 @@ def path_spring_tension(length: float, rate: float, l0: float, k: float, d: floa
 
 
 def path_spring_energy(length: float, l0: float, k: float) -> float:
-    """Return the energy k (l - l0)^2 / 2 where l > l0, else 0 (J).
+    """Return the energy k (l - l0)^2 / 2 of a spring along a path where l > l0, else 0 (J).
 
-    Arguments as of `path_spring_tension`.
+    Args:
+        length: length l (m).
+        l0: rest length (m).
+        k: stiffness (N/m).
     """
     return 0.5 * k * (length - l0) * (length - l0) if length > l0 else 0.0
 
@@ -102,6 +105,7 @@ def blankevoort_tension(
     if e <= 0.0:
         return 0.0
     tension = 0.5 * k / e1 * e * e if e < e1 else k * (e - 0.5 * e1)
+    # OpenSim damps only lengthening ligaments, and lets damping set in over 1 % of strain.
     if rate > 0.0:
         x = e / 0.01 if e < 0.01 else 1.0
         tension += x * x * x * (10.0 + x * (6.0 * x - 15.0)) * c * rate / l0
@@ -109,10 +113,16 @@ def blankevoort_tension(
 
 
 def blankevoort_energy(length: float, l0: float, k: float, e1: float) -> float:
-    """Return the energy of a ligament (J); arguments as of `blankevoort_tension`.
+    """Return the energy of a ligament (J).
 
     It is the integral of the elastic tension over the length: k l0 e^3 / (6 e1) for 0 < e < e1, and k
     l0 (e (e - e1) / 2 + e1^2 / 6) beyond.
+
+    Args:
+        length: length l (m).
+        l0: slack length (m).
+        k: stiffness of the linear region (N per strain).
+        e1: strain at which the linear region begins.
     """
     e = length / l0 - 1.0
     if e <= 0.0:

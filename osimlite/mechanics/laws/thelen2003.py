@@ -1,8 +1,12 @@
-"""Muscle of D. G. Thelen (Journal of Biomechanical Engineering 125, 2003), as in OpenSim's Thelen2003Muscle.
+"""Thelen's muscle, as in OpenSim's Thelen2003Muscle.
 
-Forces are normalized by the maximum isometric force F, fiber lengths by the optimal fiber length,
-fiber velocities by the maximum contraction velocity times that length, tendon lengths by the tendon
-slack length.
+Source: D. G. Thelen, Journal of Biomechanical Engineering 125, 2003. Forces are normalized by the
+maximum isometric force F, fiber lengths by the optimal fiber length, fiber velocities by the
+maximum contraction velocity times that length, tendon lengths by the tendon slack length.
+
+The fiber velocity follows from the equilibrium (fa + fp(l)) cos(phi) = ft, where fa = a fl(l) fv(v)
+is the active force of fibers with activation a, fp the passive force, ft the tendon force and phi
+the pennation angle.
 """
 
 from __future__ import annotations
@@ -46,14 +50,14 @@ class Thelen2003(NamedTuple):
     shape: float  # Af
     most: float  # Flen
     bound: float  # fv_linear_extrap_threshold
-    height: float  # as of `pennation`, with the three that follow
-    shortest: float
-    largest_sin: float
-    least_cos: float
-    toe: float  # as of `tendon_shape`, with the three that follow
-    growth: float
-    factor: float
-    slope: float
+    height: float  # constant height of the fibers, see `pennation_constants`, m
+    shortest: float  # smallest fiber length by the largest pennation angle, m
+    largest_sin: float  # sine of the largest pennation angle
+    least_cos: float  # cosine of the largest pennation angle
+    toe: float  # strain at the end of the toe region, see `tendon_shape`
+    growth: float  # exponent of the toe region over strain
+    factor: float  # factor of the toe region
+    slope: float  # slope of the linear region
     passive_growth: float  # KshapePassive / FmaxMuscleStrain
     passive_factor: float  # 1 / (exp(KshapePassive) - 1)
 
@@ -64,16 +68,22 @@ class ThelenFibers(NamedTuple):
     length: float  # m
     cos: float  # of pennation
     is_taut: bool  # whether the tendon is longer than slack
-    tendon: float  # its force
+    tendon: float  # tendon force
     tendon_slope: float  # over its normalized length
     active: float  # force at rest, fully activated
     active_slope: float  # over the normalized length
-    passive: float  # force
+    passive: float  # passive force
     passive_slope: float  # over the normalized length
 
 
 def fibers_at(m: Thelen2003, path_length: float, length: float) -> ThelenFibers:
-    """Evaluate the curves for a path length and a fiber length (m)."""
+    """Evaluate the curves for a path length and a fiber length (m).
+
+    Args:
+        m: muscle.
+        path_length: length of the path (m).
+        length: fiber length (m).
+    """
     cos = cos_pennation(length, m.height, m.shortest, m.largest_sin, m.least_cos)
     tendon_length = path_length - length * cos
     tendon, tendon_slope = tendon_force(
@@ -96,6 +106,9 @@ def tendon_shape(strain_at_one: float) -> tuple[float, float, float, float]:
     Returns:
         Strain at the end of the toe, exponent over strain and factor of the toe, slope of the line.
     """
+    # Closed form of the conditions that force and slope are continuous at the end of the toe, and
+    # the force is 1 at `strain_at_one`; 99/166 and 67/166 are OpenSim's fractions for a toe force
+    # of 0.33.
     end = 99.0 * strain_at_one * exp(TOE_SHAPE) / (166.0 * exp(TOE_SHAPE) - 67.0)
     return end, TOE_SHAPE / end, TOE_FORCE / (exp(TOE_SHAPE) - 1.0), 0.67 / (strain_at_one - end)
 
@@ -106,6 +119,15 @@ def tendon_force(
     """Return the tendon force and its derivative by strain.
 
     The constants are those of `tendon_shape`.
+
+    It is factor (exp(growth e) - 1) up to the strain `toe`, and 0.33 + slope (e - toe) beyond.
+
+    Args:
+        strain: strain e of the tendon.
+        toe: strain at the end of the toe region, from `tendon_shape` as all that follow.
+        growth: exponent of the toe region.
+        factor: factor of the toe region.
+        slope: slope of the linear region.
 
     Returns:
         Force and derivative.
@@ -119,7 +141,16 @@ def tendon_force(
 
 
 def tendon_energy(strain: float, toe: float, growth: float, factor: float, slope: float) -> float:
-    """Return the integral of the tendon force over its strain."""
+    """Return the integral of the tendon force over its strain.
+
+    Args:
+        strain: strain of the tendon.
+        toe: strain at the end of the toe region, from `tendon_shape` as all that follow.
+        growth: exponent of the toe region.
+        factor: factor of the toe region.
+        slope: slope of the linear region.
+    """
+    # Split at the end of the toe, so that each part is integrated in its own form.
     bent = min(max(strain, 0.0), toe)
     straight = max(strain - toe, 0.0)
     return factor * ((exp(growth * bent) - 1.0) / growth - bent) + straight * (
@@ -128,13 +159,26 @@ def tendon_energy(strain: float, toe: float, growth: float, factor: float, slope
 
 
 def passive_energy(length: float, growth: float, factor: float) -> float:
-    """Return the integral of the passive force over the normalized fiber length."""
+    """Return the integral of the passive force over the normalized fiber length.
+
+    Args:
+        length: normalized fiber length.
+        growth: KshapePassive / FmaxMuscleStrain.
+        factor: 1 / (exp(KshapePassive) - 1).
+    """
     off = max(length - 1.0, 0.0)
     return factor * ((exp(growth * off) - 1.0) / growth - off)
 
 
 def passive_force(length: float, growth: float, factor: float) -> tuple[float, float]:
     """Return the passive force of fibers of a normalized length, and its derivative.
+
+    It is factor (exp(growth (l - 1)) - 1) for l > 1, else 0.
+
+    Args:
+        length: normalized fiber length l.
+        growth: KshapePassive / FmaxMuscleStrain.
+        factor: 1 / (exp(KshapePassive) - 1).
 
     Returns:
         Force and derivative.
@@ -146,7 +190,13 @@ def passive_force(length: float, growth: float, factor: float) -> tuple[float, f
 
 
 def active_force(length: float, width: float) -> tuple[float, float]:
-    """Return the isometric force exp(-(l - 1)^2 / width) of fully active fibers, and its derivative.
+    """Return the isometric force of fully active fibers, and its derivative.
+
+    The force is exp(-(l - 1)^2 / width).
+
+    Args:
+        length: normalized fiber length l.
+        width: KshapeActive.
 
     Returns:
         Force and derivative.
@@ -161,6 +211,9 @@ def fiber_velocity(
 ) -> tuple[float, float]:
     """Return the normalized velocity of fibers that actively bear a force, and its derivative.
 
+    With force f, isometric force i and activation a it is (1/4 + 3 a / 4) (f - i) / b, where b = i
+    + f / Af for shortening and (2 + 2 / Af) (i Flen - f) / (Flen - 1) for lengthening.
+
     The published curve is continued by straight lines for forces below 0, and near the asymptote of
     lengthening fibers.
 
@@ -173,6 +226,7 @@ def fiber_velocity(
     Returns:
         Velocity and derivative by the force.
     """
+    # Evaluate the curve within its bounds; the line through that point continues it.
     at = 0.0 if force <= 0.0 else min(force, m.bound * (isometric * m.most))
     speed = 0.25 + 0.75 * activation
     if at <= isometric:
@@ -200,18 +254,22 @@ def force_at_velocity(
     Returns:
         The ratio, NaN if Newton's method does not converge.
     """
+    # Newton's method starts at zero velocity.
     force = isometric
     for _ in range(INVERSE_ROUNDS):
         result, slope = fiber_velocity(m, force, activation, isometric)
+        # A vanishing slope would send the next force to infinity.
         if abs(slope) > SIGNIFICANT:
             force -= (result - velocity) / slope
         if abs(result - velocity) < enough:
+            # A negative force, on the line below the curve, counts as none.
             return max(0.0, force / isometric)
     return nan
 
 
 def equilibrium_tolerance(m: Thelen2003) -> float:
     """Return the accepted residual of an equilibrium (N)."""
+    # OpenSim's tolerance: 1e-8 F, but not below ten times SignificantReal.
     return max(1e-8 * m.strength, 10.0 * SIGNIFICANT)
 
 
@@ -225,6 +283,10 @@ def thelen2003(
     Fibers at their smallest length stay there as long as they would shorten, and then bear no active
     force.
 
+    Args:
+        now: inputs of the muscle.
+        m: muscle.
+
     Returns:
         Tension (N), activation, fiber length (m), cosine of pennation, factors of the active force by
         length and by velocity, active and passive fiber force (N), rate of activation (1/s), fiber
@@ -232,9 +294,11 @@ def thelen2003(
     """
     active = min(max(now.activation, m.least), 1.0)
     fibers = fibers_at(m, now.length, max(now.fiber_length, m.shortest))
+    # What the tendon bears and the passive force does not is the active force.
     isometric, borne = active * fibers.active, fibers.tendon / fibers.cos - fibers.passive
     velocity, _ = fiber_velocity(m, borne, active, isometric)
     by_velocity = borne / isometric
+    # OpenSim holds fibers at their smallest length and sets their active force to 0 there.
     if now.fiber_length <= m.shortest and velocity <= 0.0:
         velocity, by_velocity, borne = 0.0, 1.0, 0.0
     return (
@@ -255,6 +319,10 @@ def thelen2003_rigid(now: MuscleInputs, m: Thelen2003) -> float:
     """Return the force of fully active fibers along a rigid tendon (N).
 
     See OpenSim's calcInextensibleTendonActiveFiberForce.
+
+    Args:
+        now: inputs of the muscle.
+        m: muscle.
     """
     fiber = fiber_length_along(now.length - m.slack, m.height, m.shortest, m.least_cos)
     if not fiber > m.shortest:
@@ -267,6 +335,9 @@ def thelen2003_rigid(now: MuscleInputs, m: Thelen2003) -> float:
 
 def thelen2003_energy(m: Thelen2003, length: float, fiber_length: float, cos: float) -> float:
     """Return the potential energy of tendon and fibers (J).
+
+    OpenSim evaluates the passive energy at the fiber length in m instead of the normalized one, so
+    that fibers below 1 m store nothing. This function does the same.
 
     OpenSim takes the fiber length in m for a normalized one, so that fibers below 1 m store nothing.
 
@@ -290,10 +361,15 @@ def thelen2003_equilibrium(now: MuscleInputs, m: Thelen2003) -> tuple[bool, floa
     of the path is distributed over fibers and tendon by their stiffness, so that a muscle whose path
     moves does not start at rest. A length below the smallest one is replaced by it.
 
+    Args:
+        now: inputs of the muscle.
+        m: muscle.
+
     Returns:
         Whether there is one, and the fiber length (m).
     """
     length, active = now.length, min(max(now.activation, m.least), 1.0)
+    # OpenSim starts with a tendon strained by 1 %.
     fibers = fibers_at(
         m, length, fiber_length_along(length - 1.01 * m.slack, m.height, m.shortest, m.least_cos)
     )
@@ -305,8 +381,10 @@ def thelen2003_equilibrium(now: MuscleInputs, m: Thelen2003) -> tuple[bool, floa
         if not abs(error) > equilibrium_tolerance(m):
             break
         before, last, part = error, fibers.length, 1.0
+        # Halve the step until the residual decreases.
         while abs(error) >= abs(before):
             step = -part * before / (stiffness - of_tendon)
+            # A vanishing step cannot help; OpenSim then tries a tiny step the other way.
             if not abs(step) > SIGNIFICANT:
                 # Try the opposite direction.
                 step, part = -SMALLEST if step > 0.0 else SMALLEST if step < 0.0 else 0.0, 0.0
@@ -316,9 +394,12 @@ def thelen2003_equilibrium(now: MuscleInputs, m: Thelen2003) -> tuple[bool, floa
                 break
             part *= 0.5
         stiffness, of_tendon = force_stiffnesses(m, fibers, active * by_velocity, borne)
+        # Outside of the line search, as in OpenSim: the factor by velocity stays constant along a
+        # step.
         by_velocity = shared_velocity_factor(m, fibers, active, now.rate, stiffness)
     if isnan(by_velocity):
         return False, fibers.length
+    # At the smallest length any residual is accepted, because the fibers cannot shorten further.
     return abs(error) < equilibrium_tolerance(m) or fibers.length <= m.shortest, fibers.length
 
 
@@ -352,11 +433,13 @@ def force_stiffnesses(
         Derivatives of the fiber force and of the tendon force.
     """
     length = fibers.length
+    # Fibers no longer than high have no pennation angle.
     if length <= m.height:
         return nan, nan
     sin = m.height / length
     cos = sqrt(1.0 - sin * sin)
     stiffness = (active * fibers.active_slope + fibers.passive_slope) * m.strength / m.optimal
+    # d(l cos phi)/dl = cos(phi) + sin^2(phi) / cos(phi), because l sin(phi) is constant.
     of_tendon = fibers.tendon_slope * m.strength / m.slack * (-fibers.cos - sin * sin / cos)
     return stiffness * fibers.cos + borne * sin * sin / (length * cos), of_tendon
 
@@ -365,6 +448,9 @@ def shared_velocity_factor(
     m: Thelen2003, fibers: ThelenFibers, activation: float, rate: float, stiffness: float
 ) -> float:
     """Return the factor of the active force by velocity, if the stiffer part moves less.
+
+    Fibers and tendon are springs in series: the tendon takes the part kf / (kf + kt) of the rate of
+    the path, where k are stiffnesses along the tendon.
 
     Args:
         m: muscle.
@@ -375,6 +461,7 @@ def shared_velocity_factor(
     """
     if rate == 0.0:
         return 1.0
+    # The products with cosines and the limit are those of OpenSim's initMuscleState.
     along, of_tendon = stiffness * fibers.cos, fibers.tendon_slope * m.strength / m.slack
     of_rate = rate
     if fibers.is_taut and abs(along + of_tendon) > SIGNIFICANT:
