@@ -48,6 +48,7 @@ NAMES_AN_EXTRA = {
     ("build", "human-walks", "-o", "study"): "sim",
     ("simulate", "walker.osim"): "sim",
     ("translate", "walker.osim"): "sim",
+    ("convert", "walker.osim", "-o", "walker.urdf"): "sim",
     ("muscles", "walker.osim"): "sim",
     ("view", "walker.osim"): "sim",
     ("run", "setup.xml"): "sim",

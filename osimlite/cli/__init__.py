@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from osimlite.errors import OsimliteError
 
 COMMANDS = (
-    "build", "validate", "rule", "format", "upgrade", "diff", "info", "translate", "view", "simulate", "sweep",
+    "build", "validate", "rule", "format", "upgrade", "diff", "info", "translate", "convert", "view", "simulate", "sweep",
     "optimize", "gait", "find-gait", "muscles", "modify", "scale", "fit", "ik", "kinematics", "inverse-dynamics",
     "static-optimization", "run", "check-trial", "scone", "lsp", "doctor", "demo",
 )  # fmt: skip

@@ -28,6 +28,7 @@ NEEDS: dict[str, tuple[str, ...]] = {
     "diff": (),
     "info": (),
     "translate": ("numpy",),
+    "convert": ("numpy",),
     "simulate": ("numpy",),
     "kinematics": ("numpy",),
     "modify": ("numpy",),

@@ -42,6 +42,10 @@ class Exporter:
     write: Callable[..., Any]
     choices: tuple[OptionSpec, ...] = ()  # options that this format has
     is_default: bool = False  # whether the command writes it if no format is named
+    title: str = ""  # name of the format in words; `name` in capitals if empty
+    suffix: str = ""  # of the main file, by which `osimlite convert` finds the format
+    carries: str = ""  # what is carried over
+    takes_motion: bool = False  # whether the function takes the keyword argument `motion`
 
 
 def write_urdf(*model: Any, **choices: Any) -> Urdf:
@@ -163,11 +167,49 @@ EXPORTERS: list[Exporter] = [
         write_urdf,
         URDF_CHOICES,
         is_default=True,
+        suffix=".urdf",
+        carries="bodies, joints, couplers, meshes, contact shapes; no muscles or springs",
     ),
-    Exporter("mjcf", "translate", "<file>.xml for MuJoCo", write_mjcf, MJCF_CHOICES),
-    Exporter("glb", "view", "Write a file for Blender, slides and web pages (glTF).", write_glb),
-    Exporter("html", "view", "Write one page that needs no server and no network.", write_page),
-    Exporter("rerun", "view", "Write a recording for the Rerun viewer (.rrd).", write_rerun),
+    Exporter(
+        "mjcf",
+        "translate",
+        "<file>.xml for MuJoCo",
+        write_mjcf,
+        MJCF_CHOICES,
+        title="MJCF (MuJoCo)",
+        suffix=".xml",
+        carries="bodies, joints, constraints, muscles with wrapping, actuators, springs, contacts, meshes",
+    ),
+    Exporter(
+        "glb",
+        "view",
+        "Write a file for Blender, slides and web pages (glTF).",
+        write_glb,
+        title="glTF",
+        suffix=".glb",
+        carries="shapes of bodies and muscles, animation; no dynamics",
+        takes_motion=True,
+    ),
+    Exporter(
+        "html",
+        "view",
+        "Write one page that needs no server and no network.",
+        write_page,
+        title="web page",
+        suffix=".html",
+        carries="shapes, motion, component tree, findings",
+        takes_motion=True,
+    ),
+    Exporter(
+        "rerun",
+        "view",
+        "Write a recording for the Rerun viewer (.rrd).",
+        write_rerun,
+        title="Rerun",
+        suffix=".rrd",
+        carries="shapes of bodies and muscles, motion",
+        takes_motion=True,
+    ),
     Exporter(
         "screenshot",
         "view",
@@ -182,6 +224,10 @@ EXPORTERS: list[Exporter] = [
                 shown="the first",
             ),
         ),
+        title="picture",
+        suffix=".png",
+        carries="one pose",
+        takes_motion=True,
     ),
 ]
 """All formats; the order is that of the help."""

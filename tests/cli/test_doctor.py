@@ -74,6 +74,7 @@ EXAMPLES = {
     "diff": "diff w.osim w.osim",
     "info": "info w.osim",
     "translate": "translate w.osim",
+    "convert": "convert w.osim --to urdf",
     "simulate": "simulate w.osim --to 0.005",
     "kinematics": "kinematics w.osim m.mot",
     "inverse-dynamics": "inverse-dynamics w.osim m.mot",

@@ -11,7 +11,8 @@ from typer.testing import CliRunner
 from osimlite.cli import COMMANDS, app
 
 MEANINGS = {
-    "--to": "seconds, but the format of translate",
+    "--to": "seconds, but the format of translate and convert",
+    "--from": "seconds, but the format that convert reads",
     "--output": "a file or a folder, as the command writes",
     "--seed": "of what it makes random",
     "--all": "findings of validate, or classes of info",

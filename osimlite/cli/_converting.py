@@ -1,0 +1,277 @@
+"""Work of ``osimlite convert``: which formats are meant, the conversion, and the report on it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from osimlite.base.files import make_folder
+from osimlite.base.records import dataclass, field
+from osimlite.base.text import format_json, join_words, suggest_name
+from osimlite.base.writing import write_into
+from osimlite.cli import _options as options
+from osimlite.cli._console import add_row, plain_console, plain_table, say
+from osimlite.cli.translate import tabulate
+from osimlite.errors import SettingError
+from osimlite.translate.exporters import EXPORTERS, Exporter
+from osimlite.translate.importers import OSIM, PROJECT, find_format, list_importers
+
+if TYPE_CHECKING:
+    from osimlite.schema.model import Model
+    from osimlite.translate.fidelity import Fidelity
+
+FIDELITY_FILE = "fidelity.json"
+"""File of the record of what was translated, approximated and left out."""
+
+SUMMARY_FILE = "summary.json"
+"""File of the facts about a conversion."""
+
+
+@dataclass(frozen=True)
+class Conversion:
+    """Result of a conversion.
+
+    Attributes:
+        files: written files, the main one first.
+        fidelity: record of what was translated, approximated and left out.
+        summary: facts about the conversion, as plain data.
+    """
+
+    files: list[Path]
+    fidelity: Fidelity
+    summary: dict[str, object] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Request:
+    """Conversion that the user asks for.
+
+    Attributes:
+        file: the file to convert.
+        source: name of its format.
+        target: name of the format to write.
+        folder: folder to write into.
+        name: name of the main file without suffix.
+    """
+
+    file: Path
+    source: str
+    target: str
+    folder: Path
+    name: str
+
+    @classmethod
+    def create(
+        cls, file: Path, output: Path | None, source: str | None, target: str | None
+    ) -> Request:
+        """Determine the formats and the output folder of a conversion.
+
+        Args:
+            file: the file to convert.
+            output: file or folder to write; None for a folder named after the file.
+            source: name of the format of the file; None to find it.
+            target: name of the format to write; None to find it.
+
+        Raises:
+            SettingError: a format is unknown, or not determined by the names.
+            MissingFileError: the file does not exist.
+        """
+        importers = list_importers()
+        sources = {OSIM, *importers}
+        if source is not None and source not in sources:
+            raise SettingError(f"--from: unknown format '{source}'{suggest_name(source, sources)}")
+        found = find_format(file) if source is None else source
+        if found is None:
+            raise SettingError(
+                f"the format of '{file.name}' is unknown; name it with --from: {', '.join(sorted(sources))}"
+            )
+        targets = {OSIM, PROJECT, *(exporter.name for exporter in EXPORTERS)}
+        if target is not None and target not in targets:
+            raise SettingError(f"--to: unknown format '{target}'{suggest_name(target, targets)}")
+        by_suffix = None if output is None else _find_target(output, found)
+        default = importers[found].target if found in importers else None
+        goal = target or by_suffix or default
+        if goal is None:
+            raise SettingError(
+                "the format to write is unknown; name a file with -o, such as robot.urdf, or a format with --to"
+            )
+        if PROJECT in (goal, default) and goal != default:
+            raise SettingError(f"a file of the format '{found}' cannot be written as '{goal}'")
+        if goal == found:
+            raise SettingError(
+                f"'{file.name}' already has the format '{goal}'; to bring a model to the current version, use "
+                "'osimlite upgrade'"
+            )
+        is_file = output is not None and output.suffix.lower() == _get_suffix(goal) != ""
+        folder = output.parent if output is not None and is_file else output
+        name = output.stem if output is not None and is_file else file.stem
+        return cls(file, found, goal, options.results_folder(file, folder), name)
+
+    def carry_out(
+        self, motion: Path | None, geometry: Sequence[Path] | None, chosen: Mapping[str, Any]
+    ) -> Conversion:
+        """Convert the file, and write all results.
+
+        Args:
+            motion: file of coordinates over time; None without a motion.
+            geometry: folders in which mesh files are searched.
+            chosen: options of the formats that were set.
+
+        Raises:
+            SettingError: an option does not belong to the formats.
+            OsimliteError: the file cannot be read, or the results cannot be written.
+        """
+        importer = list_importers().get(self.source)
+        exporter = next((each for each in EXPORTERS if each.name == self.target), None)
+        used = [each for each in (importer, exporter) if each is not None]
+        known = {choice.name for each in used for choice in each.choices}
+        for name in chosen:
+            if name not in known:
+                raise SettingError(
+                    f"--{name.replace('_', '-')} is no option of a conversion from '{self.source}' to '{self.target}'"
+                )
+        if motion is not None and (exporter is None or not exporter.takes_motion):
+            raise SettingError(f"the format '{self.target}' has no motion; leave out --motion")
+        values = {
+            each.name: {
+                choice.name: chosen[choice.name] for choice in each.choices if choice.name in chosen
+            }
+            for each in used
+        }
+        if importer is None:
+            assert exporter is not None
+            from osimlite.io.document.reader import read
+
+            result = self._export(
+                read(self.file), exporter, motion, geometry, values[exporter.name]
+            )
+        else:
+            imported = importer.read(self.file, name=self.name, **values[importer.name])
+            if exporter is None:
+                files = imported.write(self.folder)
+                result = Conversion(files, imported.fidelity, dict(imported.summary))
+            else:
+                model: Model = imported.model  # type: ignore[attr-defined]
+                result = self._export(model, exporter, motion, geometry, values[exporter.name])
+                # Losses of the first step are losses of the result, too.
+                result.fidelity.records[:0] = imported.fidelity.records
+                result.summary.update(imported.summary)
+        same, changed, dropped = result.fidelity.counts()
+        summary = {
+            "source": self.file.name,
+            "from": self.source,
+            "to": self.target,
+            "files": [_get_relative(path, self.folder) for path in result.files],
+            "parts": {"exact": same, "approximated": changed, "left_out": dropped},
+            **result.summary,
+        }
+        fidelity = write_into(self.folder, FIDELITY_FILE, result.fidelity.to_json())
+        written = write_into(self.folder, SUMMARY_FILE, format_json(summary))
+        files = [*(path for path in result.files if path.name != FIDELITY_FILE), fidelity, written]
+        return Conversion(files, result.fidelity, summary)
+
+    def _export(
+        self,
+        model: Model,
+        exporter: Exporter,
+        motion: Path | None,
+        geometry: Sequence[Path] | None,
+        choices: Mapping[str, Any],
+    ) -> Conversion:
+        """Write a model in the format of an exporter."""
+        folders = options.mesh_folders(self.file, geometry)
+        if exporter.command == "translate":
+            moved = {"motion": motion} if exporter.takes_motion else {}
+            made = exporter.write(
+                model, folder=self.file.parent, name=self.name, geometry=folders, **moved, **choices
+            )
+            return Conversion(made.write(self.folder), made.fidelity)
+        from osimlite.schema.forces import Force
+        from osimlite.schema.frames import Body
+        from osimlite.translate.fidelity import LEFT_OUT, Fidelity
+        from osimlite.view.incomplete import build_showable
+        from osimlite.view.shown import Shown
+
+        model, mechanism, left_out = build_showable(model)
+        shown = Shown.of(
+            model, mechanism, folders, file=self.file, motion=motion, left_out=left_out
+        )
+        fidelity = Fidelity(mechanism.name, exporter.name)
+        for path in (component.path for component in model.components(Body)):
+            fidelity.translated[path] = "node"
+        for force in model.components(Force):
+            fidelity.add(
+                "force",
+                force.path,
+                "what a force does",
+                f"{LEFT_OUT}; its path is drawn if it has one",
+            )
+        for remark in shown.remarks:
+            fidelity.add("view", "/", remark, LEFT_OUT)
+        path = make_folder(self.folder) / f"{self.name}{exporter.suffix}"
+        defaults = {choice.name: choice.default for choice in exporter.choices}
+        exporter.write(shown, path, **{**defaults, **choices})
+        return Conversion([path], fidelity)
+
+
+def _find_target(output: Path, source: str) -> str | None:
+    """Return the name of the format that the suffix of an output file means; None for a folder."""
+    suffix = output.suffix.lower()
+    if suffix == ".osim":
+        return OSIM
+    for exporter in EXPORTERS:
+        if exporter.suffix and suffix == exporter.suffix.lower() and exporter.name != source:
+            return exporter.name
+    return None
+
+
+def _get_suffix(target: str) -> str:
+    """Return the suffix of the main file of a format, in lower case; "" for a folder."""
+    if target == OSIM:
+        return ".osim"
+    return next((each.suffix.lower() for each in EXPORTERS if each.name == target), "")
+
+
+def _get_relative(path: Path, folder: Path) -> str:
+    """Return a path relative to a folder, or its name if it is elsewhere."""
+    return path.relative_to(folder).as_posix() if path.is_relative_to(folder) else path.name
+
+
+def report(request: Request, result: Conversion) -> None:
+    """Print what was lost, and which files were written."""
+    if len(result.fidelity):
+        plain_console().print(tabulate(result.fidelity, request.target))
+    same, changed, dropped = result.fidelity.counts()
+    say(f"parts: {same} exact, {changed} approximated or converted, {dropped} left out")
+    say("wrote " + join_words([str(path) for path in result.files], most=4))
+
+
+def print_formats() -> None:
+    """Print all formats, with suffix, direction and contents."""
+    table = plain_table()
+    for heading in ("format", "suffix", "", "carries"):
+        table.add_column(heading, overflow="fold")
+    add_row(
+        table,
+        OSIM,
+        ".osim",
+        "in, out",
+        "everything of OpenSim 4.6, and of older files after an upgrade",
+    )
+    exporters = {exporter.name: exporter for exporter in EXPORTERS}
+    importers = list_importers()
+    for name, importer in importers.items():
+        direction = "in, out" if name in exporters else f"in, to {importer.target}"
+        add_row(
+            table,
+            name,
+            " ".join(importer.suffixes),
+            direction,
+            f"{importer.title}: {importer.carries}",
+        )
+    for name, exporter in exporters.items():
+        if name not in importers:
+            title = exporter.title or name.upper()
+            add_row(table, name, exporter.suffix, "out", f"{title}: {exporter.carries}")
+    plain_console().print(table)

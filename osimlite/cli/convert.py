@@ -1,0 +1,90 @@
+"""``osimlite convert``: files of one program as files of another, with a record of what is lost."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from osimlite.cli import _options as options
+from osimlite.cli._command import Argument, Option, command_with
+from osimlite.translate.exporters import EXPORTERS
+from osimlite.translate.importers import IMPORTERS
+
+if TYPE_CHECKING:
+    from osimlite.base.options import OptionSpec
+
+
+def _list_choices() -> Iterator[OptionSpec]:
+    """Yield the options of all formats."""
+    for each in (*IMPORTERS, *EXPORTERS):
+        yield from each.choices
+
+
+@command_with(_list_choices)
+def convert(
+    file: Annotated[
+        Path | None,
+        Argument(metavar="IN", help="The file to convert.", show_default=False),
+    ] = None,
+    output: Annotated[
+        Path | None,
+        Option(
+            "-o",
+            "--output",
+            metavar="OUT",
+            help="File to write, whose suffix decides the format, or a folder.",
+            show_default="a folder named after the file",
+        ),
+    ] = None,
+    source: Annotated[
+        str | None,
+        Option(
+            "--from",
+            metavar="FORMAT",
+            help="Format of the file.",
+            show_default="by its suffix and content",
+        ),
+    ] = None,
+    target: Annotated[
+        str | None,
+        Option(
+            "--to",
+            metavar="FORMAT",
+            help="Format to write.",
+            show_default="by the suffix of OUT, else OpenSim's",
+        ),
+    ] = None,
+    motion: Annotated[
+        Path | None,
+        Option(
+            "--motion",
+            metavar="FILE",
+            help="Coordinates over time (.sto, .mot), for formats with motions.",
+            show_default=False,
+        ),
+    ] = None,
+    geometry: options.Geometry = None,
+    formats: Annotated[
+        bool, Option("--formats", help="List all formats and what each carries.")
+    ] = False,
+    **chosen: Any,
+) -> None:
+    """Convert a file: AddBiomechanics, MuJoCo, URDF, glTF and other formats from and to OpenSim's.
+
+    Writes the converted files, fidelity.json, which lists what was translated, approximated or left
+    out, and summary.json. --formats lists what can be read and written, and what each format carries.
+
+    Example: osimlite convert gait.osim -o robot/gait.urdf
+    """
+    from osimlite.cli import _converting as converting
+    from osimlite.errors import SettingError
+
+    if formats:
+        converting.print_formats()
+        return
+    if file is None:
+        raise SettingError("name a file to convert; --formats lists the formats")
+    given = {name: value for name, value in chosen.items() if value is not None}
+    request = converting.Request.create(file, output, source, target)
+    converting.report(request, request.carry_out(motion, geometry, given))

@@ -1,0 +1,98 @@
+"""Formats of other programs that are converted into files of OpenSim.
+
+An importer is one entry of `IMPORTERS`: ``osimlite convert``, its help, its messages and its list of
+formats follow from it. Each function imports what it works with itself, because the entries are also
+read to list the formats.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol
+
+from osimlite.base.options import OptionSpec
+from osimlite.base.reading import read_at_most
+from osimlite.base.records import dataclass
+
+if TYPE_CHECKING:
+    from osimlite.translate.fidelity import Fidelity
+
+BEGINNING_BYTES = 4096
+"""Number of bytes at the beginning of a file that decide between formats with the same suffix."""
+
+OSIM = "osim"
+"""Name of OpenSim's model format."""
+
+PROJECT = "project"
+"""Name of the target that is a folder with models, data and setup files of OpenSim."""
+
+
+class Imported(Protocol):
+    """Result of an importer.
+
+    An importer of models also has an attribute `model`, so that the model can be written in any
+    format of the exporters.
+    """
+
+    @property
+    def fidelity(self) -> Fidelity:
+        """Record of everything that was translated, approximated or left out."""
+
+    @property
+    def summary(self) -> Mapping[str, object]:
+        """Facts for ``summary.json``; values are plain data."""
+
+    def write(self, folder: str | Path) -> list[Path]:
+        """Write the result into a folder, which is made if it does not exist; the main file is the first."""
+
+
+@dataclass(frozen=True)
+class Importer:
+    """Declaration of a format that is read.
+
+    The function takes the path of a file, the keyword argument `name`, which names the main file
+    that is written (without suffix), and the options of the format. It returns an
+    :class:`Imported`.
+    """
+
+    name: str  # of the format in `osimlite convert --from`
+    title: str  # name of the format in words
+    suffixes: tuple[str, ...]  # in lower case
+    target: str  # OSIM or PROJECT
+    carries: str  # what is carried over
+    read: Callable[..., Imported]
+    # Texts of which one occurs in the first BEGINNING_BYTES; empty if the suffix is enough.
+    marks: tuple[bytes, ...] = ()
+    choices: tuple[OptionSpec, ...] = ()
+
+
+IMPORTERS: list[Importer] = []
+"""All formats that are read, besides OpenSim's own; the order is that of the list of formats."""
+
+
+def list_importers() -> dict[str, Importer]:
+    """Return the importers by name."""
+    return {importer.name: importer for importer in IMPORTERS}
+
+
+def find_format(path: Path) -> str | None:
+    """Return the name of a file's format, by its suffix and its beginning; None if it is unknown.
+
+    Raises:
+        MissingFileError: the file does not exist or cannot be read.
+    """
+    suffix = path.suffix.lower()
+    beginning = read_at_most(path, BEGINNING_BYTES)
+    for importer in IMPORTERS:
+        if suffix in importer.suffixes and _has_mark(beginning, importer.marks):
+            return importer.name
+    if suffix == ".osim" or _has_mark(beginning, (b"<OpenSimDocument",)):
+        return OSIM
+    return None
+
+
+def _has_mark(beginning: bytes, marks: Iterable[bytes]) -> bool:
+    """Return whether a beginning has one of some texts; True if there are none."""
+    marks = tuple(marks)
+    return not marks or any(mark in beginning for mark in marks)

@@ -1,0 +1,127 @@
+"""``convert``: formats are found by suffix and content, and every conversion has a record."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import osimlite
+from osimlite.cli import main
+from osimlite.models.dynamic_walker import dynamic_walker
+from osimlite.translate import importers
+from osimlite.translate.fidelity import Fidelity
+from osimlite.translate.importers import Importer
+from tests.cli.command import run
+
+
+@pytest.fixture
+def walker(tmp_path: Path) -> Path:
+    osimlite.write(dynamic_walker(), tmp_path / "walker.osim")
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("words", "main_file", "target"),
+    [
+        (("-o", "robot/w.urdf"), "robot/w.urdf", "urdf"),
+        (("-o", "robot/w.xml"), "robot/w.xml", "mjcf"),
+        (("-o", "robot", "--to", "urdf"), "robot/walker.urdf", "urdf"),
+        (("--to", "mjcf"), "walker/walker.xml", "mjcf"),
+        (("-o", "robot/w.glb"), "robot/w.glb", "glb"),
+    ],
+)
+def test_the_format_follows_from_the_names(
+    walker: Path, words: tuple[str, ...], main_file: str, target: str
+) -> None:
+    code, out, _ = run("convert", "walker.osim", *words, folder=walker)
+    folder = (walker / main_file).parent
+    summary = json.loads((folder / "summary.json").read_text())
+    fidelity = json.loads((folder / "fidelity.json").read_text())
+    assert code == 0 and (walker / main_file).exists() and main_file in out
+    assert (summary["from"], summary["to"]) == ("osim", target)
+    assert summary["files"][0] == Path(main_file).name
+    assert fidelity["target"].startswith(target)
+    assert summary["parts"]["left_out"] == len(
+        {each["component"] for each in fidelity["records"] if each["how"] == "dropped"}
+    )
+
+
+def test_formats_are_listed() -> None:
+    code, out, _ = run("convert", "--formats")
+    assert code == 0
+    assert all(name in out for name in ("osim", "urdf", "mjcf", "glb", *importers.list_importers()))
+    assert max(map(len, out.splitlines())) <= 80
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ((), "name a file to convert"),
+        (("walker.osim",), "name a file with -o"),
+        (("walker.osim", "-o", "out"), "name a file with -o"),
+        (("walker.osim", "--to", "urdv"), "unknown format 'urdv'; did you mean 'urdf'?"),
+        (("walker.osim", "--from", "x"), "--from: unknown format 'x'"),
+        (("notes.txt",), "the format of 'notes.txt' is unknown; name it with --from"),
+        (("gone.b3d",), "no such file"),
+        (("walker.osim", "-o", "new.osim"), "'osimlite upgrade'"),
+        (("walker.osim", "--to", "project"), "cannot be written as 'project'"),
+        (("walker.osim", "--to", "mjcf", "--merge"), "--merge is no option of a conversion"),
+        (("walker.osim", "--to", "urdf", "--motion", "m.mot"), "has no motion"),
+    ],
+)
+def test_what_cannot_be_converted_is_said_in_one_line(
+    walker: Path, words: tuple[str, ...], message: str
+) -> None:
+    (walker / "notes.txt").write_text("nothing")
+    code, out, error = run("convert", *words, folder=walker)
+    assert code == 2 and out == "" and len(error.splitlines()) == 1 and message in error
+
+
+class Names:
+    """Import of a list of names of bodies."""
+
+    def __init__(self, path: Path, name: str) -> None:
+        self.model: Any = osimlite.Model(name=name)
+        for body in path.read_text().split():
+            self.model.add(osimlite.Body(name=body, mass=1.0, inertia=(1.0,) * 3 + (0.0,) * 3))
+        self.fidelity, self.summary = Fidelity(name, "osim"), {"bodies": 2}
+        self.fidelity.add("list", "/a", "a joint", "left out")
+
+    def write(self, folder: str | Path) -> list[Path]:
+        path = Path(folder, f"{self.model.name}.osim")
+        path.parent.mkdir(exist_ok=True)
+        osimlite.write(self.model, path)
+        return [path]
+
+
+def test_a_new_importer_is_one_entry(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    entry = Importer(
+        "names", "list of names", (".lst",), "osim", "bodies", lambda path, name: Names(path, name)
+    )
+    monkeypatch.setattr(importers, "IMPORTERS", [entry])
+    monkeypatch.setattr("osimlite.cli.convert.IMPORTERS", [entry])
+    monkeypatch.chdir(tmp_path)
+    Path("two.lst").write_text("a b")
+    for words in (("-o", "x/some.osim"), ("-o", "y/some.urdf")):
+        with pytest.raises(SystemExit) as done:
+            main(["convert", "two.lst", *words])
+        assert not done.value.code, capsys.readouterr().err
+    assert len(osimlite.read("x/some.osim").body_set.objects) == 2
+    # What the first of two steps loses is lost in the result.
+    for folder in "xy":
+        records = json.loads(Path(folder, "fidelity.json").read_text())["records"]
+        assert records[0]["kind"] == "list"
+        assert json.loads(Path(folder, "summary.json").read_text())["bodies"] == 2
+
+
+def test_formats_are_listed_without_what_reads_them() -> None:
+    code = "import sys; from osimlite.translate.importers import list_importers; list_importers(); print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert not set(done.stdout.split()) & {"numpy", "lxml", "pydantic", "mujoco"}
