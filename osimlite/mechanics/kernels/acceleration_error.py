@@ -24,7 +24,19 @@ TURNS = 3
 def place_drift(
     model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, operation: int
 ) -> int:
-    """Pass the frame in SCRATCH on unchanged, since a drift does not move its link."""
+    """Pass the frame in SCRATCH on unchanged, since a drift does not move its link.
+
+    Args:
+        model: integers of the model.
+        reals: numbers of the model.
+        data: results; SCRATCH holds a frame.
+        y: state.
+        f: rates of the coordinates.
+        operation: number of the operation.
+
+    Returns:
+        `OUTCOME.OK`.
+    """
     kept, frame = operation_work(model, data, operation), at(data, WORK.SCRATCH)
     copy_numbers(12, frame, kept)
     return OUTCOME.OK
@@ -37,6 +49,18 @@ def move_drift(
 
     The components of the error along the axes of the joint are stored as amount, rate and curvature of
     the operation.
+
+    Args:
+        model: integers of the model.
+        reals: numbers of the model.
+        data: results; SCRATCH holds the origin of the spatial vectors and is filled with the
+            motion.
+        y: state.
+        f: rates of the coordinates.
+        operation: number of the operation.
+
+    Returns:
+        `OUTCOME.OK`.
     """
     own = at(model, operation_ints(model, operation)[OPERATION.ARGUMENTS])
     kept, result, u = (
@@ -45,11 +69,15 @@ def move_drift(
         at(y, model[MODEL.DOFS]),
     )
     arm, total = minus(vector(kept, OPERATION_WORK.POINT), vector(result, 0)), ZERO
+    # The first axis is fixed in the parent, so that only the second and third rotation have an
+    # error.
     for row in range(1, 3):
         last = own[TURNS + row]
         if last < 0:
             continue
-        # Simbody rotates the axis of this angle by wrong rates of the angles before it.
+        # Simbody rotates the axis of this angle by wrong rates of the angles before it: it takes the
+        # rates of all rotations by the coordinates before the row; the true rates are those of the
+        # rotations before the axis.
         drift = ZERO
         for turn in range(3):
             number = own[TURNS + turn]
@@ -68,14 +96,23 @@ def move_drift(
         axis = vector(operation_work(model, data, last), OPERATION_WORK.AXIS)
         total = add_scaled(total, -operation_rate(model, data, u, last), cross(axis, drift))
     kept[OPERATION_WORK.AMOUNT], kept[OPERATION_WORK.RATE], kept[OPERATION_WORK.CURVATURE] = total
+    # Traversed from child to parent, the same error has the opposite sign.
     total = times(float(own[SIGN]), total)
     set_spatial_vector(result, ZERO, ZERO)
+    # As a spatial acceleration about the common origin.
     set_spatial_vector(at(result, 6), cross(arm, total), total)
     return OUTCOME.OK
 
 
 def operation_rate(model: Ints, data: Floats, u: Floats, operation: int) -> float:
-    """Return the rate of the amount of an operation."""
+    """Return the rate of the amount of an operation.
+
+    Args:
+        model: integers of the model.
+        data: results of an evaluation.
+        u: generalized speeds.
+        operation: number of the operation.
+    """
     freedom = operation_ints(model, operation)[OPERATION.DOF]
     return (
         u[freedom] if freedom >= 0 else operation_work(model, data, operation)[OPERATION_WORK.RATE]
@@ -83,10 +120,19 @@ def operation_rate(model: Ints, data: Floats, u: Floats, operation: int) -> floa
 
 
 def operation_gradient(model: Ints, data: Floats, operation: int, freedom: int) -> float:
-    """Return the derivative of the amount of an operation by a degree of freedom."""
+    """Return the derivative of the amount of an operation by a degree of freedom.
+
+    Args:
+        model: integers of the model.
+        data: results of an evaluation.
+        operation: number of the operation.
+        freedom: degree of freedom.
+    """
     j, total = operation_ints(model, operation), 0.0
     if j[OPERATION.DOF] >= 0:
+        # An operation that is a coordinate itself has derivative 1 by it.
         return 1.0 if j[OPERATION.DOF] == freedom else 0.0
+    # A coordinate may occur several times among the arguments.
     for k in range(j[OPERATION.ARGUMENT_COUNT]):
         if model[j[OPERATION.ARGUMENTS] + k] == freedom:
             total += data[j[OPERATION.GRADIENT] + k]

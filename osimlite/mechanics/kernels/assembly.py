@@ -1,10 +1,11 @@
-"""Assembly of poses: the pose nearest to a given one that fulfils the constraints, for many poses in one call.
+"""Assembly of poses: the pose nearest to a target that fulfils the constraints, for many poses.
 
 The search is that of :mod:`osimlite.mechanics.multibody.assembly`: a projection onto the
 constraints by Newton's method, then minimisation of half the sum of squared changes of the
 coordinates along the constraints (J. Nocedal, S. Wright, Numerical Optimization, 2006, chapter
-15.3). The step is that of Newton's method without the curvature of the constraints while that
-converges quickly, else with it.
+15.3). With Z, an orthonormal basis of the null space of the linearized equations, g, the gradient,
+and H, the Hessian, the step is Z p with Zᵀ H Z p = -Zᵀ g. H lacks the curvature of the constraints
+while the search converges quickly, and contains it otherwise.
 """
 
 from __future__ import annotations
@@ -28,8 +29,8 @@ from osimlite.mechanics.kernels.linear_algebra import (
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at, call, copy_numbers, is_finite
 from osimlite.mechanics.kernels.projection import collect_position_errors, write_position_jacobian
 
-# Integers: the head; three arrays (n,) about the degrees of freedom; workspace for a list of free ones
-# (n,); per coupler the dependent degree of freedom and the number of its equation.
+# Integers: the head; three arrays (n,) about the degrees of freedom; workspace for a list of free
+# ones (n,); per coupler the dependent degree of freedom and the number of its equation.
 MOVES_LINKS = 0
 """Offset of 1 if the equations need positions of links, 0 if they need coordinates only."""
 COUPLERS = 1
@@ -77,7 +78,10 @@ EXACT = 1e-15
 SHORTEST_STEP = 1e-13
 """A step shorter than this part of the largest coordinate, or of 1, ends the search."""
 TINY_STEP = 1e-6
-"""Below this length (m or rad) rounding hides whether a step leads down; it is taken as long as steps shrink."""
+"""Length (m or rad) below which rounding hides whether a step decreases the cost.
+
+Such a step is taken as long as steps shrink.
+"""
 FAST = 0.1
 """Steps that shrink by less than this factor need the curvature of the constraints."""
 DIFFERENCE = 1e-6
@@ -89,20 +93,33 @@ SAFE = 1e-6
 
 
 class Assembly(NamedTuple):
-    """The mechanism with its work vectors, and the integers, numbers and work of the assembly."""
+    """The mechanism with its work vectors, and the integers, numbers and work of the assembly.
 
-    model: Ints
-    reals: Floats
-    data: Floats
-    y: Floats
-    f: Floats
-    p: Ints
-    c: Floats
-    w: Floats
+    Sections of the work vector w, with n degrees of freedom and m equations: values of fixed
+    coordinates (n,), step (n,), step of a projection (n,), two trial poses (n,), gradient (n,),
+    components of the step in the null space (n,), errors (m,), lengths of the equations (m,), right
+    sides or multipliers (m,), rows (m, n), the factor, unit rows (m, n), normal equations (m, m),
+    basis of the null space, Hessian, and workspace.
+    """
+
+    model: Ints  # the mechanism
+    reals: Floats  # its numbers
+    data: Floats  # workspace of an evaluation
+    y: Floats  # workspace of a state
+    f: Floats  # workspace of its rates
+    p: Ints  # integers of the assembly, see MOVES_LINKS
+    c: Floats  # numbers of the assembly, see TOLERANCE
+    w: Floats  # workspace, see `assembly_work_size`
 
 
 def assembly_work_size(count: int, size: int) -> int:
-    """Return the length of the work vector for `count` equations and `size` degrees of freedom."""
+    """Return the length of the work vector.
+
+    Args:
+        count: number of equations m.
+        size: number of degrees of freedom n.
+    """
+    # The terms follow the sections that `Assembly` lists.
     return (
         7 * size
         + 3 * count
@@ -133,6 +150,7 @@ def assemble_poses(
         count: number of poses.
     """
     a, size = Assembly(model, reals, data, y, f, p, c, w), model[MODEL.DOFS]
+    # Speeds stay 0: only positions are evaluated, and laws must not see old speeds.
     for k in range(2 * size):
         y[k] = f[k] = 0.0
     for number in range(count):
@@ -145,6 +163,11 @@ def assemble_poses(
 def assemble_pose(a: Assembly, target: Floats, q: Floats) -> bool:
     """Fill q with the nearest pose in which clamped coordinates are in their ranges.
 
+    Args:
+        a: the assembly.
+        target: desired values of the coordinates (n,).
+        q: filled with the pose (n,).
+
     Returns:
         Whether there is one.
     """
@@ -152,6 +175,7 @@ def assemble_pose(a: Assembly, target: Floats, q: Floats) -> bool:
     clamped, fixed = at(status, CLAMPED * size), a.w
     for k in range(size):
         fixed[k] = target[k]
+        # A coordinate that an earlier pose left at the end of its range is free again.
         if status[k] == HELD_AT_END:
             status[k] = FREED
     while True:
@@ -172,7 +196,16 @@ def assemble_pose(a: Assembly, target: Floats, q: Floats) -> bool:
 
 
 def find_nearest(a: Assembly, target: Floats, q: Floats) -> bool:
-    """Fill q with the nearest pose, whatever the ranges; return whether there is one."""
+    """Fill q with the nearest pose, whatever the ranges.
+
+    Args:
+        a: the assembly; its work vector begins with the values of fixed coordinates.
+        target: desired values of the coordinates (n,).
+        q: filled with the pose (n,).
+
+    Returns:
+        Whether there is one.
+    """
     size, tolerance = a.model[MODEL.DOFS], a.c[TOLERANCE]
     copy_numbers(size, a.w, q)
     list_freed(a)
@@ -180,6 +213,8 @@ def find_nearest(a: Assembly, target: Floats, q: Floats) -> bool:
     largest = evaluate_equations(a, q)
     # OpenSim leaves an assembled pose unchanged; its integrator projects it onto the constraints.
     is_assembled = largest <= tolerance
+    # Couplers that are followed first leave fewer errors to the projection, and no wrong branch of
+    # it.
     if not is_assembled:
         follow_couplers(a, q)
     if not restore_pose(a, q, is_assembled):
@@ -190,10 +225,13 @@ def find_nearest(a: Assembly, target: Floats, q: Floats) -> bool:
     before, has_curvature, step = inf, False, at(a.w, size)
     for _ in range(MAX_STEPS):
         value = measure_change(a, target, q)
+        # Squares of changes below the tolerance do not count as motion.
         if value < tolerance * tolerance:
             # No coordinate that counts has moved.
             return True
         length = find_step(a, target, q, has_curvature)
+        # Curvature costs 2 evaluations per free direction, so it is used only where convergence is
+        # slow.
         if not has_curvature and length > FAST * before:
             has_curvature = True
             length = find_step(a, target, q, has_curvature)
@@ -202,6 +240,8 @@ def find_nearest(a: Assembly, target: Floats, q: Floats) -> bool:
             furthest = max(furthest, 1.0 + abs(q[k]))
         if length < SHORTEST_STEP * furthest:
             return True
+        # Within rounding the cost cannot be compared; a step that is at most half as long as the
+        # last one is taken as progress.
         is_tiny, part = length < TINY_STEP and length <= 0.5 * before, 1.0
         while True:
             for k in range(size):
@@ -211,10 +251,12 @@ def find_nearest(a: Assembly, target: Floats, q: Floats) -> bool:
             if is_tiny or measure_change(a, target, trial) < value:
                 break
             part *= 0.5
+            # A thousandth of the step that still does not decrease the cost means that the
+            # direction is poor.
             if part < 1e-3:
                 break
         if part < 1e-3:
-            # The step does not decrease the cost: rounding, or the missing curvature of the constraints.
+            # The step does not decrease the cost: rounding, or missing curvature of the constraints.
             if has_curvature:
                 return True
             has_curvature, before = True, inf
@@ -236,7 +278,13 @@ def list_freed(a: Assembly) -> int:
 
 
 def measure_change(a: Assembly, target: Floats, q: Floats) -> float:
-    """Return half the sum of the squared changes that count."""
+    """Return half the sum of the squared changes that count.
+
+    Args:
+        a: the assembly.
+        target: desired values of the coordinates (n,).
+        q: present values (n,).
+    """
     size, total = a.model[MODEL.DOFS], 0.0
     counted = at(a.p, ASSEMBLY_HEAD + COUNTED * size)
     for k in range(size):
@@ -248,11 +296,16 @@ def measure_change(a: Assembly, target: Floats, q: Floats) -> float:
 def evaluate_equations(a: Assembly, q: Floats) -> float:
     """Evaluate errors and rows of the equations of a pose.
 
+    Args:
+        a: the assembly; its work vector is filled with errors and rows.
+        q: pose (n,).
+
     Returns:
         The largest error, infinite if undefined.
     """
     model, size = a.model, a.model[MODEL.DOFS]
     copy_numbers(size, q, a.y)
+    # Equations between coordinates only do not need the links, whose evaluation costs most.
     if a.p[MOVES_LINKS] > 0:
         call(model[MODEL.LAWS], model, a.reals, a.data, a.y, a.f, STAGE.VELOCITY)
     evaluate_constraints(model, a.reals, a.data, a.y, a.f)
@@ -283,13 +336,19 @@ def equation_factor(a: Assembly) -> Floats:
 
 
 def follow_couplers(a: Assembly, q: Floats) -> None:
-    """Move dependent coordinates that do not count to the values that their couplers give."""
+    """Move dependent coordinates that do not count to the values that their couplers give.
+
+    Args:
+        a: the assembly.
+        q: pose (n,); changed.
+    """
     size, status = a.model[MODEL.DOFS], at(a.p, ASSEMBLY_HEAD)
     counted, couplers = at(status, COUNTED * size), at(status, COUPLER_AT * size)
     start = a.model[MODEL.CONSTRAINED]
     for k in range(a.p[COUPLERS]):
         dependent = couplers[2 * k]
         if status[dependent] == FREED and counted[dependent] == 0:
+            # Evaluate again for each coupler, because its argument may depend on one before.
             evaluate_equations(a, q)
             # The error of a coupler is its function less the coordinate.
             q[dependent] += a.data[a.model[start + CONSTRAINED.WORK_ERRORS] + couplers[2 * k + 1]]
@@ -297,6 +356,13 @@ def follow_couplers(a: Assembly, q: Floats) -> None:
 
 def factorise_rows(a: Assembly, free: int, is_eased: bool) -> int:
     """Factorise the equations of the free coordinates, each with a left side of unit length.
+
+    Unit lengths make the threshold of independence the same for metres and radians.
+
+    Args:
+        a: the assembly, whose rows are known.
+        free: number of free degrees of freedom.
+        is_eased: whether coordinates that do not count move more easily, by EASE.
 
     Returns:
         Their rank.
@@ -315,6 +381,8 @@ def factorise_rows(a: Assembly, free: int, is_eased: bool) -> int:
             total += entry * entry
         lengths[i] = sqrt(total)
         longest = max(longest, lengths[i])
+    # An equation that hardly depends on the free coordinates is not enlarged to one of rounding
+    # errors.
     for i in range(count):
         if lengths[i] <= ROUNDING * longest:
             lengths[i] = longest
@@ -326,6 +394,12 @@ def factorise_rows(a: Assembly, free: int, is_eased: bool) -> int:
 def restore_pose(a: Assembly, q: Floats, is_assembled: bool) -> bool:
     """Move q to where the equations hold, by Newton's method with the shortest steps.
 
+    Args:
+        a: the assembly.
+        q: pose (n,); changed.
+        is_assembled: whether the pose fulfils the equations within the tolerance already; then all
+            coordinates move alike.
+
     Returns:
         Whether they do.
     """
@@ -336,6 +410,7 @@ def restore_pose(a: Assembly, q: Floats, is_assembled: bool) -> bool:
     lengths, values = at(errors, count), at(errors, 2 * count)
     free, largest = list_freed(a), evaluate_equations(a, q)
     for _ in range(MAX_STEPS):
+        # The first condition is false for infinite and undefined errors.
         if not largest < inf or largest <= EXACT:
             break
         rank = factorise_rows(a, free, not is_assembled)
@@ -344,6 +419,7 @@ def restore_pose(a: Assembly, q: Floats, is_assembled: bool) -> bool:
         solve_minimum_norm(count, free, factor, rank, values, work, step)
         furthest = LONGEST_STEP
         for k in range(free):
+            # The unknown of an eased coordinate is its change over EASE.
             if not is_assembled and counted[free_list[k]] == 0:
                 step[k] *= EASE
             furthest = max(furthest, abs(step[k]))
@@ -352,6 +428,7 @@ def restore_pose(a: Assembly, q: Floats, is_assembled: bool) -> bool:
         for k in range(free):
             trial[free_list[k]] += LONGEST_STEP / furthest * step[k]
         new = evaluate_equations(a, trial)
+        # Within the tolerance, go on only while errors at least halve; then rounding is reached.
         if largest <= tolerance and not new < 0.5 * largest:
             break
         largest = new
@@ -383,6 +460,8 @@ def find_step(a: Assembly, target: Floats, q: Floats, has_curvature: bool) -> fl
     rank = factorise_rows(a, free, False)
     left = free - rank
     curvature, spare = at(along, size * size), at(along, 2 * size * size)
+    # The cost is half the sum of squares, so that its Hessian is the identity for the coordinates
+    # that count.
     for k in range(free):
         gradient[k] = q[free_list[k]] - target[free_list[k]] if counted[free_list[k]] > 0 else 0.0
     write_null_space(free, factor, rank, along)
@@ -396,6 +475,7 @@ def find_step(a: Assembly, target: Floats, q: Floats, has_curvature: bool) -> fl
     if has_curvature:
         add_curvature(a, q, free, left, along, curvature)
     # The negative gradient in the null space, replaced by the solution of the linear system.
+    # `lengths` are the components p of the step along the basis.
     lengths = at(a.w, 6 * size)
     for k in range(left):
         lengths[k] = 0.0
@@ -403,6 +483,7 @@ def find_step(a: Assembly, target: Floats, q: Floats, has_curvature: bool) -> fl
             lengths[k] -= along[free * k + j] * gradient[j]
     copy_numbers(left * left, curvature, spare)
     is_convex = factorise_cholesky(left, spare, 0.0)
+    # A pivot that is too small hides a direction without curvature, which `step_downhill` handles.
     for k in range(left):
         is_convex = is_convex and spare[left * k + k] * spare[left * k + k] > SAFE
     if is_convex:
@@ -424,7 +505,19 @@ def find_step(a: Assembly, target: Floats, q: Floats, has_curvature: bool) -> fl
 def add_curvature(
     a: Assembly, q: Floats, free: int, left: int, along: Floats, curvature: Floats
 ) -> None:
-    """Add the second derivatives of the equations times their multipliers, by central differences."""
+    """Add the second derivatives of the equations times their multipliers to the Hessian.
+
+    The multipliers are the least-squares solution of Gᵀ λ = -g with the unit rows G; the
+    derivatives are central differences of the rows along the basis of the null space.
+
+    Args:
+        a: the assembly, whose rows and gradient are known.
+        q: present values (n,).
+        free: number of free degrees of freedom.
+        left: dimension of the null space.
+        along: basis of the null space, by rows (left, free).
+        curvature: reduced Hessian (left, left); changed.
+    """
     size, count = a.model[MODEL.DOFS], count_equations(a)
     factor, gradient = equation_factor(a), at(a.w, 5 * size)
     rows, lengths, multipliers = (
@@ -442,6 +535,7 @@ def add_curvature(
             multipliers[i] -= unit[free * i + k] * gradient[k]
     for i in range(count):
         for j in range(count):
+            # The small diagonal keeps the normal equations regular where constraints are redundant.
             total = 1e-12 if i == j else 0.0
             for k in range(free):
                 total += unit[free * i + k] * unit[free * j + k]
@@ -449,6 +543,7 @@ def add_curvature(
     if not factorise_cholesky(count, normal, 0.0):
         return
     solve_cholesky(count, normal, multipliers)
+    # Multipliers of the equations themselves, which were scaled to unit length.
     for i in range(count):
         multipliers[i] /= lengths[i]
     for k in range(left):
@@ -487,6 +582,7 @@ def step_downhill(count: int, curvature: Floats, vectors: Floats, work: Floats, 
         total, value = 0.0, abs(curvature[count * k + k])
         for j in range(count):
             total += vectors[count * k + j] * x[j]
+        # The absolute value turns a direction of negative curvature downhill.
         work[k] = 0.0 if value < FLAT else total / value
     for j in range(count):
         x[j] = 0.0

@@ -52,7 +52,19 @@ from osimlite.mechanics.laws.vectors import (
 def place_ball(
     model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, operation: int
 ) -> int:
-    """Advance the frame in SCRATCH by the rotation and translation of a ball or ellipsoid joint."""
+    """Advance the frame in SCRATCH by the rotation and translation of a ball or ellipsoid joint.
+
+    Args:
+        model: integers of the model.
+        reals: numbers of the model.
+        data: results; SCRATCH holds the frame before the joint and is filled with that behind it.
+        y: state.
+        f: rates of the coordinates.
+        operation: number of the operation.
+
+    Returns:
+        `OUTCOME.OK`.
+    """
     j = operation_ints(model, operation)
     kept, frame, radii = (
         operation_work(model, data, operation),
@@ -65,6 +77,8 @@ def place_ball(
     s3, c3 = sine_cosine(y[angles[2]])
     axes, turned_by = axes_from_rows(frame), rotation_from_xyz(s1, c1, s2, c2, s3, c3)
     end = multiply_elementwise(vector(radii, 0), turned_by[2])
+    # The frame that the speeds are about is that of the parent: before the motion, or, if the joint
+    # is traversed from its end, behind it.
     if j[OPERATION.MOTION] == MOTION.BALL:
         copy_numbers(12, frame, kept)
         set_frame(
@@ -86,6 +100,15 @@ def move_ball(
 
     Velocity and acceleration while udot = 0 of the motion itself go to SCRATCH.
 
+    Args:
+        model: integers of the model.
+        reals: numbers of the model.
+        data: results; SCRATCH holds the origin of the spatial vectors and is filled with the
+            motion.
+        y: state.
+        f: filled with the rates of the three angles.
+        operation: number of the operation.
+
     Returns:
         `OUTCOME.SINGULAR_RATES` where the second angle is a right angle, else `OUTCOME.OK`.
     """
@@ -96,6 +119,7 @@ def move_ball(
         at(reals, j[OPERATION.EXTRA]),
     )
     angles, u = at(model, j[OPERATION.ARGUMENTS]), at(y, model[MODEL.DOFS])
+    # Traversed from end to start, all velocities are opposite.
     sign = 1.0 if j[OPERATION.MOTION] == MOTION.BALL else -1.0
     n, far = third_axis(y, angles), vector(radii, 0)
     arm, spin = (
@@ -103,6 +127,8 @@ def move_ball(
         (u[angles[0]], u[angles[1]], u[angles[2]]),
     )
     turn = shift = ZERO
+    # The column of speed k: a turn about axis k of the parent, and the velocity of the end of the
+    # ellipsoid.
     for k in range(3):
         axis = replace_component(ZERO, k, 1.0)
         e = times(sign, rotate(kept, axis))
@@ -113,6 +139,7 @@ def move_ball(
     set_spatial_vector(
         at(result, 6), times(sign, rotate(kept, far_end_velocity(far, spin, cross(spin, n)))), ZERO
     )
+    # N contains 1 / cos of the second angle; near a right angle the angles have no finite rates.
     if abs(sine_cosine(y[angles[1]])[1]) < 1e-12:
         return OUTCOME.SINGULAR_RATES
     for k in range(3):
@@ -121,7 +148,16 @@ def move_ball(
 
 
 def angle_rate_row(y: Floats, angles: Ints, part: int) -> Vector:
-    """Return the row of N that gives the rate of one angle from the three speeds."""
+    """Return the row of N that gives the rate of one angle from the three speeds.
+
+    N is the matrix of body-fixed X-Y-Z angles with angular velocity along the axes of the parent;
+    its first and third row are singular where the second angle is a right angle.
+
+    Args:
+        y: state.
+        angles: degrees of freedom of the three angles.
+        part: number of the angle, 0, 1 or 2.
+    """
     s1, c1 = sine_cosine(y[angles[0]])
     s2, c2 = sine_cosine(y[angles[1]])
     if part == 1:
@@ -144,20 +180,34 @@ def angle_acceleration_bias(y: Floats, f: Floats, angles: Ints, row: Vector) -> 
     s1, c1 = sine_cosine(y[angles[0]])
     s2, c2 = sine_cosine(y[angles[1]])
     r1, r2, r3 = f[angles[0]], f[angles[1]], f[angles[2]]
+    # Components y and z of -Bdot r; the first axis is fixed in the parent.
     dy = -s1 * r1 * r2 + (s1 * s2 * r2 - c1 * c2 * r1) * r3
     dz = c1 * r1 * r2 - (s1 * c2 * r1 + c1 * s2 * r2) * r3
     return -dot(row, (c2 * r2 * r3, dy, dz))
 
 
 def third_axis(y: Floats, angles: Ints) -> Vector:
-    """Return the third axis n of the rotation of a ball, in its parent frame."""
+    """Return the third axis n of the rotation of a ball, in its parent frame.
+
+    Args:
+        y: state.
+        angles: degrees of freedom of the three angles.
+    """
     s1, c1 = sine_cosine(y[angles[0]])
     s2, c2 = sine_cosine(y[angles[1]])
     return s2, -s1 * c2, c1 * c2
 
 
 def far_end_velocity(far: Vector, turn: Vector, n: Vector) -> Vector:
-    """Return the velocity of the end r * n less that of the rotating frame: r * (e x n) - e x (r * n)."""
+    """Return the velocity of the end r * n less that of the rotating frame.
+
+    It is r * (e x n) - e x (r * n), where * is the elementwise product.
+
+    Args:
+        far: half axes r (m).
+        turn: angular velocity e in the parent (rad/s).
+        n: third axis of the rotation, or its rate for the acceleration.
+    """
     return minus(
         multiply_elementwise(far, cross(turn, n)), cross(turn, multiply_elementwise(far, n))
     )

@@ -56,6 +56,7 @@ def request_value(x: Floats, room: Floats, number: int, place: int, z: float) ->
         place: offset of the curve in `x`.
         z: argument.
     """
+    # The result of a linear end needs no search, but the lane must take part in it without harm.
     c: Any = at(x, place)
     lane = at(room, number)
     end = FIRST if not z >= c[FIRST] else LAST
@@ -74,7 +75,7 @@ def request_value(x: Floats, room: Floats, number: int, place: int, z: float) ->
 def request_sum(
     x: Floats, room: Floats, number: int, place: int, of_y: float, of_x: float, total: float
 ) -> None:
-    """Request the value of a curve where ``of_y * y + of_x * x`` has a total, see `bezier.value_of_sum`.
+    """Request the value of a curve where ``of_y * y + of_x * x`` has a total, see `bezier.solve_sum`.
 
     Args:
         x: numbers of the model.
@@ -91,12 +92,14 @@ def request_sum(
     if end > 0:
         lane[LANES * VALUE] = extrapolate_sum(c, of_y, of_x, total, end)
         lane[LANES * INSIDE] = lane[LANES * U] = 0.0
+        # total - total is 0, or NaN for an undefined total, which must show in the result.
         lane[LANES * REST], lane[LANES * OF_X] = total - total, 1.0
         for k in range(1, COEFFICIENTS):
             lane[LANES * (OF_X + k)] = 0.0
         return
     section, rest, u = find_section_of_sum(c, of_y, of_x, total)
     lane[LANES * INSIDE], lane[LANES * REST], lane[LANES * U] = 1.0, rest, u
+    # The polynomial in u that the lane solves is that of the sum instead of that of x.
     for k in range(Y - X):
         lane[LANES * (OF_X + k)] = of_y * c[section + Y + 1 + k] + of_x * c[section + X + k]
     for k in range(Y - X, COEFFICIENTS):
@@ -104,14 +107,24 @@ def request_sum(
 
 
 def request_residual(room: Any, number: int) -> float:
-    """Return the residual of a search."""
+    """Return the residual of a search.
+
+    Args:
+        room: workspace of the requests.
+        number: number of the request.
+    """
     return search_residual(
         room, LANES * OF_X + number, LANES, room[LANES * U + number], room[LANES * REST + number]
     )
 
 
 def request_result(room: Floats, number: int) -> float:
-    """Return the result of a request."""
+    """Return the result of a request.
+
+    Args:
+        room: workspace of the requests.
+        number: number of the request.
+    """
     return room[LANES * VALUE + number]
 
 
@@ -123,6 +136,7 @@ def compute_requests(room: Any, asked: int, rounds: int) -> None:
         asked: number of requests.
         rounds: number of search steps that all lanes take together; it is usually enough.
     """
+    # Separate loops over the lanes, so that each becomes vector instructions.
     for lane in range(asked):
         room[LANES * GOES_ON + lane] = 1.0
     for _ in range(rounds):
@@ -130,6 +144,7 @@ def compute_requests(room: Any, asked: int, rounds: int) -> None:
             step_lane(room, lane)
     for lane in range(asked):
         store_result(room, lane)
+    # Lanes that need more steps than most continue alone.
     for lane in range(asked):
         if room[LANES * GOES_ON + lane] > 0.0:
             u, rest = room[LANES * U + lane], room[LANES * REST + lane]
@@ -139,17 +154,28 @@ def compute_requests(room: Any, asked: int, rounds: int) -> None:
 
 
 def step_lane(room: Any, lane: int) -> None:
-    """Take a search step in one lane."""
+    """Take a search step in one lane.
+
+    Args:
+        room: workspace of the requests.
+        lane: number of the lane.
+    """
     before, is_going = room[LANES * U + lane], room[LANES * GOES_ON + lane] > 0.0
     u, goes_on = take_halley_step(
         room, LANES * OF_X + lane, LANES, before, room[LANES * REST + lane]
     )
+    # Select instead of branching, since lanes of one vector instruction do the same.
     room[LANES * U + lane] = u if is_going else before
     room[LANES * GOES_ON + lane] = 1.0 if is_going and goes_on else 0.0
 
 
 def store_result(room: Any, lane: int) -> None:
-    """Store the result of a search."""
+    """Store the result of a search.
+
+    Args:
+        room: workspace of the requests.
+        lane: number of the lane.
+    """
     value, _ = evaluate_section(room, LANES * OF_X + lane, LANES, room[LANES * U + lane])
     is_inside = room[LANES * INSIDE + lane] > 0.0
     room[LANES * VALUE + lane] = value if is_inside else room[LANES * VALUE + lane]

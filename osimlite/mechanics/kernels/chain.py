@@ -61,6 +61,8 @@ def chain_dynamics(
     status = call(h[CHAIN.SUPPLY], model, reals, data, y, f, 0)
     if status != OUTCOME.OK:
         return status
+    # Joint forces follow the values, rates and accelerations of the joints, and the matrix follows
+    # them.
     forces, shares = (
         at(data, h[CHAIN.WORK_JOINTS] + 3 * h[CHAIN.JOINTS]),
         at(data, h[CHAIN.WORK_SHARES]),
@@ -80,6 +82,7 @@ def chain_dynamics(
             * shares[product[PRODUCT.TWO]]
             * matrix[product[PRODUCT.ENTRY]]
         )
+    # The other program needs a least inertia for links without mass; take the excess away again.
     for k in range(h[CHAIN.EXCESSES]):
         excess = at(model, h[CHAIN.EXCESS_AT] + EXCESS.SIZE * k)
         subtract_inertia(
@@ -114,6 +117,8 @@ def subtract_inertia(
             at(columns, 6 * freedom),
             at(data, freedoms[DOF.SIZE * freedom + DOF.ROW]),
             freedom,
+            # Entries of a row are those of the degrees of freedom on the path to ground, the own
+            # one first.
             0,
         )
         right[freedom] += moment * (
@@ -150,6 +155,7 @@ def move_joints(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) 
             joint[JOINT.PART],
             at(data, h[CHAIN.WORK_SHARES] + joint[JOINT.FIRST_SHARE]),
         )
+        # A joint that is a coordinate, or a multiple of one, is the usual case.
         if kind == JOINT_KIND.LINE:
             factor = reals[part]
             shares[0] = factor
@@ -190,7 +196,18 @@ def move_joints(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) 
 
 
 def move_angle(angles: Ints, y: Floats, f: Floats, part: int, row: Floats) -> float:
-    """Fill the row of N of one angle of a ball; return its acceleration while udot = 0 (rad/s²)."""
+    """Fill the row of N of one angle of a ball.
+
+    Args:
+        angles: degrees of freedom of the ball.
+        y: state.
+        f: rates of the coordinates.
+        part: number of the angle, 0, 1 or 2.
+        row: filled with the derivatives by the three speeds.
+
+    Returns:
+        Acceleration of the angle while udot = 0 (rad/s²).
+    """
     store_vector(row, 0, angle_rate_row(y, angles, part))
     return angle_acceleration_bias(y, f, angles, vector(row, 0))
 

@@ -97,6 +97,7 @@ LEVERS = 4
 RIGHT_AT = 5
 """Number of matrices, after which a right side (n,) follows."""
 
+# In place of the inertia of a link, which has 10 numbers, and the first two of its wrench.
 LOAD = 12
 """Length of the load of a link: force (3,), and sum of products of positions and forces (3, 3)."""
 CENTER = 7
@@ -110,7 +111,12 @@ HEAVY = 1e6
 
 
 def condensation_size(size: int, responses: int) -> int:
-    """Return the length of the workspace for `size` speeds and `responses` forces."""
+    """Return the length of the workspace of the condensation.
+
+    Args:
+        size: number of speeds.
+        responses: number of forces.
+    """
     return RIGHT_AT * size * size + size + responses * (size + RESPONSE_WORK)
 
 
@@ -142,9 +148,11 @@ def linearise_state(
     if is_evaluated == 0.0:
         status = call(model[MODEL.LAWS], model, reals, data, y, f, STAGE.ACCELERATION)
     if status != OUTCOME.OK:
+        # Constraint rows are needed by `fill_mass_matrix`.
         return status
     if model[MODEL.CONSTRAINED] > 0:
         evaluate_constraints(model, reals, data, y, f)
+    # The mass matrix is composed again, because solving for accelerations has overwritten it.
     spatial_inertias_and_bias(model, reals, data)
     composite_rigid_body(model, data, right)
     fill_mass_matrix(model, data, work)
@@ -157,6 +165,9 @@ def linearise_state(
             at(model, model[MODEL.RESPONSE_AT] + RESPONSE.SIZE * number),
             response_record(model, work, number),
         )
+        # The kernel of a response applies 1 N to the wrenches and generalized forces, and writes
+        # derivatives to SCRATCH; what it writes to f is the change of the force by the coordinates,
+        # if it is not along its own displacement.
         clear_wrenches(model, data)
         for k in range(size):
             f[k] = right[k] = 0.0
@@ -168,6 +179,7 @@ def linearise_state(
             record[size + k] = data[WORK.SCRATCH + k]
             changes = changes or data[WORK.SCRATCH + k] != 0.0
         first, end = size, 0
+        # A force without any derivative, such as a slack spring, needs no generalized force.
         if changes:
             add_generalized_forces(model, data, right)
         for k in range(size):
@@ -181,6 +193,8 @@ def linearise_state(
                 record[size],
                 record[size + 1],
             )
+            # The derivative by the displacement acts along the generalized force per newton: a
+            # rank-one matrix.
             add_outer_product(size, 1.0, record, first, end, f, 0, size, stiffness)
             add_outer_product(
                 size, sense * by_displacement, record, first, end, record, first, end, stiffness
@@ -192,13 +206,31 @@ def linearise_state(
 
 
 def response_record(model: Ints, work: Floats, number: int) -> Floats:
-    """Return the record of a force in the workspace: its generalized force per newton, then RESPONSE_WORK."""
+    """Return the record of a force in the workspace.
+
+    It contains the generalized force per newton (n,), then RESPONSE_WORK numbers.
+
+    Args:
+        model: integers of the model.
+        work: workspace of the condensation.
+        number: number of the force.
+    """
     size = model[MODEL.DOFS]
     return at(work, RIGHT_AT * size * size + size + number * (size + RESPONSE_WORK))
 
 
 def fill_mass_matrix(model: Ints, data: Floats, mass: Floats) -> None:
-    """Fill the mass matrix (n, n), with heavy masses along the constraint equations."""
+    """Fill the mass matrix, with heavy masses along the constraint equations.
+
+    The equation G du = 0 is replaced by a mass HEAVY times the largest entry of M along each row of
+    G. Exact multipliers would need a larger system; an iteration corrects the small remaining
+    motion.
+
+    Args:
+        model: integers of the model.
+        data: results with the sparse rows of the mass matrix and the constraint equations.
+        mass: filled with the matrix (n, n).
+    """
     size, freedoms, largest = model[MODEL.DOFS], at(model, model[MODEL.DOF_AT]), 0.0
     for k in range(size * size):
         mass[k] = 0.0
@@ -206,6 +238,7 @@ def fill_mass_matrix(model: Ints, data: Floats, mass: Floats) -> None:
         j, i = at(freedoms, DOF.SIZE * k), k
         row = at(data, j[DOF.ROW])
         largest = max(largest, row[0])
+        # A sparse row stores the entries of the degrees of freedom on the path to ground.
         for m in range(j[DOF.DEPTH] + 1):
             mass[size * k + i] = mass[size * i + k] = row[m]
             i = freedoms[DOF.SIZE * i + DOF.ABOVE]
@@ -213,6 +246,7 @@ def fill_mass_matrix(model: Ints, data: Floats, mass: Floats) -> None:
         h = at(model, model[MODEL.CONSTRAINED])
         for equation in range(h[CONSTRAINED.EQUATIONS]):
             row, square = at(data, h[CONSTRAINED.WORK_ROWS] + size * equation), 0.0
+            # Divide by the squared length, so that equations in metres and radians weigh the same.
             for k in range(size):
                 square += row[k] * row[k]
             if square > 0.0:
@@ -226,6 +260,12 @@ def add_geometric_stiffness(model: Ints, reals: Floats, data: Floats, levers: Fl
     inertias of the links, which are no longer needed, are replaced by loads: the force on a link and
     its subtree, and the sum of products of positions (from the origin of the spatial vectors) and
     forces, by rows.
+
+    Args:
+        model: integers of the model.
+        reals: numbers of the model.
+        data: results of an evaluation; the inertias of the links are destroyed.
+        levers: matrix (n, n); changed.
     """
     size = model[MODEL.DOFS]
     for link in range(model[MODEL.LINKS]):
@@ -244,19 +284,28 @@ def add_geometric_stiffness(model: Ints, reals: Floats, data: Floats, levers: Fl
         contact = at(data, model[MODEL.WORK_CONTACT] + CONTACT_WORK.SIZE * pair)
         force, point = vector(contact, CONTACT_WORK.FORCE), vector(contact, CONTACT_WORK.FORCE + 3)
         one, two = i[ITEM.OWN], i[ITEM.OWN + 1]
+        # Contacts with ground only move one link; pairs of surfaces on ground have no degrees of
+        # freedom.
         if contact[CONTACT_WORK.DEPTH] > 0.0 and max(one, two) >= 0:
             center = station(model, data, two, vector(reals, i[ITEM.NUMBERS] + CENTER))
             add_load(model, data, two, point, force, minus(center, point))
             add_load(model, data, one, point, times(-1.0, force), ZERO)
+    # Inwards from the leaves: the load of a link contains those of its subtree.
     for link in range(model[MODEL.LINKS] - 1, -1, -1):
         i, here = link_ints(model, link), link_work(model, data, link)
         load, origin = at(here, LINK_WORK.INERTIA), vector(here, LINK_WORK.ORIGIN)
         for operation in range(i[LINK.FIRST_OPERATION], i[LINK.END_OPERATION]):
             j = operation_ints(model, operation)
+            # Only motions about or along one axis; those of balls and functions are omitted from J.
             if j[OPERATION.DOF] < 0 or j[OPERATION.MOTION] >= MOTION.BALL:
                 continue
             turn, shift = unit_twist(j, operation_work(model, data, operation), origin)
+            # Change of the moment of the load as it moves along this operation: with the sum S of
+            # products of positions and forces, it is shift x F + S turn - trace(S) turn.
             moved = minus(cross(shift, vector(load, 0)), times(load[3] + load[7] + load[11], turn))
+            moved, inner, within = plus(moved, rotate(at(load, 3), turn)), operation, link
+            # Each pair of an operation and a rotation on its path to ground is visited once, so both
+            # entries of the symmetric matrix are changed.
             moved, inner, within = plus(moved, rotate(at(load, 3), turn)), operation, link
             while within >= 0:
                 other = operation_ints(model, inner)
@@ -294,6 +343,8 @@ def add_load(
         here = link_work(model, data, link)
         load, arm = at(here, LINK_WORK.INERTIA), minus(point, vector(here, LINK_WORK.ORIGIN))
         store_vector(load, 0, plus(vector(load, 0), force))
+        # The products contain the motion of the point where the material point is not the point of
+        # action.
         for k in range(3):
             store_vector(
                 load,
@@ -336,6 +387,11 @@ def add_outer_product(
 def condense_system(model: Ints, c: float, work: Floats) -> bool:
     """Eliminate all but the speeds from 1 - c J and factorise the rest.
 
+    Args:
+        model: integers of the model.
+        c: coefficient of the method times step length (s).
+        work: workspace after `linearise_state`; filled with the factorised matrix.
+
     Returns:
         Whether it is regular.
     """
@@ -343,6 +399,7 @@ def condense_system(model: Ints, c: float, work: Floats) -> bool:
     system, levers = at(work, SYSTEM * size * size), at(work, LEVERS * size * size)
     stiffness, damping = at(work, STIFFNESS * size * size), at(work, DAMPING * size * size)
     for k in range(size * size):
+        # Coordinates follow the speeds as dq = c du, so that stiffness counts with c^2.
         system[k] = work[k] - c * (damping[k] + c * stiffness[k])
         levers[k] = stiffness[k]
     for number in range(model[MODEL.RESPONSES]):
@@ -352,17 +409,22 @@ def condense_system(model: Ints, c: float, work: Floats) -> bool:
         )
         count, a = response[RESPONSE.STATES], at(record, size)
         states = at(model, response[RESPONSE.ITEM] + response[RESPONSE.FIRST_STATE])
+        # Forces without states are complete in the stiffness and damping matrices.
         if count == 0:
             continue
         inverse, gains, pulls, driven = at(a, INVERSE), at(a, GAINS), at(a, PULLS), at(a, RIGHT)
         for i in range(count):
             rates = at(a, WIDTH * (1 + i))
+            # A negative index stands for a state that the model does not have; its row is that of
+            # the identity.
             has_state = states[i] >= 0
             driven[i] = c * (c * rates[0] + rates[1]) if has_state else 0.0
             for k in range(count):
                 own = c * rates[2 + k] if has_state and states[k] >= 0 else 0.0
                 inverse[count * i + k] = (1.0 if i == k else 0.0) - own
         invert_matrix(count, inverse)
+        # Schur complement: what the states add to the derivatives of the force by speed and
+        # displacement.
         by_speed = by_displacement = 0.0
         for i in range(count):
             gains[i] = pulls[i] = 0.0
@@ -387,13 +449,21 @@ def condense_system(model: Ints, c: float, work: Floats) -> bool:
 def factorise_matrix(size: int, a: Floats, masses: Floats) -> bool:
     """Factorise a matrix (size, size) in place by Gaussian elimination without pivoting.
 
+    Args:
+        size: size of the matrix.
+        a: matrix (size, size); replaced by its factors.
+        masses: mass matrix (size, size).
+
     Returns:
         Whether each pivot is more than `SMALLEST_PIVOT` times the mass there.
     """
+    # The matrix is nearly symmetric and positive definite for small steps, so that pivoting is
+    # unnecessary.
     for k in range(size):
         row = at(a, size * k)
         if not row[k] > SMALLEST_PIVOT * masses[size * k + k]:
             return False
+        # Store inverse pivots, because divisions are slow and each is used in every solution.
         row[k] = 1.0 / row[k]
         for i in range(k + 1, size):
             other = at(a, size * i)
@@ -406,7 +476,13 @@ def factorise_matrix(size: int, a: Floats, masses: Floats) -> bool:
 
 
 def solve_factorised(size: int, a: Floats, x: Floats) -> None:
-    """Solve a linear system in place with the factors of `factorise_matrix`."""
+    """Solve a linear system in place with the factors of `factorise_matrix`.
+
+    Args:
+        size: size of the matrix.
+        a: factors.
+        x: right side (size,), replaced by the solution.
+    """
     for i in range(size):
         x[i] -= dot_range(0, i, at(a, size * i), x)
     for i in range(size - 1, -1, -1):
@@ -415,7 +491,15 @@ def solve_factorised(size: int, a: Floats, x: Floats) -> None:
 
 
 def invert_matrix(size: int, a: Floats) -> None:
-    """Invert a small matrix (size, size) in place."""
+    """Invert a small matrix (size, size) in place.
+
+    It is Gauss-Jordan elimination without pivoting, since 1 - c J of the states of a force is near
+    the identity for small c.
+
+    Args:
+        size: size of the matrix.
+        a: matrix; replaced by its inverse.
+    """
     for i in range(size):
         pivot = 1.0 / a[size * i + i]
         a[size * i + i] = 1.0
@@ -430,7 +514,14 @@ def invert_matrix(size: int, a: Floats) -> None:
 
 
 def solve_condensed(model: Ints, c: float, work: Floats, d: Floats) -> None:
-    """Solve (1 - c J) d = r in place, after `condense_system` with the same c."""
+    """Solve (1 - c J) d = r in place, after `condense_system` with the same c.
+
+    Args:
+        model: integers of the model.
+        c: coefficient of the method times step length (s).
+        work: workspace after `condense_system`.
+        d: right side r of coordinates, speeds and states, replaced by the solution.
+    """
     size = model[MODEL.DOFS]
     du, system, right = (
         at(d, size),
@@ -438,6 +529,8 @@ def solve_condensed(model: Ints, c: float, work: Floats, d: Floats) -> None:
         at(work, RIGHT_AT * size * size),
     )
     levers = at(work, LEVERS * size * size)
+    # Multiply the right sides of speeds by the mass matrix, and add those of the eliminated
+    # coordinates and states.
     for i in range(size):
         right[i] = 0.0
         for k in range(size):
@@ -459,6 +552,7 @@ def solve_condensed(model: Ints, c: float, work: Floats, d: Floats) -> None:
             for k in range(int(a[FIRST]), int(a[END])):
                 right[k] += force * record[k]
     solve_factorised(size, system, right)
+    # Back-substitution: the states follow from displacement and speed along each force.
     for number in range(model[MODEL.RESPONSES]):
         response, record = (
             at(model, model[MODEL.RESPONSE_AT] + RESPONSE.SIZE * number),
@@ -480,13 +574,21 @@ def solve_condensed(model: Ints, c: float, work: Floats, d: Floats) -> None:
                 d[states[i]] = a[GAINS + i] * speed + dot_range(
                     0, count, at(a, INVERSE + count * i), at(a, RIGHT)
                 )
+    # Last of all the coordinates, whose right sides the states still needed.
     for k in range(size):
         du[k] = right[k]
         d[k] += c * right[k]
 
 
 def dot_range(first: int, end: int, a: Floats, b: Floats) -> float:
-    """Return the scalar product of the entries `first` to `end` of two vectors."""
+    """Return the scalar product of the entries `first` to `end` of two vectors.
+
+    Args:
+        first: first index.
+        end: end of the indices.
+        a: first vector.
+        b: second vector.
+    """
     total = 0.0
     for k in range(first, end):
         total += a[k] * b[k]

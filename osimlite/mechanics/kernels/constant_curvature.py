@@ -28,7 +28,19 @@ SERIES = 7
 def amount_by_arc(
     model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, operation: int
 ) -> int:
-    """Compute an amount, its gradient, rate and curvature from the bending of a rod in two angles."""
+    """Compute an amount, its gradient, rate and curvature from the bending of a rod in two angles.
+
+    Args:
+        model: integers of the model.
+        reals: numbers of the model.
+        data: results; filled with amount, rate, curvature and gradient of the operation.
+        y: state.
+        f: rates of the coordinates.
+        operation: number of the operation.
+
+    Returns:
+        `OUTCOME.OK`.
+    """
     j, kept = (
         operation_ints(model, operation),
         operation_work(model, data, operation),
@@ -45,6 +57,7 @@ def amount_by_arc(
     value, da, db, daa, dab, dbb = evaluate_arc(table, a, b)
     data[j[OPERATION.GRADIENT]], data[j[OPERATION.GRADIENT] + 1] = da, db
     kept[OPERATION_WORK.AMOUNT], kept[OPERATION_WORK.RATE] = value, da * ua + db * ub
+    # Second derivative by time of the amount at constant speeds.
     kept[OPERATION_WORK.CURVATURE] = daa * ua * ua + 2.0 * dab * ua * ub + dbb * ub * ub
     return OUTCOME.OK
 
@@ -66,7 +79,10 @@ def evaluate_arc(
     # Cosine of the total angle, with its derivatives by both angles.
     c, ga, gb, haa, hab, hbb = ca * cb, -sa * cb, -ca * sb, -ca * cb, sa * sb, -ca * cb
     component = int(table[COMPONENT])
+    # Along the rod the factor is sin(theta) / theta; across it, the sine of the direction is taken
+    # out, so that a factor (1 - cos(theta)) / (theta sin(theta)) remains.
     share, first, second = axial_ratio(table, c) if component == 1 else transverse_ratio(table, c)
+    # Chain rule from cos(theta) to both angles.
     oaa, oab, obb = (
         first * haa + second * ga * ga,
         first * hab + second * ga * gb,
@@ -107,6 +123,8 @@ def transverse_ratio(table: Floats, cosine: float) -> tuple[float, float, float]
     square, count = angle_squared(cosine), int(table[TERMS])
     h, h1, h2 = evaluate_series(at(table, SERIES), count, square)
     m, m1, m2 = evaluate_series(at(table, SERIES + count), count, square)
+    # Reciprocal of h with its derivatives, by which the series of (1 - cos) / theta^2 is
+    # multiplied.
     k, k1 = 1.0 / h, -h1 / (h * h)
     k2 = 2.0 * h1 * h1 / (h * h * h) - h2 / (h * h)
     return differentiate_by_cosine(m * k, m1 * k + m * k1, m2 * k + 2.0 * m1 * k1 + m * k2, h, h1)
@@ -114,6 +132,7 @@ def transverse_ratio(table: Floats, cosine: float) -> tuple[float, float, float]
 
 def angle_squared(cosine: float) -> float:
     """Return the square of an angle from its cosine."""
+    # Rounding may lead beyond 1.
     angle = acos(max(-1.0, min(1.0, cosine)))
     return angle * angle
 
@@ -130,6 +149,7 @@ def evaluate_series(terms: Floats, count: int, square: float) -> tuple[float, fl
         Value, first and second derivative.
     """
     value = slope = bend = 0.0
+    # Horner's rule for value and derivatives at once; `bend` is half of the second derivative.
     for k in range(count - 1, -1, -1):
         bend = bend * square + slope
         slope = slope * square + value

@@ -1,8 +1,9 @@
 """Accelerations under constraints: M udot + Gᵀ λ = f and G udot = b.
 
-Where M is well conditioned, udot is eliminated: the sparse factor of M gives the response to the
-force of each equation. Otherwise the motion is computed in the null space of G. Contradictory
-equations are fulfilled in the least-squares sense.
+M is the mass matrix (n, n), G the matrix of the constraint equations (m, n), f the generalized
+forces and λ the multipliers. Where M is well conditioned, udot is eliminated: the sparse factor of
+M gives the response to the force of each equation. Otherwise the motion is computed in the null
+space of G. Contradictory equations are fulfilled in the least-squares sense.
 """
 
 from __future__ import annotations
@@ -62,6 +63,7 @@ def constrained_dynamics(
     forces = at(system, h[CONSTRAINED.ENTRIES])
     for k in range(size):
         forces[k] = right[k]
+    # A singular M, of a coordinate that moves no mass, may still be regular along the constraints.
     if solve_accelerations(model, data, right) < 0 and solve_by_multipliers(
         model, data, right, at(forces, size)
     ):
@@ -128,6 +130,7 @@ def solve_by_multipliers(model: Ints, data: Floats, right: Floats, room: Floats)
         at(data, h[CONSTRAINED.WORK_FACTOR]),
     )
     for i in range(count):
+        # An equation of rounding errors must not be enlarged by a light degree of freedom.
         row, turned, longest = at(rows, size * i), at(weighted, size * i), 0.0
         for k in range(size):
             longest = max(longest, abs(row[k]))
@@ -144,6 +147,7 @@ def solve_by_multipliers(model: Ints, data: Floats, right: Floats, room: Floats)
             for k in range(size):
                 missing -= row[k] * right[k]
             values[i] = missing
+        # The shortest solution in the scaled unknowns is the one that constraint forces cause.
         solve_by_law(model, count, weighted, values, spare, push)
         for k in range(size):
             push[k] *= scales[k]
@@ -154,9 +158,16 @@ def solve_by_multipliers(model: Ints, data: Floats, right: Floats, room: Floats)
 
 
 def solve_transposed_factor(model: Ints, data: Floats, right: Floats) -> None:
-    """Solve Uᵀ x = b in place with the factor that `solve_accelerations` left."""
+    """Solve Uᵀ x = b in place with the factor that `solve_accelerations` left.
+
+    Args:
+        model: integers of the model.
+        data: results with the factor of M.
+        right: right side b (n,), replaced by the solution.
+    """
     freedoms = at(model, model[MODEL.DOF_AT])
     for k in range(model[MODEL.DOFS] - 1, -1, -1):
+        # Skip zeros: rows of G touch few degrees of freedom.
         j, load = at(freedoms, DOF.SIZE * k), right[k]
         if is_nothing(load):
             continue
@@ -167,7 +178,13 @@ def solve_transposed_factor(model: Ints, data: Floats, right: Floats) -> None:
 
 
 def solve_factor(model: Ints, data: Floats, right: Floats) -> None:
-    """Solve U x = b in place with the factor that `solve_accelerations` left."""
+    """Solve U x = b in place with the factor that `solve_accelerations` left.
+
+    Args:
+        model: integers of the model.
+        data: results with the factor of M.
+        right: right side b (n,), replaced by the solution.
+    """
     freedoms = at(model, model[MODEL.DOF_AT])
     for k in range(model[MODEL.DOFS]):
         j, total = at(freedoms, DOF.SIZE * k), right[k]
@@ -216,7 +233,9 @@ def solve_in_null_space(
         for k in range(size):
             equations[size * i + k] = scale * rows[size * i + k]
     rank = factorise_by_law(model, data, count, equations, REDUNDANT)
+    # The complement of the rank is the number of remaining degrees of freedom.
     free = size - rank
+    # A particular solution of the equations; the free motion is added to it.
     solve_by_law(model, count, equations, values, spare, right)
     pushed, reduced, basis = (
         at(spare, count),
@@ -224,12 +243,14 @@ def solve_in_null_space(
         at(spare, count + 2 * size + size * size),
     )
     rest = at(pushed, size)
+    # Its inertial forces reduce the forces of the free motion.
     multiply_mass(model, matrix, right, pushed)
     for k in range(size):
         forces[k] -= pushed[k]
     for j in range(free):
         direction = at(basis, size * j)
         for k in range(size):
+            # The unit vectors beyond the rank, transformed by Q, span the null space of G.
             direction[k] = 1.0 if k == rank + j else 0.0
         apply_q(size, equations, rank, direction)
         multiply_mass(model, matrix, direction, pushed)
@@ -252,7 +273,14 @@ def solve_in_null_space(
 
 
 def multiply_mass(model: Ints, matrix: Floats, u: Floats, product: Floats) -> None:
-    """Multiply a vector by the mass matrix, whose sparse rows are stored one after the other."""
+    """Multiply a vector by the mass matrix, whose sparse rows are stored one after the other.
+
+    Args:
+        model: integers of the model.
+        matrix: entries of the mass matrix, row by row.
+        u: vector (n,).
+        product: filled with M u (n,).
+    """
     size, freedoms, start = model[MODEL.DOFS], at(model, model[MODEL.DOF_AT]), 0
     for k in range(size):
         product[k] = 0.0
@@ -261,6 +289,7 @@ def multiply_mass(model: Ints, matrix: Floats, u: Floats, product: Floats) -> No
         product[k] += matrix[start] * u[k]
         i = j[DOF.ABOVE]
         for m in range(1, j[DOF.DEPTH] + 1):
+            # M is symmetric, and each entry off the diagonal is stored once.
             product[k] += matrix[start + m] * u[i]
             product[i] += matrix[start + m] * u[k]
             i = freedoms[DOF.SIZE * i + DOF.ABOVE]

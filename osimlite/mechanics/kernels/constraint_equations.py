@@ -4,6 +4,9 @@ Each law fills in the equations of one constraint after the velocities of the li
 Equations between bodies consist of two types of vectors: an axis that is fixed in a link, and an
 arm from a point of one link to a point of another. The derivative of a vector's component by the
 speeds equals the generalized force of a unit force along it (principle of virtual work).
+
+For an equation g(q) = 0 with the rate G u, the required value of G udot is -Gdot u, the negative
+second derivative of g while udot = 0.
 """
 
 from __future__ import annotations
@@ -68,12 +71,25 @@ EQUATION_NUMBERS = 13
 def prescribe(
     model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, constraint: int
 ) -> int:
-    """Fill in the equation of a coordinate that follows a function of time."""
+    """Fill in the equation of a coordinate that follows a function of time.
+
+    Args:
+        model: integers of the model.
+        reals: numbers of the model.
+        data: results; the equation is filled in.
+        y: state.
+        f: rates of the coordinates.
+        constraint: offset of the constraint in the model.
+
+    Returns:
+        `OUTCOME.OK`.
+    """
     i, h = at(model, constraint), at(model, model[MODEL.CONSTRAINED])
     row, own = i[CONSTRAINT.FIRST_EQUATION], at(i, CONSTRAINT.OWN)
     value, slope, curvature = evaluate_function(at(reals, i[CONSTRAINT.NUMBERS]), data[WORK.TIME])
     data[h[CONSTRAINED.WORK_ERRORS] + row] = y[own[0]] - value
     data[h[CONSTRAINED.WORK_RATES] + row] = slope
+    # The angles of a ball accelerate while its speeds are constant; this bias is subtracted.
     bias = add_coordinate(
         model, y, f, own, 1.0, at(data, h[CONSTRAINED.WORK_ROWS] + model[MODEL.DOFS] * row)
     )
@@ -88,6 +104,17 @@ def couple(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, const
     gradient, the number of the other coordinates, their degrees of freedom, and each of these again as
     a `COORDINATE`. Its numbers are the values of constant coordinates, the dependent one first, and the
     table of the function.
+
+    Args:
+        model: integers of the model.
+        reals: numbers of the model.
+        data: results; the equation is filled in.
+        y: state.
+        f: rates of the coordinates.
+        constraint: offset of the constraint in the model.
+
+    Returns:
+        `OUTCOME.OK`.
     """
     i, h, p = (
         at(model, constraint),
@@ -98,6 +125,7 @@ def couple(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, const
     size, freedoms = own[COORDINATE.SIZE + 1], at(own, COORDINATE.SIZE + 2)
     others, gradient, constants = at(freedoms, size), at(data, own[COORDINATE.SIZE]), at(p, 1)
     if int(constants[size]) >= MONOMIALS:
+        # A function of one coordinate, or a constant.
         value, _, curvature = evaluate_monomials(size, freedoms, constants, y, f, gradient)
     else:
         argument = rate = 0.0
@@ -108,6 +136,7 @@ def couple(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, const
         curvature = bend * rate * rate
         gradient[0] = slope
     to = at(data, h[CONSTRAINED.WORK_ROWS] + model[MODEL.DOFS] * row)
+    # The dependent coordinate has the factor -1: the error is the function less the coordinate.
     bias = add_coordinate(model, y, f, own, -1.0, to)
     for k in range(size):
         bias += add_coordinate(model, y, f, at(others, COORDINATE.SIZE * k), gradient[k], to)
@@ -133,11 +162,13 @@ def add_coordinate(
         The multiple of the acceleration of the coordinate while udot = 0.
     """
     freedom, ball = coordinate[COORDINATE.DOF], coordinate[COORDINATE.BALL]
+    # A locked coordinate has no speed.
     if freedom < 0:
         return 0.0
     if ball < 0:
         row[freedom] += factor
         return 0.0
+    # The rate of an angle of a ball is a row of N times its three speeds.
     angles = at(model, ball)
     n = angle_rate_row(y, angles, coordinate[COORDINATE.PART])
     one, two, three = n
@@ -150,7 +181,19 @@ def add_coordinate(
 def bind_bodies(
     model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, constraint: int
 ) -> int:
-    """Fill in the equations of a constraint between bodies, which its integers and numbers list."""
+    """Fill in the equations of a constraint between bodies, which its integers and numbers list.
+
+    Args:
+        model: integers of the model.
+        reals: numbers of the model.
+        data: results; the equations are filled in.
+        y: state.
+        f: rates of the coordinates.
+        constraint: offset of the constraint in the model.
+
+    Returns:
+        `OUTCOME.OK`.
+    """
     i, h = at(model, constraint), at(model, model[MODEL.CONSTRAINED])
     first, size = i[CONSTRAINT.FIRST_EQUATION], model[MODEL.DOFS]
     for row in range(first, i[CONSTRAINT.END_EQUATION]):
@@ -163,9 +206,12 @@ def bind_bodies(
         a, a_rate, a_bias = differentiate_vector(model, reals, data, one, p)
         b, b_rate, b_bias = differentiate_vector(model, reals, data, two, at(p, 6))
         error = drift = 0.0
+        # Second derivative of a scalar product: both vectors change, hence twice the product of
+        # their rates.
         if own[0] == PRODUCT:
             error = dot(a, b) - wanted
             drift = dot(a, b_bias) + dot(b, a_bias) + 2.0 * dot(a_rate, b_rate)
+            # The derivative of a . b is that of a along b, plus that of b along a.
             add_vector_row(model, data, one, p, b, to)
             add_vector_row(model, data, two, at(p, 6), a, to)
         elif own[0] == DISTANCE:
@@ -179,6 +225,7 @@ def bind_bodies(
             drift = dot(e, b_bias) + stretch
             add_vector_row(model, data, two, at(p, 6), e, to)
         else:
+            # A roller must not slip on the surface at the point of the surface that it touches.
             surface, roller, point = two[1], two[2], station(model, data, two[1], vector(p, 6))
             add_force_row(model, data, surface, point, times(-1.0, a), to)
             add_force_row(model, data, roller, point, a, to)
@@ -186,6 +233,7 @@ def bind_bodies(
                 angular_velocity(model, data, roller),
                 angular_acceleration_bias(model, data, roller),
             )
+            # The rate of the arm contains the rotation of the roller, which is not slip.
             drift = dot(a_rate, minus(b_rate, cross(turning, b)))
             drift += dot(a, minus(minus(b_bias, cross(turning_bias, b)), cross(turning, b_rate)))
         data[h[CONSTRAINED.WORK_ERRORS] + row], data[h[CONSTRAINED.WORK_DRIFTS] + row] = (
@@ -224,6 +272,8 @@ def differentiate_vector(
         )
     start, end = station(model, data, one, vector(p, 0)), station(model, data, two, vector(p, 3))
     arm = minus(end, start)
+    # Both velocities at the same point of ground: what remains is the motion of the end relative to
+    # link 1.
     if kind[0] == MEETING:
         start = end
     rate = minus(velocity(model, data, two, end), velocity(model, data, one, start))
@@ -254,6 +304,7 @@ def add_vector_row(
         on: direction, along the axes of ground.
         row: row of G (n,); changed.
     """
+    # An axis changes by w x a, whose component along `on` is w . (a x on): a torque.
     one, two = kind[1], kind[2]
     if kind[0] == AXIS:
         add_wrench_row(
@@ -270,7 +321,16 @@ def add_vector_row(
 def add_force_row(
     model: Ints, data: Floats, link: int, point: Vector, force: Vector, row: Floats
 ) -> None:
-    """Add to a row the generalized forces of a force on a link at a point of ground."""
+    """Add to a row the generalized forces of a force on a link at a point of ground.
+
+    Args:
+        model: integers of the model.
+        data: results of an evaluation.
+        link: number of the link; ground has no generalized forces.
+        point: point of action in ground (m).
+        force: force, along the axes of ground.
+        row: row of G (n,); changed.
+    """
     if link >= 0:
         arm = minus(point, vector(link_work(model, data, link), LINK_WORK.ORIGIN))
         add_wrench_row(model, data, link, cross(arm, force), force, row)
@@ -279,7 +339,16 @@ def add_force_row(
 def add_wrench_row(
     model: Ints, data: Floats, link: int, torque: Vector, force: Vector, row: Floats
 ) -> None:
-    """Add to a row the generalized forces of a wrench on a link about the origin of its spatial vectors."""
+    """Add to a row the generalized forces of a wrench on a link.
+
+    Args:
+        model: integers of the model.
+        data: results of an evaluation.
+        link: number of the link; ground has no generalized forces.
+        torque: torque about the origin of the spatial vectors, along the axes of ground.
+        force: force, along the axes of ground.
+        row: row of G (n,); changed.
+    """
     # Links without degrees of freedom, such as welded bodies, transmit the wrench to their parent.
     while (
         link >= 0 and link_ints(model, link)[LINK.FIRST_DOF] == link_ints(model, link)[LINK.END_DOF]

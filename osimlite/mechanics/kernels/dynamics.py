@@ -67,6 +67,8 @@ def evaluate(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, sta
     if status != OUTCOME.OK or stage == STAGE.VELOCITY:
         return status
     right = at(f, model[MODEL.DOFS])
+    # Without a mass matrix of its own the evaluation skips inertias: forces only, or another
+    # program supplies M.
     if stage == STAGE.FORCE or model[MODEL.CHAIN] > 0:
         clear_wrenches(model, data)
         status = apply_forces(model, reals, data, y, f)
@@ -82,8 +84,10 @@ def evaluate(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, sta
                 0,
             )
     else:
+        # Inertial wrenches first; forces of items are then added to the same wrenches.
         spatial_inertias_and_bias(model, reals, data)
         status = apply_forces(model, reals, data, y, f)
+        # One pass inwards gives M and the generalized forces.
         composite_rigid_body(model, data, right)
     if stage == STAGE.FORCE or status != OUTCOME.OK:
         return status
@@ -123,11 +127,14 @@ def inverse(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, unus
     if status != OUTCOME.OK:
         return status
     right = at(f, model[MODEL.DOFS])
+    # Recursive Newton-Euler algorithm: accelerations outwards, wrenches inwards.
     add_accelerations(model, data, right)
     spatial_inertias_and_bias(model, reals, data)
     status = apply_forces(model, reals, data, y, f)
     add_generalized_forces(model, data, right)
     for freedom in range(model[MODEL.DOFS]):
+        # Forces that balance inertia and items would be negative; what is missing has the opposite
+        # sign.
         right[freedom] = -right[freedom]
     return status
 
@@ -137,12 +144,21 @@ def equilibrate(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, 
 
     The remaining items are equilibrated even if one fails.
 
+    Args:
+        model: integers of the model.
+        reals: numbers of the model.
+        data: filled with the results of the evaluation.
+        y: state; auxiliary states of forces are changed.
+        f: workspace for its rates.
+        stage: how far the evaluation before goes, see `STAGE`.
+
     Returns:
         `OUTCOME.OK` or what went wrong; with UNSOLVED, f[0] is the number of the first item that failed.
     """
     status = call(model[MODEL.LAWS], model, reals, data, y, f, stage)
     if status != OUTCOME.OK:
         return status
+    # Backwards, so that f[0] ends up with the first item that failed.
     for k in range(model[MODEL.EQUILIBRIA] - 1, -1, -1):
         j = at(model, model[MODEL.EQUILIBRIUM_AT] + EQUILIBRIUM.SIZE * k)
         if call(j[EQUILIBRIUM.KERNEL], model, reals, data, y, f, j[EQUILIBRIUM.ITEM]) != OUTCOME.OK:
@@ -151,7 +167,12 @@ def equilibrate(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, 
 
 
 def multiply_symmetric(moments: Floats, a: Vector) -> Vector:
-    """Multiply a vector by the symmetric matrix with the entries xx, yy, zz, xy, xz, yz."""
+    """Multiply a vector by the symmetric matrix with the entries xx, yy, zz, xy, xz, yz.
+
+    Args:
+        moments: entries xx, yy, zz, xy, xz, yz.
+        a: vector.
+    """
     x, y, z = a
     xx, yy, zz, xy, xz, yz = moments[0], moments[1], moments[2], moments[3], moments[4], moments[5]
     return xx * x + xy * y + xz * z, xy * x + yy * y + yz * z, xz * x + yz * y + zz * z
@@ -176,7 +197,16 @@ def spatial_momentum(i: Floats, spin: Vector, velocity: Vector) -> tuple[Vector,
 
 
 def spatial_inertias_and_bias(model: Ints, reals: Floats, data: Floats) -> None:
-    """Compute spatial inertias of the links, and minus the wrenches that they need while udot = 0."""
+    """Compute spatial inertias of the links, and minus the wrenches that they need while udot = 0.
+
+    With m the mass, c the mass centre and I the inertia about it, the spatial inertia about the
+    origin is (I + m (c.c 1 - c c'), m c x; -m c x, m), and the wrench is I a + v x* (I v).
+
+    Args:
+        model: integers of the model.
+        reals: numbers of the model.
+        data: results with poses, velocities and accelerations; filled with inertias and wrenches.
+    """
     for link in range(model[MODEL.LINKS]):
         b, here = at(reals, INERTIA_AT + INERTIA.SIZE * link), link_work(model, data, link)
         r, i, m = at(here, LINK_WORK.ROTATION), at(here, LINK_WORK.INERTIA), b[INERTIA.MASS]
@@ -186,6 +216,7 @@ def spatial_inertias_and_bias(model: Ints, reals: Floats, data: Floats) -> None:
         )
         cx, cy, cz = center
         mx, my, mz = times(m, center)
+        # Rows of the rotation, since I in ground is R I Rᵀ.
         one, two, three = vector(r, 0), vector(r, 3), vector(r, 6)
         # Rows of R I, where I is the inertia in the link.
         first, second = (
@@ -208,12 +239,19 @@ def spatial_inertias_and_bias(model: Ints, reals: Floats, data: Floats) -> None:
             i, vector(here, LINK_WORK.ACCELERATION), vector(here, LINK_WORK.ACCELERATION + 3)
         )
         torque = plus(torque, plus(cross(spin, angular), cross(velocity, linear)))
+        # The sign makes inertia a load like any other: M udot = sum of loads.
         store_vector(here, LINK_WORK.WRENCH, times(-1.0, torque))
         store_vector(here, LINK_WORK.WRENCH + 3, times(-1.0, plus(force, cross(spin, linear))))
 
 
 def add_accelerations(model: Ints, data: Floats, udot: Floats) -> None:
-    """Add the contribution of udot to the accelerations of the links, outwards from ground."""
+    """Add the contribution of udot to the accelerations of the links, outwards from ground.
+
+    Args:
+        model: integers of the model.
+        data: results with accelerations while udot = 0; changed.
+        udot: accelerations of the speeds (n,).
+    """
     columns = at(data, model[MODEL.WORK_COLUMN])
     for link in range(model[MODEL.LINKS]):
         j, here = link_ints(model, link), link_work(model, data, link)
@@ -237,7 +275,12 @@ def add_accelerations(model: Ints, data: Floats, udot: Floats) -> None:
 
 
 def clear_wrenches(model: Ints, data: Floats) -> None:
-    """Set the wrenches on all links to zero."""
+    """Set the wrenches on all links to zero.
+
+    Args:
+        model: integers of the model.
+        data: results; the wrenches are changed.
+    """
     for link in range(model[MODEL.LINKS]):
         load = at(link_work(model, data, link), LINK_WORK.WRENCH)
         for k in range(6):
@@ -245,18 +288,31 @@ def clear_wrenches(model: Ints, data: Floats) -> None:
 
 
 def apply_forces(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) -> int:
-    """Add the loads of all items to the wrenches, or to the generalized forces after the rates in f.
+    """Add the loads of all items to wrenches or generalized forces.
+
+    Generalized forces follow the rates of the coordinates in f.
+
+    Args:
+        model: integers of the model.
+        reals: numbers of the model.
+        data: results with poses and velocities; the wrenches are changed.
+        y: state.
+        f: rates of the coordinates, then generalized forces, then rates of auxiliary states;
+            changed.
 
     Returns:
         `OUTCOME.OK`, or the outcome of the kernel of an item; then f[0] is the number of the item.
     """
+    # Items add to the rates of auxiliary states, such as activation, so that these start from 0.
     for number in range(model[MODEL.DOFS], model[MODEL.STATE_SIZE]):
         f[number] = 0.0
+    # A pair that does not touch writes nothing; clear what the last evaluation left.
     for number in range(model[MODEL.CONTACTS]):
         result = at(data, model[MODEL.WORK_CONTACT] + CONTACT_WORK.SIZE * number)
         result[0], result[1], result[2], result[CONTACT_WORK.DEPTH] = 0.0, 0.0, 0.0, 0.0
     for number in range(model[MODEL.RUNS]):
         run = model[MODEL.RUN_AT] + RUN.SIZE * number
+        # A run of muscles of one type is computed together, other items one by one.
         if model[run + RUN.LAW] != 0:
             status = call(model[run + RUN.LAW], model, reals, data, y, f, run)
             if status != OUTCOME.OK:
@@ -272,8 +328,15 @@ def apply_forces(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats)
 
 
 def add_generalized_forces(model: Ints, data: Floats, right: Floats) -> None:
-    """Add the generalized forces of the wrenches, inwards from the leaves; sums up the wrenches."""
+    """Add the generalized forces of the wrenches, inwards from the leaves; sums up the wrenches.
+
+    Args:
+        model: integers of the model.
+        data: results with wrenches, which are summed up over the subtrees.
+        right: generalized forces (n,); changed.
+    """
     columns = at(data, model[MODEL.WORK_COLUMN])
+    # Children have larger numbers than their parents, so that this order goes inwards.
     for link in range(model[MODEL.LINKS] - 1, -1, -1):
         j, load = (
             link_ints(model, link),
@@ -290,7 +353,13 @@ def add_generalized_forces(model: Ints, data: Floats, right: Floats) -> None:
 
 
 def composite_rigid_body(model: Ints, data: Floats, right: Floats) -> None:
-    """Compute the mass matrix and add generalized forces of wrenches, inwards from the leaves."""
+    """Compute the mass matrix and add generalized forces of wrenches, inwards from the leaves.
+
+    Args:
+        model: integers of the model.
+        data: results with inertias and wrenches, both summed up over the subtrees; filled with M.
+        right: generalized forces (n,); changed.
+    """
     freedoms, columns = at(model, model[MODEL.DOF_AT]), at(data, model[MODEL.WORK_COLUMN])
     for link in range(model[MODEL.LINKS] - 1, -1, -1):
         j, here = link_ints(model, link), link_work(model, data, link)
@@ -299,6 +368,8 @@ def composite_rigid_body(model: Ints, data: Floats, right: Floats) -> None:
             c = at(columns, 6 * freedom)
             turn, shift = vector(c, 0), vector(c, 3)
             right[freedom] += dot(turn, vector(load, 0)) + dot(shift, vector(load, 3))
+            # Force that accelerates the subtree along this degree of freedom by 1; its products
+            # with the columns above are the entries of M.
             angular, linear = spatial_momentum(i, turn, shift)
             row, k, column = at(data, freedoms[DOF.SIZE * freedom + DOF.ROW]), freedom, 0
             while k >= 0:
@@ -329,6 +400,7 @@ def solve_accelerations(model: Ints, data: Floats, right: Floats) -> int:
         at(model, model[MODEL.DOF_AT]),
         at(data, model[MODEL.WORK_PIVOT]),
     )
+    # Keep the diagonal: pivots are compared with it, and `solve_by_multipliers` needs it.
     for k in range(size):
         pivots[k] = data[freedoms[DOF.SIZE * k + DOF.ROW]]
     # Factorise M = Lᵀ D L from the leaves to the root, and solve with Lᵀ and D on the way.
@@ -336,18 +408,23 @@ def solve_accelerations(model: Ints, data: Floats, right: Floats) -> int:
         j = at(freedoms, DOF.SIZE * k)
         row, depth, i = at(data, j[DOF.ROW]), j[DOF.DEPTH], j[DOF.ABOVE]
         pivot = row[0]
+        # A pivot of rounding errors means that a degree of freedom moves no mass; also true for
+        # NaN.
         if not pivot > SMALLEST_PIVOT * pivots[k]:
             return k
         inverse, load = 1.0 / pivot, right[k]
         for m in range(1, depth + 1):
             a = row[m] * inverse
             target = at(data, freedoms[DOF.SIZE * i + DOF.ROW])
+            # Only entries on the path to ground exist: elimination from the leaves causes no
+            # fill-in.
             for t in range(depth + 1 - m):
                 target[t] -= a * row[m + t]
             right[i] -= a * load
             row[m] = a
             i = freedoms[DOF.SIZE * i + DOF.ABOVE]
         right[k] = load * inverse
+    # Solve with L from the root to the leaves.
     for k in range(size):
         j = at(freedoms, DOF.SIZE * k)
         row, i, total = at(data, j[DOF.ROW]), j[DOF.ABOVE], right[k]

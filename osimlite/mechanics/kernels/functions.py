@@ -1,6 +1,7 @@
-"""Functions of coordinates and of time, each in a table of numbers; and controls, which are sums of them.
+"""Functions of coordinates and of time, each in a table of numbers, and controls.
 
-A table begins with the kind of the function and a factor for all of it; the rest depends on the kind.
+A table begins with the kind of the function and a factor for all of it; the rest depends on the
+kind. A control is a sum of functions of time.
 """
 
 from __future__ import annotations
@@ -49,6 +50,7 @@ def evaluate_function(table: Floats, z: float) -> tuple[float, float, float]:
         slope = table[2] * table[3] * cos(angle)
         curvature = -table[2] * table[3] * table[3] * sin(angle)
     elif kind == STEP:
+        # Quintic step: S(t) = 10 t^3 - 15 t^4 + 6 t^5 between both ends, constant outside.
         rate = 1.0 / (table[3] - table[2])
         t, rise = (z - table[2]) * rate, table[5] - table[4]
         if 0.0 < t < 1.0:
@@ -74,6 +76,7 @@ def evaluate_piecewise(table: Floats, z: float, kind: int) -> tuple[float, float
     """
     value = slope = curvature = 0.0
     knots, width = int(table[2]), int(table[3])
+    # Binary search for the piece. The first one also holds before its knot, the last one after.
     low, high = 0, knots
     while high - low > 1:
         middle = (low + high) // 2
@@ -82,17 +85,31 @@ def evaluate_piecewise(table: Floats, z: float, kind: int) -> tuple[float, float
         else:
             low = middle
     piece, t = at(table, 4 + knots + low * width), z - table[4 + low]
+    # Horner's rule for value and derivatives at once; `curvature` is half of the second derivative.
     for k in range(width - 1, -1, -1):
         curvature = curvature * t + slope
         slope = slope * t + value
         value = value * t + piece[k]
+    # OpenSim 4.6 returns the first derivative as the second one for some piecewise functions.
     return value, slope, slope if kind == PIECES_OF_OPENSIM else 2.0 * curvature
 
 
 def amount_by_one(
     model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, operation: int
 ) -> int:
-    """Compute the amount of an operation by a function of one coordinate, with its derivatives."""
+    """Compute the amount of an operation by a function of one coordinate, with its derivatives.
+
+    Args:
+        model: integers of the model.
+        reals: numbers of the model.
+        data: results; filled with amount, rate, curvature and gradient of the operation.
+        y: state.
+        f: rates of the coordinates.
+        operation: number of the operation.
+
+    Returns:
+        `OUTCOME.OK`.
+    """
     j, a = (
         operation_ints(model, operation),
         operation_work(model, data, operation),
@@ -114,7 +131,19 @@ def amount_by_one(
 def amount_by_several(
     model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, operation: int
 ) -> int:
-    """Compute the amount of an operation by a polynomial of several coordinates, with its derivatives."""
+    """Compute the amount of an operation by a polynomial of several coordinates.
+
+    Args:
+        model: integers of the model.
+        reals: numbers of the model.
+        data: results; filled with amount, rate, curvature and gradient of the operation.
+        y: state.
+        f: rates of the coordinates.
+        operation: number of the operation.
+
+    Returns:
+        `OUTCOME.OK`.
+    """
     j, a = (
         operation_ints(model, operation),
         operation_work(model, data, operation),
@@ -154,6 +183,8 @@ def evaluate_monomials(
         gradient[index] = 0.0
     for term in range(count):
         coefficient, powers = factor * table[3 + term], at(table, 3 + count + term * size)
+        # Each derivative is a product of powers of its own: dividing the value by an argument would
+        # fail at 0.
         value += coefficient * multiply_powers(size, arguments, constants, y, powers, -1, -1)
         for one in range(size):
             if powers[one] == 0.0:
@@ -164,6 +195,7 @@ def evaluate_monomials(
                 * multiply_powers(size, arguments, constants, y, powers, one, -1)
             )
             gradient[one] += first
+            # Constant arguments have a gradient, which workspace expects, but no rate.
             if arguments[one] < 0:
                 continue
             rate += first * rates[arguments[one]]
@@ -178,6 +210,7 @@ def evaluate_monomials(
                     * multiply_powers(size, arguments, constants, y, powers, one, two)
                 )
                 curvature += second * rates[arguments[one]] * rates[arguments[two]]
+    # OpenSim's error: the gradient stands in place of each row of the second derivatives.
     if int(table[0]) == MONOMIALS_OF_OPENSIM:
         total = 0.0
         for index in range(size):
@@ -189,9 +222,20 @@ def evaluate_monomials(
 def multiply_powers(
     size: int, arguments: Ints, constants: Floats, y: Floats, powers: Floats, one: int, two: int
 ) -> float:
-    """Return the product of powers of all arguments; those of `one` and `two` (-1: none) are reduced by 1."""
+    """Return the product of powers of all arguments.
+
+    Args:
+        size: number of arguments.
+        arguments: degrees of freedom of the arguments, -1 for a constant one.
+        constants: values of constant arguments (size,).
+        y: values of the degrees of freedom.
+        powers: powers (size,).
+        one: argument whose power is reduced by 1, -1 for none.
+        two: argument whose power is reduced by 1 (once more), -1 for none.
+    """
     total = 1.0
     for index in range(size):
+        # Powers are integers, so that negative arguments have defined results.
         power = int(powers[index]) - (1 if index == one else 0) - (1 if index == two else 0)
         total *= (y[arguments[index]] if arguments[index] >= 0 else constants[index]) ** power
     return total
@@ -202,6 +246,17 @@ def set_controls(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats,
 
     The integers of the record from OWN on are the number of controls, per control the cumulative number
     of its functions, and the offsets of the functions' tables among the numbers.
+
+    Args:
+        model: integers of the model.
+        reals: numbers of the model.
+        data: results; the controls are filled.
+        y: state.
+        f: rates of the coordinates.
+        item: offset of the record of the controls in the model.
+
+    Returns:
+        `OUTCOME.OK`.
     """
     i = at(model, item)
     count, numbers, values = i[ITEM.OWN], at(reals, i[ITEM.NUMBERS]), at(data, i[ITEM.RECORD])
@@ -218,7 +273,19 @@ def set_controls(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats,
 
 
 def add_reflex(data: Floats, place: int, gain: float, rate: float) -> float:
-    """Add a stretch reflex to a control: gain (s/m) times the lengthening speed (m/s) of the muscle."""
+    """Add a stretch reflex to a control.
+
+    The reflex is gain max(v, 0): a muscle that shortens causes none.
+
+    Args:
+        data: results with the controls.
+        place: offset of the control in data.
+        gain: gain (s/m).
+        rate: lengthening speed v of the muscle (m/s).
+
+    Returns:
+        The control.
+    """
     total: float = data[place] + gain * max(rate, 0.0)
     data[place] = total
     return total

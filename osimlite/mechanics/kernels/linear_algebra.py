@@ -29,12 +29,27 @@ than `count`, and at the end the rank.
 
 
 def factor_size(count: int, size: int) -> int:
-    """Return the length of a factor of `count` equations in `size` unknowns."""
+    """Return the length of a factor of `count` equations in `size` unknowns.
+
+    Args:
+        count: number of equations.
+        size: number of unknowns.
+    """
     return count * size + count * count + FACTOR_EXTRA * count + 1
 
 
 def factorise_by_law(model: Ints, data: Floats, count: int, a: Floats, smallest: float) -> int:
-    """Factorise equations in all speeds by the law of the model, see `factorise_equations`.
+    """Factorise equations in all speeds by the law of the model.
+
+    The indirection lets the compiled program have one copy of the factorization. See
+    `factorise_equations`.
+
+    Args:
+        model: integers of the model.
+        data: results; SCRATCH is used.
+        count: number of equations.
+        a: left sides (count, n), replaced by the factor.
+        smallest: relative threshold of independence.
 
     Returns:
         The rank.
@@ -78,7 +93,19 @@ def solve_by_law(
 def factorise_law(
     model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, count: int
 ) -> int:
-    """Factorise equations as a law: f holds the equations and gets the factor, SCRATCH the threshold."""
+    """Factorise equations as a law, which is called by its address.
+
+    Args:
+        model: integers of the model.
+        reals: not used.
+        data: results; SCRATCH holds the threshold of independence.
+        y: not used.
+        f: left sides, replaced by the factor.
+        count: number of equations.
+
+    Returns:
+        The rank, which is stored at the end of the factor, too.
+    """
     size = model[MODEL.DOFS]
     rank = factorise_equations(count, size, f, data[WORK.SCRATCH])
     f[factor_size(count, size) - 1] = rank
@@ -88,7 +115,19 @@ def factorise_law(
 def minimum_norm_law(
     model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, count: int
 ) -> int:
-    """Solve factorised equations as a law: right sides `reals`, workspace `data`, factor y, solution f."""
+    """Solve factorised equations as a law, which is called by its address.
+
+    Args:
+        model: integers of the model.
+        reals: right sides (count,).
+        data: workspace (count,).
+        y: factor.
+        f: filled with the shortest solution (n,).
+        count: number of equations.
+
+    Returns:
+        The rank.
+    """
     size = model[MODEL.DOFS]
     rank = int(y[factor_size(count, size) - 1])
     solve_minimum_norm(count, size, y, rank, reals, data, f)
@@ -116,6 +155,7 @@ def factorise_equations(count: int, size: int, a: Floats, smallest: float) -> in
     least = 0.0
     for r in range(min(count, size)):
         best, most = r, -1.0
+        # Pivoting: process the equation with the longest remaining part next.
         for i in range(r, count):
             square = 0.0
             for k in range(r, size):
@@ -123,6 +163,7 @@ def factorise_equations(count: int, size: int, a: Floats, smallest: float) -> in
             if square > most:
                 best, most = i, square
         length = sqrt(max(most, 0.0))
+        # The first equation is the longest one and defines the scale of the threshold.
         if r == 0:
             least = smallest * length
         if not length > least:
@@ -136,6 +177,7 @@ def factorise_equations(count: int, size: int, a: Floats, smallest: float) -> in
         for i in range(r + 1, count):
             apply_reflection(r, size, 1, row, 1, at(a, size * i))
         rank += 1
+    # Fewer independent equations than equations: least squares by a second reduction.
     if rank < count:
         # Reduce the lower trapezoid (count, rank) to a triangle by reflections of its columns.
         t, corner = at(a, count * size + FACTOR_EXTRA * count), at(a, count * size + 2 * count)
@@ -167,6 +209,7 @@ def make_reflection(first: int, end: int, stride: int, length: float, v: Floats)
         The value of the entry after the reflection.
     """
     lead = v[stride * first]
+    # Reflect to the opposite sign of the entry, so that the difference does not cancel.
     value = -length if lead > 0.0 else length
     if length > 0.0:
         v[stride * first] = lead - value
@@ -212,6 +255,7 @@ def solve_minimum_norm(
     diagonal, order = at(a, count * size), at(a, count * size + count)
     for i in range(count):
         room[i] = values[int(order[i])]
+    # Least squares over all equations, redundant ones included.
     if rank < count:
         t, corner = at(a, count * size + FACTOR_EXTRA * count), at(a, count * size + 2 * count)
         for r in range(rank):
@@ -227,19 +271,27 @@ def solve_minimum_norm(
             for k in range(r):
                 total -= a[size * r + k] * room[k]
             room[r] = total / diagonal[r]
+    # Unknowns beyond the rank are zero in the rotated basis, which makes the solution shortest.
     for k in range(size):
         x[k] = room[k] if k < rank else 0.0
     apply_q(size, a, rank, x)
 
 
 def apply_q(size: int, a: Floats, rank: int, x: Floats) -> None:
-    """Transform rotated unknowns back to the unknowns; those from `rank` on are free."""
+    """Transform rotated unknowns back to the unknowns; those from `rank` on are free.
+
+    Args:
+        size: number of unknowns.
+        a: factor.
+        rank: number of independent equations.
+        x: rotated unknowns (size,), replaced by the unknowns.
+    """
     for r in range(rank - 1, -1, -1):
         apply_reflection(r, size, 1, at(a, size * r), 1, x)
 
 
 def write_null_space(size: int, a: Floats, rank: int, basis: Floats) -> None:
-    """Write an orthonormal basis of the null space of factorised equations, by rows (size - rank, size).
+    """Write an orthonormal basis of the null space of factorised equations, by rows.
 
     Args:
         size: number of unknowns.
@@ -260,6 +312,11 @@ def factorise_cholesky(size: int, a: Floats, smallest: float) -> bool:
 
     Its lower triangle is used.
 
+    Args:
+        size: size of the matrix.
+        a: matrix; its lower triangle is replaced by the factor L of L Lᵀ.
+        smallest: relative threshold of the pivots.
+
     Returns:
         Whether each pivot is more than `smallest` times its entry of the matrix.
     """
@@ -272,6 +329,7 @@ def factorise_cholesky(size: int, a: Floats, smallest: float) -> bool:
             if k < i:
                 row[k] = total / other[k]
             else:
+                # Also false for NaN.
                 if not total > smallest * entry:
                     return False
                 row[i] = sqrt(total)
@@ -279,7 +337,13 @@ def factorise_cholesky(size: int, a: Floats, smallest: float) -> bool:
 
 
 def solve_cholesky(size: int, a: Floats, x: Floats) -> None:
-    """Solve a linear system in place with the factor of `factorise_cholesky`."""
+    """Solve a linear system in place with the factor of `factorise_cholesky`.
+
+    Args:
+        size: size of the matrix.
+        a: factor.
+        x: right side (size,), replaced by the solution.
+    """
     for i in range(size):
         total = x[i]
         for k in range(i):
@@ -323,10 +387,20 @@ def diagonalize(size: int, a: Floats, vectors: Floats) -> None:
 
 
 def rotate_plane(size: int, a: Floats, vectors: Floats, i: int, j: int) -> None:
-    """Rotate the plane of two unknowns so that their common entry vanishes."""
+    """Rotate the plane of two unknowns so that their common entry vanishes.
+
+    Args:
+        size: size of the matrix.
+        a: symmetric matrix (size, size); changed.
+        vectors: product of all rotations so far, by rows; changed.
+        i: first unknown.
+        j: second unknown.
+    """
     entry = a[size * i + j]
     if entry == 0.0:
         return
+    # The smaller of both roots of the equation for the tangent: a rotation by at most 45 degrees,
+    # for which the method converges.
     ratio = (a[size * j + j] - a[size * i + i]) / (2.0 * entry)
     tangent = (1.0 if ratio >= 0.0 else -1.0) / (abs(ratio) + sqrt(1.0 + ratio * ratio))
     cosine = 1.0 / sqrt(1.0 + tangent * tangent)

@@ -63,6 +63,7 @@ def place_links(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) 
         y: state, of which the coordinates are used.
         f: scratch that laws may use.
     """
+    # Parents come before children, so that one pass is enough.
     for link in range(model[MODEL.LINKS]):
         i, here = link_ints(model, link), link_work(model, data, link)
         # Start from the frame of the parent, or of ground.
@@ -75,6 +76,7 @@ def place_links(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) 
             j, a = at(model, record), operation_work(model, data, operation)
             b = at(reals, model[MODEL.FIXED_AT] + FIXED.SIZE * operation)
             # Apply the fixed transform before the motion.
+            # Most joints are not offset by a rotation: skip what is the identity.
             if j[OPERATION.BEFORE] != TRANSFORM.NOTHING:
                 origin = plus(origin, combine_axes(axes, vector(b, FIXED.TRANSLATION)))
                 if j[OPERATION.BEFORE] == TRANSFORM.MOVE:
@@ -85,6 +87,7 @@ def place_links(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) 
                     amount = y[j[OPERATION.DOF]]
                 else:
                     call(
+                        # A function of coordinates gives the amount.
                         model[MODEL.LAWS + j[OPERATION.FUNCTION]],
                         model,
                         reals,
@@ -109,12 +112,15 @@ def place_links(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) 
                     axis = combine_axes(axes, vector(b, FIXED.AXIS))
                     store_vector(a, OPERATION_WORK.AXIS, axis)
                     origin = add_scaled(origin, amount, axis)
+            # A ball changes the frame by three angles: its law receives the frame in SCRATCH and
+            # returns it there.
             else:
                 frame = at(data, WORK.SCRATCH)
                 set_frame(frame, axes, origin)
                 call(model[MODEL.LAWS + j[OPERATION.FUNCTION]], model, reals, data, y, f, operation)
                 axes, origin = axes_from_rows(frame), vector(frame, LINK_WORK.POSITION)
-        # All links of a tree share the origin of its first link for their spatial vectors.
+        # All links of a tree share the origin of its first link for their spatial vectors, so that
+        # these add up without shifts.
         set_frame(here, axes, origin)
         if i[LINK.PARENT] >= 0:
             origin = vector(link_work(model, data, i[LINK.PARENT]), LINK_WORK.ORIGIN)
@@ -127,7 +133,13 @@ def axes_from_rows(rows: Floats) -> Axes:
 
 
 def set_frame(rows: Floats, axes: Axes, origin: Vector) -> None:
-    """Store a rotation by rows, and the position after it."""
+    """Store a rotation by rows, and the position after it.
+
+    Args:
+        rows: filled with the rotation (9,) and the position (3,).
+        axes: axes of the frame, the columns of the rotation.
+        origin: position of its origin (m).
+    """
     one, two, three = axes
     rows[0], rows[3], rows[6] = one
     rows[1], rows[4], rows[7] = two
@@ -151,10 +163,13 @@ def move_links(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) -
         `OUTCOME.OK`, or the outcome of a law that failed.
     """
     status, size, controls = OUTCOME.OK, model[MODEL.DOFS], model[MODEL.CONTROLS]
+    # Controls first: items may need them.
     if controls > 0:
         status = call(model[controls + ITEM.LAW], model, reals, data, y, f, controls)
+    # The rates are the speeds, except for balls, whose law overwrites them.
     for freedom in range(size):
         f[freedom] = y[size + freedom]
+    # Columns that are sums start from zero; all others are overwritten.
     for k in range(model[MODEL.SUMMED]):
         set_spatial_vector(
             at(data, model[MODEL.WORK_COLUMN] + 6 * model[model[MODEL.SUMMED_AT] + k]), ZERO, ZERO
@@ -189,10 +204,14 @@ def move_links(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) -
                     rate = y[size + freedom]
                     column = at(data, model[MODEL.WORK_COLUMN] + 6 * freedom)
                     if j[OPERATION.FUNCTION] == OPERATION.ALONE:
+                        # Only an operation that is a degree of freedom alone may overwrite its
+                        # column.
                         set_spatial_vector(column, turn, shift)
                     else:
                         add_spatial_vector(column, 1.0, turn, shift)
                 else:
+                    # A function: its rate moves the link, and its curvature is an acceleration
+                    # while udot = 0.
                     rate, curvature = a[OPERATION_WORK.RATE], a[OPERATION_WORK.CURVATURE]
                     spin_rate = add_scaled(spin_rate, curvature, turn)
                     acceleration = add_scaled(acceleration, curvature, shift)
@@ -237,13 +256,26 @@ def move_links(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) -
 
 
 def set_spatial_vector(row: Floats, turn: Vector, shift: Vector) -> None:
-    """Store a spatial vector."""
+    """Store a spatial vector, angular part first.
+
+    Args:
+        row: filled (6,).
+        turn: angular part.
+        shift: linear part.
+    """
     store_vector(row, 0, turn)
     store_vector(row, 3, shift)
 
 
 def add_spatial_vector(row: Floats, factor: float, turn: Vector, shift: Vector) -> None:
-    """Add a multiple of a spatial vector to a stored one."""
+    """Add a multiple of a spatial vector to a stored one.
+
+    Args:
+        row: spatial vector (6,); changed.
+        factor: the multiple.
+        turn: angular part.
+        shift: linear part.
+    """
     set_spatial_vector(
         row, add_scaled(vector(row, 0), factor, turn), add_scaled(vector(row, 3), factor, shift)
     )

@@ -33,34 +33,71 @@ laws: dict[int, Law] = {}
 
 
 def register_law(law: Law) -> int:
-    """Register a law and return the integer that stands for its address in Python."""
+    """Register a law for calls by address in Python.
+
+    Returns:
+        The integer that stands for its address.
+    """
     laws[id(law)] = law
     return id(law)
 
 
 def at(vector: Vector, place: int) -> Vector:
-    """Return the vector from an offset on, as a view."""
+    """Return the vector from an offset on, as a view.
+
+    Args:
+        vector: vector.
+        place: offset of the first entry of the view.
+    """
     return vector[place:]
 
 
 def call(
     address: int, model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, place: int
 ) -> int:
-    """Call the law at an address and return its outcome."""
+    """Call the law at an address.
+
+    Args:
+        address: address in machine code, or the integer of `register_law` in Python.
+        model: integers of the model.
+        reals: numbers of the model.
+        data: results of an evaluation.
+        y: state.
+        f: rates of the state.
+        place: number of the law's subject, such as an operation, or offset of an item or
+            constraint.
+
+    Returns:
+        Outcome of the law, see `OUTCOME`.
+    """
     return laws[address](model, reals, data, y, f, place)
 
 
 def copy_numbers(count: int, values: Floats, to: Floats) -> None:
-    """Copy `count` numbers."""
+    """Copy the first numbers of a vector to another one.
+
+    Args:
+        count: number of entries.
+        values: source.
+        to: destination; changed.
+    """
     for k in range(count):
         to[k] = values[k]
 
 
 def is_finite(count: int, values: Floats) -> bool:
-    """Return whether the first `count` numbers are all finite."""
+    """Return whether the first `count` numbers of a vector are all finite.
+
+    Args:
+        count: number of entries.
+        values: vector.
+    """
+    # The sum is not finite if any entry is not. It may also overflow for huge finite numbers, which
+    # are as useless here.
     total = 0.0
     for k in range(count):
         total += values[k]
+    # Infinity less infinity is NaN, so the difference is 0 for finite sums only.
     return total - total == 0.0
 
 
@@ -90,6 +127,7 @@ def interpolate_cubic(
     """
     h = t1 - t0
     z = (t - t0) / h
+    # Hermite's basis functions; those of the rates contain the step length h.
     b1 = z * z * (3.0 - 2.0 * z)
     b0 = 1.0 - b1
     c = h * z * (z - 1.0)

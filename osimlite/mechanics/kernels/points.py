@@ -28,22 +28,44 @@ from osimlite.mechanics.laws.vectors import (
 
 
 def link_ints(model: Ints, link: int) -> Ints:
-    """Return the integers of a link, see `LINK`."""
+    """Return the integers of a link, see `LINK`.
+
+    Args:
+        model: integers of the model.
+        link: number of the link.
+    """
     return at(model, model[MODEL.LINK_AT] + LINK.SIZE * link)
 
 
 def link_work(model: Ints, data: Floats, link: int) -> Floats:
-    """Return the results of a link, see `LINK_WORK`."""
+    """Return the results of a link, see `LINK_WORK`.
+
+    Args:
+        model: integers of the model.
+        data: results of an evaluation.
+        link: number of the link.
+    """
     return at(data, model[MODEL.WORK_LINK] + LINK_WORK.SIZE * link)
 
 
 def operation_ints(model: Ints, operation: int) -> Ints:
-    """Return the integers of an operation, see `OPERATION`."""
+    """Return the integers of an operation, see `OPERATION`.
+
+    Args:
+        model: integers of the model.
+        operation: number of the operation.
+    """
     return at(model, model[MODEL.OPERATION_AT] + OPERATION.SIZE * operation)
 
 
 def operation_work(model: Ints, data: Floats, operation: int) -> Floats:
-    """Return the results of an operation, see `OPERATION_WORK`."""
+    """Return the results of an operation, see `OPERATION_WORK`.
+
+    Args:
+        model: integers of the model.
+        data: results of an evaluation.
+        operation: number of the operation.
+    """
     return at(data, model[MODEL.WORK_OPERATION] + OPERATION_WORK.SIZE * operation)
 
 
@@ -59,13 +81,21 @@ def unit_twist(j: Ints, a: Floats, origin: Vector) -> tuple[Vector, Vector]:
         Angular and linear part of the twist.
     """
     axis = vector(a, OPERATION_WORK.AXIS)
+    # A rotation about an axis that does not contain the origin moves the origin, too.
     if j[OPERATION.MOTION] == MOTION.TURN:
         return axis, cross(minus(vector(a, OPERATION_WORK.POINT), origin), axis)
     return ZERO, axis
 
 
 def station(model: Ints, data: Floats, link: int, point: Vector) -> Vector:
-    """Return the position in ground of a point that is given in a link (m)."""
+    """Return the position in ground of a point that is given in a link (m).
+
+    Args:
+        model: integers of the model.
+        data: results of an evaluation.
+        link: number of the link, negative for ground.
+        point: position in the link (m).
+    """
     if link < 0:
         return point
     r = link_work(model, data, link)
@@ -78,7 +108,14 @@ def station(model: Ints, data: Floats, link: int, point: Vector) -> Vector:
 
 
 def direction(model: Ints, data: Floats, link: int, along: Vector) -> Vector:
-    """Return a direction that is given in a link, along the axes of ground."""
+    """Return a direction that is given in a link, along the axes of ground.
+
+    Args:
+        model: integers of the model.
+        data: results of an evaluation.
+        link: number of the link, negative for ground.
+        along: direction in the link.
+    """
     return along if link < 0 else rotate(link_work(model, data, link), along)
 
 
@@ -103,17 +140,31 @@ def place_frame(
 
 
 def velocity(model: Ints, data: Floats, link: int, point: Vector) -> Vector:
-    """Return the velocity (m/s) of the material point of a link at a position in ground."""
+    """Return the velocity (m/s) of the material point of a link at a position in ground.
+
+    Args:
+        model: integers of the model.
+        data: results of an evaluation.
+        link: number of the link, negative for ground.
+        point: position in ground (m).
+    """
     if link < 0:
         return ZERO
     here = link_work(model, data, link)
     v = at(here, LINK_WORK.VELOCITY)
     px, py, pz = minus(point, vector(here, LINK_WORK.ORIGIN))
+    # v + w x p, written out: this is the most frequent product of an evaluation.
     return v[3] + v[1] * pz - v[2] * py, v[4] + v[2] * px - v[0] * pz, v[5] + v[0] * py - v[1] * px
 
 
 def angular_velocity(model: Ints, data: Floats, link: int) -> Vector:
-    """Return the angular velocity of a link along the axes of ground (rad/s)."""
+    """Return the angular velocity of a link along the axes of ground (rad/s).
+
+    Args:
+        model: integers of the model.
+        data: results of an evaluation.
+        link: number of the link, negative for ground.
+    """
     return ZERO if link < 0 else vector(link_work(model, data, link), LINK_WORK.VELOCITY)
 
 
@@ -122,6 +173,13 @@ def acceleration(model: Ints, reals: Floats, data: Floats, link: int, point: Vec
 
     The point is at a position in ground. Links carry accelerations relative to free fall, so that
     gravity is added here.
+
+    Args:
+        model: integers of the model.
+        reals: numbers of the model.
+        data: results of an evaluation.
+        link: number of the link, negative for ground.
+        point: position in ground (m).
     """
     if link < 0:
         return ZERO
@@ -139,12 +197,26 @@ def acceleration(model: Ints, reals: Floats, data: Floats, link: int, point: Vec
 
 
 def angular_acceleration_bias(model: Ints, data: Floats, link: int) -> Vector:
-    """Return the angular acceleration of a link while udot = 0 (rad/s²)."""
+    """Return the angular acceleration of a link while udot = 0 (rad/s²).
+
+    Args:
+        model: integers of the model.
+        data: results of an evaluation.
+        link: number of the link, negative for ground.
+    """
     return ZERO if link < 0 else vector(link_work(model, data, link), LINK_WORK.ACCELERATION)
 
 
 def apply_force(model: Ints, data: Floats, link: int, point: Vector, force: Vector) -> None:
-    """Add a force (N) at a position in ground to the wrench on a link."""
+    """Add a force (N) at a position in ground to the wrench on a link.
+
+    Args:
+        model: integers of the model.
+        data: results; the wrench is changed.
+        link: number of the link; forces on ground have no effect.
+        point: position in ground (m).
+        force: force along the axes of ground (N).
+    """
     if link < 0:
         return
     here = link_work(model, data, link)
@@ -156,7 +228,14 @@ def apply_force(model: Ints, data: Floats, link: int, point: Vector, force: Vect
 
 
 def apply_torque(model: Ints, data: Floats, link: int, torque: Vector) -> None:
-    """Add a torque (N m) to the wrench on a link."""
+    """Add a torque (N m) to the wrench on a link.
+
+    Args:
+        model: integers of the model.
+        data: results; the wrench is changed.
+        link: number of the link; torques on ground have no effect.
+        torque: torque along the axes of ground (N m).
+    """
     if link >= 0:
         load = at(link_work(model, data, link), LINK_WORK.WRENCH)
         store_vector(load, 0, plus(vector(load, 0), torque))

@@ -7,6 +7,8 @@ from osimlite.mechanics.kernels.table import compile_text
 from osimlite.mechanics.laws import formulas
 from osimlite.mechanics.laws.formulas import FUNCTIONS, OF_TWO, divide, larger, power, smaller
 
+# The branches of single functions are generated, so that their order is that of FUNCTIONS in one
+# place only.
 OF_ONE = tuple(law for name, law in FUNCTIONS.items() if name not in OF_TWO)
 """Names of the functions of one argument, in the order of their numbers."""
 STEPS = ("number", "+", "-", "*", "negative", "divide", "power", "smaller", "larger", *OF_ONE)
@@ -38,6 +40,7 @@ def run_program(
         registers: the variables, then one register for the result of each step.
         variables: number of variables.
     """
+    # The operations are tested in the order of STEPS.
     value = 0.0
     for k in range(count):
         kind, one, two = steps[3 * k], steps[3 * k + 1], steps[3 * k + 2]
@@ -70,6 +73,17 @@ def run_program(
 def run_binary_program(
     one: float, two: float, steps: Ints, constants: Floats, registers: Floats
 ) -> float:
-    """Run a program of two variables that is preceded by its number of steps, and return its result."""
+    """Run a program of two variables.
+
+    Args:
+        one: first variable.
+        two: second variable.
+        steps: number of steps, then the steps.
+        constants: numbers of the formula.
+        registers: workspace of 2 registers and one for each step.
+
+    Returns:
+        Result of the program.
+    """
     registers[0], registers[1] = one, two
     return run_program(at(steps, 1), steps[0], constants, registers, 2)

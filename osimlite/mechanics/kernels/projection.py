@@ -45,6 +45,7 @@ def project(
     """
     size, h = model[MODEL.DOFS], at(model, model[MODEL.CONSTRAINED])
     tolerance, limit = data[WORK.SCRATCH], data[WORK.SCRATCH + 1]
+    # Work on a copy: a state that cannot be projected stays as it was.
     trial = at(data, h[CONSTRAINED.WORK_TRIAL])
     for k in range(2 * size):
         trial[k] = y[k]
@@ -54,6 +55,7 @@ def project(
             model, reals, data, trial, state_errors, has_errors, tolerance, limit
         )
     if status == OUTCOME.OK:
+        # Speeds after positions, because G depends on the positions.
         status = project_speeds(
             model, data, trial, at(state_errors, size), has_errors, tolerance, limit
         )
@@ -64,7 +66,15 @@ def project(
 
 
 def evaluate_equations(model: Ints, reals: Floats, data: Floats, y: Floats) -> int:
-    """Evaluate all constraint equations at a state; return the outcome."""
+    """Evaluate all constraint equations at a state; return the outcome.
+
+    Args:
+        model: integers of the model.
+        reals: numbers of the model.
+        data: results; changed.
+        y: state.
+    """
+    # Rates go to workspace behind the trial state.
     f = at(data, model[model[MODEL.CONSTRAINED] + CONSTRAINED.WORK_TRIAL] + 2 * model[MODEL.DOFS])
     status = call(model[MODEL.LAWS], model, reals, data, y, f, STAGE.VELOCITY)
     if status == OUTCOME.OK:
@@ -109,9 +119,11 @@ def project_values(
         at(errors, 2 * count),
         at(data, h[CONSTRAINED.WORK_TRIAL] + 4 * size),
     )
+    # Simbody leaves states alone that fulfil the constraints within the tolerance.
     norm = collect_position_errors(model, data, errors)
     if norm <= tolerance:
         return OUTCOME.OK
+    # Also true for NaN.
     if not norm <= limit:
         return OUTCOME.FAR
     for iteration in range(ITERATIONS):
@@ -121,10 +133,13 @@ def project_values(
         factorise_by_law(model, data, count, factor, REDUNDANT * count)
         solve_by_law(model, count, factor, errors, work, step)
         for k in range(size):
+            # Speeds are copied, since the evaluation of velocities needs a complete state.
             following[k], following[size + k] = y[k] - step[k], y[size + k]
         before, norm = norm, inf
         if evaluate_equations(model, reals, data, following) == OUTCOME.OK:
             norm = collect_position_errors(model, data, errors)
+        # OpenSim accepts the first step even if it increases the error, and stops at the first
+        # later one that does.
         if iteration > 0 and not norm <= before:
             norm = before
             break
@@ -138,6 +153,7 @@ def project_values(
         normal_component(model, count, jacobian, factor, state_errors, errors, work, step)
         for k in range(size):
             state_errors[k] -= step[k]
+    # The last evaluation may have been at a rejected state.
     return evaluate_equations(model, reals, data, y)
 
 
@@ -181,6 +197,7 @@ def project_speeds(
         return OUTCOME.OK
     if not norm <= limit:
         return OUTCOME.FAR
+    # Simbody weights a change of a speed above 1 by the speed.
     for k in range(size):
         scales[k] = max(abs(u[k]), 1.0)
     for i in range(count):
@@ -235,7 +252,16 @@ def normal_component(
 
 
 def collect_position_errors(model: Ints, data: Floats, errors: Floats) -> float:
-    """Collect the errors of the positions; return their root mean square."""
+    """Collect the errors of the positions.
+
+    Args:
+        model: integers of the model.
+        data: results with the equations.
+        errors: filled (p,).
+
+    Returns:
+        Their root mean square; locks count as equations without error, as in Simbody.
+    """
     h, count, total = at(model, model[MODEL.CONSTRAINED]), 0, 0.0
     for number in range(h[CONSTRAINED.CONSTRAINTS]):
         constraint = at(model, model[h[CONSTRAINED.CONSTRAINT_AT] + number])
@@ -249,7 +275,17 @@ def collect_position_errors(model: Ints, data: Floats, errors: Floats) -> float:
 
 
 def compute_speed_errors(model: Ints, data: Floats, u: Floats, errors: Floats) -> float:
-    """Compute the errors G u - b of the speeds; return their root mean square."""
+    """Compute the errors G u - b of the speeds.
+
+    Args:
+        model: integers of the model.
+        data: results with the equations.
+        u: generalized speeds (n,).
+        errors: filled (m,).
+
+    Returns:
+        Their root mean square; locks count as equations without error, as in Simbody.
+    """
     h, size, total = at(model, model[MODEL.CONSTRAINED]), model[MODEL.DOFS], 0.0
     rows, rates = at(data, h[CONSTRAINED.WORK_ROWS]), at(data, h[CONSTRAINED.WORK_RATES])
     for i in range(h[CONSTRAINED.EQUATIONS]):
@@ -262,7 +298,14 @@ def compute_speed_errors(model: Ints, data: Floats, u: Floats, errors: Floats) -
 
 
 def write_position_jacobian(model: Ints, data: Floats, y: Floats, rows: Floats) -> None:
-    """Write the derivatives of the position errors by the coordinates (not by the speeds)."""
+    """Write the derivatives of the position errors by the coordinates, not by the speeds.
+
+    Args:
+        model: integers of the model.
+        data: results with the equations.
+        y: state.
+        rows: filled (p, n).
+    """
     h, size, count = at(model, model[MODEL.CONSTRAINED]), model[MODEL.DOFS], 0
     for number in range(h[CONSTRAINED.CONSTRAINTS]):
         constraint = at(model, model[h[CONSTRAINED.CONSTRAINT_AT] + number])
@@ -271,6 +314,8 @@ def write_position_jacobian(model: Ints, data: Floats, y: Floats, rows: Floats) 
             for k in range(size):
                 row[k] = speed_row[k]
             count += 1
+    # Speeds and coordinates differ for balls only. With the angular velocity w = B qdot, the
+    # derivatives by the angles are those by the speeds times B.
     for number in range(h[CONSTRAINED.BALLS]):
         a = at(model, model[h[CONSTRAINED.BALL_AT] + number])
         s1, c1 = sine_cosine(y[a[0]])

@@ -83,34 +83,38 @@ METHOD_AT = 8
 class Motion(NamedTuple):
     """Inputs and records of a run; any of the records may have no rows.
 
-    A state has y numbers, see `MODEL.STATE_SIZE`.
+    A state has y numbers, see `MODEL.STATE_SIZE`. P is the number of pairs of contact surfaces.
+
+    Each watch has three integers: its type; a degree of freedom, a link or a contact; and -1 or 1
+    if falling or rising through the level ends the run, 0 if neither does.
     """
 
     model: Ints  # the mechanism
     reals: Floats  # its numbers
-    data: Floats  # room; at METHOD_AT the method's
+    data: Floats  # results and workspace; the record of the integration method at METHOD_AT
     sizes: Ints  # see MOST_TRIES
     clock: Floats  # time and next step to try, s; changed
-    # numbers of steps, tried steps, evaluations, reports, logged steps and events; changed. Events
-    # beyond the workspace are only counted.
-    counts: Ints
+    counts: Ints  # see TAKEN; changed
     times: Floats  # of the reports, s (r,)
     reports: Floats  # states at these times (r, y)
     log: Floats  # of each step the time, y, f (k, 1 + 2y)
     forces: Floats  # of each step the force on surface 2 of each pair (k, P, 3)
-    # time, number (of a contact, or P and the number of a watch), 1 if it begins or rises, else 0,
-    # and if the row is long enough the state (e, 3 or 3 + y)
-    events: Floats
+    events: Floats  # see `insert_event` (e, 3 or 3 + y)
     peaks: Floats  # largest force of each pair at the end of a step, and its time (P, 2)
-    # kind, degree of freedom or link or contact, and -1 or 1 if falling or rising through the level
-    # ends the run, 0 if neither (w, 3)
-    watches: Ints
-    # of each watch the station in the link, the direction in ground, and the level (w, 7)
-    levels: Floats
+    watches: Ints  # see `compute_levels` (w, 3)
+    levels: Floats  # station in the link, direction in ground, and level of each watch (w, 7)
 
 
 def evaluate_state(m: Motion, t: float, y: Floats, f: Floats, stage: int) -> int:
-    """Evaluate a state at a time; return the outcome."""
+    """Evaluate a state at a time; return the outcome.
+
+    Args:
+        m: the run.
+        t: time (s).
+        y: state.
+        f: filled with the rates.
+        stage: how far the evaluation goes, see `STAGE`.
+    """
     m.data[WORK.TIME] = t
     return call(m.model[MODEL.LAWS], m.model, m.reals, m.data, y, f, stage)
 
@@ -140,6 +144,9 @@ def interpolate_state(
         y: filled with the state.
     """
     interpolate_cubic(m.model[MODEL.STATE_SIZE], t0, y0, f0, t1, y1, f1, t, y)
+    # The cubic polynomial leaves the constraints by its interpolation error. A tenth of the
+    # accuracy is as exact as an integrator's own projection, and without a limit every state is
+    # projected.
     if m.model[MODEL.CONSTRAINED] > 0:
         project_by_law(
             m.model, m.reals, m.data, t, y, y, 0, m.data[m.sizes[METHOD_AT] + ACCEPTED] / 10.0, inf
@@ -147,7 +154,12 @@ def interpolate_state(
 
 
 def note_peaks(m: Motion, t: float) -> None:
-    """Update the largest forces of the contacts, and their times."""
+    """Update the largest forces of the contacts, and their times.
+
+    Args:
+        m: the run, whose last evaluation was at time t.
+        t: time (s).
+    """
     for pair in range(m.model[MODEL.CONTACTS]):
         c, peak = (
             at(m.data, m.model[MODEL.WORK_CONTACT] + CONTACT_WORK.SIZE * pair),
@@ -159,7 +171,14 @@ def note_peaks(m: Motion, t: float) -> None:
 
 
 def note_step(m: Motion, t: float, y: Floats, f: Floats) -> None:
-    """Append a step to the log."""
+    """Append a step to the log.
+
+    Args:
+        m: the run, whose last evaluation was at time t.
+        t: time at the end of the step (s).
+        y: state.
+        f: its rates.
+    """
     size, row = m.model[MODEL.STATE_SIZE], m.counts[LOGGED]
     log = at(m.log, (1 + 2 * size) * row)
     log[0] = t
@@ -185,6 +204,8 @@ def compute_levels(m: Motion, y: Floats, levels: Floats) -> None:
     pairs = m.model[MODEL.CONTACTS]
     for pair in range(pairs):
         c = at(m.data, m.model[MODEL.WORK_CONTACT] + CONTACT_WORK.SIZE * pair)
+        # A contact transmits a force or does not: between -1 and 1 the level always changes its
+        # sign.
         levels[pair] = 1.0 if c[0] != 0.0 or c[1] != 0.0 or c[2] != 0.0 else -1.0
     for number in range(m.sizes[WATCHES]):
         watch, a = at(m.watches, 3 * number), at(m.levels, 7 * number)
@@ -228,6 +249,7 @@ def note_events(
     counts, events = m.counts, m.events
     size, pairs = m.model[MODEL.STATE_SIZE], m.model[MODEL.CONTACTS]
     stop, first, total, event = inf, counts[EVENTS], pairs + m.sizes[WATCHES], m.sizes[EVENT]
+    # WORK_STATE has room for STATES states; the integrators use the first four.
     ya = at(m.data, m.model[MODEL.WORK_STATE] + 4 * size)
     fa, result = at(ya, size), at(after, total)
     for number in range(total):
@@ -237,10 +259,12 @@ def note_events(
         low, high = t0, t1
         # Bisect the interpolated motion for the change of sign.
         while high - low > TIME_OF_EVENT:
+            # Stop also where floats between both ends run out, at times above 1e6 s.
             middle = 0.5 * (low + high)
             if not low < middle < high:
                 break
             interpolate_state(m, t0, y0, f0, t1, y1, f1, middle, ya)
+            # Contacts need forces, all other watches only poses.
             touch = number < pairs or m.watches[3 * (number - pairs)] == TOUCH
             evaluate_state(m, middle, ya, fa, STAGE.FORCE if touch else STAGE.POSITION)
             compute_levels(m, ya, result)
@@ -249,6 +273,7 @@ def note_events(
             else:
                 low = middle
         t = 0.5 * (low + high)
+        # A run that ends at an event must end on the far side of it, hence `high`.
         if number >= pairs and m.watches[3 * (number - pairs) + 2] == (1 if rises else -1):
             t = high
             stop = min(stop, t)
@@ -256,6 +281,7 @@ def note_events(
         if row < m.sizes[MOST_EVENTS] and event > 3:
             interpolate_state(m, t0, y0, f0, t1, y1, f1, t, at(events, event * row + 3))
     # Drop events after the end of the run.
+    # Events are sorted by time, so those after the end are the last ones.
     while counts[EVENTS] > first and counts[EVENTS] <= m.sizes[MOST_EVENTS]:
         if events[event * (counts[EVENTS] - 1)] <= stop:
             break
@@ -264,19 +290,26 @@ def note_events(
 
 
 def insert_event(m: Motion, first: int, t: float, number: int, rises: bool) -> int:
-    """Insert an event among those of its step, sorted by time; return its row, which may not exist.
+    """Insert an event among those of its step, sorted by time.
+
+    A row holds the time, the number, 1 if the level rises or 0 if it falls, and the state if the
+    row is long enough.
 
     Args:
         m: the run.
         first: first event of the step.
         t: time of the event (s).
-        number: number of the contact or watch.
+        number: number of the contact, or number of contacts plus that of the watch.
         rises: whether the level rises.
+
+    Returns:
+        Index of the row, which does not exist if the records are full; the event is counted then.
     """
     row, events, length = int(m.counts[EVENTS]), m.events, m.sizes[EVENT]
     m.counts[EVENTS] += 1
     if row >= m.sizes[MOST_EVENTS]:
         return row
+    # Insertion sort: few events happen within one step.
     while row > first and events[length * (row - 1)] > t:
         copy_numbers(length, at(events, length * (row - 1)), at(events, length * row))
         row -= 1

@@ -83,14 +83,15 @@ LAW_MODULES = {
     "inverse": "dynamics",
     "assemble_poses": "assembly",
 }
-"""The module of each of the engine's own."""
+"""Module of each kernel that models call by number; its keys define the order of the numbers."""
 
+# Numbers, not addresses, are stored in records that are written before a kernel is compiled.
 LAW_NUMBERS = {name: number for number, name in enumerate(LAW_MODULES)}
 """Index of each kernel's address among the addresses from `layout.MODEL.LAWS` on."""
 
 
 def load_kernel(name: str) -> Callable[..., Any]:
-    """Return the kernel of a name in the table."""
+    """Return the kernel of a name in the table, importing its module."""
     function: Callable[..., Any] = getattr(
         import_module(f"{__package__}.{LAW_MODULES[name]}"), name
     )
