@@ -303,7 +303,6 @@ def add_geometric_stiffness(model: Ints, reals: Floats, data: Floats, levers: Fl
             # Change of the moment of the load as it moves along this operation: with the sum S of
             # products of positions and forces, it is shift x F + S turn - trace(S) turn.
             moved = minus(cross(shift, vector(load, 0)), times(load[3] + load[7] + load[11], turn))
-            moved, inner, within = plus(moved, rotate(at(load, 3), turn)), operation, link
             # Each pair of an operation and a rotation on its path to ground is visited once, so both
             # entries of the symmetric matrix are changed.
             moved, inner, within = plus(moved, rotate(at(load, 3), turn)), operation, link
