@@ -20,6 +20,7 @@ import numpy as np
 
 from osimlite.models.walking import write_scenario
 from osimlite.simulation.copies import Copies
+from osimlite.simulation.options import IntegrationOptions
 from osimlite.studies.reflexes.scenario import Scenario
 
 METHODS = {
@@ -46,7 +47,12 @@ def measured(
     size = len(walkers.coordinates)
 
     def ends(method: str, accuracy: float) -> tuple[np.ndarray, float]:
-        copies = Copies(scenario.model, len(start), scenario.step, accuracy, method)
+        copies = Copies(
+            scenario.model,
+            len(start),
+            scenario.step,
+            IntegrationOptions(accuracy=accuracy, integrator=method),
+        )
         took = []
         for _ in range(TIMES if accuracy > 1e-10 else 1):
             copies.set_states(slice(None), start)

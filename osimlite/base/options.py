@@ -16,7 +16,7 @@ class OptionSpec(NamedTuple):
         name: keyword of the library; on the command line with - for _, unless `spelled` is given.
         type: type of the value.
         help: one sentence.
-        default: value if the option is absent.
+        default: value if the option is absent; None if `shown` says what the library then takes.
         unit: placeholder of the value in the help, in capitals, as SECONDS.
         shown: default in words, where `default` does not say it.
         group: heading of the help under which the option is listed.
@@ -69,15 +69,17 @@ def list_options(options: Any) -> Iterator[OptionSpec]:
     for name, each in options.__record_fields__.items():
         description: OptionDescription = each.option
         if description.help:
+            owner = next(item for item in options.__mro__ if name in item.__annotations__)
             kind = description.type or eval(
-                options.__annotations__[name], vars(sys.modules[options.__module__])
+                owner.__annotations__[name], vars(sys.modules[owner.__module__])
             )
             spelled = (f"--{name.replace('_', '-')}",) if kind is bool else ()
             yield OptionSpec(
                 name,
                 kind,
                 description.help,
-                each.default,
+                # The library can then tell that the user has not set the option.
+                None if description.shown else each.default,
                 description.unit,
                 description.shown,
                 "",

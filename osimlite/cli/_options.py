@@ -192,14 +192,23 @@ Geometry = Annotated[
 Browser = Annotated[bool, Option("--browser/--no-browser", help="Open the page in the browser.")]
 
 
-def simulating(*names: str) -> Callable[[], Iterator[OptionSpec]]:
-    """The options of a simulation, or those of these names, for :func:`osimlite.cli._command.command_with`."""
+def simulating(*names: str, integration: bool = False) -> Callable[[], Iterator[OptionSpec]]:
+    """Return the options of a simulation for :func:`osimlite.cli._command.command_with`.
+
+    Args:
+        names: options that the command takes; by default all.
+        integration: whether it takes the options of integration too.
+    """
 
     def chosen() -> Iterator[OptionSpec]:
         from osimlite.base.options import list_options
-        from osimlite.simulation.options import Options
+        from osimlite.simulation.options import INTEGRATION_OPTIONS, Options
 
-        return (each for each in list_options(Options) if not names or each.name in names)
+        return (
+            each
+            for each in list_options(Options)
+            if not names or each.name in names or (integration and each.name in INTEGRATION_OPTIONS)
+        )
 
     return chosen
 

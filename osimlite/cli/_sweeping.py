@@ -76,8 +76,8 @@ Cluster = Annotated[
 ]
 
 
-PASSED = "accuracy", "integrator", "wrapping", "equilibrate", "skip_unsupported"
-"""Options of a simulation that those of many take too."""
+PASSED = "wrapping", "equilibrate", "skip_unsupported"
+"""Options of a simulation, besides those of integration, that commands for many simulations take too."""
 
 
 def make_plan(

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from osimlite.studies.sweep.optimize import Optimum
 
 
-@command_with(options.simulating(*sweeping.PASSED))
+@command_with(options.simulating(*sweeping.PASSED, integration=True))
 def optimize(
     source: options.Source,
     objective: Annotated[

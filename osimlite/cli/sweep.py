@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from osimlite.studies.sweep.run import Outcome
 
 
-@command_with(options.simulating(*sweeping.PASSED))
+@command_with(options.simulating(*sweeping.PASSED, integration=True))
 def sweep(
     source: options.Source,
     vary: sweeping.Vary = None,

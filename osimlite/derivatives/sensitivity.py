@@ -237,7 +237,7 @@ class _SensitivityRun:
         start = self._pack_rows(trajectory)[0].tolist()
         wanted = trajectory.times.tolist()
         times, states, ended = self._simulation.record_every_step(
-            0.0, start, wanted[-1], Settings(accuracy)
+            0.0, start, wanted[-1], Settings(accuracy=accuracy)
         )
         if ended is not None:
             raise ended

@@ -26,7 +26,7 @@ from osimlite.schema.model import Model
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.builder import OPENSIM
 from osimlite.simulation.engines.protocol import Engine
-from osimlite.simulation.options import DEFAULT_ACCURACY, MERSON, UNBOUNDED_STEPS, check_integrator
+from osimlite.simulation.options import IntegrationOptions
 
 if TYPE_CHECKING:
     from osimlite.simulation.control_steps import KernelController
@@ -53,20 +53,16 @@ the allowed number of attempted steps.
 
 
 @dataclass(frozen=True, kw_only=True)
-class BatchOptions:
-    """Options of a batch."""
+class BatchOptions(IntegrationOptions):
+    """Options of a batch, besides those of its integration."""
 
     to: float = 2.0  # end of the runs unless a watch stops them, s
-    accuracy: float = DEFAULT_ACCURACY  # accuracy of the integrator
-    integrator: str = MERSON  # see `Options`
     report_times: Sequence[float] = ()  # increasing times at which states are recorded, s
     watches: Sequence[Watch] = ()  # events besides the begin and end of contacts
     most_events: int = 0  # largest number of recorded events of a run; later ones are dropped
     event_states: bool = False  # whether states at events are recorded
     most_tries: int = UNLIMITED_TRIES  # largest number of attempted steps of a run
     threads: int | None = None  # number of threads; by default one for each core
-    # shortest and longest step (s), see `Settings`
-    step_bounds: tuple[float, float] = UNBOUNDED_STEPS
     # controllers of the runs; the last function of each of their controls is a constant
     held: Sequence[KernelController] = ()
 
@@ -76,9 +72,7 @@ class BatchOptions:
         Raises:
             SettingError: a value has no meaning.
         """
-        if not 0.0 < self.accuracy < 1.0:
-            raise SettingError(f"the accuracy must lie between 0 and 1; {self.accuracy} does not")
-        check_integrator(self.integrator)
+        self.check_integration()
         if not self.to >= 0.0:
             raise SettingError(f"the runs end at a time that is not negative, not at {self.to} s")
         if not all(one <= other for one, other in pairwise([0.0, *self.report_times])):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from math import inf
 from typing import Any
 
 import numpy as np
@@ -17,6 +16,7 @@ from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.model import Model
 from osimlite.simulation.batches import BatchOptions
 from osimlite.simulation.engines.batch import Batch
+from osimlite.simulation.options import IntegrationOptions
 from osimlite.simulation.run import Simulation
 from osimlite.simulation.run_controls import find_constant_offsets
 
@@ -33,9 +33,7 @@ class Copies:
         model: the model; its controllers add to the controls.
         count: number of copies.
         step: length of a control step, s.
-        accuracy: accuracy of the integrator.
-        integrator: name of the integrator.
-        longest: longest step of the integrator, s.
+        options: accuracy, integrator and other options of the integration.
 
     Attributes:
         states: states of all copies (w, y) in the engine's order; they are changed in place.
@@ -48,9 +46,7 @@ class Copies:
         model: Model,
         count: int,
         step: float,
-        accuracy: float,
-        integrator: str,
-        longest: float = inf,
+        options: IntegrationOptions,
     ) -> None:
         self.simulation = simulation = Simulation(model, "compiled")
         engine: Any = simulation.engine
@@ -61,11 +57,9 @@ class Copies:
         self.engine.set_controls(driven)
         self.start = np.array(simulation.initial_state({}, {}, equilibrate=True))
         self.places = find_constant_offsets(engine, driven)
-        options = BatchOptions(
-            to=step, accuracy=accuracy, integrator=integrator, step_bounds=(0.0, longest)
-        )
-        options.check()
-        self.batch = Batch(engine, np.tile(self.start, (count, 1)), options, start_holds=True)
+        batch_options = BatchOptions(to=step, **options.integration_choices())
+        batch_options.check()
+        self.batch = Batch(engine, np.tile(self.start, (count, 1)), batch_options, start_holds=True)
         self._first_step = float(self.batch.clocks[0, 1])
         self._parts = [
             (first, min(first + COPIES_PER_TASK, count))

@@ -24,9 +24,113 @@ if TYPE_CHECKING:
     from osimlite.simulation.trajectory import Trajectory
 
 
+MERSON = "merson"
+"""Name of the default integrator."""
+INTEGRATORS = {
+    MERSON: "RungeKuttaMerson",
+    "euler2": "SemiExplicitEuler2",
+    "adams": "Adams",
+    "bdf": "BDF",
+    "rosenbrock": "Rosenbrock",
+}
+"""Integrators with error control: the method's class name by the option's value, which is also the name of the kernel.
+
+The first two are Simbody's (OpenSim uses RungeKuttaMerson), the other three are for stiff or smooth
+motions.
+"""
+
+DEFAULT_ACCURACY = 1e-3
+"""Accuracy of OpenSim's Manager where none is set."""
+LOOSEST_SOUND_ACCURACY = 1e-2
+"""Loosest accuracy at which motions stay near the exact solution; looser ones cause a warning.
+
+At this accuracy the walker ends within 0.01 rad of the exact motion after one second, with every
+integrator. At 0.1 it is 0.05 rad off with Rosenbrock's method and 0.07 rad with Merson's.
+"""
+
+INITIAL_STEP_S = 0.01
+"""First step that an integrator tries, s: a tenth of Simbody's default time scale."""
+UNBOUNDED_STEPS = 0.0, inf
+"""Shortest and longest step (s) where the options set none."""
+
+
+def check_integrator(name: str) -> None:
+    """Check the name of an integrator.
+
+    Raises:
+        SettingError: there is no integrator of that name.
+    """
+    if name not in INTEGRATORS:
+        raise SettingError(f"there is no integrator '{name}'{suggest_or_list(name, INTEGRATORS)}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class IntegrationOptions:
+    """Options of integrators with error control, declared once for all that integrate motions.
+
+    The records of simulations, batches, sweeps and learning tasks extend this one, and hand its
+    options on with :meth:`integration_choices`. A new option of the integrator is therefore one
+    attribute here, and its use in `simulation/engines`. An attribute with a help text is an option
+    of the commands too.
+    """
+
+    accuracy: float = define_option(
+        DEFAULT_ACCURACY,
+        "Integrator accuracy, as in OpenSim.",
+        shown="0.001",
+        more="0.001 if left out.",
+        type=float | None,
+    )
+    integrator: str = define_option(
+        MERSON,
+        "'merson', whose steps are OpenSim's; 'euler2', whose steps are SCONE's; 'adams' for smooth motion, as of few "
+        "muscles; 'bdf' for stiff motion, as of many; 'rosenbrock' for stiff motion at loose accuracy.",
+        shown="merson",
+        type=str | None,
+    )
+    step_bounds: tuple[float, float] = define_option(
+        UNBOUNDED_STEPS,
+        more="shortest and longest step, s. A step of the shortest length is accepted whatever its error.",
+    )
+
+    def integration_choices(self) -> dict[str, Any]:
+        """Return the values of the integration options by name, as keyword arguments for another record."""
+        return {name: getattr(self, name) for name in INTEGRATION_OPTIONS}
+
+    def summarize_choices(self) -> dict[str, Any]:
+        """Return what a summary says of the integration: accuracy, integrator, and all that is not default.
+
+        Returns:
+            Values by name of the option.
+        """
+        return {
+            name: getattr(self, name)
+            for name, declared in INTEGRATION_OPTIONS.items()
+            if name in ("accuracy", "integrator") or getattr(self, name) != declared.default
+        }
+
+    def check_integration(self) -> None:
+        """Check the values, since machine code might never end with wrong ones.
+
+        Raises:
+            SettingError: a value has no meaning.
+        """
+        if not 0.0 < self.accuracy < 1.0:
+            raise SettingError(f"the accuracy must lie between 0 and 1; {self.accuracy} does not")
+        check_integrator(self.integrator)
+        shortest, longest = self.step_bounds
+        if not (0.0 <= shortest <= longest and longest > 0.0):
+            raise SettingError(
+                f"steps cannot last from {shortest:g} s to {longest:g} s; the shortest step is at least 0, and the "
+                "longest is positive and not shorter"
+            )
+
+
+INTEGRATION_OPTIONS: dict[str, Any] = IntegrationOptions.__record_fields__  # type: ignore[attr-defined]
+"""Declarations of the integration options, by name."""
+
 RUN_OPTIONS = (
-    "accuracy",
-    "integrator",
+    *INTEGRATION_OPTIONS,
     "fixed_step",
     "report_interval",
     "initial",
@@ -41,22 +145,13 @@ RUN_OPTIONS = (
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options:
+class Options(IntegrationOptions):
     """Options of :func:`osimlite.simulate` and :class:`Simulation`, given as keyword arguments.
 
     Those in `RUN_OPTIONS` may differ between the runs of a `Simulation`. An attribute with a help
     text is an option of ``osimlite simulate`` too.
     """
 
-    accuracy: float | None = define_option(
-        None, "Integrator accuracy, as in OpenSim.", shown="0.001", more="0.001 if left out."
-    )
-    integrator: str | None = define_option(
-        None,
-        "'merson', whose steps are OpenSim's; 'euler2', whose steps are SCONE's; 'adams' for smooth motion, as of few "
-        "muscles; 'bdf' for stiff motion, as of many; 'rosenbrock' for stiff motion at loose accuracy.",
-        shown="merson",
-    )
     fixed_step: float | None = define_option(
         None,
         "Use fixed steps (semi-implicit Euler), without error control.",
@@ -170,8 +265,10 @@ class Options:
     def changed(self, choices: Mapping[str, Any]) -> Options:
         """Return a copy in which keyword arguments replace some options.
 
+        None stands for the default of an integration option.
+
         Raises:
-            SettingError: a keyword is not an option.
+            SettingError: a keyword is not an option, or integration options meet a fixed step.
         """
         if not choices:
             return self
@@ -181,7 +278,24 @@ class Options:
                 raise SettingError(
                     f"there is no option '{name}' of a simulation{suggest_or_list(name, known)}"
                 )
-        return replace(self, **choices)
+        integration = {
+            name: choices[name] for name in INTEGRATION_OPTIONS if choices.get(name) is not None
+        }
+        defaults = {
+            name: INTEGRATION_OPTIONS[name].default
+            for name in choices
+            if name in INTEGRATION_OPTIONS
+        }
+        changed = replace(self, **{**choices, **defaults, **integration})
+        if changed.fixed_step is not None:
+            # Only here is it known whether somebody asked for a value that equals the default.
+            for name, declared in INTEGRATION_OPTIONS.items():
+                if name in integration or getattr(changed, name) != declared.default:
+                    raise SettingError(
+                        f"`{name}` cannot be combined with `fixed_step`, which has no error control; leave one of "
+                        "them out"
+                    )
+        return changed
 
     def override_for_run(self, choices: Mapping[str, Any]) -> Options:
         """Return a copy in which keyword arguments replace options for one run.
@@ -268,43 +382,3 @@ def compute_report_times(to: float, interval: float, start: float = 0.0) -> list
     if start > 0.0:
         times = [start, *(time for time in times if time - start > 1e-9 * interval)]
     return [*times, to]
-
-
-MERSON = "merson"
-"""Name of the default integrator."""
-INTEGRATORS = {
-    MERSON: "RungeKuttaMerson",
-    "euler2": "SemiExplicitEuler2",
-    "adams": "Adams",
-    "bdf": "BDF",
-    "rosenbrock": "Rosenbrock",
-}
-"""Integrators with error control: the method's class name by the option's value, which is also the name of the kernel.
-
-The first two are Simbody's (OpenSim uses RungeKuttaMerson), the other three are for stiff or smooth
-motions.
-"""
-
-DEFAULT_ACCURACY = 1e-3
-"""Accuracy of OpenSim's Manager where none is set."""
-LOOSEST_SOUND_ACCURACY = 1e-2
-"""Loosest accuracy at which motions stay near the exact solution; looser ones cause a warning.
-
-At this accuracy the walker ends within 0.01 rad of the exact motion after one second, with every
-integrator. At 0.1 it is 0.05 rad off with Rosenbrock's method and 0.07 rad with Merson's.
-"""
-
-INITIAL_STEP_S = 0.01
-"""First step that an integrator tries, s: a tenth of Simbody's default time scale."""
-UNBOUNDED_STEPS = 0.0, inf
-"""Shortest and longest step (s) where the options set none."""
-
-
-def check_integrator(name: str) -> None:
-    """Check the name of an integrator.
-
-    Raises:
-        SettingError: there is no integrator of that name.
-    """
-    if name not in INTEGRATORS:
-        raise SettingError(f"there is no integrator '{name}'{suggest_or_list(name, INTEGRATORS)}")

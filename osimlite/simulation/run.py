@@ -12,7 +12,6 @@ from threading import RLock
 from typing import TYPE_CHECKING, Any
 
 from osimlite.base.quantity import warn_caller, warn_of_unit
-from osimlite.base.records import replace
 from osimlite.errors import SettingError, SimulationError
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.mechanics.multibody.constraints import Lock
@@ -35,13 +34,10 @@ from osimlite.simulation.initial_state import (
     resolve_initial_values,
 )
 from osimlite.simulation.options import (
-    DEFAULT_ACCURACY,
     LOOSEST_SOUND_ACCURACY,
-    MERSON,
     RUN_OPTIONS,
     Options,
     check_fixed_step,
-    check_integrator,
 )
 from osimlite.simulation.options import compute_report_times as report_times
 from osimlite.simulation.run_report import (
@@ -282,17 +278,10 @@ class Simulation:
         times = report_times(to, chosen.report_interval, start)
         if fixed_step is not None:
             check_fixed_step(fixed_step, to)
-            for name in ("accuracy", "integrator"):
-                if getattr(chosen, name) is not None:
-                    raise SettingError(
-                        f"the {name} means nothing for a fixed step; leave one of them out"
-                    )
-        accuracy = DEFAULT_ACCURACY if chosen.accuracy is None else chosen.accuracy
-        integrator = MERSON if chosen.integrator is None else chosen.integrator
-        check_integrator(integrator)
-        if fixed_step is None and LOOSEST_SOUND_ACCURACY < accuracy < 1.0:
+        chosen.check_integration()
+        if fixed_step is None and chosen.accuracy > LOOSEST_SOUND_ACCURACY:
             warn_caller(
-                f"an accuracy of {accuracy:g} is so loose that a motion may end far from the model's own; "
+                f"an accuracy of {chosen.accuracy:g} is so loose that a motion may end far from the model's own; "
                 f"take {LOOSEST_SOUND_ACCURACY:g} or less"
             )
         if chosen.show and fixed_step is None:
@@ -328,11 +317,15 @@ class Simulation:
         self.engine.set_controls(opened)
         y = self.initial_state(initial, initial_speeds, equilibrate=chosen.equilibrate)
         self._require_inertia(y)
-        settings = Settings(accuracy, integrator, fixed_step, self.engine.route, chosen.show)
         runs = None if held is None else held.make_runs(self.engine, opened, to, before)
-        recorder, stepper, states = self._integrate(
-            y, replace(settings, held=runs), times, chosen.progress
+        settings = Settings(
+            fixed_step=fixed_step,
+            route=self.engine.route,
+            show=chosen.show,
+            held=runs,
+            **chosen.integration_choices(),
         )
+        recorder, stepper, states = self._integrate(y, settings, times, chosen.progress)
         if runs is not None:
             controls = runs.add_record(controls)
         times = times[: len(states)]
@@ -345,11 +338,7 @@ class Simulation:
         wall = time.perf_counter() - started
         wanted = {
             "to": to,
-            **(
-                {"accuracy": accuracy, "integrator": integrator}
-                if fixed_step is None
-                else {"fixed_step": fixed_step}
-            ),
+            **(chosen.summarize_choices() if fixed_step is None else {"fixed_step": fixed_step}),
             "report_interval": chosen.report_interval,
             "initial": initial,
             "initial_speeds": initial_speeds,

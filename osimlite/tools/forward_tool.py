@@ -57,7 +57,7 @@ def run_forward_tool(job: Job, outcome: Outcome) -> None:
                 f"the final_time {setup.final_time:g} s is too far away for steps of {bounds[1]:g} "
                 "s"
             )
-        settings = Settings(setup.integrator_error_tolerance, step_bounds=bounds)
+        settings = Settings(accuracy=setup.integrator_error_tolerance, step_bounds=bounds)
         times, states, failure = simulation.record_every_step(start, y, setup.final_time, settings)
         outcome.done = failure is None
         if failure is not None:

@@ -225,7 +225,7 @@ def _track_motion(
             start, y = tracker.settle_muscles(start, y, followed)
         if not followed.failure:
             bounds = setup.minimum_integrator_step_size, setup.maximum_integrator_step_size
-            settings = Settings(setup.integrator_error_tolerance, step_bounds=bounds)
+            settings = Settings(accuracy=setup.integrator_error_tolerance, step_bounds=bounds)
             before = followed.errors
             followed = tracker.follow_motion(start, y, end - window, settings)
             followed.errors = before | followed.errors

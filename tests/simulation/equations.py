@@ -13,6 +13,7 @@ from osimlite.mechanics.kernels.layout import MODEL, WORK
 from osimlite.mechanics.kernels.table import LAW_NUMBERS
 from osimlite.simulation.engines.controlled_steps import ControlledSteps
 from osimlite.simulation.engines.linking import PYTHON_CODE, Program
+from osimlite.simulation.options import IntegrationOptions
 from osimlite.simulation.pack import PackedModel
 
 
@@ -84,4 +85,4 @@ def runge_kutta_merson(
 ):
     """Runge-Kutta-Merson on any equations."""
     engine: Any = Equations(f, len(y), n, **options)
-    return ControlledSteps(engine, t, y, accuracy, observe)
+    return ControlledSteps(engine, t, y, IntegrationOptions(accuracy=accuracy), observe)

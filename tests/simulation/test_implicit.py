@@ -34,6 +34,7 @@ from osimlite.simulation.batches import run_many
 from osimlite.simulation.elements import force_elements
 from osimlite.simulation.engines.controlled_steps import ControlledSteps
 from osimlite.simulation.engines.linking import PYTHON_CODE
+from osimlite.simulation.options import IntegrationOptions
 from osimlite.simulation.system import System
 from tests.simulation.elements.muscle_rows import hung, muscle
 from tests.simulation.equations import Equations, last, oscillator
@@ -46,7 +47,8 @@ def steps_of(
     f: Any, y: list[float], accuracy: float, method: str, to: float = 3.0
 ) -> tuple[list[float], Any]:
     """The end of a motion of auxiliary states only, and its stepper."""
-    stepper = ControlledSteps(Equations(f, len(y), 0), 0.0, y, accuracy, None, method)  # type: ignore[arg-type]
+    options = IntegrationOptions(accuracy=accuracy, integrator=method)
+    stepper = ControlledSteps(Equations(f, len(y), 0), 0.0, y, options)  # type: ignore[arg-type]
     return last(stepper.iterate_steps(to))[1], stepper
 
 

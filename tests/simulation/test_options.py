@@ -9,7 +9,11 @@ import pytest
 import osimlite
 from osimlite.errors import DoubtfulWarning, SettingError
 from osimlite.simulation import Options, Simulation
-from osimlite.simulation.options import RUN_OPTIONS
+from osimlite.simulation.batches import BatchOptions
+from osimlite.simulation.engines.protocol import Settings
+from osimlite.simulation.options import INTEGRATION_OPTIONS, RUN_OPTIONS, IntegrationOptions
+from osimlite.studies.gym.tasks import Task
+from osimlite.studies.sweep.plan import Plan
 from tests.simulation.damped import damped
 
 
@@ -50,3 +54,28 @@ def test_an_accuracy_that_promises_nothing_is_told(integrator):
     ):
         simulation.run(0.1, accuracy=0.1, integrator=integrator)
     simulation.run(0.1, accuracy=0.01, integrator=integrator)
+
+
+def test_options_of_integration_are_declared_once_and_handed_on():
+    chosen = {"accuracy": 1e-4, "integrator": "adams", "step_bounds": (1e-6, 0.1)}
+    assert list(INTEGRATION_OPTIONS) == list(chosen)
+    for record in (Options, Settings, BatchOptions):
+        assert record(**chosen).integration_choices() == chosen
+    for record in (Options, Settings, BatchOptions, Plan, Task):
+        assert {*INTEGRATION_OPTIONS} < {item.name for item in fields(record)}
+    assert IntegrationOptions().summarize_choices() == {"accuracy": 1e-3, "integrator": "merson"}
+    assert IntegrationOptions(**chosen).summarize_choices() == chosen
+
+
+def test_steps_keep_their_bounds():
+    with Simulation(damped(), "compiled") as simulation:
+        free = simulation.run(0.1, accuracy=0.01)
+        short = simulation.run(0.1, accuracy=0.01, step_bounds=(0.0, 1e-3))
+        with pytest.raises(SettingError, match=r"steps cannot last from 0.1 s to 0.01 s"):
+            simulation.run(0.1, step_bounds=(0.1, 0.01))
+        with pytest.raises(
+            SettingError, match="`step_bounds` cannot be combined with `fixed_step`"
+        ):
+            simulation.run(0.1, step_bounds=(0.0, 0.01), fixed_step=1e-3)
+    assert short.summary["steps"] >= 100 > free.summary["steps"]
+    assert short.summary["settings"]["step_bounds"] == (0.0, 1e-3)

@@ -81,17 +81,7 @@ class KernelEngine(System):
                 names=self.state.names,
                 projected=self.project_state,
             )
-        bounds, held = settings.step_bounds, settings.held
-        return ControlledSteps(
-            self,
-            t,
-            y,
-            settings.accuracy,
-            observe,
-            settings.integrator,
-            step_bounds=bounds,
-            held=held,
-        )
+        return ControlledSteps(self, t, y, settings, observe, held=settings.held)
 
     def project_state(self, t: float, y: Sequence[float], tolerance: float) -> list[float] | None:
         """Return the nearest state (y,) that fulfils the constraints to a tolerance; None if none is near."""

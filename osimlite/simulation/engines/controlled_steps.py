@@ -9,7 +9,7 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Any, NoReturn
 from weakref import WeakKeyDictionary
 
-from osimlite.errors import SettingError, SimulationError
+from osimlite.errors import SimulationError
 from osimlite.mechanics.kernels import record
 from osimlite.mechanics.kernels.error_control import error_weight, shortest_step
 from osimlite.mechanics.kernels.layout import MODEL
@@ -20,8 +20,7 @@ from osimlite.simulation.options import (
     DEFAULT_ACCURACY,
     INITIAL_STEP_S,
     INTEGRATORS,
-    MERSON,
-    UNBOUNDED_STEPS,
+    IntegrationOptions,
 )
 from osimlite.simulation.stepper import IntegrationError, Observer, Progress, Stepper
 
@@ -59,11 +58,9 @@ class ControlledSteps(Stepper):
         engine: the engine.
         t: initial time, s.
         y: initial state.
-        accuracy: accuracy as OpenSim defines it.
+        options: accuracy, integrator and other options of the integration.
         observe: called with time and state for each step; for the steps of a table only when a
             result needs them.
-        integrator: one of `INTEGRATORS`.
-        step_bounds: shortest and longest step of Merson's method, s.
         held: controller of the run.
 
     Attributes:
@@ -77,27 +74,20 @@ class ControlledSteps(Stepper):
         engine: KernelEngine,
         t: float,
         y: Sequence[float],
-        accuracy: float = DEFAULT_ACCURACY,
+        options: IntegrationOptions,
         observe: Observer | None = None,
-        integrator: str = MERSON,
         *,
-        step_bounds: tuple[float, float] = UNBOUNDED_STEPS,
         held: ControllerRuns | None = None,
     ) -> None:
-        if not 0.0 < accuracy < 1.0:
-            raise SettingError(f"The accuracy must lie between 0 and 1; {accuracy} does not.")
+        options.check_integration()
         super().__init__(engine.compute_derivative, t, y, observe, engine.state.names)
-        self._engine, self._accuracy, self._integrator, self._step_bounds = (
-            engine,
-            accuracy,
-            integrator,
-            step_bounds,
-        )
+        self._engine = engine
+        self._options = options
+        self._accuracy = options.accuracy
         self._held = held
+        shortest, longest = options.step_bounds
         self.next_step = (
-            min(max(INITIAL_STEP_S, step_bounds[0]), step_bounds[1])
-            if held is None
-            else held.next_step
+            min(max(INITIAL_STEP_S, shortest), longest) if held is None else held.next_step
         )
         self._room: Floats | None = None
         self._put_off: list[tuple[Floats, Floats]] = []
@@ -110,7 +100,7 @@ class ControlledSteps(Stepper):
     @property
     def name(self) -> str:
         """Name of the method."""
-        return INTEGRATORS[self._integrator]
+        return INTEGRATORS[self._options.integrator]
 
     def step(self, limit: float = inf) -> None:
         """Take one step of the length that the error allows, and choose the next length."""
@@ -170,13 +160,7 @@ class ControlledSteps(Stepper):
         batch = Batch(
             self._engine,
             [self.state],
-            BatchOptions(
-                to=to,
-                accuracy=self._accuracy,
-                integrator=self._integrator,
-                report_times=times,
-                step_bounds=self._step_bounds,
-            ),
+            BatchOptions(to=to, report_times=times, **self._options.integration_choices()),
             start=self.time,
             next_step=self.next_step,
             most_logged=LOGGED_STEPS,
@@ -229,7 +213,7 @@ class ControlledSteps(Stepper):
             errors: errors of the last attempted step (y,).
         """
         t0, y0 = self.time, self.state
-        h = max(shortest_step(self.time, self.attempted), self._step_bounds[0])
+        h = max(shortest_step(self.time, self.attempted), self._options.step_bounds[0])
         f0, size = self._evaluate(t0, y0), len(self._engine.order)
         # The derivative may not exist after this state.
         self._evaluate(t0 + h, [y + h * f for y, f in zip(y0, f0, strict=True)])

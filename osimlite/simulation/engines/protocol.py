@@ -15,7 +15,7 @@ from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.controls import Controls
 from osimlite.simulation.elements.probe_type import DeclaredProbe
-from osimlite.simulation.options import DEFAULT_ACCURACY, MERSON, UNBOUNDED_STEPS
+from osimlite.simulation.options import IntegrationOptions
 from osimlite.simulation.states import StateLayout
 from osimlite.simulation.stepper import Observer, Stepper
 
@@ -24,20 +24,16 @@ if TYPE_CHECKING:
     from osimlite.simulation.robot.visuals import Visuals
 
 
-@dataclass(frozen=True)
-class Settings:
-    """Settings of the integration."""
+@dataclass(frozen=True, kw_only=True)
+class Settings(IntegrationOptions):
+    """Settings of an engine and of one motion that it computes."""
 
-    accuracy: float = DEFAULT_ACCURACY  # accuracy as OpenSim defines it
-    integrator: str = MERSON  # one of `INTEGRATORS`
     # length (s) of fixed steps, which replace error control
     fixed_step: float | None = None
     # how the accelerations are computed, in the engine's terms; "auto" lets it choose
     route: str = "auto"
     show: bool = False  # whether a window shows the motion meanwhile
     visuals: Visuals | None = None  # shapes of the bodies in the window
-    # shortest and longest step (s) of Merson's method; the shortest is accepted whatever its error
-    step_bounds: tuple[float, float] = UNBOUNDED_STEPS
     held: ControllerRuns | None = None  # controllers of the runs
 
 

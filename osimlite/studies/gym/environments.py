@@ -25,7 +25,7 @@ class _Observed:
 
     def __init__(self, task: Task, count: int) -> None:
         self.task, self.count = task, count
-        self.copies = Copies(task.model(), count, task.step, task.accuracy, task.integrator)
+        self.copies = Copies(task.model(), count, task.step, task)
         simulation = self.copies.simulation
         infos = simulation.mechanism.coordinates
         order = [infos[k] for k in simulation.state.order]

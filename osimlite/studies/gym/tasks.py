@@ -15,6 +15,7 @@ from osimlite.models.jumper import jumper
 from osimlite.schema.actuators import Actuator
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.model import Model
+from osimlite.simulation.options import IntegrationOptions
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +33,7 @@ class Seen:
 
 
 @dataclass(frozen=True, eq=False)
-class Task:
+class Task(IntegrationOptions):
     """A task for learners.
 
     Attributes:
@@ -44,8 +45,8 @@ class Task:
             random generator.
         seconds: of an episode.
         step: for which controls are held, s.
-        accuracy: of the integrator.
-        integrator: which.
+
+    Besides, options of the integration, such as `accuracy` and `integrator`.
     """
 
     model: Callable[[], Model]
@@ -55,8 +56,6 @@ class Task:
     start: Callable[[Array, tuple[str, ...], np.random.Generator], Array] | None = None
     seconds: float = 10.0
     step: float = 0.01
-    accuracy: float = 1e-3
-    integrator: str = "merson"
 
 
 CONTACT = "euler2"

@@ -16,6 +16,7 @@ from osimlite.io.tables.storage import StoTable, read_sto
 from osimlite.mechanics.kernels.walks import BEGIN, FEEL, GOING, START, STEPS
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.model import Model
+from osimlite.simulation.options import DEFAULT_ACCURACY, IntegrationOptions
 from osimlite.studies.reflexes.controllers import CONTROLLERS, Reflexes
 from osimlite.studies.reflexes.measures import MEASURES, Criteria, Measure
 from osimlite.studies.reflexes.parameters import Parameter, Parameters, read_par
@@ -248,9 +249,11 @@ class Scenario:
                 self.model.copy_deep(),
                 count,
                 self.step,
-                node.number("integration_accuracy", 1e-3),
-                self._integrator,
-                node.number("max_integration_step_size", np.inf),
+                IntegrationOptions(
+                    accuracy=node.number("integration_accuracy", DEFAULT_ACCURACY),
+                    integrator=self._integrator,
+                    step_bounds=(0.0, node.number("max_integration_step_size", np.inf)),
+                ),
                 legs_of(node),
             )
         return self._walkers[count]

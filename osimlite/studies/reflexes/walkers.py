@@ -22,6 +22,7 @@ from osimlite.schema.model import Model
 from osimlite.schema.muscles import Muscle
 from osimlite.simulation.copies import Copies
 from osimlite.simulation.elements.contact import PairContact
+from osimlite.simulation.options import IntegrationOptions
 
 SIDES = "_l", "_r"
 """Ends of names, left before right, which is the order of the legs."""
@@ -207,9 +208,7 @@ class Walkers(Felt):
         model: that walks.
         count: of the candidates.
         step: for which controls are held, s.
-        accuracy: of the integrator.
-        integrator: which.
-        longest: of the integrator's own steps, s.
+        options: accuracy, integrator and other options of the integration.
         legs: as of :class:`Felt`.
 
     Attributes:
@@ -229,13 +228,13 @@ class Walkers(Felt):
         model: Model,
         count: int,
         step: float,
-        accuracy: float,
-        integrator: str,
-        longest: float,
+        options: IntegrationOptions,
         legs: Mapping[str, str],
     ) -> None:
-        self.copies = Copies(model, count, step, accuracy, integrator, longest)
-        super().__init__(model, self.copies.engine, count, step, legs, lags=integrator in LAGGING)
+        self.copies = Copies(model, count, step, options)
+        super().__init__(
+            model, self.copies.engine, count, step, legs, lags=options.integrator in LAGGING
+        )
         others = self.names[len(self.muscles) :]
         if others:
             raise ModelError(

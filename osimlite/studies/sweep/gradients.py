@@ -172,8 +172,7 @@ class Gradients:
             here.variant.engine,
             here.start[None],
             plan.to,
-            accuracy=plan.accuracy,
-            integrator=plan.integrator,
+            **plan.integration_choices(),
             report_times=self._times if plan.interval is not None else [],
             most_tries=MOST_TRIES,
             threads=1,
@@ -188,7 +187,7 @@ class Gradients:
             states.append(y)
 
         stepper = here.variant.engine.make_stepper(
-            0.0, here.start.tolist(), Settings(self._plan.accuracy), note
+            0.0, here.start.tolist(), Settings(**self._plan.integration_choices()), note
         )
         stepper.tabulate([self._plan.to])
         stepper.catch_up()

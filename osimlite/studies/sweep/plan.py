@@ -22,7 +22,7 @@ from osimlite.schema.model import Model
 from osimlite.simulation.elements.builder import OPENSIM
 from osimlite.simulation.engines import engine_name
 from osimlite.simulation.initial_state import convert_value, describe_suspect_value
-from osimlite.simulation.options import DEFAULT_ACCURACY, MERSON, check_integrator
+from osimlite.simulation.options import IntegrationOptions
 from osimlite.simulation.run import Simulation
 from osimlite.studies.sweep.controls import Control, check_nodes, controller_of
 from osimlite.studies.sweep.measures import is_expression, measure_name
@@ -58,7 +58,7 @@ class Stop:
 
 
 @dataclass(frozen=True)
-class Plan:
+class Plan(IntegrationOptions):
     """Runs of one model, each with its own values of some numbers."""
 
     text: str  # the model as .osim
@@ -67,9 +67,7 @@ class Plan:
     measures: tuple[Any, ...] = DEFAULT_MEASURES
     to: float = 2.0  # how long a run lasts, s
     engine: str = "compiled"  # that computes it, by name
-    accuracy: float = DEFAULT_ACCURACY  # of the integrator
-    integrator: str = MERSON  # see `Options`; so too `wrapping`
-    wrapping: str = OPENSIM
+    wrapping: str = OPENSIM  # see `Options`
     stops: tuple[Stop, ...] = ()  # what ends a run before
     # whether the walker is put on the ground with the deeper foot, at rest there, before each run
     is_planted: bool = False
@@ -147,14 +145,13 @@ class Plan:
             "measures": [measure_name(item) for item in self.measures],
             "to": self.to,
             "engine": self.engine,
-            "accuracy": self.accuracy,
             "stops": [item.words for item in self.stops],
             "planted": self.is_planted,
             "feet": None if self.feet is None else list(self.feet),
             "report_interval": self.report_interval,
             "equilibrate": self.equilibrate,
             "interpolation": self.interpolation,
-            "integrator": self.integrator,
+            **self.summarize_choices(),
             "wrapping": self.wrapping,
             "skip_unsupported": self.skip_unsupported,
             **({} if self.controller is None else {"controller": self.controller.digest}),
@@ -233,7 +230,7 @@ def plan(
             raise SettingError(f"'{name}' is a positive number, not {value:g}")
     if made.accuracy >= 1.0:
         raise SettingError(f"'accuracy' is less than 1, not {made.accuracy:g}")
-    check_integrator(made.integrator)
+    made.check_integration()
     targets = {place: item.target for place, item in enumerate(result)}
     nodes = {place: target for place, target in targets.items() if isinstance(target, Control)}
     check_nodes(nodes, made.interpolation, made.to)

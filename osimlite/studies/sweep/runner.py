@@ -230,8 +230,7 @@ class Runner:
             starts,
             self.plan.to,
             numbers=self._numbers(variants),
-            accuracy=self.plan.accuracy,
-            integrator=self.plan.integrator,
+            **self.plan.integration_choices(),
             report_times=self._report_times.tolist(),
             watches=look.watches,
             most_events=look.most_events,
@@ -305,8 +304,7 @@ class Runner:
             try:
                 trajectory = simulation.run(
                     plan.to,
-                    accuracy=plan.accuracy,
-                    integrator=plan.integrator,
+                    **plan.integration_choices(),
                     report_interval=plan.interval or plan.to,
                     controller=variant.controller,
                     initial={infos[k].path: row[k] for k in may} | auxiliary,
