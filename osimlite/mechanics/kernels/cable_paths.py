@@ -136,6 +136,8 @@ ROUNDS = 50
 SIGNIFICANT = 2.0**-45.5
 """Threshold of independence per equation, Simbody's significant part of a double."""
 
+# Start of the workspace: that of an integration; then lines, kinks, corrections and the equations.
+
 
 def solver_size(obstacles: int) -> int:
     """Return the length of the workspace of a search with `obstacles` obstacles between two points."""
@@ -144,7 +146,21 @@ def solver_size(obstacles: int) -> int:
 
 
 def cable_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
-    """Compute length and speed of a cable; they are NaN where a point is inside an obstacle."""
+    """Compute length and speed of a cable; they are NaN where a point is inside an obstacle.
+
+    Between two points the cable runs over the obstacles that lie there, independently of the rest.
+
+    Args:
+        model: integers of the model.
+        reals: numbers of the model.
+        data: results; the record of the cable is filled.
+        y: state.
+        f: rates of the coordinates.
+        item: offset of the item in the model.
+
+    Returns:
+        `OUTCOME.OK`.
+    """
     i, p = at(model, item), at(reals, model[item + ITEM.NUMBERS])
     result = at(data, i[ITEM.RECORD])
     elements = at(i, ELEMENTS)
@@ -163,18 +179,33 @@ def cable_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, i
 
 
 def place_element(model: Ints, data: Floats, element: Ints, p: Floats, record: Floats) -> None:
-    """Compute the position of a point, or the pose and the initial contact of an obstacle."""
+    """Compute the position of a point, or the pose and the initial contact of an obstacle.
+
+    Args:
+        model: integers of the model.
+        data: results of an evaluation.
+        element: integers of the element.
+        p: numbers of the cable.
+        record: record of the cable; the part of the element is filled.
+    """
     numbers, part, link = at(p, element[AT]), at(record, element[KEPT]), element[LINK]
     if element[IS_OBSTACLE] == 0:
         store_vector(part, 0, station(model, data, link, vector(numbers, PLACE)))
         return
     place_frame(model, data, link, numbers, vector(numbers, 9), at(part, IN_GROUND))
+    # Every search starts from the contact in the default pose, so that it depends on the pose
+    # alone.
     for k in range(TOUCH_NUMBERS):
         part[k] = numbers[BEGIN + k]
 
 
 def surface_to_ground(pose: Floats, point: Vector) -> Vector:
-    """Return a point of a surface in ground."""
+    """Return a point of a surface in ground.
+
+    Args:
+        pose: pose of the surface in ground: rotation by rows, then origin.
+        point: position in the frame of the surface (m).
+    """
     return plus(vector(pose, 9), rotate(pose, point))
 
 
@@ -197,18 +228,22 @@ def find_cable(
     lines = at(work, GEODESIC_ROOM)
     count = 0
     for round_number in range(ROUNDS + 1):
+        # Contacts change while the search runs, as in Simbody, because lines move with the
+        # geodesics.
         for k in range(first + 1, last):
             if not update_contact(elements, p, record, first, k, last, work):
                 return nan
         count = draw_lines(elements, record, first, last, lines)
         values = at(lines, 4 * (count + 1))
         rough = measure_kinks(elements, record, first, last, lines, values)
+        # NaN arises where two points coincide or a geodesic degenerates.
         if isnan(rough):
             return nan
         if rough <= SMOOTH or round_number == ROUNDS:
             break
         if not correct_geodesics(elements, p, record, first, last, count, rough, work):
             return nan
+    # Directions at the points, for the forces.
     store_vector(at(record, elements[ELEMENT_INTS * first + KEPT]), AFTER, vector(lines, 0))
     store_vector(at(record, elements[ELEMENT_INTS * last + KEPT]), BEFORE, vector(lines, 4 * count))
     length = 0.0
@@ -241,9 +276,12 @@ def update_contact(
     element = at(elements, ELEMENT_INTS * number)
     numbers, part = at(p, element[AT]), at(record, element[KEPT])
     geodesic, pose, surface = at(part, GEODESIC), at(part, IN_GROUND), at(numbers, SURFACE)
+    # A geodesic with a length touches for certain; only one that has shrunk to a point may lift
+    # off.
     if part[STATE] != TOUCHES or not geodesic[ARC] > 0.0:
         before = find_neighbour(elements, record, pose, number, -1, first)
         after = find_neighbour(elements, record, pose, number, 1, last)
+        # No cable starts from inside an obstacle.
         if surface_value(surface, before) > 0.0 or surface_value(surface, after) > 0.0:
             return False
         chord = minus(after, before)
@@ -253,6 +291,7 @@ def update_contact(
                 return False
         elif part[STATE] == TOUCHES:
             point, normal = vector(geodesic, START + POINT), vector(geodesic, START + NORMAL)
+            # Both neighbours above the tangent plane: the line passes over the surface.
             if dot(minus(before, point), normal) > 0.0 and dot(minus(after, point), normal) > 0.0:
                 part[STATE] = LIFTED
                 store_vector(part, TRACKED, point)
@@ -261,6 +300,7 @@ def update_contact(
             store_vector(part, TRACKED, point)
             if below:
                 part[STATE] = TOUCHES
+                # A touch begins with a geodesic of zero length in the direction of the chord.
                 if not shoot_geodesic(surface, point, chord, 0.0, geodesic, work):
                     return False
     if part[STATE] == TOUCHES:
@@ -272,7 +312,16 @@ def update_contact(
 def find_neighbour(
     elements: Ints, record: Floats, pose: Floats, number: int, step: int, limit: int
 ) -> Vector:
-    """Return the next end of the cable before (-1) or after (1) an obstacle, in the obstacle's frame."""
+    """Return the nearest end of the cable on one side of an obstacle, in the obstacle's frame (m).
+
+    Args:
+        elements: integers of the elements.
+        record: record of the cable.
+        pose: pose of the obstacle in ground.
+        number: number of the obstacle.
+        step: -1 for the side before, 1 for the side after.
+        limit: number of the point at which the cable ends on this side.
+    """
     k = number + step
     while k != limit and record[elements[ELEMENT_INTS * k + KEPT] + STATE] == LIFTED:
         k += step
@@ -287,16 +336,30 @@ def find_neighbour(
 
 
 def end_to_ground(pose: Floats, end: Floats, ground: Floats) -> None:
-    """Transform an end of a geodesic to ground."""
+    """Transform an end of a geodesic to ground.
+
+    Args:
+        pose: pose of the surface in ground.
+        end: end of the geodesic in the frame of the surface.
+        ground: filled with the end in ground.
+    """
     store_vector(ground, POINT, surface_to_ground(pose, vector(end, POINT)))
     for place in (ALONG, NORMAL, ACROSS):
         store_vector(ground, place, rotate(pose, vector(end, place)))
+    # Curvatures and torsion do not depend on the frame.
     for place in (ALONG_BENDS, ACROSS_BENDS, TORSION):
         ground[place] = end[place]
 
 
 def draw_lines(elements: Ints, record: Floats, first: int, last: int, lines: Floats) -> int:
     """Compute direction and length of each straight part.
+
+    Args:
+        elements: integers of the elements.
+        record: record of the cable.
+        first: number of the point before.
+        last: number of the point after.
+        lines: filled per line with its unit vector (3,) and its length (m).
 
     Returns:
         The number of touched obstacles.
@@ -319,6 +382,17 @@ def measure_kinks(
     elements: Ints, record: Floats, first: int, last: int, lines: Floats, values: Floats
 ) -> float:
     """Compute the kinks at both ends of each geodesic, along the normal and the binormal.
+
+    A kink is the component of the line's unit vector, which vanishes where the line is tangent to
+    the geodesic (rad for small kinks).
+
+    Args:
+        elements: integers of the elements.
+        record: record of the cable.
+        first: number of the point before.
+        last: number of the point after.
+        lines: directions and lengths of the lines.
+        values: filled with the kinks: two at the start and two at the end of each geodesic.
 
     Returns:
         The largest kink, NaN if one is not a number.
@@ -349,7 +423,7 @@ def correct_geodesics(
     rough: float,
     work: Floats,
 ) -> bool:
-    """Correct all geodesics once; return whether all of them exist.
+    """Correct all geodesics once by the least-squares solution of the linearized equations.
 
     Args:
         elements: integers of the elements.
@@ -360,6 +434,9 @@ def correct_geodesics(
         count: number of touched obstacles.
         rough: largest kink.
         work: workspace of the search, with lines and kinks.
+
+    Returns:
+        Whether all geodesics exist afterwards.
     """
     size, equations = UNKNOWNS * count, EQUATIONS * count
     lines = at(work, GEODESIC_ROOM)
@@ -390,10 +467,13 @@ def correct_geodesics(
             a[(4 * count + number) * size + 4 * number + 3] = rough
             values[4 * count + number] = 0.0
             number, before = number + 1, k
+    # The threshold of independence is Simbody's.
     rank = factorise_equations(equations, size, a, SIGNIFICANT * equations)
     solve_minimum_norm(equations, size, a, rank, values, at(values, equations), corrections)
     for k in range(size):
         corrections[k] = -corrections[k]
+    # Turn no end by more than LARGEST, for which the linearization holds; all geodesics take the
+    # same part.
     step, number = 1.0, 0
     for k in range(first + 1, last):
         part = at(record, elements[ELEMENT_INTS * k + KEPT])
@@ -417,7 +497,18 @@ def correct_geodesics(
 
 
 def set_rows(part: Floats, end: int, line: Floats, rows: Floats, size: int) -> None:
-    """Fill the derivatives of both kinks at an end of a geodesic by its own variations."""
+    """Fill the derivatives of both kinks at an end of a geodesic by its own variations.
+
+    With the unit vector e of a line of length l and an axis a of the frame, the kink e . a changes
+    by (a - (e . a) e) / l per displacement of the end, and by a x e per rotation of the frame.
+
+    Args:
+        part: record of the obstacle.
+        end: GROUND_START or GROUND_END.
+        line: direction and length of the line at this end.
+        rows: filled with two rows (2, size).
+        size: length of a row.
+    """
     e = vector(line, 0)
     for k in range(2):
         a = vector(part, end + (NORMAL if k == 0 else ACROSS))
@@ -430,7 +521,17 @@ def set_rows(part: Floats, end: int, line: Floats, rows: Floats, size: int) -> N
 def set_far_rows(
     part: Floats, end: int, line: Floats, other: Floats, far: int, rows: Floats, size: int
 ) -> None:
-    """Fill the derivatives of both kinks at an end by the variations of the geodesic across the line."""
+    """Fill the derivatives of both kinks at an end by the geodesic at the other end of the line.
+
+    Args:
+        part: record of the obstacle of the end.
+        end: GROUND_START or GROUND_END.
+        line: direction and length of the line between both geodesics.
+        other: record of the other obstacle.
+        far: end of the other geodesic, GROUND_END or GROUND_START.
+        rows: filled with two rows (2, size).
+        size: length of a row.
+    """
     e = vector(line, 0)
     for k in range(2):
         a = vector(part, end + (NORMAL if k == 0 else ACROSS))
@@ -443,10 +544,18 @@ def set_far_rows(
 def jacobi_fields(part: Floats, end: int) -> tuple[float, float, float, float]:
     """Return A, R and their derivatives at an end of a geodesic.
 
+    A is the lateral displacement per unit lateral displacement of the start, R that per unit
+    rotation.
+
+    Args:
+        part: record of the obstacle.
+        end: GROUND_START or GROUND_END.
+
     Returns:
         A, R, A', R'.
     """
     if end == GROUND_START:
+        # At the start: a displacement is kept, and a rotation displaces nothing yet.
         return 1.0, 0.0, 0.0, 1.0
     g = at(part, GEODESIC)
     return g[A], g[R], g[A_RATE], g[R_RATE]
@@ -465,12 +574,15 @@ def differentiate_end(part: Floats, end: int, shift: Vector, turn: Vector, row: 
     a, r, a_rate, r_rate = jacobi_fields(part, end)
     frame = at(part, end)
     t, n, b = vector(frame, ALONG), vector(frame, NORMAL), vector(frame, ACROSS)
+    # The Darboux frame along the geodesic: moving forwards rotates it by torsion about t and by
+    # normal curvature about b.
     tt, nt, bt = dot(t, turn), dot(n, turn), dot(b, turn)
     forwards = dot(t, shift) + frame[TORSION] * tt + frame[ALONG_BENDS] * bt
     sideways = dot(b, shift) - frame[ACROSS_BENDS] * tt - frame[TORSION] * bt
     row[0] = forwards
     row[1] = a * sideways - a_rate * nt
     row[2] = r * sideways - r_rate * nt
+    # A longer geodesic moves its last end forwards only.
     row[3] = forwards if end == GROUND_END else 0.0
 
 
@@ -478,6 +590,10 @@ def largest_turn(part: Floats, corrections: Floats) -> float:
     """Return the largest component of the rotation of the ends by corrections.
 
     As in Simbody, only positive products count.
+
+    Args:
+        part: record of the obstacle.
+        corrections: corrections of the four variations.
     """
     most = 0.0
     for end in (GROUND_START, GROUND_END):
@@ -507,7 +623,7 @@ def largest_component(a: Vector) -> float:
 def shoot_again(
     surface: Floats, geodesic: Floats, corrections: Floats, step: float, work: Floats
 ) -> bool:
-    """Apply a part of the corrections to a geodesic; return whether it exists.
+    """Apply a part of the corrections to a geodesic.
 
     Args:
         surface: numbers of the surface.
@@ -515,15 +631,20 @@ def shoot_again(
         corrections: corrections of its four variations.
         step: the part.
         work: workspace of an integration.
+
+    Returns:
+        Whether the new geodesic exists.
     """
     forwards, sideways, turn = step * corrections[0], step * corrections[1], step * corrections[2]
     length = geodesic[ARC] + step * corrections[3]
+    # A geodesic that would become shorter than zero shrinks to a point in its middle.
     if length < 0.0:
         forwards += 0.5 * length
         length = 0.0
     start = at(geodesic, START)
     t, n, b = vector(start, ALONG), vector(start, NORMAL), vector(start, ACROSS)
     point = add_scaled(add_scaled(vector(start, POINT), forwards, t), sideways, b)
+    # The tangent turns with the surface as the start moves, and by the correction of the direction.
     tilt = start[ALONG_BENDS] * forwards - start[TORSION] * sideways
     turning = add_scaled(times(tilt, b), -turn, n)
     return shoot_geodesic(surface, point, plus(t, cross(turning, t)), length, geodesic, work)
@@ -534,7 +655,15 @@ def lengthening_speed(
 ) -> float:
     """Return the lengthening speed of the straight parts (m/s).
 
-    Their ends on obstacles move with these.
+    Their ends on obstacles move with these. The geodesics add nothing: to first order the length is
+    stationary under sliding.
+
+    Args:
+        model: integers of the model.
+        data: results of an evaluation.
+        count: number of elements.
+        elements: integers of the elements.
+        record: record of the cable.
     """
     total = 0.0
     here = vector(record, elements[KEPT])
@@ -558,6 +687,17 @@ def pull_cable(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, i
     """Apply the tension at the points of a cable and at both ends of each geodesic.
 
     A cable does not push: a negative tension has no effect.
+
+    Args:
+        model: integers of the model.
+        reals: numbers of the model.
+        data: results with the record of the cable; wrenches are changed.
+        y: state.
+        f: rates of the coordinates.
+        item: offset of the item in the model.
+
+    Returns:
+        `OUTCOME.OK`.
     """
     i, p = at(model, item), at(reals, model[item + ITEM.NUMBERS])
     result, elements = at(data, i[ITEM.RECORD]), at(i, ELEMENTS)
@@ -568,6 +708,7 @@ def pull_cable(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, i
         element = at(elements, ELEMENT_INTS * k)
         numbers, part, link = at(p, element[AT]), at(result, element[KEPT]), element[LINK]
         if element[IS_OBSTACLE] == 0:
+            # The station at which the cable pulls may differ from the point that it passes.
             place = station(model, data, link, vector(numbers, PULLED))
             if k > 0:
                 apply_force(model, data, link, place, times(-tension, vector(part, BEFORE)))

@@ -121,7 +121,15 @@ MORE = 1.2
 
 
 def surface_value(p: Floats, a: Vector) -> float:
-    """Return the function of a surface, which is zero on the surface and positive inside."""
+    """Return the function of a surface, which is zero on the surface and positive inside.
+
+    It is s - x' W x for a quadric, and 1 - ((R - sqrt(x^2 + y^2))^2 + z^2) / r^2 for a torus with
+    the radius R of the ring and r of the tube.
+
+    Args:
+        p: numbers of the surface.
+        a: point in the frame of the surface (m).
+    """
     x, y, z = a
     result = p[SQUARE] - dot(multiply_elementwise(vector(p, WEIGHTS), a), a)
     if p[KIND] == TORUS:
@@ -131,7 +139,12 @@ def surface_value(p: Floats, a: Vector) -> float:
 
 
 def surface_gradient(p: Floats, a: Vector) -> Vector:
-    """Return the gradient of the function of a surface."""
+    """Return the gradient of the function of a surface.
+
+    Args:
+        p: numbers of the surface.
+        a: point in the frame of the surface (m), not on the axis of a torus.
+    """
     if p[KIND] == TORUS:
         x, y, z = a
         scale, distance = -2.0 / (p[TUBE] * p[TUBE]), sqrt(x * x + y * y)
@@ -142,6 +155,10 @@ def surface_gradient(p: Floats, a: Vector) -> Vector:
 
 def surface_hessian(p: Floats, a: Vector) -> tuple[float, float, float, float]:
     """Return the second derivatives xx, yy, zz, xy of the function of a surface; xz and yz vanish.
+
+    Args:
+        p: numbers of the surface.
+        a: point in the frame of the surface (m).
 
     Returns:
         Four entries.
@@ -161,7 +178,13 @@ def surface_hessian(p: Floats, a: Vector) -> tuple[float, float, float, float]:
 
 
 def hessian_times(p: Floats, a: Vector, b: Vector) -> Vector:
-    """Multiply a vector by the second derivatives of the function of a surface."""
+    """Multiply a vector by the second derivatives of the function of a surface.
+
+    Args:
+        p: numbers of the surface.
+        a: point at which the derivatives are taken (m).
+        b: vector.
+    """
     xx, yy, zz, xy = surface_hessian(p, a)
     x, y, z = b
     return xx * x + xy * y, xy * x + yy * y, zz * z
@@ -186,12 +209,15 @@ def nearest_on_line(p: Floats, a: Vector, b: Vector, start: Vector) -> tuple[boo
     square = dot(way, way)
     if square < EPSILON:
         return surface_value(p, a) > 0.0, a
+    # Start from the point of the segment nearest to the last result.
     part = min(max(-dot(way, minus(a, start)) / square, 0.0), 1.0)
     for _ in range(50):
         point = add_scaled(a, part, way)
         if -surface_value(p, point) < EPSILON:
             return True, point
         curvature = abs(dot(way, hessian_times(p, point, way)))
+        # Newton's step with Simbody's safeguards: 1/2 added to the curvature, and at most a fifth
+        # of the segment.
         step = -dot(surface_gradient(p, point), way) / (curvature + 0.5)
         before = part
         part = min(max(part - min(max(step, -0.2), 0.2), 0.0), 1.0)
@@ -203,7 +229,7 @@ def nearest_on_line(p: Floats, a: Vector, b: Vector, start: Vector) -> tuple[boo
 def shoot_geodesic(
     p: Floats, point: Vector, direction: Vector, length: float, geodesic: Floats, work: Floats
 ) -> bool:
-    """Compute a geodesic from near a point in about a direction; return whether it exists.
+    """Compute a geodesic from near a point in about a direction.
 
     Args:
         p: numbers of the surface.
@@ -212,8 +238,12 @@ def shoot_geodesic(
         length: length of the geodesic (m).
         geodesic: filled.
         work: workspace of GEODESIC_ROOM numbers.
+
+    Returns:
+        Whether the geodesic exists.
     """
     geodesic[ARC] = length
+    # On a sphere geodesics are great circles, with A = cos(s / r) and R = r sin(s / r).
     if p[KIND] == SPHERE:
         radius = p[RADIUS]
         normal = unit(point)
@@ -227,6 +257,7 @@ def shoot_geodesic(
         store_end(p, times(radius, end), end_tangent, at(geodesic, END))
         geodesic[A], geodesic[A_RATE], geodesic[R], geodesic[R_RATE] = c, -s / radius, s * radius, c
         return True
+    # On a cylinder geodesics are helices; the surface is flat, so that A = 1 and R = s.
     if p[KIND] == CYLINDER:
         radius = p[RADIUS]
         x, y, height = point
@@ -239,14 +270,24 @@ def shoot_geodesic(
         store_end(p, end, (c * tx - s * ty, s * tx + c * ty, tz), at(geodesic, END))
         geodesic[A], geodesic[A_RATE], geodesic[R], geodesic[R_RATE] = 1.0, 0.0, length, 1.0
         return True
+    # STEP is 0 for wrap objects, whose moment arms need exact lengths; Simbody's steps serve
+    # cables.
     if geodesic[STEP] == 0.0:
         return integrate_by_extrapolation(p, point, direction, length, geodesic, work)
     return integrate_by_merson(p, point, direction, length, geodesic, work)
 
 
 def store_end(p: Floats, point: Vector, direction: Vector, end: Floats) -> None:
-    """Store an end of a geodesic: position, frame, curvatures and torsion."""
+    """Store an end of a geodesic: position, frame, curvatures and torsion.
+
+    Args:
+        p: numbers of the surface.
+        point: point of the surface (m).
+        direction: direction of the geodesic; projected onto the tangent plane.
+        end: filled.
+    """
     g = surface_gradient(p, point)
+    # The function of the surface is positive inside, so that its gradient points inwards.
     normal = times(-1.0, unit(g))
     across = unit(cross(direction, normal))
     tangent = cross(normal, across)
@@ -265,7 +306,16 @@ def integrate_by_merson(
 ) -> bool:
     """Integrate a geodesic by Merson's method, with the steps of Simbody's GeodesicIntegrator.
 
-    The arguments and the result are those of `shoot_geodesic`.
+    Args:
+        p: numbers of the surface.
+        point: start; projected onto the surface.
+        direction: direction; projected onto the tangent plane.
+        length: length of the geodesic (m).
+        geodesic: filled; its first step is adapted for the next call.
+        work: workspace of GEODESIC_ROOM numbers.
+
+    Returns:
+        Whether the geodesic exists.
     """
     y, rates, trial = work, at(work, SIZE), at(work, 2 * SIZE)
     store_vector(y, 0, point)
@@ -278,6 +328,7 @@ def integrate_by_merson(
     t, step, first, second, taken = 0.0, geodesic[STEP], 0.0, 0.0, 0
     while t != length:
         next_t = t + step
+        # Stretch the last step rather than add a tiny one.
         if next_t + STRETCH * step > length:
             next_t = length
         while True:
@@ -287,6 +338,8 @@ def integrate_by_merson(
                 break
             if not h > SMALLEST:
                 return False
+            # A rejected step is shortened by the error, or by a tenth where it left the surface too
+            # far.
             if error > ACCURACY:
                 h = min(max(SAFETY * h * sqrt(sqrt(ACCURACY / error)), LEAST * h), LESS * h)
             else:
@@ -303,11 +356,13 @@ def integrate_by_merson(
             y[k] = trial[k]
         geodesic_derivative(p, y, rates)
         if next_t < length:
+            # The method is of fourth order, hence the fourth root of the error.
             longer = MOST * h if error == 0.0 else SAFETY * h * sqrt(sqrt(ACCURACY / error))
             step = min(longer if longer >= MORE * h else h, MOST * h)
         t = next_t
     store_end(p, vector(y, 0), vector(y, 5), at(geodesic, END))
     geodesic[R], geodesic[A], geodesic[R_RATE], geodesic[A_RATE] = y[3], y[4], y[8], y[9]
+    # As in Simbody, the next geodesic begins with the size of the first or second step of this one.
     if taken >= 2:
         geodesic[STEP] = first if first < geodesic[STEP] else max(geodesic[STEP], second)
     return True
@@ -316,9 +371,18 @@ def integrate_by_merson(
 def integrate_by_extrapolation(
     p: Floats, point: Vector, direction: Vector, length: float, geodesic: Floats, work: Floats
 ) -> bool:
-    """Integrate a geodesic by the method of Gragg, Bulirsch and Stoer, in steps as long as possible.
+    """Integrate a geodesic by the method of Gragg, Bulirsch and Stoer, in long steps.
 
-    The arguments and the result are those of `shoot_geodesic`.
+    Args:
+        p: numbers of the surface.
+        point: start; projected onto the surface.
+        direction: direction; projected onto the tangent plane.
+        length: length of the geodesic (m).
+        geodesic: filled.
+        work: workspace of GEODESIC_ROOM numbers.
+
+    Returns:
+        Whether the geodesic exists.
     """
     y = work
     store_vector(y, 0, point)
@@ -331,6 +395,7 @@ def integrate_by_extrapolation(
     while left > 0.0:
         step = min(step, left)
         while not extrapolate_step(p, step, work):
+            # Most geodesics succeed in one step over their complete length.
             step *= 0.5
             if not step > SMALLEST:
                 return False
@@ -344,6 +409,11 @@ def integrate_by_extrapolation(
 
 def extrapolate_step(p: Floats, step: float, work: Floats) -> bool:
     """Take a step by midpoint rules of 2, 4, 6 ... parts, extrapolated.
+
+    Args:
+        p: numbers of the surface.
+        step: length of the step (m).
+        work: state y at the start of the step, changed if the step is exact; then workspace.
 
     Returns:
         Whether it is exact.
@@ -369,9 +439,12 @@ def extrapolate_step(p: Floats, step: float, work: Floats) -> bool:
             )
             error = 0.0
             for k in range(SIZE):
+                # The error of Gragg's midpoint rule contains even powers of h only, hence squared
+                # ratios.
                 row[k] = last[k] + (last[k] - row[k]) / (ratio * ratio - 1.0)
                 if k < 3:
                     error = max(error, abs(row[k] - last[k]))
+        # Three columns are the least from which the error can be judged.
         if column > 1 and error <= EXACT:
             for k in range(SIZE):
                 y[k] = columns[k]
@@ -384,23 +457,40 @@ def geodesic_derivative(p: Floats, y: Floats, f: Floats) -> None:
 
     The acceleration is normal to the surface, and the Jacobi fields satisfy A'' = -K A and R'' = -K R
     with the Gaussian curvature K.
+
+    Args:
+        p: numbers of the surface.
+        y: position, R, A, velocity and the derivatives of R and A.
+        f: filled with the derivative of y.
     """
     point, velocity = vector(y, 0), vector(y, 5)
     g = surface_gradient(p, point)
     xx, yy, zz, xy = surface_hessian(p, point)
     gx, gy, gz = g
     square = dot(g, g)
+    # Gaussian curvature K of an implicit surface: g' adj(H) g / |g|^4, where the entries xz and yz
+    # of the Hessian H vanish.
     adjoint = (gx * gx * yy + gy * gy * xx - 2.0 * gx * gy * xy) * zz + gz * gz * (
         xx * yy - xy * xy
     )
     gaussian = adjoint / (square * square)
     store_vector(f, 0, velocity)
+    # The acceleration of a unit-speed geodesic is -(v' H v / |g|^2) g.
     store_vector(f, 5, times(-dot(velocity, hessian_times(p, point, velocity)) / square, g))
     f[3], f[4], f[8], f[9] = y[8], y[9], -gaussian * y[3], -gaussian * y[4]
 
 
 def project_to_surface(p: Floats, y: Floats, exactness: float) -> bool:
-    """Project the state of a geodesic onto the surface; return whether that converged."""
+    """Project the state of a geodesic onto the surface.
+
+    Args:
+        p: numbers of the surface.
+        y: state; position and velocity are changed.
+        exactness: value of the function at which the projection ends.
+
+    Returns:
+        Whether the value is at most CONSTRAINT afterwards.
+    """
     point = vector(y, 0)
     error = surface_value(p, point)
     for _ in range(MOST_CORRECTIONS):
@@ -417,7 +507,16 @@ def project_to_surface(p: Floats, y: Floats, exactness: float) -> bool:
 
 
 def merson_step(p: Floats, h: float, work: Floats) -> float:
-    """Take a step of Merson's method; fill the state at its end, and return its error."""
+    """Take a step of Merson's method (five evaluations, fourth order).
+
+    Args:
+        p: numbers of the surface.
+        h: length of the step (m).
+        work: state and derivative at the start; filled with the state at the end after these.
+
+    Returns:
+        Largest estimated error of an entry of the state.
+    """
     y, f0, y1, rough = work, at(work, SIZE), at(work, 2 * SIZE), at(work, 3 * SIZE)
     f1, f2, f3, f4 = at(work, 4 * SIZE), at(work, 5 * SIZE), at(work, 6 * SIZE), at(work, 7 * SIZE)
     for k in range(SIZE):

@@ -40,7 +40,12 @@ def closest_point(radii: Vector, point: Vector) -> Vector:
 
     For a point in a plane of symmetry it is that of the ellipse there, as OpenSim's formula needs; for
     one in two such planes that of the plane across the longer axis.
+
+    Args:
+        radii: half axes (m).
+        point: point (m).
     """
+    # Find the longest axis along which the point has no component.
     axis = -1
     for k in range(3):
         if abs(component(point, k)) <= FLAT and (
@@ -54,10 +59,14 @@ def closest_point(radii: Vector, point: Vector) -> Vector:
     aa, bb, cc = a * a, b * b, c * c
     aauu, bbvv, ccww = aa * (u * u), bb * (v * v), cc * (w * w)
     inside = (u / a) * (u / a) + (v / b) * (v / b) + (w / c) * (w / c) < 1.0
+    # Outside, this start is beyond the largest root, from which Newton's method converges
+    # monotonically.
     t = 0.0 if inside else max(a, b, c) * norm(point)
     for _ in range(STEPS):
         value, slope = evaluate_polynomial(t + aa, t + bb, t + cc, aauu, bbvv, ccww)
         if abs(value) < SMALL:
+            # The root carries derivatives by the implicit function theorem, although OpenSim's
+            # steps end early.
             t = settled(t, value, slope)
             break
         t -= value / slope
@@ -81,13 +90,20 @@ def evaluate_polynomial(
         Value and derivative by t.
     """
     PQ, PR, QR = P * Q, P * R, Q * R
+    # The equation times (P Q R)^2, as in OpenSim, whose search ends at a value of this polynomial.
     PQR, u, v, w = P * QR, aauu * QR, bbvv * PR, ccww * PQ
     value = PQR * PQR - u * QR - v * PR - w * PQ
     return value, 2.0 * (PQR * (QR + PR + PQ) - u * (Q + R) - v * (P + R) - w * (P + Q))
 
 
 def closest_in_plane(radii: Vector, point: Vector, axis: int) -> Vector:
-    """Return the closest point of the ellipse in the plane of symmetry across an axis."""
+    """Return the closest point of the ellipse in the plane of symmetry across an axis.
+
+    Args:
+        radii: half axes (m).
+        point: point (m); its component along the axis is returned unchanged.
+        axis: axis across the plane, 0, 1 or 2.
+    """
     a, b, c = radii
     u, v, w = point
     if axis == 0:
@@ -102,13 +118,23 @@ def closest_in_plane(radii: Vector, point: Vector, axis: int) -> Vector:
 def closest_on_ellipse(a: float, b: float, u: float, v: float) -> tuple[float, float]:
     """Return the point of an ellipse that is closest to (u, v).
 
+    Args:
+        a: half axis along the first coordinate (m).
+        b: half axis along the second coordinate (m).
+        u: first coordinate (m).
+        v: second coordinate (m).
+
     Returns:
         Its two coordinates.
     """
     aa, bb = a * a, b * b
+    # At the centre the nearest points are the ends of the shorter axis; the sign decides between
+    # them.
     if abs(u) <= FLAT and abs(v) <= FLAT:
         return (-a if u < 0.0 else a, v) if a < b else (u, -b if v < 0.0 else b)
     if abs(u) <= FLAT:
+        # On an axis: within the evolute two points are nearest, and OpenSim takes that with a
+        # positive coordinate.
         if a >= b or abs(v) >= b - aa / b:
             return u, b if v >= 0.0 else -b
         y = bb * v / (bb - aa)
@@ -148,8 +174,10 @@ def mean_way_out(radii: Vector, start: Vector, chord: Vector, work: Floats) -> V
     for first in range(1, SAMPLES - 1, LANES):
         for k in range(LANES):
             part = min(first + k, SAMPLES - 2) / SAMPLES
+            # Each blade solves the equation of `closest_point`; all lanes take the same steps.
             u, v, w = sx + part * dx, sy + part * dy, sz + part * dz
             aauu, bbvv, ccww = aa * (u * u), bb * (v * v), cc * (w * w)
+            # The first step is that from t = 0, since the points of the chord are inside.
             value, slope = evaluate_polynomial(aa, bb, cc, aauu, bbvv, ccww)
             work[PART + k], work[MULTIPLIER + k] = (
                 part,
@@ -173,6 +201,8 @@ def mean_way_out(radii: Vector, start: Vector, chord: Vector, work: Floats) -> V
             part, t = work[PART + k], work[MULTIPLIER + k]
             u, v, w = sx + part * dx, sy + part * dy, sz + part * dz
             P, Q, R = t + aa, t + bb, t + cc
+            # Direction from the point to the closest one, times (t + aa)(t + bb)(t + cc): -t u / (t
+            # + aa) and so on.
             x, y, z = -t * u * (Q * R), -t * v * (P * R), -t * w * (P * Q)
             size = sqrt(x * x + y * y + z * z)
             inverse = 1.0 / size if size > 0.0 else 0.0
@@ -181,6 +211,7 @@ def mean_way_out(radii: Vector, start: Vector, chord: Vector, work: Floats) -> V
             point = add_scaled(start, work[PART + k], chord)
             blade = work[X + k], work[Y + k], work[Z + k]
             u, v, w = point
+            # In a plane of symmetry the formula degenerates.
             if min(abs(u), abs(v), abs(w)) <= FLAT:
                 blade = unit(minus(closest_point(radii, point), point))
             total = plus(total, blade)

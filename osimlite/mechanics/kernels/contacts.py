@@ -63,7 +63,19 @@ SMOOTH = 9
 def touch_half_space(
     model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int
 ) -> int:
-    """Apply the contact force of a sphere on a half space."""
+    """Apply the contact force of a sphere on a half space.
+
+    Args:
+        model: integers of the model.
+        reals: numbers of the model.
+        data: results; the record of the contact and wrenches are changed.
+        y: state.
+        f: rates of the coordinates.
+        item: offset of the item in the model.
+
+    Returns:
+        `OUTCOME.OK`.
+    """
     d, radius, n, point = measure_half_space(model, reals, data, item)
     if d > 0.0:
         apply_contact_force(model, reals, data, item, d, radius, n, point)
@@ -71,7 +83,19 @@ def touch_half_space(
 
 
 def touch_spheres(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
-    """Apply the contact force of two spheres."""
+    """Apply the contact force of two spheres.
+
+    Args:
+        model: integers of the model.
+        reals: numbers of the model.
+        data: results; the record of the contact and wrenches are changed.
+        y: state.
+        f: rates of the coordinates.
+        item: offset of the item in the model.
+
+    Returns:
+        `OUTCOME.OK`.
+    """
     d, radius, n, point = measure_spheres(model, reals, data, item)
     if d > 0.0:
         apply_contact_force(model, reals, data, item, d, radius, n, point)
@@ -82,6 +106,12 @@ def measure_half_space(
     model: Ints, reals: Floats, data: Floats, item: int
 ) -> tuple[float, float, Vector, Vector]:
     """Compute the contact geometry of a sphere on a half space.
+
+    Args:
+        model: integers of the model.
+        reals: numbers of the model.
+        data: results of an evaluation.
+        item: offset of the contact's item.
 
     Returns:
         Depth (m), effective radius (m), normal, and point of application (m).
@@ -98,6 +128,12 @@ def measure_spheres(
 ) -> tuple[float, float, Vector, Vector]:
     """Compute the contact geometry of two spheres.
 
+    Args:
+        model: integers of the model.
+        reals: numbers of the model.
+        data: results of an evaluation.
+        item: offset of the contact's item.
+
     Returns:
         Depth (m), effective radius (m), normal, and point of application (m).
     """
@@ -113,11 +149,22 @@ def measure_spheres(
 def contact_response(
     model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int
 ) -> int:
-    """Apply 1 N along or across the normal of a contact; write the derivatives of its force to SCRATCH.
+    """Apply 1 N along or across the normal of a contact, and write derivatives of its force.
 
     The integers of the item are the distance back to the contact's item, the axis (0 along the normal,
     1 and 2 across it), and whether surface 1 is a half space. Friction is proportional to the normal
     force, and that to the depth to the power of 1.5.
+
+    Args:
+        model: integers of the model.
+        reals: numbers of the model.
+        data: results; SCRATCH is filled with the derivatives, and wrenches are changed.
+        y: state.
+        f: row of derivatives by coordinates (n,); changed.
+        item: offset of the item in the model.
+
+    Returns:
+        `OUTCOME.OK`.
     """
     i, change = at(model, item), at(data, WORK.SCRATCH)
     pair, axis = item - i[ITEM.OWN], i[ITEM.OWN + 1]
@@ -137,6 +184,8 @@ def contact_response(
         v = minus(velocity(model, data, one, point), velocity(model, data, two, point))
         changes = contact_derivatives(d, radius, p[11], p[13], p[14], p[15], p[16], p[17], n, v)
         center = station(model, data, two, vector(p, CENTER))
+        # The elastic force grows with d^(3/2), so that its relative derivative by the depth is 1.5
+        # / d.
         write_response(
             model, data, y, f, one, two, axis, point, center, n, v, 1.0 - p[12], changes, 1.5 / d
         )
@@ -146,11 +195,22 @@ def contact_response(
 def smooth_contact_response(
     model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int
 ) -> int:
-    """Apply 1 N at a smooth contact of a sphere with a half space, and write the derivatives to SCRATCH.
+    """Apply 1 N at a smooth contact of a sphere with a half space, and write derivatives.
 
     The integers of the item are the distance ahead to the contact's item, and the axis. The numbers of
     the contact are those of the law, then those of the sphere on the plane
     (:mod:`osimlite.simulation.elements.geometries.sphere_on_plane`).
+
+    Args:
+        model: integers of the model.
+        reals: numbers of the model.
+        data: results; SCRATCH is filled with the derivatives, and wrenches are changed.
+        y: state.
+        f: row of derivatives by coordinates (n,); changed.
+        item: offset of the item in the model.
+
+    Returns:
+        `OUTCOME.OK`.
     """
     i, change = at(model, item), at(data, WORK.SCRATCH)
     for k in range(INVERSE):
@@ -163,6 +223,7 @@ def smooth_contact_response(
         station(model, data, g[1], vector(place, 6)),
     )
     d = place[9] - dot(minus(center, station(model, data, g[0], vector(place, 0))), n)
+    # The force acts midway between the two surfaces.
     point = add_scaled(center, 0.5 * d - place[9], n)
     v = minus(velocity(model, data, g[0], point), velocity(model, data, g[1], point))
     pressed, damped, dragged, growth = smooth_contact_derivatives(
@@ -233,9 +294,12 @@ def write_response(
             way = divide(cross(n, (0.0, 1.0, 0.0)), sqrt(nx * nx + nz * nz))
         if axis > 1:
             way = cross(n, way)
+        # Friction resists slip like a damper, whose constant grows with the depth.
         change[1], by_depth = -dragged, -growth * dragged * dot(v, way)
     else:
+        # Depth and approach increase the force, so that it resists both.
         change[0], change[1] = -pressed, -damped
+    # The point moves with surface 2 and is at rest, but for sinking, relative to surface 1.
     apply_force(model, data, two, point, way)
     apply_force(model, data, one, point, times(-1.0, way))
     add_rotation_terms(
@@ -300,6 +364,8 @@ def add_rotation_terms(
         return
     here = link_work(model, data, link)
     origin, spin = vector(here, LINK_WORK.ORIGIN), vector(here, LINK_WORK.VELOCITY)
+    # From the link to ground: `turning` and `shifting` are the velocity of the operations passed so
+    # far, which the current one carries along.
     arm, turning, shifting = minus(point, origin), ZERO, ZERO
     while link >= 0:
         i = link_ints(model, link)
@@ -310,8 +376,10 @@ def add_rotation_terms(
             turn, shift = unit_twist(j, a, origin)
             rate = a[OPERATION_WORK.RATE]
             if j[OPERATION.DOF] >= 0:
+                # The point of application follows the centre of surface 2, except along the normal.
                 moved = plus(shift, cross(turn, minus(center, origin)))
                 moved = minus(moved, times(dot(n, moved), sinks))
+                # Derivative of the velocity at a fixed point by the coordinate of this operation.
                 swept = plus(
                     plus(cross(turn, shifting), cross(shift, turning)),
                     cross(cross(turn, turning), arm),
@@ -352,6 +420,7 @@ def apply_contact_force(
         at(reals, i[ITEM.NUMBERS]),
         at(data, i[ITEM.RECORD]),
     )
+    # Relative velocity at the point of application, of surface 1 relative to surface 2.
     v = minus(velocity(model, data, one, point), velocity(model, data, two, point))
     force = contact_force(d, radius, p[11], p[13], p[14], p[15], p[16], p[17], n, v)
     store_vector(result, 0, force)
@@ -385,6 +454,9 @@ def contact_places(
         positions: filled per state and contact with the centre of surface 1, its normal, and the centre
             of surface 2, in ground (k, P, 9).
         count: number k of states.
+
+    Returns:
+        `OUTCOME.OK`.
     """
     pairs, size = model[MODEL.CONTACTS], model[MODEL.STATE_SIZE]
     for k in range(count):

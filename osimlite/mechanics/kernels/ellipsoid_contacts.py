@@ -19,6 +19,17 @@ def touch_ellipsoid(
     """Apply the contact force of an ellipsoid on a half space.
 
     The axes and half axes of the ellipsoid follow the numbers of a pair.
+
+    Args:
+        model: integers of the model.
+        reals: numbers of the model.
+        data: results; the record of the contact and wrenches are changed.
+        y: state.
+        f: rates of the coordinates.
+        item: offset of the item in the model.
+
+    Returns:
+        `OUTCOME.OK`.
     """
     i = at(model, item)
     one, two, p = i[ITEM.OWN], i[ITEM.OWN + 1], at(reals, i[ITEM.NUMBERS])
@@ -35,14 +46,26 @@ def touch_ellipsoid(
 def touch_ellipsoids(
     model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int
 ) -> int:
-    """Apply the contact force of two ellipsoids, one of which may be a sphere.
+    """Apply the contact force of two ellipsoids; a sphere counts as an ellipsoid.
 
     The axes and half axes of both follow the numbers of a pair.
+
+    Args:
+        model: integers of the model.
+        reals: numbers of the model.
+        data: results; the record of the contact and wrenches are changed.
+        y: state.
+        f: rates of the coordinates.
+        item: offset of the item in the model.
+
+    Returns:
+        `OUTCOME.OK`.
     """
     i = at(model, item)
     one, two, p = i[ITEM.OWN], i[ITEM.OWN + 1], at(reals, i[ITEM.NUMBERS])
     a, b = station(model, data, one, vector(p, 0)), station(model, data, two, vector(p, 7))
     way = minus(b, a)
+    # Bounding spheres: their radii are stored where a pair of spheres has its radii.
     if dot(way, way) >= (p[6] + p[10]) * (p[6] + p[10]):
         return OUTCOME.OK
     axes1, axes2 = (
@@ -59,6 +82,12 @@ def touch_ellipsoids(
 
 def ellipsoid_axes(model: Ints, data: Floats, link: int, p: Floats) -> Axes:
     """Return the axes of an ellipsoid in ground.
+
+    Args:
+        model: integers of the model.
+        data: results of an evaluation.
+        link: number of the link.
+        p: axes in the link, one after the other (9,).
 
     Returns:
         Three unit vectors.
@@ -77,6 +106,17 @@ def early_return(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats,
     surfaces and pairs, the link of each surface, and the surfaces of each pair; the numbers are centre
     and radius of each surface. Simbody sweeps along the axis of ground with the largest sum of
     distances of the centres from their mean, from the surface that begins first.
+
+    Args:
+        model: integers of the model.
+        reals: numbers of the model.
+        data: results; the records of the contacts and wrenches are changed.
+        y: state.
+        f: rates of the coordinates.
+        item: offset of the item that stands for all pairs of the force.
+
+    Returns:
+        `OUTCOME.OK`.
     """
     i = at(model, item)
     count, pairs, links, p, room = (
@@ -101,6 +141,7 @@ def early_return(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats,
         # Simbody chooses y over x where both are equal.
         if spread > widest or (side == 1 and spread == widest):
             axis, widest = side, spread
+    # Insertion sort by the lower end of each surface along the axis.
     for k in range(count):
         start[k] = centers[3 * k + axis] - p[4 * k + 3]
         place = k
@@ -112,6 +153,7 @@ def early_return(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats,
         one = int(order[position])
         for later in range(position + 1, count):
             two = int(order[later])
+            # All later surfaces begin beyond the end of this one.
             if start[two] > centers[3 * one + axis] + p[4 * one + 3]:
                 break
             if are_near(at(centers, 3 * one), at(centers, 3 * two), p[4 * one + 3], p[4 * two + 3]):
@@ -132,6 +174,12 @@ def are_near(a: Floats, b: Floats, one: float, two: float) -> bool:
     """Return whether the bounding spheres of two surfaces overlap.
 
     Two half spaces are never a pair.
+
+    Args:
+        a: centre of the first surface (m).
+        b: centre of the second surface (m).
+        one: radius of the first surface (m), infinite for a half space.
+        two: radius of the second surface (m).
     """
     if one == inf and two == inf:
         return False
@@ -140,7 +188,14 @@ def are_near(a: Floats, b: Floats, one: float, two: float) -> bool:
 
 
 def find_pair(surfaces: Ints, pairs: int, one: int, two: int) -> int:
-    """Return the number of the pair of two surfaces, or -1."""
+    """Return the number of the pair of two surfaces, or -1.
+
+    Args:
+        surfaces: numbers of the surfaces of each pair.
+        pairs: number of pairs.
+        one: number of the first surface.
+        two: number of the second surface.
+    """
     for pair in range(pairs):
         a, b = surfaces[2 * pair], surfaces[2 * pair + 1]
         if (a == one and b == two) or (a == two and b == one):
@@ -151,7 +206,16 @@ def find_pair(surfaces: Ints, pairs: int, one: int, two: int) -> int:
 def is_separating(
     model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, part: int
 ) -> bool:
-    """Compute one contact; return whether it touches without a force."""
+    """Compute one contact, and return whether it touches without a force.
+
+    Args:
+        model: integers of the model.
+        reals: numbers of the model.
+        data: results; the record of the contact and wrenches are changed.
+        y: state.
+        f: rates of the coordinates.
+        part: offset of the contact's item.
+    """
     call(model[part + ITEM.LAW], model, reals, data, y, f, part)
     result = at(data, model[part + ITEM.RECORD])
     return bool(

@@ -41,7 +41,19 @@ DERIVATIVES = 1
 
 
 def function_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
-    """Compute length, speed and moment arms of a FunctionBasedPath."""
+    """Compute length, speed and moment arms of a FunctionBasedPath.
+
+    Args:
+        model: integers of the model.
+        reals: numbers of the model.
+        data: results; the record of the path is filled.
+        y: state.
+        f: rates of the coordinates.
+        item: offset of the item in the model.
+
+    Returns:
+        `OUTCOME.OK`.
+    """
     i, result = at(model, item), at(data, model[item + ITEM.RECORD])
     count, coordinates = i[COUNT], at(i, COORDINATES)
     length = evaluate_item(model, reals, data, y, f, item - i[LENGTH_BACK])
@@ -55,6 +67,7 @@ def function_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats
         )
         result[ARMS + k] = arm
         if coordinates[k] >= 0:
+            # OpenSim defines moment arms as negative derivatives of the length.
             speed -= arm * f[coordinates[k]]
     if i[SPEED_BACK] > 0:
         speed = evaluate_item(model, reals, data, y, f, item - i[SPEED_BACK])[0]
@@ -65,7 +78,16 @@ def function_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats
 def evaluate_item(
     model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int
 ) -> Floats:
-    """Evaluate the function of an item and return its record."""
+    """Evaluate the function of an item and return its record.
+
+    Args:
+        model: integers of the model.
+        reals: numbers of the model.
+        data: results; the record of the item is filled.
+        y: state.
+        f: rates of the coordinates.
+        item: offset of the item in the model.
+    """
     call(model[item + ITEM.LAW], model, reals, data, y, f, item)
     return at(data, model[item + ITEM.RECORD])
 
@@ -73,7 +95,19 @@ def evaluate_item(
 def pull_coordinates(
     model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int
 ) -> int:
-    """Apply the tension of a path to its coordinates by its moment arms."""
+    """Apply the tension of a path to its coordinates by its moment arms.
+
+    Args:
+        model: integers of the model.
+        reals: numbers of the model.
+        data: results with the record of the path.
+        y: state.
+        f: rates of the coordinates, then generalized forces; changed.
+        item: offset of the item in the model.
+
+    Returns:
+        `OUTCOME.OK`.
+    """
     i, result = at(model, item), at(data, model[item + ITEM.RECORD])
     for k in range(i[COUNT]):
         freedom = i[COORDINATES + k]
@@ -85,7 +119,19 @@ def pull_coordinates(
 def function_of_one(
     model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int
 ) -> int:
-    """Evaluate a function of one argument and its derivative by its table."""
+    """Evaluate a function of one argument and its derivative by its table.
+
+    Args:
+        model: integers of the model.
+        reals: numbers of the model.
+        data: results; the record of the function is filled.
+        y: state.
+        f: rates of the coordinates.
+        item: offset of the item in the model.
+
+    Returns:
+        `OUTCOME.OK`.
+    """
     i, p, result = (
         at(model, item),
         at(reals, model[item + ITEM.NUMBERS]),
@@ -104,6 +150,17 @@ def polynomial(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, i
     The terms are sorted by the power of the first argument, then of the next. The record holds, after
     the derivatives, the powers of each argument, the exponents of the current term, and its partial
     products up to each argument.
+
+    Args:
+        model: integers of the model.
+        reals: numbers of the model.
+        data: results; the record of the function is filled.
+        y: state.
+        f: rates of the coordinates.
+        item: offset of the item in the model.
+
+    Returns:
+        `OUTCOME.OK`.
     """
     i, p, result = (
         at(model, item),
@@ -115,6 +172,7 @@ def polynomial(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, i
     exponents, factors = at(powers, size * width), at(powers, size * width + size)
     for k in range(size):
         place = i[ARGUMENTS + k]
+        # Powers once per argument, since many terms share them.
         argument = y[place] if place >= 0 else p[k]
         powers[k * width] = 1.0
         for power in range(1, width):
@@ -128,6 +186,8 @@ def polynomial(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, i
             product *= powers[k * width + int(exponents[k])]
         value += product
         after = 1.0
+        # Derivatives by the product before the argument, that of its power, and the product after
+        # it: no division.
         for k in range(size - 1, -1, -1):
             power = int(exponents[k])
             if power > 0:
@@ -135,7 +195,7 @@ def polynomial(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, i
                     factors[k] * (power * powers[k * width + power - 1]) * after
                 )
             after *= powers[k * width + power]
-        # The next term.
+        # Count exponents up like digits, as long as their sum does not exceed the order.
         k = size - 1
         while k > 0 and total == i[ORDER]:
             total -= int(exponents[k])
@@ -155,6 +215,17 @@ def formula(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item
 
     The integers after the arguments are the programs of the value and of the derivatives: the number of
     steps, the offset of the constants, and the steps. The registers are in the record.
+
+    Args:
+        model: integers of the model.
+        reals: numbers of the model.
+        data: results; the record of the function is filled.
+        y: state.
+        f: rates of the coordinates.
+        item: offset of the item in the model.
+
+    Returns:
+        `OUTCOME.OK`.
     """
     i, p, result = (
         at(model, item),

@@ -59,10 +59,18 @@ from osimlite.mechanics.laws.vectors import Vector, dot, rotate_back, store_vect
 def trace_geodesics(
     model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int
 ) -> int:
-    """Write all corners of a path whose length was computed to f, in ground.
+    """Write all corners of a path along geodesics to f, after its length was computed.
+
+    Args:
+        model: integers of the model.
+        reals: numbers of the model.
+        data: results with the record of the path.
+        y: state.
+        f: filled with positions in ground (m).
+        item: offset of the item in the model.
 
     Returns:
-        Their number.
+        Number of corners.
     """
     i, p, result = (
         at(model, item),
@@ -80,12 +88,14 @@ def trace_geodesics(
         store_vector(f, 3 * count, vector(here, PLACE))
         count += 1
         wrap = (number - points) // 2
+        # Of the two nodes of a wrap, the first is that where the geodesic begins.
         if number >= points and number == points + 2 * wrap:
             surface, pose = (
                 at(p, wraps[WRAP_INTS * wrap + PLACES] + SURFACE),
                 at(result, slots[POSES] + POSE_NUMBERS * wrap),
             )
             point = point_in_surface(pose, vector(here, PLACE))
+            # The geodesic starts in the direction of the line before it.
             way = rotate_back(pose, vector(work, NODE_WORK * int(order[k - 1]) + ALONG))
             length = here[NODE_WORK + SURFACE_LENGTH]
             count += trace_geodesic(
@@ -95,10 +105,18 @@ def trace_geodesics(
 
 
 def trace_cable(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
-    """Write all corners of a cable whose length was computed to f, in ground.
+    """Write all corners of a cable to f, after its length was computed.
+
+    Args:
+        model: integers of the model.
+        reals: numbers of the model.
+        data: results with the record of the cable.
+        y: state.
+        f: filled with positions in ground (m).
+        item: offset of the item in the model.
 
     Returns:
-        Their number.
+        Number of corners.
     """
     i, p, result = (
         at(model, item),
@@ -140,7 +158,7 @@ def trace_geodesic(
     work: Floats,
     f: Floats,
 ) -> int:
-    """Write points of a geodesic between its ends to f, in ground; return their number.
+    """Write points of a geodesic between its ends to f, in ground.
 
     Args:
         surface: numbers of the surface.
@@ -151,7 +169,12 @@ def trace_geodesic(
         geodesic: workspace of a geodesic.
         work: workspace of an integration.
         f: filled with the points.
+
+    Returns:
+        Number of points.
     """
+    # Without a first step the geodesic is integrated by extrapolation, which is exact at any
+    # length.
     geodesic[STEP] = 0.0
     if not (dot(way, way) > 0.0 and shoot_geodesic(surface, point, way, length, geodesic, work)):
         return 0

@@ -151,7 +151,19 @@ def layout_slots(most: int, wraps: int, work: int) -> tuple[list[int], int]:
 
 
 def geodesic_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
-    """Compute length and speed of a path with wraps."""
+    """Compute length and speed of a path with wraps.
+
+    Args:
+        model: integers of the model.
+        reals: numbers of the model.
+        data: results; the record of the path is filled.
+        y: state.
+        f: rates of the coordinates.
+        item: offset of the item in the model.
+
+    Returns:
+        `OUTCOME.OK`.
+    """
     place_points(model, reals, data, y, item)
     i, p = at(model, item), at(reals, model[item + ITEM.NUMBERS])
     result, points, size = at(data, i[ITEM.RECORD]), i[POINTS], i[POINTS] + 2 * i[WRAPS]
@@ -160,6 +172,7 @@ def geodesic_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats
     place_surfaces(model, data, i, p)
     for k in range(1, int(result[COUNT])):
         mark_near_wraps(i, p, result, slots, int(order[k - 1]), int(order[k]))
+    # Backwards, so that the nodes inserted for one segment do not move the segments still to come.
     for k in range(int(result[COUNT]) - 2, -1, -1):
         count = bend_segment(i, p, result, int(order[k]), int(order[k + 1]))
         if count > 0:
@@ -172,6 +185,7 @@ def geodesic_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats
             one, two = at(work, NODE_WORK * node), at(work, NODE_WORK * (node + 1))
             store_vector(one, PLACE, vector(slot, GROUND_START + POINT))
             store_vector(two, PLACE, vector(slot, GROUND_END + POINT))
+            # The second tangent point carries the length on the surface before it.
             one[SURFACE_LENGTH], two[SURFACE_LENGTH] = 0.0, slot[GEODESIC + ARC]
             one[IS_KEPT] = two[IS_KEPT] = 0.0
             order[k + 2 * number + 1], order[k + 2 * number + 2] = node, node + 1
@@ -180,7 +194,14 @@ def geodesic_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats
 
 
 def place_surfaces(model: Ints, data: Floats, i: Ints, p: Floats) -> None:
-    """Compute the poses of the surfaces in ground."""
+    """Compute the poses of the surfaces in ground.
+
+    Args:
+        model: integers of the model.
+        data: results with the poses of the links; the poses of the surfaces are filled.
+        i: integers of the path.
+        p: numbers of the path.
+    """
     size = i[POINTS] + 2 * i[WRAPS]
     poses = at(data, i[ITEM.RECORD] + i[NODES_AT + NODE_INTS * size + WRAP_INTS * i[WRAPS] + POSES])
     for number in range(i[WRAPS]):
@@ -214,6 +235,7 @@ def bend_segment(i: Ints, p: Floats, record: Floats, one: int, two: int) -> int:
         if wraps[WRAP_INTS * number + FIRST] == one and poses[POSE_NUMBERS * number + HOW] != NOT:
             near += 1
     store_vector(chain, 0, vector(work, NODE_WORK * one + PLACE))
+    # `way` counts combinations of directions past open surfaces, as digits of a mixed radix.
     most, least, way, stage = 0, inf, 0, MEANT
     while way < WAYS and near > 0:
         store_vector(chain, SLOT, vector(work, NODE_WORK * two + PLACE))
@@ -224,15 +246,20 @@ def bend_segment(i: Ints, p: Floats, record: Floats, one: int, two: int) -> int:
             for k in range(SLOT * (count + 1)):
                 best[k] = chain[k]
         way += step
-        # On an ellipsoid there may be no geodesic near the start, but there is a shortest one;
-        # where surfaces intersect there is none.
+        # On an ellipsoid there may be no geodesic near the start, but a shortest one exists; where
+        # surfaces intersect, no smooth path may exist, and one surface alone must do.
         if way == WAYS and least == inf and stage < ALONE:
             way, stage = 0, stage + 1
     return most
 
 
 def chain_length(chain: Floats, count: int) -> float:
-    """Return the length of a segment that is bent around `count` surfaces (m)."""
+    """Return the length of a segment that is bent around surfaces (m).
+
+    Args:
+        chain: slots.
+        count: number of slots in use.
+    """
     length = norm(minus(line_end(chain, 0, count), line_start(chain, 1)))
     for k in range(1, count + 1):
         line = minus(line_end(chain, k, count), line_start(chain, k + 1))
@@ -278,9 +305,12 @@ def fill_slots(
     )
     for number in range(i[WRAPS]):
         store_vector(poses, POSE_NUMBERS * number + ABOUT, (0.0, 0.0, 0.0))
+    # A surface that is passed in another direction needs the others in place before the chain is
+    # smoothed.
     waits = False
     for _ in range(TURNS):
         before = count
+        # A geodesic that has shrunk to nothing does not touch.
         for k in range(count, 0, -1):
             if not chain[SLOT * k + GEODESIC + ARC] > 0.0:
                 remove_slot(chain, count, k)
@@ -298,11 +328,15 @@ def fill_slots(
                 )
                 is_open = numbers[SIDE] == 0.0 and numbers[SURFACE + KIND] != TORUS and step > 1
                 if is_open and norm(vector(pose, ABOUT)) == 0.0:
+                    # The direction past an open surface is chosen when it is first touched, and
+                    # kept from then on.
                     a, b = node_in_surface(pose, work, one), node_in_surface(pose, work, two)
                     ways = min(count_ways(at(numbers, SURFACE), a, b, near == 1), step)
                     if ways > 1:
                         step //= ways
                         which = way // step % ways
+                        # Directions 2 and 3 are perpendicular to 0 and 1; odd ones are opposite to
+                        # even ones.
                         if which > 1:
                             axis = cross(axis, unit(minus(b, a)))
                         store_vector(pose, ABOUT, times(-1.0 if which % 2 == 1 else 1.0, axis))
@@ -318,13 +352,23 @@ def fill_slots(
                     continue
         elif count == 0:
             break
+        # A chain that is clearly longer than the best one need not be smoothed.
         if NEARLY * chain_length(chain, count) > least or not smooth_chain(chain, count, room):
             break
     return -1, step
 
 
 def mark_near_wraps(i: Ints, p: Floats, record: Floats, slots: Ints, one: int, two: int) -> None:
-    """Mark the wraps that may bend the segment between two points outside of them, and how."""
+    """Mark the wraps that may bend the segment between two points outside of them, and how.
+
+    Args:
+        i: integers of the path.
+        p: numbers of the path.
+        record: record of the path with the poses of the surfaces; HOW is filled.
+        slots: integers after the wraps.
+        one: first point.
+        two: second point.
+    """
     size = i[POINTS] + 2 * i[WRAPS]
     wraps, work = at(i, NODES_AT + NODE_INTS * size), at(record, ORDER + size)
     for number in range(i[WRAPS]):
@@ -335,6 +379,7 @@ def mark_near_wraps(i: Ints, p: Floats, record: Floats, slots: Ints, one: int, t
         if wrap_ints[FIRST] == one:
             numbers = at(p, wrap_ints[PLACES])
             surface = at(numbers, SURFACE)
+            # An end inside the surface makes OpenSim ignore it.
             inside, a, b = (
                 INSIDE * surface[SQUARE],
                 node_in_surface(pose, work, one),
@@ -346,6 +391,7 @@ def mark_near_wraps(i: Ints, p: Floats, record: Floats, slots: Ints, one: int, t
                 and surface_value(surface, b) <= inside
             )
             pose[HOW] = AS_MEANT if is_near else NOT
+            # Of several segments around one cylinder or torus, only the deepest must obey its side.
             if (
                 is_near
                 and wrap_ints[LAST] - wrap_ints[RANGE] > 1
@@ -368,12 +414,24 @@ def mark_near_wraps(i: Ints, p: Floats, record: Floats, slots: Ints, one: int, t
 
 
 def node_in_surface(pose: Floats, work: Floats, node: int) -> Vector:
-    """Return the position of a node in the frame of a surface."""
+    """Return the position of a node in the frame of a surface (m).
+
+    Args:
+        pose: pose of the surface in ground.
+        work: results of the nodes.
+        node: number of the node.
+    """
     return point_in_surface(pose, vector(work, NODE_WORK * node + PLACE))
 
 
 def find_slot(chain: Floats, count: int, number: int) -> int:
-    """Return the slot of a wrap, 0 if it has none."""
+    """Return the slot of a wrap, 0 if it has no slot.
+
+    Args:
+        chain: slots.
+        count: number of slots in use.
+        number: number of the wrap.
+    """
     for k in range(1, count + 1):
         if chain[SLOT * k + OWNER] == number:
             return k
@@ -381,7 +439,13 @@ def find_slot(chain: Floats, count: int, number: int) -> int:
 
 
 def remove_slot(chain: Floats, count: int, place: int) -> None:
-    """Remove a slot from the chain."""
+    """Remove a slot from the chain, and move those after it.
+
+    Args:
+        chain: slots; changed.
+        count: number of slots in use.
+        place: slot to remove.
+    """
     for k in range(SLOT * place, SLOT * (count + 1)):
         chain[k] = chain[k + SLOT]
 
@@ -411,7 +475,7 @@ def find_largest_turn(
         work: workspace of a search.
 
     Returns:
-        The wrap, the slot after the line (0 if there is none), and the axis of the turn.
+        The wrap, the slot after the line (0 if no wrap turns a line), and the axis of the turn.
     """
     result, place, most, axis = 0, 0, 0.0, (0.0, 0.0, 0.0)
     for number in range(i[WRAPS]):
@@ -445,10 +509,20 @@ def find_largest_turn(
 def insert_slot(
     p: Floats, pose: Floats, chain: Floats, count: int, place: int, number: int
 ) -> None:
-    """Insert a surface into a slot of the chain."""
+    """Insert a surface into a slot of the chain.
+
+    Args:
+        p: numbers of the wrap.
+        pose: pose of the surface in ground.
+        chain: slots; changed.
+        count: number of slots in use.
+        place: slot of the surface; those from there on move by one.
+        number: number of the wrap.
+    """
     for k in range(SLOT * (count + 3) - 1, SLOT * (place + 1) - 1, -1):
         chain[k] = chain[k - SLOT]
     slot = at(chain, SLOT * place)
+    # STEP 0 selects the exact integration of geodesics.
     slot[OWNER], slot[GEODESIC + STEP] = number, 0.0
     for k in range(HOW):
         slot[IN_GROUND + k] = pose[k]
@@ -460,6 +534,15 @@ def lay_chain(
     p: Floats, pose: Floats, chain: Floats, count: int, k: int, stage: int, work: Floats
 ) -> bool:
     """Lay the chain around the surface in a slot, between its neighbours.
+
+    Args:
+        p: numbers of the wrap.
+        pose: pose of the surface in ground; its axis of the turn is updated.
+        chain: slots; the geodesic of slot `k` is filled.
+        count: number of slots in use.
+        k: slot of the surface.
+        stage: MEANT, STRING or ALONE.
+        work: workspace of a search.
 
     Returns:
         Whether it touches.
@@ -477,6 +560,7 @@ def lay_chain(
         and shoot_geodesic(at(slot, OBSTACLE_WORK), point, way, arc, at(slot, GEODESIC), work)
     ):
         return False
+    # The axis follows the geodesic, so that later calls keep to this side of the surface.
     if norm(about) > 0.0:
         store_vector(pose, ABOUT, cross(point, way))
     ends_to_ground(slot)

@@ -89,19 +89,38 @@ def ends_to_ground(slot: Floats) -> None:
 
 
 def line_start(chain: Floats, k: int) -> Vector:
-    """Return the start of the line to a slot."""
+    """Return the start of the line to a slot (m).
+
+    Args:
+        chain: slots.
+        k: number of the slot.
+    """
     return vector(chain, SLOT * (k - 1) + (GROUND_END + POINT if k > 1 else 0))
 
 
 def line_end(chain: Floats, k: int, count: int) -> Vector:
-    """Return the end of the line from a slot."""
+    """Return the end of the line from a slot (m).
+
+    Args:
+        chain: slots.
+        k: number of the slot.
+        count: number of slots in use.
+    """
     return vector(chain, SLOT * (k + 1) + (GROUND_START + POINT if k < count else 0))
 
 
 def smooth_chain(chain: Floats, count: int, work: Floats) -> bool:
-    """Correct all geodesics until the lines meet them without kinks; return whether that converged.
+    """Correct all geodesics until the lines meet them without kinks.
 
     It also ends where a geodesic would become shorter than zero; this one then has no length.
+
+    Args:
+        chain: slots; their geodesics are changed.
+        count: number of slots in use.
+        work: workspace, see `search_size`.
+
+    Returns:
+        Whether the search converged, or a geodesic vanished.
     """
     size = UNKNOWNS * count
     values = at(work, GEODESIC_ROOM)
@@ -114,16 +133,20 @@ def smooth_chain(chain: Floats, count: int, work: Floats) -> bool:
             return True
         before = rough
         rank = factorise_equations(size, size, a, 0.0)
+        # A negative determinant marks a saddle of the length: stiffen the springs and try again
+        # from here.
         if determinant_sign(size, a) < 0.0:
             stiff = max(STIFFER * stiff, STIFF)
             continue
         solve_minimum_norm(size, size, a, rank, values, at(values, size), corrections)
+        # Near a minimum the springs only slow down convergence; release them step by step.
         stiff = stiff / STIFFER if stiff > STIFF else 0.0
         step = 1.0
         for k in range(count):
             step = min(
                 step, accepted_part(at(chain, SLOT * (k + 1)), at(corrections, UNKNOWNS * k))
             )
+        # A negative or undefined part cannot be taken; 0 reports a geodesic that vanishes.
         if not step > 0.0:
             return step == 0.0
         for k in range(count):
@@ -144,14 +167,20 @@ def accepted_part(slot: Floats, corrections: Floats) -> float:
     """Return the part of its corrections that a geodesic may take.
 
     It is 0 if the geodesic would become shorter than zero, and its length is then set to zero.
+
+    Args:
+        slot: slot; its length may be set to zero.
+        corrections: corrections of its four variations; that of the length may be bounded.
     """
     start, arc = at(slot, GROUND_START), slot[GEODESIC + ARC]
+    # Rotation of the ends by displacements, estimated by the curvature at the start.
     bends = max(abs(start[ALONG_BENDS]), abs(start[ACROSS_BENDS]))
     turn = max(
         abs(corrections[2]),
         bends * max(abs(corrections[0]), abs(corrections[1]), abs(corrections[3])),
     )
     part = MOST_TURN / turn if turn > MOST_TURN else 1.0
+    # Keep a part of the length, unless the geodesic is so short already that it may vanish.
     if not arc + part * corrections[3] > LEAST_PART * arc:
         if arc + corrections[3] <= 0.0 and arc * abs(start[ALONG_BENDS]) < SHORT:
             slot[GEODESIC + ARC] = part = 0.0
@@ -161,11 +190,20 @@ def accepted_part(slot: Floats, corrections: Floats) -> float:
 
 
 def determinant_sign(size: int, a: Floats) -> float:
-    """Return the sign of the determinant of square equations that were factorised."""
+    """Return the sign of the determinant of square equations that were factorised.
+
+    The determinant is that of the reflections, which the signs of the diagonal contain, times that
+    of the permutation.
+
+    Args:
+        size: number of equations.
+        a: factor of the equations.
+    """
     diagonal, order, sign = at(a, size * size), at(a, size * size + size), 1.0
     for r in range(size):
         sign = -sign if diagonal[r] < 0.0 else sign
         for k in range(r):
+            # Every inversion of the order changes the sign.
             sign = -sign if order[k] > order[r] else sign
     return sign
 
@@ -198,6 +236,7 @@ def fill_equations(chain: Floats, count: int, values: Floats, a: Floats, stiff: 
                 if side == 0
                 else minus(line_end(chain, k, count), here)
             )
+            # A kink is the component across over the length; very short lines are not divided by.
             distance = max(norm(line), NEAR)
             for across in range(2):
                 axis = vector(slot, end + (ACROSS if across == 1 else NORMAL))
@@ -206,11 +245,15 @@ def fill_equations(chain: Floats, count: int, values: Floats, a: Floats, stiff: 
                 most = max(most, abs(values[row]) / distance)
                 differentiate_end(
                     slot,
+                    # A spring at each end adds to the derivative by its displacement; it does not
+                    # change the right side.
                     end,
                     times(sign * (1.0 + stiff * distance), axis),
                     cross(axis, line),
                     at(a, size * row + UNKNOWNS * (k - 1)),
                 )
+                # The other end of the line is on a neighbouring geodesic: its displacement has the
+                # opposite effect.
                 if 0 < other <= count:
                     far, of = (
                         GROUND_END if side == 0 else GROUND_START,

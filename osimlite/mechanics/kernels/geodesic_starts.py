@@ -131,6 +131,12 @@ def count_ways(p: Floats, first: Vector, second: Vector, is_alone: bool) -> int:
     Around a single surface there is a second one only on an ellipsoid. Among others, each is passed on
     either side; a sphere, on which any direction may be the shortest, also perpendicular to these if
     the line passes near its middle.
+
+    Args:
+        p: numbers of the surface.
+        first: start of the line.
+        second: end of the line.
+        is_alone: whether no other surface may bend the segment.
     """
     if not is_alone:
         return 4 if p[KIND] == SPHERE and squared_depth(p, first, second) < NEAR_MIDDLE else 2
@@ -152,11 +158,17 @@ def squared_depth(p: Floats, first: Vector, second: Vector) -> float:
 
     It is the distance from the axis of a cylinder or the ring of a torus (m²), or from the centre of a
     sphere or an ellipsoid in units of the radii.
+
+    Args:
+        p: numbers of the surface.
+        first: start of the segment.
+        second: end of the segment.
     """
     if p[KIND] == TORUS:
         return distance_from_ring(nearest_to_ring(p[RADIUS], first, second), p[RADIUS])
     way, weights = minus(second, first), vector(p, WEIGHTS)
     square = dot(multiply_elementwise(weights, way), way)
+    # In scaled coordinates the surface is a unit sphere, and the nearest point is a projection.
     part = min(max(-dot(multiply_elementwise(weights, first), way) / max(square, LEAST), 0.0), 1.0)
     middle = add_scaled(first, part, way)
     return dot(multiply_elementwise(weights, middle), middle) / (
@@ -169,7 +181,7 @@ def start_on_cylinder(
 ) -> Start:
     """Return the start on a cylinder about z, along a straight line on the unrolled cylinder.
 
-    As in OpenSim there is none if the path would meet and leave the cylinder beyond its ends.
+    As in OpenSim a path that would meet and leave the cylinder beyond its ends does not touch.
 
     Args:
         radius: radius of the cylinder (m).
@@ -186,6 +198,8 @@ def start_on_cylinder(
     is_open = ux == 0.0 and uy == 0.0
     active = dot(side_out, first) >= 0.0, dot(side_out, second) >= 0.0
     if (
+        # With a prescribed direction the segment bends in any case; otherwise OpenSim's rules
+        # decide.
         about == 0.0
         and (
             NONE
@@ -203,10 +217,12 @@ def start_on_cylinder(
         atan2(ux * qy - uy * qx, ux * qx + uy * qy),
     )
     far1, far2 = sqrt(px * px + py * py), sqrt(qx * qx + qy * qy)
+    # Lengths of the tangents, 0 for ends inside, which count as on the surface.
     line1, line2 = (
         sqrt(max(far1 * far1 - radius * radius, 0.0)),
         sqrt(max(far2 * far2 - radius * radius, 0.0)),
     )
+    # Angles between the ends and their tangent points, seen from the axis.
     before, after = atan2(line1, radius), atan2(line2, radius)
     sweep = (two - one) % (2.0 * pi)
     way = 1.0 if (sweep <= pi if is_open else turns_left(one, before, two, after, sweep)) else -1.0
@@ -216,8 +232,10 @@ def start_on_cylinder(
     size = sqrt(ux * ux + uy * uy)
     c, s = cos(one + way * before) / size, sin(one + way * before) / size
     nx, ny = c * ux - s * uy, c * uy + s * ux
+    # On the unrolled cylinder the path is a straight line of constant slope.
     slope = (qz - pz) / max(line1 + radius * max(turn, 0.0) + line2, LEAST)
     z = pz + slope * line1
+    # OpenSim ignores a path that meets and leaves beyond the ends of the cylinder.
     if abs(z) > half_length and abs(qz - slope * line2) > half_length:
         turn = 0.0
     return (
@@ -264,6 +282,16 @@ def start_on_ellipsoid(
     """Return the start on a sphere or an ellipsoid, along a circle on the scaled unit sphere.
 
     The circle is in the plane of the ends and the direction in which the line is least deep.
+
+    Args:
+        p: numbers of the surface.
+        first: start of the segment.
+        second: end of the segment.
+        axis: axis of the active side.
+        side: sign of the active side, 0.0 for the complete surface.
+        how: AS_MEANT, ANY_SIDE or PULLED.
+        about: axis about which the segment turns, zeros for either direction.
+        work: workspace of a string; filled with beads.
     """
     weights = vector(p, WEIGHTS)
     wx, wy, wz = times(1.0 / p[SQUARE], weights)
@@ -273,9 +301,12 @@ def start_on_ellipsoid(
     way = minus(two, one)
     part = min(max(-dot(one, way) / max(dot(way, way), LEAST), 0.0), 1.0)
     middle = add_scaled(one, part, way)
+    # The line passes outside of the unit sphere.
     if not dot(middle, middle) < 1.0:
         return 0.0, first, way, 0.0
     out = middle
+    # On a sphere the nearest point of the line points out of it; on an ellipsoid the least deep
+    # direction must be searched.
     if p[KIND] == ELLIPSOID or norm(cross(middle, way)) < LEAST:
         # Of two opposite directions both start at the narrow side.
         out = way_out(
@@ -299,6 +330,7 @@ def start_on_ellipsoid(
     out = multiply_elementwise(scale, out)
     result = start_on_section(radii, one, two, cross(out, way), work)
     turn, _, sets_out, _ = result
+    # A section that turns far, or that starts on the wrong side, is a poor start.
     is_bent = dot(unit(sets_out), unit(vector(work, 0))) < BENT and (
         side == 0.0 or dot(out, middle) > 0.0
     )
@@ -314,16 +346,18 @@ def way_out(radii: Vector, middle: Vector, way: Vector, deeper: float) -> Vector
         radii: half axes.
         middle: point of the line.
         way: direction of the line.
-        deeper: if positive, return the second best local minimum, or zeros if there is none or the
-            line is more than this many times deeper there.
+        deeper: if positive, return the second best local minimum, or zeros if the line is more than
+            this many times deeper there or no second minimum exists.
     """
     x, y, z = way
+    # Any axis that is not along the line gives two directions across it.
     axis = 0 if abs(x) <= min(abs(y), abs(z)) else (1 if abs(y) <= abs(z) else 2)
     a = unit(cross(way, replace_component((0.0, 0.0, 0.0), axis, 1.0)))
     b = cross(unit(way), a)
     ra, rb = multiply_elementwise(radii, a), multiply_elementwise(radii, b)
     aa, ab, bb = dot(ra, ra), dot(ra, rb), dot(rb, rb)
     ma, mb = dot(middle, a), dot(middle, b)
+    # Sample the depth all around, and refine each minimum by the parabola through three samples.
     best = second = (inf, 0.0)
     before, here = line_depth(aa, ab, bb, ma, mb, -2), line_depth(aa, ab, bb, ma, mb, -1)
     for k in range(WAYS):
@@ -345,7 +379,19 @@ def way_out(radii: Vector, middle: Vector, way: Vector, deeper: float) -> Vector
 
 
 def line_depth(aa: float, ab: float, bb: float, ma: float, mb: float, k: int) -> float:
-    """Return the depth of a line in an ellipsoid in a direction across it."""
+    """Return the depth of a line in an ellipsoid in a direction across it.
+
+    With the unit directions a and b across the line, a point m of it and the half axes r, the depth
+    along e = c a + s b is |r * e| - m . e (* is the elementwise product).
+
+    Args:
+        aa: scalar product of r * a with itself.
+        ab: scalar product of r * a and r * b.
+        bb: scalar product of r * b with itself.
+        ma: scalar product of m and a.
+        mb: scalar product of m and b.
+        k: number of the direction.
+    """
     c, s = cos(2.0 * pi / WAYS * k), sin(2.0 * pi / WAYS * k)
     return sqrt(aa * c * c + 2.0 * ab * c * s + bb * s * s) - ma * c - mb * s
 
@@ -362,6 +408,7 @@ def start_on_section(
         across: normal of the plane of the section; the path turns to the left about it.
         work: filled with the direction at the end, and the beads.
     """
+    # The section of the unit sphere is a circle with this centre and radius.
     normal = unit(across)
     centre = times(dot(normal, one), normal)
     radius = sqrt(max(1.0 - dot(centre, centre), 0.0))
@@ -371,10 +418,13 @@ def start_on_section(
     )
     across = cross(normal, a1)
     turn = atan2(dot(across, a2), dot(a1, a2))
+    # A small negative angle is rounding of a path that just touches; others are turns by more than
+    # half.
     if turn < -1e-6:
         turn += 2.0 * pi
     store_vector(work, 0, multiply_elementwise(radii, cross(normal, a2)))
     length = 0.0
+    # Length by the midpoint rule over the angles of the beads.
     for k in range(1, BEADS):
         angle = turn * (k - 0.5) / (BEADS - 1)
         c, s = cos(angle), sin(angle)
@@ -393,18 +443,30 @@ def start_on_section(
 
 
 def start_on_string(p: Floats, turn: float, first: Vector, second: Vector, work: Floats) -> Start:
-    """Return a start from a string of beads that is tightened over an ellipsoid, at rising resolutions.
+    """Return a start from a string of beads that is tightened over an ellipsoid.
+
+    The resolution of the string rises from 4 to 16 segments.
 
     A section that turns far may be near no geodesic, or not near the shortest one.
+
+    Args:
+        p: numbers of the surface.
+        turn: angle by which the section turns (rad).
+        first: start of the segment.
+        second: end of the segment.
+        work: beads of the section; the ends are filled, and the beads moved.
     """
     store_vector(work, 0, first)
     store_vector(work, 3 * BEADS, second)
+    # Start with four segments, so that the string moves far in few sweeps.
     stride = BEADS // 4
     one, two = BEADS, 0
     while stride > 0:
         for pull in range(PULLS + 1):
             # The first sweep sets the new beads only.
             for k in range(stride, BEADS, stride if pull > 0 else 2 * stride):
+                # Gauss-Seidel relaxation: each bead moves to the middle of its neighbours, and out
+                # of the surface.
                 bead = times(
                     0.5, plus(vector(work, 3 * (k - stride)), vector(work, 3 * (k + stride)))
                 )
@@ -412,6 +474,7 @@ def start_on_string(p: Floats, turn: float, first: Vector, second: Vector, work:
                     for _ in range(2):
                         out = multiply_elementwise(vector(p, WEIGHTS), bead)
                         bead = add_scaled(bead, 0.5 * surface_value(p, bead) / dot(out, out), out)
+                    # In the last sweep note the first and last bead that touch.
                     if stride == 1 and pull == PULLS:
                         one, two = min(one, k), k
                 store_vector(work, 3 * k, bead)
@@ -419,6 +482,7 @@ def start_on_string(p: Floats, turn: float, first: Vector, second: Vector, work:
     if two == 0:
         return 0.0, first, second, 0.0
     begin, end = vector(work, 3 * one - 3), vector(work, 3 * one)
+    # The first and last segment are half on the surface.
     length = 0.5 * (
         norm(minus(end, begin)) + norm(minus(vector(work, 3 * two + 3), vector(work, 3 * two)))
     )
@@ -428,9 +492,15 @@ def start_on_string(p: Floats, turn: float, first: Vector, second: Vector, work:
 
 
 def find_tangent(point: Vector, radius: float, normal: Vector, way: float) -> Vector:
-    """Return the tangent point of a circle about the origin from a point, in a direction of rotation.
+    """Return the tangent point of a circle about the origin, seen from a point of its plane.
 
     For a point inside, it is the nearest point of the circle.
+
+    Args:
+        point: point of the plane of the circle.
+        radius: radius of the circle.
+        normal: unit normal of the plane.
+        way: 1.0 for the tangent point to the left about the normal, -1.0 for that to the right.
     """
     distance = max(norm(point), LEAST)
     cosine = min(radius / distance, 1.0)
@@ -443,7 +513,17 @@ def find_tangent(point: Vector, radius: float, normal: Vector, way: float) -> Ve
 def start_on_torus(
     ring: float, tube: float, first: Vector, second: Vector, axis: int, side: float, how: float
 ) -> Start:
-    """Return the start on a torus about z, as on a cylinder at the nearest point of its ring."""
+    """Return the start on a torus about z, as on a cylinder at the nearest point of its ring.
+
+    Args:
+        ring: radius of the ring (m).
+        tube: radius of the tube (m).
+        first: start of the segment.
+        second: end of the segment.
+        axis: axis of the active side.
+        side: sign of the active side, 0.0 for the complete surface.
+        how: AS_MEANT or ANY_SIDE.
+    """
     x, y, _ = near = nearest_to_ring(ring, first, second)
     if side != 0.0 and not is_on_side(near, axis, side):
         return 0.0, first, near, 0.0
@@ -454,7 +534,14 @@ def start_on_torus(
         vector_in_cylinder(minus(second, centre), inwards, tangent),
     )
     turn, point, way, length = start_on_cylinder(
-        tube, inf, one, two, (0.0 if how == ANY_SIDE else 1.0, 0.0, 0.0), 0.0
+        # The active side of the cylinder is the inside of the ring, since a path passes through the
+        # hole.
+        tube,
+        inf,
+        one,
+        two,
+        (0.0 if how == ANY_SIDE else 1.0, 0.0, 0.0),
+        0.0,
     )
     return (
         turn,
@@ -465,9 +552,16 @@ def start_on_torus(
 
 
 def nearest_to_ring(ring: float, first: Vector, second: Vector) -> Vector:
-    """Return the point of a segment that is nearest to a ring about z."""
+    """Return the point of a segment that is nearest to a ring about z.
+
+    Args:
+        ring: radius of the ring (m).
+        first: start of the segment.
+        second: end of the segment.
+    """
     wx, wy, wz = way = minus(second, first)
     best, least = 0.0, inf
+    # The distance has up to two minima along a line: sample it before Newton's method.
     for k in range(SAMPLES + 1):
         distance = distance_from_ring(add_scaled(first, k / SAMPLES, way), ring)
         if distance < least:
@@ -482,6 +576,7 @@ def nearest_to_ring(ring: float, first: Vector, second: Vector) -> Vector:
             + ring * flat * flat / (square * outer)
             + wz * wz
         )
+        # Near a maximum Newton's method would leave the minimum.
         if not bends > 0.0:
             break
         best = min(max(best - slope / bends, 0.0), 1.0)
@@ -489,19 +584,36 @@ def nearest_to_ring(ring: float, first: Vector, second: Vector) -> Vector:
 
 
 def distance_from_ring(point: Vector, ring: float) -> float:
-    """Return the squared distance of a point from a ring about z (m²)."""
+    """Return the squared distance of a point from a ring about z (m²).
+
+    Args:
+        point: point (m).
+        ring: radius of the ring (m).
+    """
     x, y, z = point
     across = sqrt(x * x + y * y) - ring
     return across * across + z * z
 
 
 def vector_in_cylinder(point: Vector, inwards: Vector, tangent: Vector) -> Vector:
-    """Return the components of a vector in the cylinder at the ring: inwards, down, and along it."""
+    """Return the components of a vector in the cylinder at the ring: inwards, down, and along it.
+
+    Args:
+        point: vector in the frame of the torus.
+        inwards: unit vector from the ring to the middle of the torus.
+        tangent: unit vector along the ring.
+    """
     _, _, z = point
     return dot(inwards, point), -z, dot(tangent, point)
 
 
 def vector_from_cylinder(point: Vector, inwards: Vector, tangent: Vector) -> Vector:
-    """Return the vector with these components, in the frame of the torus."""
+    """Return the vector with these components in the cylinder, in the frame of the torus.
+
+    Args:
+        point: components inwards, down and along the ring.
+        inwards: unit vector from the ring to the middle of the torus.
+        tangent: unit vector along the ring.
+    """
     x, y, z = point
     return add_scaled(add_scaled((0.0, 0.0, -y), x, inwards), z, tangent)

@@ -43,6 +43,17 @@ def touch_mesh(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, i
     springs, and whether surface 1 is a half space. The numbers are centre, normal and radius of surface
     1 in its link, centre and radius of the bounding sphere of the mesh in its link, and c, us, ud, uv,
     vt of the law.
+
+    Args:
+        model: integers of the model.
+        reals: numbers of the model.
+        data: results; the records of mesh and contact and the wrenches are changed.
+        y: state.
+        f: rates of the coordinates.
+        item: offset of the item in the model.
+
+    Returns:
+        `OUTCOME.OK`.
     """
     i = at(model, item)
     one, two, count, is_plane = i[ITEM.OWN], i[ITEM.OWN + 1], i[ITEM.OWN + 3], i[ITEM.OWN + 4]
@@ -51,11 +62,13 @@ def touch_mesh(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, i
         result[k] = 0.0
     o, about = station(model, data, one, vector(p, 0)), station(model, data, two, vector(p, 7))
     n, way = direction(model, data, one, vector(p, 3)), minus(about, o)
+    # Skip all springs if the bounding sphere of the mesh does not reach the other surface.
     if is_plane:
         if dot(way, n) >= p[10]:
             return OUTCOME.OK
     elif dot(way, way) >= (p[6] + p[10]) * (p[6] + p[10]):
         return OUTCOME.OK
+    # Relative motion at one point, from which `spring_load` computes that of each spring.
     v = minus(velocity(model, data, one, about), velocity(model, data, two, about))
     turning = minus(angular_velocity(model, data, one), angular_velocity(model, data, two))
     force = torque = ZERO
@@ -113,5 +126,6 @@ def apply_mesh_load(
     apply_torque(model, data, two, torque)
     apply_force(model, data, one, about, times(-1.0, force))
     apply_torque(model, data, one, times(-1.0, torque))
+    # A mesh has no depth of its own: 1 says that it transmits a force.
     if norm(force) != 0.0:
         contact[CONTACT_WORK.DEPTH] = 1.0

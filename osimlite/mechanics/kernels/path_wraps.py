@@ -94,10 +94,23 @@ SURFACE_WORK = BEST + ROOM - FIRST_TANGENT
 
 
 def wrapped_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
-    """Compute length and speed of a path with wraps."""
+    """Compute length and speed of a path with wraps.
+
+    Args:
+        model: integers of the model.
+        reals: numbers of the model.
+        data: results; the record of the path is filled.
+        y: state.
+        f: rates of the coordinates.
+        item: offset of the item in the model.
+
+    Returns:
+        `OUTCOME.OK`, or UNSOLVED where OpenSim fails.
+    """
     place_points(model, reals, data, y, item)
     place_surfaces(model, reals, data, item)
     wraps, length, exchanged = model[item + WRAPS], inf, False
+    # A single surface does not depend on others, so that one round is enough.
     for turn in range(ROUNDS if wraps > 1 else 1):
         first = second = NONE
         for k in range(wraps):
@@ -118,6 +131,8 @@ def wrapped_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats,
         before, length = length, measure_points(model, data, y, item)
         if abs(length - before) < STILL:
             break
+        # OpenSim exchanges the first two wraps if the first does not wrap and the second fails in
+        # the first round.
         if turn == 0 and wraps > 1 and first == NONE and second == INSIDE:
             exchanged = True
             remove_tangents(model, data, item, 0)
@@ -125,7 +140,14 @@ def wrapped_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats,
 
 
 def place_surfaces(model: Ints, reals: Floats, data: Floats, item: int) -> None:
-    """Compute the poses of the surfaces, and mark all tangent points as unused."""
+    """Compute the poses of the surfaces, and mark all tangent points as unused.
+
+    Args:
+        model: integers of the model.
+        reals: numbers of the model.
+        data: results with the poses of the links; those of the surfaces are filled.
+        item: offset of the item in the model.
+    """
     i, p = at(model, item), at(reals, model[item + ITEM.NUMBERS])
     nodes, work = (
         i[POINTS] + 2 * i[WRAPS],
@@ -145,9 +167,17 @@ def place_surfaces(model: Ints, reals: Floats, data: Floats, item: int) -> None:
 
 
 def remove_tangents(model: Ints, data: Floats, item: int, number: int) -> None:
-    """Remove the tangent points of a wrap from the path, if they are in it."""
+    """Remove the tangent points of a wrap from the path, if they are in it.
+
+    Args:
+        model: integers of the model.
+        data: results with the record of the path.
+        item: offset of the item in the model.
+        number: number of the wrap.
+    """
     i, result = at(model, item), at(data, model[item + ITEM.RECORD])
     order, count, first = at(result, ORDER), int(result[COUNT]), i[POINTS] + 2 * number
+    # Tangent points have the numbers behind those of the points.
     kept = 0
     for k in range(count):
         if not first <= order[k] <= first + 1:
@@ -159,7 +189,20 @@ def remove_tangents(model: Ints, data: Floats, item: int, number: int) -> None:
 def wrap_surface(
     model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int, number: int
 ) -> int:
-    """Bend the path around one surface; return the result for the last segment that was tried."""
+    """Bend the path around one surface; return the result for the last segment that was tried.
+
+    Args:
+        model: integers of the model.
+        reals: numbers of the model.
+        data: results with the record of the path; changed.
+        y: state.
+        f: rates of the coordinates.
+        item: offset of the item in the model.
+        number: number of the wrap.
+
+    Returns:
+        Result of the last segment that was tried, NOWHERE or BEYOND.
+    """
     remove_tangents(model, data, item, number)
     i, result = at(model, item), at(data, model[item + ITEM.RECORD])
     points, count = i[POINTS], int(result[COUNT])
@@ -168,6 +211,7 @@ def wrap_surface(
     wrap_ints, tangent = at(nodes, NODE_INTS * size + WRAP_INTS * number), points + 2 * number
     if wrap_ints[BACK] == 0:
         return NONE
+    # The range of the PathWrap names a point that the path does not have.
     if wrap_ints[FIRST] <= wrap_ints[LAST] and wrap_ints[LAST] >= points:
         return BEYOND
     surface = item - wrap_ints[BACK]
@@ -183,6 +227,7 @@ def wrap_surface(
     for k in range(begin, end):
         m, n = at(nodes, NODE_INTS * int(order[k])), at(nodes, NODE_INTS * int(order[k + 1]))
         a, b = at(work, NODE_WORK * int(order[k])), at(work, NODE_WORK * int(order[k + 1]))
+        # The segment between both tangent points of another surface lies on that surface.
         if m[KIND] == TANGENT and n[KIND] == TANGENT and m[OF] == n[OF]:
             continue
         store_vector(e, FIRST_END, point_in_surface(at(e, POSE), vector(a, PLACE)))
@@ -192,6 +237,8 @@ def wrap_surface(
             continue
         r1 = point_in_ground(at(e, POSE), vector(e, FIRST_TANGENT))
         r2 = point_in_ground(at(e, POSE), vector(e, SECOND_TANGENT))
+        # A segment that must wrap wins over all others; of those that may, the one that adds least
+        # length.
         increase = -inf
         if code == WRAPPED:
             p1, p2 = line_end(m, a), line_end(n, b)
@@ -203,6 +250,7 @@ def wrap_surface(
             store_vector(one, PLACE, r1)
             store_vector(two, PLACE, r2)
             one[SURFACE], two[SURFACE] = 0.0, e[SURFACE_LENGTH]
+            # Keep the results of the chosen segment, which the next trial overwrites.
             for j in range(ROOM - FIRST_TANGENT):
                 e[BEST + j] = e[FIRST_TANGENT + j]
         if code == MANDATORY:
@@ -217,10 +265,20 @@ def wrap_surface(
 
 
 def point_in_surface(pose: Floats, a: Vector) -> Vector:
-    """Return a point of ground in the frame of a surface."""
+    """Return a point of ground in the frame of a surface.
+
+    Args:
+        pose: pose of the surface in ground: rotation by rows, then origin.
+        a: position in ground (m).
+    """
     return rotate_back(pose, minus(a, vector(pose, 9)))
 
 
 def point_in_ground(pose: Floats, a: Vector) -> Vector:
-    """Return a point of a surface in ground."""
+    """Return a point of a surface in ground.
+
+    Args:
+        pose: pose of the surface in ground: rotation by rows, then origin.
+        a: position in the frame of the surface (m).
+    """
     return plus(vector(pose, 9), rotate(pose, a))

@@ -112,20 +112,33 @@ SIGNIFICANT = 2.0 ** (-52.0 * 7.0 / 8.0)
 def path_length(
     model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, path: int
 ) -> tuple[float, float]:
-    """Compute length (m) and lengthening speed (m/s) of the path of an item.
+    """Compute length and lengthening speed of the path of an item.
+
+    Args:
+        model: integers of the model.
+        reals: numbers of the model.
+        data: results; the record of the path is filled.
+        y: state.
+        f: rates of the coordinates.
+        path: offset of the path in the model.
 
     Returns:
-        Length and speed.
+        Length (m) and speed (m/s).
     """
     call(model[path + ITEM.LAW], model, reals, data, y, f, path)
     return last_length(model, data, path)
 
 
 def last_length(model: Ints, data: Floats, path: int) -> tuple[float, float]:
-    """Return length (m) and lengthening speed (m/s) of a path as they were computed last.
+    """Return length and lengthening speed of a path as they were computed last.
+
+    Args:
+        model: integers of the model.
+        data: results of an evaluation.
+        path: offset of the path in the model.
 
     Returns:
-        Length and speed.
+        Length (m) and speed (m/s).
     """
     result = at(data, model[path + ITEM.RECORD])
     return result[LENGTH], result[SPEED]
@@ -134,20 +147,51 @@ def last_length(model: Ints, data: Floats, path: int) -> tuple[float, float]:
 def pull_path(
     model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, path: int, tension: float
 ) -> None:
-    """Apply a tension (N) along the path of an item, after its length has been computed."""
+    """Apply a tension along a path, after its length has been computed.
+
+    Args:
+        model: integers of the model.
+        reals: numbers of the model.
+        data: results with the record of the path; wrenches are changed.
+        y: state.
+        f: rates of the coordinates, then generalized forces; changed.
+        path: offset of the path in the model.
+        tension: tension, positive where the path pulls (N).
+    """
     data[model[path + ITEM.RECORD] + TENSION] = tension
+    # Different kinds of paths pull in different ways; the record says by which kernel.
     call(model[path - model[path + PULL] + ITEM.LAW], model, reals, data, y, f, path)
 
 
 def straight_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
-    """Compute length and speed of a path without wraps."""
+    """Compute length and speed of a path without wraps.
+
+    Args:
+        model: integers of the model.
+        reals: numbers of the model.
+        data: results; the record of the path is filled.
+        y: state.
+        f: rates of the coordinates.
+        item: offset of the item in the model.
+
+    Returns:
+        `OUTCOME.OK`.
+    """
     place_points(model, reals, data, y, item)
     measure_points(model, data, y, item)
     return OUTCOME.OK
 
 
 def place_points(model: Ints, reals: Floats, data: Floats, y: Floats, item: int) -> None:
-    """Compute the positions of the points and list the active ones."""
+    """Compute the positions of the points and list the active ones.
+
+    Args:
+        model: integers of the model.
+        reals: numbers of the model.
+        data: results with the poses of the links; the record of the path is filled.
+        y: state.
+        item: offset of the item in the model.
+    """
     i, p = at(model, item), at(reals, model[item + ITEM.NUMBERS])
     result = at(data, i[ITEM.RECORD])
     order, work = at(result, ORDER), at(result, ORDER + i[POINTS] + 2 * i[WRAPS])
@@ -158,6 +202,7 @@ def place_points(model: Ints, reals: Floats, data: Floats, y: Floats, item: int)
         point = vector(n, STATION)
         if node[KIND] != FIXED:
             value = y[node[OF]] if node[OF] >= 0 else n[VALUE]
+            # A conditional point belongs to the path only while its coordinate is in its range.
             if node[KIND] == CONDITIONAL:
                 if not n[LOW] <= value <= n[HIGH]:
                     continue
@@ -187,6 +232,12 @@ def place_points(model: Ints, reals: Floats, data: Floats, y: Floats, item: int)
 def measure_points(model: Ints, data: Floats, y: Floats, item: int) -> float:
     """Compute length, speed and directions from the positions of the active nodes.
 
+    Args:
+        model: integers of the model.
+        data: results with velocities; the record of the path is filled.
+        y: state.
+        item: offset of the item in the model.
+
     Returns:
         The length.
     """
@@ -203,20 +254,30 @@ def measure_points(model: Ints, data: Floats, y: Floats, item: int) -> float:
         a, b = at(work, NODE_WORK * one), at(work, NODE_WORK * two)
         way = minus(line_end(n, b), line_end(m, a))
         distance = norm(way)
+        # Between both tangent points of one surface the path is not straight.
         if m[KIND] == TANGENT and n[KIND] == TANGENT and m[OF] == n[OF]:
             length += b[SURFACE]
         else:
             length += distance
+        # Points of one link keep their distance, unless they move in it.
         if m[LINK] != n[LINK] or m[KIND] >= MOVING or n[KIND] >= MOVING:
             moves = minus(node_velocity(model, data, y, n, b), node_velocity(model, data, y, m, a))
             speed += norm(moves) if distance < COINCIDENT else dot(moves, way) / distance
+        # Forces along a segment without direction vanish, where OpenSim has NaN.
         store_vector(a, ALONG, times(0.0 if distance < SIGNIFICANT else 1.0 / distance, way))
     result[LENGTH], result[SPEED] = length, speed
     return length
 
 
 def line_end(node: Ints, here: Floats) -> Vector:
-    """Return the position of a node for straight lines: of a tangent point where it was when first used."""
+    """Return the position of a node that straight lines begin and end at (m).
+
+    OpenSim caches the position of a tangent point at its first use, see `path_wraps`.
+
+    Args:
+        node: integers of the node.
+        here: results of the node; a tangent point is cached.
+    """
     if node[KIND] != TANGENT:
         return vector(here, PLACE)
     if here[IS_KEPT] == 0.0:
@@ -226,7 +287,17 @@ def line_end(node: Ints, here: Floats) -> Vector:
 
 
 def node_velocity(model: Ints, data: Floats, y: Floats, node: Ints, here: Floats) -> Vector:
-    """Return the velocity of a node (m/s); tangent points move with the body of their surface."""
+    """Return the velocity of a node in ground (m/s).
+
+    Tangent points move with the body of their surface.
+
+    Args:
+        model: integers of the model.
+        data: results of an evaluation.
+        y: state.
+        node: integers of the node.
+        here: results of the node.
+    """
     v = velocity(model, data, node[LINK], vector(here, PLACE))
     if MOVING <= node[KIND] <= CLAMPED and node[OF] >= 0:
         return add_scaled(v, y[model[MODEL.DOFS] + node[OF]], vector(here, GRADIENT))
@@ -237,6 +308,17 @@ def pull_points(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, 
     """Apply the tension at the nodes of a path, along each line between two bodies.
 
     At a moving point the tension also acts on its coordinate.
+
+    Args:
+        model: integers of the model.
+        reals: numbers of the model.
+        data: results with the record of the path; wrenches are changed.
+        y: state.
+        f: rates of the coordinates, then generalized forces; changed.
+        item: offset of the item in the model.
+
+    Returns:
+        `OUTCOME.OK`.
     """
     i, result = at(model, item), at(data, model[item + ITEM.RECORD])
     nodes, order, work = (
@@ -249,11 +331,13 @@ def pull_points(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, 
     for k in range(last + 1):
         number = int(order[k])
         node, here = at(nodes, NODE_INTS * number), at(work, NODE_WORK * number)
+        # The force at a node is the pull towards the next one less the pull of the one before.
         back, pull = pull, (0.0, 0.0, 0.0)
         if k < last and nodes[NODE_INTS * int(order[k + 1]) + BODY] != node[BODY]:
             pull = times(tension, vector(here, ALONG))
         force = minus(pull, back)
         apply_force(model, data, node[LINK], vector(here, PLACE), force)
+        # A moving point does work along its coordinate, even within its link.
         if MOVING <= node[KIND] <= CLAMPED and node[OF] >= 0:
             f[model[MODEL.DOFS] + node[OF]] += dot(force, vector(here, GRADIENT))
     return OUTCOME.OK
@@ -269,11 +353,13 @@ def pull_each(
     states: Floats,
     forces: Floats,
 ) -> int:
-    """Compute the generalized forces of 1 N along each item, all of which are paths, at several states.
+    """Compute the generalized forces of 1 N along each path, at several states.
+
+    All items of the model must be paths. With OpenSim's sign these are the moment arms.
 
     Args:
         model: integers of the model.
-        reals: its numbers.
+        reals: numbers of the model.
         data: workspace of an evaluation.
         y: workspace of a state.
         f: workspace of its derivative.
@@ -289,6 +375,7 @@ def pull_each(
     for row in range(count):
         for k in range(model[MODEL.STATE_SIZE]):
             y[k] = states[model[MODEL.STATE_SIZE] * row + k]
+        # The stage FORCE computes the lengths of all paths, which pulling needs.
         status = call(model[MODEL.LAWS], model, reals, data, y, f, STAGE.FORCE)
         if status != OUTCOME.OK:
             return status

@@ -49,9 +49,21 @@ SHAPE = BEST + CURVE - FIRST_TANGENT
 
 
 def trace_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
-    """Write all corners of a path whose length was computed to f, in ground; return their number.
+    """Write all corners of a path to f, after its length was computed.
 
-    After the wraps among the integers of the path follow the laws that trace it on each surface, or 0.
+    After the wraps among the integers of the path follow the laws that trace it on each surface, or
+    0.
+
+    Args:
+        model: integers of the model.
+        reals: numbers of the model.
+        data: results with the record of the path.
+        y: state.
+        f: filled with positions in ground (m).
+        item: offset of the item in the model.
+
+    Returns:
+        Number of corners.
     """
     i, result = at(model, item), at(data, model[item + ITEM.RECORD])
     points, wraps = i[POINTS], i[WRAPS]
@@ -64,6 +76,7 @@ def trace_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, i
         store_vector(f, 3 * count, vector(work, NODE_WORK * number + PLACE))
         count += 1
         wrap = (number - points) // 2
+        # Of the two nodes of a wrap, points follow the first one.
         if number >= points and number == points + 2 * wrap and own[WRAP_INTS * wraps + wrap] != 0:
             surface = item - own[WRAP_INTS * wrap + BACK]
             count += call(
@@ -74,13 +87,26 @@ def trace_path(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, i
 
 def count_segments(angle: float) -> int:
     """Return the number of segments with which an angle (rad) is drawn."""
+    # An undefined angle is drawn as one line.
     return int(min(1.0 + abs(angle) / ANGLE, MOST)) if not isnan(angle) else 1
 
 
 def trace_cylinder(
     model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int
 ) -> int:
-    """Write the points of a helix about z; return their number."""
+    """Write the points of a helix about z to f.
+
+    Args:
+        model: integers of the model.
+        reals: numbers of the model.
+        data: results with the record of the surface.
+        y: state.
+        f: filled with positions in ground (m).
+        item: offset of the surface in the model.
+
+    Returns:
+        Number of points.
+    """
     e = at(data, model[item + ITEM.RECORD])
     one, two, turn = vector(e, FIRST), vector(e, SECOND), e[SHAPE]
     count = count_segments(turn)
@@ -92,7 +118,19 @@ def trace_cylinder(
 
 
 def trace_torus(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
-    """Write the points of a helix on the cylinder that replaces the torus; return their number."""
+    """Write the points of a helix on the cylinder that replaces the torus to f.
+
+    Args:
+        model: integers of the model.
+        reals: numbers of the model.
+        data: results with the record of the surface.
+        y: state.
+        f: filled with positions in ground (m).
+        item: offset of the surface in the model.
+
+    Returns:
+        Number of points.
+    """
     p, e = at(reals, model[item + ITEM.NUMBERS]), at(data, model[item + ITEM.RECORD])
     ring, outwards = p[SIZES + 1], (e[SHAPE + 1], e[SHAPE + 2], 0.0)
     one, two = (
@@ -107,7 +145,14 @@ def trace_torus(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, 
 
 
 def helix_point(one: Vector, two: Vector, turn: float, part: float) -> Vector:
-    """Return the point of a helix about z at a fraction of its length."""
+    """Return the point of a helix about z at a fraction of its length.
+
+    Args:
+        one: first point of the helix (m).
+        two: last point, of which the height is used (m).
+        turn: angle of the helix (rad).
+        part: fraction of its length.
+    """
     x, y, z = one
     _, _, end = two
     c, s = cos(part * turn), sin(part * turn)
@@ -115,7 +160,19 @@ def helix_point(one: Vector, two: Vector, turn: float, part: float) -> Vector:
 
 
 def trace_sphere(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
-    """Write the points of a great circle; return their number."""
+    """Write the points of a great circle to f.
+
+    Args:
+        model: integers of the model.
+        reals: numbers of the model.
+        data: results with the record of the surface.
+        y: state.
+        f: filled with positions in ground (m).
+        item: offset of the surface in the model.
+
+    Returns:
+        Number of points.
+    """
     e = at(data, model[item + ITEM.RECORD])
     one, turn = vector(e, FIRST), e[SHAPE]
     across = cross(unit(cross(one, vector(e, SECOND))), one)
@@ -133,20 +190,32 @@ def trace_sphere(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats,
 def trace_ellipsoid(
     model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int
 ) -> int:
-    """Write the points of the section with the plane of the path; return their number.
+    """Write the points of the section of an ellipsoid with the plane of the path to f.
 
-    It is 0 where OpenSim's points are not numbers.
+    Args:
+        model: integers of the model.
+        reals: numbers of the model.
+        data: results with the record of the surface.
+        y: state.
+        f: filled with positions in ground (m).
+        item: offset of the surface in the model.
+
+    Returns:
+        Number of points, 0 where OpenSim's points are not numbers.
     """
     p, e = at(reals, model[item + ITEM.NUMBERS]), at(data, model[item + ITEM.RECORD])
     a, b, c = vector(p, SIZES)
     factor = 3.0 / (a + b + c)
     one, two = times(factor, vector(e, FIRST)), times(factor, vector(e, SECOND))
     centre, to_one, across, turn = polar_coordinates(one, two, vector(e, SHAPE), e[SHAPE + 3])
+    # OpenSim may take the longer way around the section.
     turn -= 2.0 * pi * e[SHAPE + 4]
     scale = times(1.0 / factor, invert_components((a, b, c)))
     count = count_segments(turn)
     for k in range(1, count):
         angle = turn * k / count
+        # Rays from the centre of the section, at equal angles as in `measure_polyline`, meet the
+        # surface.
         way = add_scaled(times(cos(angle), to_one), sin(angle), across)
         size = distance_to_sphere(
             multiply_elementwise(scale, centre), multiply_elementwise(scale, way)
@@ -162,7 +231,15 @@ def trace_ellipsoid(
 
 
 def distance_to_sphere(start: Vector, way: Vector) -> float:
-    """Return the multiple of a direction that leads from a point to the unit sphere, NaN if it misses."""
+    """Return the multiple of a direction that leads from a point to the unit sphere.
+
+    Args:
+        start: point.
+        way: direction.
+
+    Returns:
+        The multiple, NaN if the line misses the sphere.
+    """
     square, half = dot(way, way), dot(start, way)
     inner = half * half - square * (dot(start, start) - 1.0)
     return (sqrt(inner) - half) / square if inner >= 0.0 else nan

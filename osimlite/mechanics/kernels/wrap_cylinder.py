@@ -62,7 +62,19 @@ ROUNDS = 100
 
 
 def wrap_cylinder(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
-    """Bend a segment around a WrapCylinder, see :mod:`osimlite.mechanics.kernels.wrapping`."""
+    """Bend a segment around a WrapCylinder, see :mod:`osimlite.mechanics.kernels.wrapping`.
+
+    Args:
+        model: integers of the model.
+        reals: numbers of the model.
+        data: results; the record of the surface holds the ends of the segment and is filled.
+        y: state.
+        f: rates of the coordinates.
+        item: offset of the surface in the model.
+
+    Returns:
+        INSIDE, NONE, WRAPPED or MANDATORY.
+    """
     p, e = at(reals, model[item + ITEM.NUMBERS]), at(data, model[item + ITEM.RECORD])
     first, second = vector(e, FIRST_END), vector(e, SECOND_END)
     return bend_around_cylinder(
@@ -108,6 +120,7 @@ def bend_around_cylinder(
     if code == NONE:
         return NONE
 
+    # The tangents are found in the plane across the axis; heights follow later.
     flat_first, flat_second = set_height(first, 0.0), set_height(second, 0.0)
     a1, b1 = find_tangents(flat_first, radius, (0.0, 0.0, 1.0))
     a2, b2 = find_tangents(flat_second, radius, (0.0, 0.0, 1.0))
@@ -130,6 +143,8 @@ def bend_around_cylinder(
         far = from_a == wide
         long = dot(plus(one, two), plus(minus(one, flat_first), minus(two, flat_second))) < 0.0
 
+    # The plane through both ends and an apex on the surface gives the heights of the tangent
+    # points.
     apex = apex_between(first, second, radius, far)
     normal = unit(cross(minus(first, apex), minus(second, apex)))
     z1, z2 = edge_height(one, pz, first, normal), edge_height(two, qz, first, normal)
@@ -138,19 +153,23 @@ def bend_around_cylinder(
         # all heights then count as that of the first end.
         z1, z2 = pz, z2 if pz != qz else qz
     else:
+        # A height beyond that of the other end counts as that of the own end.
         z1, z2 = (
             z1 if abs(z1 - qz) < abs(pz - qz) else pz,
             z2 if abs(z2 - pz) < abs(qz - pz) else qz,
         )
+    # Both tangent points beyond the ends of the cylinder: the path misses it.
     if abs(z1) > 0.5 * length and abs(z2) > 0.5 * length:
         return NONE
     x1, y1, _ = one
     x2, y2, _ = two
     angle = atan2(x1 * y2 - y1 * x2, x1 * x2 + y1 * y2)
+    # `turn` has a sign for drawing; the length uses the angle of the arc that is taken.
     turn = angle
     if long:
         angle = 2.0 * pi - angle
         turn = -angle
+    # OpenSim smooths the heights only if a path has several PathWraps.
     if not alone:
         z1, z2 = smooth_heights(first, second, (x1, y1, z1), (x2, y2, z2), radius * angle, turn)
     store_vector(e, FIRST_TANGENT, (x1, y1, z1))
@@ -162,12 +181,18 @@ def bend_around_cylinder(
 def closest_to_axis(first: Vector, second: Vector, radius: float) -> tuple[Vector, bool]:
     """Return the point of a line that is closest to the axis.
 
+    Args:
+        first: first end of the line.
+        second: second end of the line.
+        radius: radius of the cylinder (m).
+
     Returns:
         The point, and whether it is within the radius and between the ends.
     """
     x, y, _ = first
     dx, dy, dz = way = minus(second, first)
     across = dx * dx + dy * dy
+    # OpenSim treats a line along the axis as one that does not cross.
     if across <= PARALLEL * (across + dz * dz):
         return (0.0, 0.0, 0.0), False
     part = -(x * dx + y * dy) / across
@@ -176,7 +201,12 @@ def closest_to_axis(first: Vector, second: Vector, radius: float) -> tuple[Vecto
 
 
 def set_height(point: Vector, height: float) -> Vector:
-    """Return a point moved to another height."""
+    """Return a point moved to another height.
+
+    Args:
+        point: point.
+        height: its new z component (m).
+    """
     x, y, _ = point
     return x, y, height
 
@@ -209,11 +239,19 @@ def apex_between(first: Vector, second: Vector, radius: float, far: bool) -> Vec
     It is at the height of the point that divides the segment in the ratio of the distances of the ends
     from the axis, and in the direction in which the plane through the ends and the axis at that height
     cuts the cylinder; on the far side of the axis if `far`.
+
+    Args:
+        first: first end.
+        second: second end.
+        radius: radius of the cylinder (m).
+        far: whether the apex is on the far side of the axis.
     """
     px, py, pz = first
     qx, qy, qz = second
     d1, d2 = sqrt(px * px + py * py), sqrt(qx * qx + qy * qy)
     x, y, z = add_scaled(first, d1 / (d1 + d2), minus(second, first))
+    # Direction of the intersection of the plane with the cross section, on the side of the segment
+    # or opposite.
     nx, ny, _ = unit(cross((px, py, pz - z), (qx, qy, qz - z)))
     ux, uy, _ = unit((-ny, nx, 0.0))
     if (x * ux + y * uy > 0.0) == far:
@@ -222,7 +260,9 @@ def apex_between(first: Vector, second: Vector, radius: float, far: bool) -> Vec
 
 
 def edge_height(point: Vector, end_height: float, end: Vector, normal: Vector) -> float:
-    """Return the height at which the edge of a tangent point intersects a plane, or `end_height` if it does not.
+    """Return the height at which the edge of a tangent point intersects a plane (m).
+
+    It is `end_height` if they do not intersect nearby.
 
     Args:
         point: point of the edge, which is parallel to the axis.
@@ -231,6 +271,7 @@ def edge_height(point: Vector, end_height: float, end: Vector, normal: Vector) -
         normal: normal of the plane, the zero vector if there is no plane.
     """
     nx, ny, nz = normal
+    # OpenSim treats an edge nearly parallel to the plane as one that does not meet it.
     if abs(nz) < FLATTEST:
         return end_height
     dx, dy, _ = minus(end, point)
@@ -240,14 +281,21 @@ def edge_height(point: Vector, end_height: float, end: Vector, normal: Vector) -
 
 
 def helix_length(arc: float, rise: float) -> float:
-    """Return the length of a helix (m)."""
+    """Return the length of a helix (m).
+
+    Args:
+        arc: length of the arc, seen along the axis (m).
+        rise: difference of the heights (m).
+    """
     return sqrt(arc * arc + rise * rise)
 
 
 def smooth_heights(
     first: Vector, second: Vector, one: Vector, two: Vector, arc: float, turn: float
 ) -> tuple[float, float]:
-    """Return the heights of the tangent points at which the lines continue as the helix with little bend.
+    """Return the heights of the tangent points at which the lines continue as the helix.
+
+    A small bend may remain.
 
     OpenSim compares with the next point that it would draw, so that the result jumps where the number
     of these points changes. It does this only if a path has several PathWraps, and without a guarantee
@@ -271,9 +319,11 @@ def smooth_heights(
     for _ in range(ROUNDS):
         rise = z2 - z1
         length = helix_length(arc, rise) / PIECE
+        # Helices of less than two of OpenSim's segments, and undefined ones, stay as they are.
         if not 2.0 <= length < inf:
             break
         count = int(length)
+        # Seen along the axis nothing changes while the number of segments stays the same.
         if count != pieces:
             pieces, part = count, 1.0 / count
             c, s = cos(part * turn), sin(part * turn)
@@ -326,6 +376,8 @@ def next_height(
     """
     line, piece, with_next, with_end = leg
     line_rise, piece_rise = tangent - end, next_point - tangent
+    # Tangent of the angle between line and helix, without a division.
     if abs(line * piece_rise - line_rise * piece) <= BEND * (line_rise * piece_rise + line * piece):
         return tangent
+    # OpenSim over-relaxes by the factor 3/2.
     return with_next * next_point + (with_end * end - 0.5 * tangent)

@@ -82,9 +82,22 @@ STEPS = 16.0
 def wrap_ellipsoid(
     model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int
 ) -> int:
-    """Bend a segment around a WrapEllipsoid, see :mod:`osimlite.mechanics.kernels.wrapping`."""
+    """Bend a segment around a WrapEllipsoid, see :mod:`osimlite.mechanics.kernels.wrapping`.
+
+    Args:
+        model: integers of the model.
+        reals: numbers of the model.
+        data: results; the record of the surface holds the ends of the segment and is filled.
+        y: state.
+        f: rates of the coordinates.
+        item: offset of the surface in the model.
+
+    Returns:
+        INSIDE, NONE or MANDATORY.
+    """
     p, e = at(reals, model[item + ITEM.NUMBERS]), at(data, model[item + ITEM.RECORD])
     a, b, c = vector(p, SIZES)
+    # OpenSim scales the surface to a mean radius of 1, so that its tolerances are relative.
     factor, axis, side = 3.0 / (a + b + c), int(p[AXIS]), p[SIDE]
     radii = times(factor, (a, b, c))
     first, second = times(factor, vector(e, FIRST_END)), times(factor, vector(e, SECOND_END))
@@ -94,6 +107,7 @@ def wrap_ellipsoid(
     way = minus(first, second)
     enters, leaves = find_crossings(radii, second, way)
     one, two = add_scaled(second, enters, way), add_scaled(second, leaves, way)
+    # Ends in the same direction have no plane; a chord outside of the segment does not cross.
     if abs(dot(unit(first), unit(second)) - 1.0) < CLOSE or not (enters < 1.0 and leaves > 0.0):
         return NONE
     support, by_fan, starts = support_point(
@@ -102,6 +116,7 @@ def wrap_ellipsoid(
     if starts:
         one = two = support
     if side != 0.0 and not is_on_side(support, axis, side):
+        # On the wrong side OpenSim mirrors the point across the plane of symmetry.
         outwards = -component(support, axis)
         one = two = support = replace_component(support, axis, outwards)
         if by_fan > 0.0:
@@ -110,21 +125,25 @@ def wrap_ellipsoid(
             )
     normal = unit(cross(way, minus(first, support)))
     offset = dot(normal, support)
+    # An end on the surface is its own tangent point.
     one = tangent_point(radii, one, first, normal, offset) if abs(first_height) >= CLOSE else first
     two = (
         tangent_point(radii, two, second, normal, offset) if abs(second_height) >= CLOSE else second
     )
 
     length = norm(minus(one, two)) / factor
+    # OpenSim's search may fail; it then wraps without points.
     if isnan(length):
         return clear_tangents(e, MANDATORY)
     store_vector(e, CURVE, normal)
     e[CURVE + 3], e[CURVE + 4] = offset, 0.0
+    # A short path is measured by its chord, a long one by a polyline as OpenSim draws it.
     if length >= PIECE:
         pieces = int(min(length / PIECE, 1.0 * PIECES))
         length, next_one, next_two = measure_polyline(
             radii, one, two, normal, offset, pieces, False
         )
+        # A path that starts backwards takes the longer way around the section.
         if (
             side != 0.0
             and pieces > 1
@@ -140,7 +159,12 @@ def wrap_ellipsoid(
 
 
 def ellipsoid_height(radii: Vector, point: Vector) -> float:
-    """Return (x/a)^2 + (y/b)^2 + (z/c)^2 - 1, negative inside."""
+    """Return (x/a)^2 + (y/b)^2 + (z/c)^2 - 1, negative inside.
+
+    Args:
+        radii: half axes.
+        point: point.
+    """
     x, y, z = point
     a, b, c = radii
     return (x / a) * (x / a) + (y / b) * (y / b) + (z / c) * (z / c) - 1.0
@@ -167,6 +191,7 @@ def find_crossings(radii: Vector, point: Vector, way: Vector) -> tuple[float, fl
         multiply_elementwise(invert_components(radii), way),
         multiply_elementwise(invert_components(radii), point),
     )
+    # Scaled by the half axes, the surface is a unit sphere and the equation is quadratic.
     a, b, c = dot(way, way), 2.0 * dot(way, point), dot(point, point) - 1.0
     square = b * b - 4.0 * a * c
     if not (square >= 0.0 and a > 0.0):
@@ -193,12 +218,14 @@ def support_point(
     middle = add_scaled(start, 0.5, chord)
     if method == MIDPOINT:
         return closest_point(radii, middle), 0.0, True
+    # OpenSim's axial method uses the plane of symmetry across the largest component of the segment.
     axis = longest_axis(way)
     passes = -component(start, axis) / component(chord, axis)
     axial = closest_in_plane(radii, add_scaled(start, passes, chord), axis)
     if method == AXIAL:
         return axial, 0.0, 0.0 < passes < 1.0
     cosine = abs(component(unit(way), axis))
+    # Where the chord crosses this plane near one of its ends, the fan is phased in.
     fade = max(0.0, min(passes, 1.0 - passes) / BORDER)
     if cosine > ALL_FAN and fade < 1.0:
         cosine = ALL_FAN + fade * (cosine - ALL_FAN)
@@ -207,6 +234,7 @@ def support_point(
     fanned = closest_point(radii, plus(middle, mean_way_out(radii, start, chord, room)))
     if cosine <= ALL_FAN:
         return fanned, 1.0, True
+    # Between both limits OpenSim blends the axial and the fanned point.
     part = (cosine - ALL_FAN) / (NO_FAN - ALL_FAN)
     return (
         closest_point(radii, add_scaled(times(part, axial), 1.0 - part, fanned)),
@@ -243,6 +271,7 @@ def tangent_point(
     weights = invert_components(multiply_elementwise(radii, radii))
     by_end = times(2.0, multiply_elementwise(weights, end))
     r, step, d_step = start, (0.0, 0.0, 0.0), 0.0
+    # Start with the tangent plane through r itself, where the third residual vanishes.
     d = -2.0 * dot(multiply_elementwise(weights, r), r)
     e0, e1, e2, e3 = tangent_residuals(weights, by_end, normal, offset, r, d)
     error = before = e0 * e0 + e1 * e1 + e2 * e2 + e3 * e3
@@ -253,7 +282,9 @@ def tangent_point(
         n = times(2.0, multiply_elementwise(weights, r))
         downhill = minus(times(-e0, normal), add_scaled(times(e1 + 2.0 * e2, n), e3, by_end))
         cosine = dot(unit(minus(end, r)), unit(end))
+        # OpenSim takes small steps where the end is seen under a large angle.
         size = (1.0 - cosine**100 if cosine > 0.1 else 1.0) / STEPS
+        # Increase the damping until the error decreases.
         for _ in range(TRIALS):
             if not error >= before:
                 break
@@ -264,6 +295,7 @@ def tangent_point(
             before, error = error, e0 * e0 + e1 * e1 + e2 * e2 + e3 * e3
             damping *= 4.0
         damping /= 8.0
+        # Then repeat the step at double length as long as that helps, and take the last one back.
         longer = 0.5
         for _ in range(TRIALS):
             if not error <= before:
@@ -283,6 +315,14 @@ def tangent_residuals(
 ) -> tuple[float, float, float, float]:
     """Return the residuals of the four equations of `tangent_point`.
 
+    Args:
+        weights: reciprocal squares of the half axes.
+        by_end: gradient of the fourth equation.
+        normal: unit normal of the plane.
+        offset: offset of the plane along it.
+        r: point.
+        d: offset of the tangent plane.
+
     Returns:
         Four residuals.
     """
@@ -293,7 +333,9 @@ def tangent_residuals(
 def damped_step(
     normal: Vector, n: Vector, by_end: Vector, downhill: Vector, d_downhill: float, damping: float
 ) -> tuple[Vector, float]:
-    """Solve (J' J + damping D) step = downhill for the step of r and d, where D is the diagonal of J' J.
+    """Solve (J' J + damping D) step = downhill, where D is the diagonal of J' J.
+
+    J is the Jacobian of the four equations.
 
     The gradients of the four equations by r are the normal, n, 2 n and `by_end`; those by d are 0, 0,
     1, 1.
@@ -316,6 +358,7 @@ def damped_step(
     x = add_scaled(add_scaled(times(px, normal), 5.0 * nx, n), qx, by_end)
     y = add_scaled(add_scaled(times(py, normal), 5.0 * ny, n), qy, by_end)
     z = add_scaled(add_scaled(times(pz, normal), 5.0 * nz, n), qz, by_end)
+    # Marquardt's damping scales the diagonal, so that the step does not depend on the units.
     x = replace_component(x, 0, more * component(x, 0))
     y = replace_component(y, 1, more * component(y, 1))
     z = replace_component(z, 2, more * component(z, 2))
@@ -366,8 +409,11 @@ def measure_polyline(
     next_one = one
     for k in range(1, pieces):
         c, s = c * c_piece - s * s_piece, s * c_piece + c * s_piece
+        # Intersection of the ray with the surface: a quadratic equation for m, where `inner` is its
+        # discriminant.
         square, half = (uu * c + 2.0 * uv * s) * c + vv * s * s, uw * c + vw * s
         inner = half * half - square * ww
+        # A ray from outside may miss the surface; OpenSim's points are then undefined.
         m = (sqrt(inner) - half) / square if inner >= 0.0 else nan
         length += sqrt((m * c - x) * (m * c - x) + (m * s - y) * (m * s - y))
         x, y = m * c, m * s
@@ -399,10 +445,17 @@ def polar_coordinates(
     across = component(normal, axis)
     centre = replace_component((0.0, 0.0, 0.0), axis, offset / across if across != 0.0 else nan)
     a, b = unit(minus(one, centre)), unit(minus(two, centre))
+    # Rounding may give a cosine beyond 1, for which acos is undefined in OpenSim.
     cosine = dot(a, b)
     return centre, a, cross(unit(cross(a, b)), a), acos(cosine) if abs(cosine) <= 1.0 else nan
 
 
 def bends_back(end: Vector, tangent: Vector, next_point: Vector) -> bool:
-    """Return whether a path on the surface starts towards the end that it comes from."""
+    """Return whether a path on the surface starts towards the end that it comes from.
+
+    Args:
+        end: end of the segment.
+        tangent: tangent point next to it.
+        next_point: next corner of the path on the surface.
+    """
     return dot(minus(end, tangent), minus(next_point, tangent)) > 0.0

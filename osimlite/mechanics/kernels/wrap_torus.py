@@ -56,9 +56,23 @@ DOWN = (0.0, 0.0, -1.0)
 
 
 def wrap_torus(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int) -> int:
-    """Bend a segment around a WrapTorus about z; a segment never must wrap."""
+    """Bend a segment around a WrapTorus about z; a segment never must wrap.
+
+    Args:
+        model: integers of the model.
+        reals: numbers of the model.
+        data: results; the record of the surface holds the ends of the segment and is filled.
+        y: state.
+        f: rates of the coordinates.
+        item: offset of the surface in the model.
+
+    Returns:
+        NONE or WRAPPED.
+    """
     p, e = at(reals, model[item + ITEM.NUMBERS]), at(data, model[item + ITEM.RECORD])
     first, second, ring = vector(e, FIRST_END), vector(e, SECOND_END), p[SIZES + 1]
+    # The search stops early, so that its result depends on the end from which it starts; OpenSim
+    # tries both.
     one, two = near_ring(first, second, ring), near_ring(second, first, ring)
     closer = distance_from_ring(one, ring) < distance_from_ring(two, ring)
     if p[SIDE] != 0.0:
@@ -71,10 +85,12 @@ def wrap_torus(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, i
         closer = one_active and (closer or not two_active)
     rx, ry, _ = one if closer else two
     distance = sqrt(rx * rx + ry * ry)
+    # On the axis no part of the ring is nearest.
     if not distance > 0.0:
         return clear_tangents(e, WRAPPED)
     outwards = (rx / distance, ry / distance, 0.0)
     a, b = point_in_cylinder(first, outwards, ring), point_in_cylinder(second, outwards, ring)
+    # The side x > 0 of the cylinder is the inside of the ring, which the path must touch.
     if bend_around_cylinder(a, b, p[SIZES], LENGTH, 0, 1.0, p[ALONE] == 1.0, e) <= NONE:
         return clear_tangents(e, WRAPPED)
     for place in (FIRST_TANGENT, SECOND_TANGENT):
@@ -87,13 +103,24 @@ def point_in_cylinder(point: Vector, outwards: Vector, ring: float) -> Vector:
     """Return a point in the frame of the cylinder at the ring in a direction.
 
     Its x axis points to the middle of the torus, its y axis down, its z axis along the ring.
+
+    Args:
+        point: point in the frame of the torus (m).
+        outwards: unit vector from the middle to the nearest part of the ring.
+        ring: radius of the ring (m).
     """
     away, inwards = add_scaled(point, -ring, outwards), times(-1.0, outwards)
     return dot(inwards, away), dot(DOWN, away), dot(cross(inwards, DOWN), away)
 
 
 def point_from_cylinder(point: Vector, outwards: Vector, ring: float) -> Vector:
-    """Return a point of the frame of the cylinder in the frame of the torus."""
+    """Return a point of the frame of the cylinder in the frame of the torus.
+
+    Args:
+        point: point in the frame of the cylinder (m).
+        outwards: unit vector from the middle to the nearest part of the ring.
+        ring: radius of the ring (m).
+    """
     x, y, z = point
     inwards = times(-1.0, outwards)
     return add_scaled(
@@ -102,13 +129,24 @@ def point_from_cylinder(point: Vector, outwards: Vector, ring: float) -> Vector:
 
 
 def distance_from_ring(point: Vector, ring: float) -> float:
-    """Return the squared distance of a point from the ring (m²)."""
+    """Return the squared distance of a point from the ring (m²).
+
+    Args:
+        point: point in the frame of the torus (m).
+        ring: radius of the ring (m).
+    """
     x, y, _ = point
     return dot(point, point) + ring * ring - 2.0 * ring * sqrt(x * x + y * y)
 
 
 def near_ring(first: Vector, second: Vector, ring: float) -> Vector:
-    """Return a point of a line near the ring, as found from the first end."""
+    """Return a point of a line near the ring, as found from the first end.
+
+    Args:
+        first: end from which the search starts (m).
+        second: other end (m).
+        ring: radius of the ring (m).
+    """
     dx, dy, dz = minus(second, first)
     distance = norm((dx, dy, dz))
     if not distance > 0.0:
@@ -150,7 +188,12 @@ def minimize_residual(
 ) -> float:
     """Return the distance u that minimizes the squared residual, with lmdif's steps from 0.
 
-    The arguments are those of `compute_residual`.
+    Args:
+        start: scalar product of first end and direction (m).
+        flat_start: the same in the plane of the ring (m).
+        flat: squared component of the direction in the plane of the ring.
+        square: squared distance of the first end from the axis (m²).
+        ring: radius of the ring (m).
     """
     u = damping = scale = 0.0
     value, radius, moved, evaluations = (
@@ -163,19 +206,23 @@ def minimize_residual(
         slope = (compute_residual(u + STEP, start, flat_start, flat, square, ring) - value) / STEP
         if not abs(slope * value) > 0.0:
             return u
+        # lmdif scales the unknown by the largest slope so far.
         scale = max(scale, abs(slope))
         while True:
             step, damping = damped_step(slope, value, scale, radius, damping)
             size = scale * abs(step)
+            # The first trust region is not longer than the first step.
             if not moved:
                 radius = min(radius, size)
             next_value = compute_residual(u + step, start, flat_start, flat, square, ring)
             evaluations += 1
+            # A residual that grows tenfold does not count as a decrease, as in lmdif.
             falls = 0.1 * abs(next_value) < abs(value)
             actual = 1.0 - (next_value / value) ** 2 if falls else -1.0
             linear, damped = (slope * step / value) ** 2, damping * (size / value) ** 2
             predicted = linear + 2.0 * damped
             ratio = actual / predicted if predicted != 0.0 else 0.0
+            # Shrink the trust region if the prediction was poor, and enlarge it if it was good.
             if ratio <= 0.25:
                 part = (
                     0.5
@@ -216,6 +263,7 @@ def damped_step(
     if over <= 0.1 * radius:
         return step, 0.0
     least = over / radius * (slope / scale) ** 2
+    # Bounds of the damping, as MINPACK's lmpar computes them for one unknown.
     damping = min(max(damping, least), abs(slope * value) / scale / radius)
     for last in range(10):
         square = slope * slope + damping * scale * scale

@@ -85,18 +85,26 @@ def is_on_side(point: Vector, axis: int, side: float) -> bool:
     """Return whether a point is on the active side.
 
     Points between the sides belong to the positive one.
+
+    Args:
+        point: point in the frame of the surface.
+        axis: axis of the quadrant, 0, 1 or 2.
+        side: sign of the active side.
     """
     return (component(point, axis) >= 0.0) == (side > 0.0)
 
 
 def decide_wrapping(first: bool, second: bool, closest: bool, crosses: bool) -> int:
-    """Return whether a segment wraps, from which of its points are on the active side.
+    """Return whether a segment wraps, by which of its points are on the active side.
 
     Args:
         first: whether the first end is on the active side.
         second: whether the second end is.
         closest: whether the point of the segment that is closest to the middle of the surface is.
         crosses: whether the segment passes through the surface.
+
+    Returns:
+        NONE, WRAPPED or MANDATORY, as OpenSim decides.
     """
     if not (first or second):
         return WRAPPED
@@ -117,6 +125,7 @@ def find_tangents(point: Vector, radius: float, axis: Vector) -> tuple[Vector, V
         The tangent points to the left and to the right about the axis.
     """
     distance = norm(point)
+    # The tangent point is at the height r^2 / d above the centre, seen towards the point.
     sine = radius / distance
     foot, across = times(sine * sine, point), cross(axis, point)
     reach = radius * sqrt(1.0 - sine * sine) / distance
@@ -146,7 +155,12 @@ def nearest_pair(a1: Vector, b1: Vector, a2: Vector, b2: Vector) -> tuple[Vector
 
 
 def clear_tangents(e: Floats, code: int) -> int:
-    """Return a code after setting the tangent points to NaN, where OpenSim finds none."""
+    """Return a code after setting the tangent points to NaN, where OpenSim finds none.
+
+    Args:
+        e: record of the law; changed.
+        code: result of the law.
+    """
     store_vector(e, FIRST_TANGENT, (nan, nan, nan))
     store_vector(e, SECOND_TANGENT, (nan, nan, nan))
     e[SURFACE_LENGTH] = nan
@@ -163,6 +177,17 @@ def wrap_sphere(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, 
     As in OpenSim, a segment through the centre stays straight, and a length on the far side of the
     sphere is negative. Where a side is active, a segment must wrap only if its first end is less
     than 1 m from the point of the line that is closest to the centre.
+
+    Args:
+        model: integers of the model.
+        reals: numbers of the model.
+        data: results; the record of the surface holds the ends of the segment and is filled.
+        y: state.
+        f: rates of the coordinates.
+        item: offset of the surface in the model.
+
+    Returns:
+        INSIDE, NONE, WRAPPED or MANDATORY.
     """
     p, e = at(reals, model[item + ITEM.NUMBERS]), at(data, model[item + ITEM.RECORD])
     first, second, radius = vector(e, FIRST_END), vector(e, SECOND_END), p[SIZES]
@@ -172,6 +197,7 @@ def wrap_sphere(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, 
         return NONE
     way = unit(minus(first, second))
     normal = cross(way, unit(second))
+    # Ends and centre on one line define no plane.
     if norm(normal) < STRAIGHT:
         return clear_tangents(e, WRAPPED)
     normal = unit(normal)
@@ -183,29 +209,39 @@ def wrap_sphere(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, 
         axis, side = int(p[AXIS]), p[SIDE]
         active = is_on_side(first, axis, side), is_on_side(second, axis, side)
         before = dot(first, way)
+        # OpenSim compares an absolute distance with 1 m here, see above.
         code = decide_wrapping(
             *active, is_on_side(add_scaled(first, -before, way), axis, side), before < 1.0
         )
         if code == NONE:
             return NONE
+        # Only where an end is on the other side may the longer arc be the active one.
         if not (active[0] and active[1]):
             one, two, far = pair_on_side(first, second, a1, b1, a2, b2, axis, side)
     angle = atan2(norm(cross(one, two)), dot(one, two))
     store_vector(e, FIRST_TANGENT, one)
     store_vector(e, SECOND_TANGENT, two)
+    # The far arc has a negative length in OpenSim; the drawn arc goes the other way, too.
     e[CURVE] = angle - 2.0 * pi if far else angle
     e[SURFACE_LENGTH] = radius * e[CURVE]
     return code
 
 
 def crosses_sphere(first: Vector, second: Vector, radius: float) -> bool:
-    """Return whether a segment enters and leaves a sphere between its ends."""
+    """Return whether a segment enters and leaves a sphere between its ends.
+
+    Args:
+        first: first end of the segment.
+        second: second end of the segment.
+        radius: radius of the sphere.
+    """
     way = minus(first, second)
     a, b, c = dot(way, way), 2.0 * dot(second, way), dot(second, second) - radius * radius
     discriminant = b * b - 4.0 * a * c
     if not (discriminant >= 0.0 and a > 0.0):
         return False
     root = sqrt(discriminant)
+    # Both intersections must be between the ends: parameters from 0 to 1.
     return -b - root > 0.0 and root - b < 2.0 * a
 
 
@@ -241,6 +277,7 @@ def pair_on_side(
     )
     one, two = a1 if a1_nearer else b1, a2 if a2_nearer else b2
     outwards = plus(minus(one, first), minus(two, second))
+    # If the nearer tangent points lead away from the active side, take the other ones.
     if side * component(outwards, axis) < 0.0:
         one, two = b1 if a1_nearer else a1, b2 if a2_nearer else a2
         outwards = plus(minus(one, first), minus(two, second))
