@@ -1,8 +1,9 @@
 """Criteria that score a walk: SCONE's measures, updated after each control step.
 
 The integers are the number of criteria, and per criterion a `CRITERION`. The numbers of a criterion
-are the times between which it is active (s), and those of its kind. Its workspace begins as `NOTED`
-says, that of a gait as `GAIT_NOTED`; there the steps follow, each with its time (s) and length (m).
+are the times between which it is active (s), and those of its kind. The workspace of a criterion is
+laid out by `NOTED`, that of a gait by `GAIT_NOTED`, and that of a jump by `JUMP_NOTED`. Behind the
+workspace of a gait follow its steps, each with its time (s) and length (m).
 """
 
 from __future__ import annotations
@@ -115,7 +116,14 @@ class JUMP_NOTED(metaclass=Record):
 
 
 def begin_criteria(senses: Ints, i: Ints, row: Floats, room: Floats) -> None:
-    """Start all criteria with a sensor row."""
+    """Start all criteria with a sensor row.
+
+    Args:
+        senses: plan of the sensor row.
+        i: integers of the criteria.
+        row: sensor row.
+        room: workspace of the criteria; filled.
+    """
     for number in range(i[0]):
         criterion = at(i, 1 + CRITERION.SIZE * number)
         noted, centre = at(room, criterion[CRITERION.ROOM]), senses[SENSES.CENTRE]
@@ -123,6 +131,8 @@ def begin_criteria(senses: Ints, i: Ints, row: Floats, room: Floats) -> None:
             noted[GAIT_NOTED.BEFORE] = noted[GAIT_NOTED.HERE] = walked_distance(senses, row)
             noted[GAIT_NOTED.HEIGHT] = row[centre + 1]
             noted[GAIT_NOTED.FALLEN] = noted[GAIT_NOTED.COUNT] = 0.0
+            # Unknown contact, so that a foot that stands from the start does not count as one that
+            # lands.
             noted[GAIT_NOTED.TOUCHES] = noted[GAIT_NOTED.TOUCHES + 1] = -1.0
         elif criterion[CRITERION.KIND] == JUMP:
             for k in range(JUMP_NOTED.ENDED):
@@ -153,6 +163,7 @@ def update_criteria(
     for number in range(i[0]):
         criterion = at(i, 1 + CRITERION.SIZE * number)
         numbers, noted = at(p, criterion[CRITERION.NUMBERS]), at(room, criterion[CRITERION.ROOM])
+        # SCONE's measures see only what happens within their times.
         if not numbers[CRITERION_NUMBERS.START] <= t < numbers[CRITERION_NUMBERS.STOP]:
             continue
         if criterion[CRITERION.KIND] == GAIT:
@@ -179,7 +190,13 @@ def update_criteria(
 
 
 def add_sample(noted: Floats, t: float, value: float) -> None:
-    """Add a sample of a value to its integral by the trapezoidal rule, and to its extremes."""
+    """Add a sample of a value to its integral by the trapezoidal rule, and to its extremes.
+
+    Args:
+        noted: workspace of the criterion, see `NOTED`.
+        t: time (s).
+        value: value.
+    """
     if noted[NOTED.BEGUN] > 0.0:
         dt = t - noted[NOTED.TIME]
         noted[NOTED.TOTAL] += 0.5 * dt * (noted[NOTED.VALUE] + value)
@@ -195,19 +212,35 @@ def walked_distance(senses: Ints, row: Floats) -> float:
     """Return the distance of a walker along x (m).
 
     It is the mean of the two smallest positions of both feet and the mass centre.
+
+    Args:
+        senses: plan of the sensor row.
+        row: sensor row.
     """
     centre, one, two = (
         row[senses[SENSES.CENTRE]],
         foot_position(senses, row, 0),
         foot_position(senses, row, 1),
     )
+    # SCONE takes the two smallest of three, so that a trunk that falls forwards adds little.
     if centre >= one and centre >= two:
         return 0.5 * (one + two)
     return 0.5 * (centre + min(one, two))
 
 
 def note_gait(senses: Ints, numbers: Floats, t: float, row: Floats, noted: Floats) -> None:
-    """Update a gait: detect a fall by the height of the mass centre, and a step by a foot that lands."""
+    """Update a gait: detect a fall and steps.
+
+    A fall is a mass centre below a part of its height at the start. A step is a foot that lands,
+    after a shortest duration since the last one.
+
+    Args:
+        senses: plan of the sensor row.
+        numbers: numbers of the criterion.
+        t: time (s).
+        row: sensor row.
+        noted: workspace of the criterion, see `GAIT_NOTED`.
+    """
     noted[GAIT_NOTED.HERE] = walked_distance(senses, row)
     if (
         row[senses[SENSES.CENTRE] + 1]
@@ -237,6 +270,13 @@ def note_jump(senses: Ints, numbers: Floats, t: float, row: Floats, noted: Float
 
     The jumper takes off once it rises after its time to prepare, and comes down when it sinks, or when
     it is on the ground after a flight.
+
+    Args:
+        senses: plan of the sensor row.
+        numbers: numbers of the criterion.
+        t: time (s).
+        row: sensor row.
+        noted: workspace of the criterion, see `JUMP_NOTED`.
     """
     height, rise, does = (
         row[senses[SENSES.CENTRE] + 1],
@@ -260,7 +300,17 @@ def note_jump(senses: Ints, numbers: Floats, t: float, row: Floats, noted: Float
 
 
 def range_penalty(senses: Ints, kind: int, place: int, numbers: Floats, row: Floats) -> float:
-    """Return the penalty of a number beyond its range."""
+    """Return the penalty of a number beyond its range.
+
+    It is linear off + squared off^2, where off is the distance from the range.
+
+    Args:
+        senses: plan of the sensor row.
+        kind: NUMBER, LARGEST_LOAD or WHOLE_LOAD.
+        place: index of the number in the row.
+        numbers: numbers of the criterion.
+        row: sensor row.
+    """
     one, two = row[place], 0.0
     if kind != NUMBER:
         one, two = row[senses[SENSES.LOADS]], row[senses[SENSES.LOADS] + 1]
@@ -275,7 +325,15 @@ def range_penalty(senses: Ints, kind: int, place: int, numbers: Floats, row: Flo
 
 
 def muscle_effort(senses: Ints, known: Floats, kind: int, power: int, row: Floats) -> float:
-    """Return the sum of the activations to a power, or 1 plus the sum of the tensions (N)."""
+    """Return the sum of the activations to a power, or 1 plus the sum of the tensions (N).
+
+    Args:
+        senses: plan of the sensor row.
+        known: numbers of the sensor row.
+        kind: POWERS or TENSIONS.
+        power: exponent of the activations.
+        row: sensor row.
+    """
     count, total = senses[SENSES.MUSCLES], 1.0 if kind == TENSIONS else 0.0
     strengths = at(known, SENSED.HEAD + count)
     for k in range(count):
@@ -283,6 +341,7 @@ def muscle_effort(senses: Ints, known: Floats, kind: int, power: int, row: Float
         if kind == TENSIONS:
             each = row[senses[SENSES.FORCES] + k] * strengths[k]
         else:
+            # The exponent is an integer.
             for _ in range(power):
                 each *= row[senses[SENSES.ACTIVATIONS] + k]
         total += each
@@ -295,6 +354,11 @@ def metabolic_power(
     """Return the metabolic power of all muscles (W).
 
     Source: J. M. Wang et al., ACM Trans. Graph. 31, 2012, after F. C. Anderson's thesis of 1999.
+
+    Per muscle the heat of activation is m (40 s sin(pi u / 2) + 133 (1 - s)(1 - cos(pi u / 2))),
+    that of maintenance m l (74 s sin(pi a / 2) + 111 (1 - s)(1 - cos(pi a / 2))), with the mass m,
+    the part s of slow fibers, excitation u, activation a and a factor l of the fiber length; heat
+    of shortening and work are added.
 
     Args:
         senses: plan of the sensor row.
@@ -310,8 +374,11 @@ def metabolic_power(
         n = row[senses[SENSES.LENGTHS] + k]
         of_activation = 40.0 * slow * sin(u) + 133.0 * (1.0 - slow) * (1.0 - cos(u))
         of_maintenance = 74.0 * slow * sin(a) + 111.0 * (1.0 - slow) * (1.0 - cos(a))
+        # Factor of the fiber length: 1/2 for short fibers, largest at the optimal length, 0 beyond
+        # 1.5.
         shape = 0.5 if n < 0.5 else n if n < 1.0 else 3.0 - 2.0 * n if n < 1.5 else 0.0
         shortens = -row[senses[SENSES.VELOCITIES] + k] * optimal[k]
+        # Lengthening fibers take up no heat here, and their negative work is not recovered.
         heat = max(0.0, 0.25 * row[senses[SENSES.FORCES] + k] * strengths[k] * shortens)
         work = max(0.0, row[senses[SENSES.ACTIVE] + k] * shortens)
         total += (

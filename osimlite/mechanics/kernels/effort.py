@@ -69,7 +69,12 @@ LEAST_GAIN = 1e-15
 
 
 def effort_size(equations: int, unknowns: int) -> int:
-    """Return the length of the workspace for `equations` equations and `unknowns` unknowns."""
+    """Return the length of the workspace.
+
+    Args:
+        equations: number m of equations.
+        unknowns: number n of unknowns.
+    """
     return equations * (equations + 8) + 5 * unknowns
 
 
@@ -89,6 +94,7 @@ def least_effort(
         `OUTCOME.OK`.
     """
     m, n = sizes[EQUATIONS], sizes[UNKNOWNS]
+    # Multipliers of the previous frame are stored for unscaled equations, since scales change.
     scales, previous, multipliers, inner_work = work, at(work, m), at(work, 2 * m), at(work, 3 * m)
     targets, compliances = inner_work, at(inner_work, n)
     for k in range(m):
@@ -96,6 +102,7 @@ def least_effort(
     for frame in range(sizes[FRAMES]):
         columns, x = at(problems, (n + 1) * m * frame), at(solutions, (n + m + 1) * frame)
         scale_equations(sizes, columns, scales)
+        # With targets 0 and compliances 1 the weighted problem is that for p = 2.
         for j in range(n):
             targets[j], compliances[j] = 0.0, 1.0
         for k in range(m):
@@ -106,6 +113,7 @@ def least_effort(
             )
             <= CLOSE
         )
+        # A start from a distant frame may stall; try again from zero.
         if not is_solved and frame > 0:
             for k in range(m):
                 multipliers[k] = 0.0
@@ -115,10 +123,12 @@ def least_effort(
                 )
                 <= CLOSE
             )
+        # After a frame that has no solution, start from zero.
         for k in range(m):
             previous[k] = multipliers[k] * scales[k] if is_solved else 0.0
         if is_solved and numbers[POWER] != 2.0:
             minimize_powers(sizes, numbers, columns, x, multipliers, inner_work)
+        # The residual is reported in the units of the generalized forces.
         for k in range(m):
             x[n + k] /= scales[k]
         x[n + m] = 1.0 if is_solved else 0.0
@@ -135,6 +145,7 @@ def scale_equations(sizes: Ints, columns: Floats, scales: Floats) -> None:
     """
     m, n = sizes[EQUATIONS], sizes[UNKNOWNS]
     rhs = at(columns, m * n)
+    # Zeros first: a tiny entry that remains would make its equation look solvable.
     most = 0.0
     for j in range(m * n):
         most = max(most, abs(columns[j]))
@@ -151,6 +162,7 @@ def scale_equations(sizes: Ints, columns: Floats, scales: Floats) -> None:
             square += columns[m * j + k] * columns[m * j + k]
         scales[k] = 1.0 / sqrt(square) if square > 0.0 else 1.0
         rhs[k] *= scales[k]
+    # The list of nonzeros is made per frame, because moment arms vanish and appear.
     for j in range(n):
         column, entries, count = at(columns, m * j), at(sizes, ENTRIES + (1 + m) * j), 0
         for k in range(m):
@@ -193,6 +205,7 @@ def minimize_powers(
         for j in range(n):
             stiffness = max(compliances[j], SOFTEST * stiffest)
             slope = unit * (abs(x[j]) / unit) ** (power - 1.0)
+            # Newton's step to the minimum of the quadratic model of |x|^p becomes the target.
             targets[j] = x[j] - (slope if x[j] > 0.0 else -slope) / stiffness
             compliances[j] = stiffest / stiffness
         for k in range(m):
@@ -200,10 +213,12 @@ def minimize_powers(
         error = solve_weighted_least_squares(
             sizes, numbers, columns, tried, at(x, n), multipliers, work
         )
+        # Stop where rounding makes the equations worse.
         if error > CLOSEST and not restore_equations(
             sizes, numbers, columns, tried, at(x, n), multipliers, work
         ):
             break
+        # The sum must decrease; halve the step until it does.
         before, step_length = sum_powers(n, power, unit, x, tried, 0.0), 1.0
         after = sum_powers(n, power, unit, x, tried, step_length)
         for _ in range(HALVINGS):
@@ -223,7 +238,16 @@ def minimize_powers(
 def sum_powers(
     n: int, power: float, unit: float, x: Floats, end: Floats, step_length: float
 ) -> float:
-    """Return the sum of (|x| / unit)^p at the fraction `step_length` of the way from x to `end`."""
+    """Return the sum of (|x| / unit)^p at the fraction `step_length` of the way from x to `end`.
+
+    Args:
+        n: number of unknowns.
+        power: exponent p.
+        unit: scale of the unknowns.
+        x: start (n,).
+        end: end (n,).
+        step_length: fraction of the way.
+    """
     total = 0.0
     for j in range(n):
         total += (abs(x[j] + step_length * (end[j] - x[j])) / unit) ** power
@@ -259,6 +283,7 @@ def solve_weighted_least_squares(
     slope, step = at(centre, m), at(centre, 2 * m)
     terms, slight, matrix = at(centre, 3 * m), at(centre, 4 * m), at(centre, 5 * m)
     error_before = error = 0.0
+    # Each proximal step moves the centre λ' to the last multipliers.
     for number in range(CENTRES):
         for k in range(m):
             centre[k] = multipliers[k]
@@ -268,6 +293,7 @@ def solve_weighted_least_squares(
         trace = 0.0
         for k in range(m):
             trace += matrix[m * k + k]
+        # The regularization is relative to the mean curvature, so that it scales with the problem.
         for k in range(m):
             slight[k] = SLIGHT * (trace / m if trace > 0.0 else 1.0)
         # Newton's method on the dual function with the present proximal term.
@@ -275,6 +301,7 @@ def solve_weighted_least_squares(
         for _ in range(ROUNDS):
             since += 1
             if error < best:
+                # A residual that has not improved for some steps is as small as rounding allows.
                 best, since = error, 0
             if error <= CLOSEST or since > PATIENCE:
                 break
@@ -297,6 +324,7 @@ def solve_weighted_least_squares(
                 multipliers[k] += step_length * step[k]
             transpose_times(sizes, columns, multipliers, y)
             error = update_primal(sizes, numbers, columns, work, x, residual, terms)
+        # Two proximal steps at least; after these, go on only while the residual decreases.
         if error <= CLOSEST or (number > 1 and not error < SLOWEST * error_before):
             break
         error_before = error
@@ -312,9 +340,21 @@ def restore_equations(
     multipliers: Floats,
     work: Floats,
 ) -> bool:
-    """Move x to the nearest point that fulfils the equations; return whether it does.
+    """Move x to the nearest point that fulfils the equations.
 
     Large compliances leave a residual of rounding errors, which equal compliances remove.
+
+    Args:
+        sizes: sizes of the problem.
+        numbers: exponent and bounds.
+        columns: scaled columns of A, followed by b.
+        x: unknowns (n,); changed.
+        residual: filled with b - A x (m,).
+        multipliers: workspace (m,).
+        work: workspace of `solve_weighted_least_squares`.
+
+    Returns:
+        Whether the equations hold afterwards.
     """
     for j in range(sizes[UNKNOWNS]):
         work[j], work[sizes[UNKNOWNS] + j] = x[j], 1.0
@@ -327,7 +367,14 @@ def restore_equations(
 
 
 def transpose_times(sizes: Ints, columns: Floats, multipliers: Floats, y: Floats) -> None:
-    """Compute y = Aᵀ λ."""
+    """Compute y = Aᵀ λ.
+
+    Args:
+        sizes: sizes of the problem, with the sparsity of A.
+        columns: scaled columns of A.
+        multipliers: multipliers λ (m,).
+        y: filled (n,).
+    """
     m = sizes[EQUATIONS]
     for j in range(sizes[UNKNOWNS]):
         column, entries, total = at(columns, m * j), at(sizes, ENTRIES + (1 + m) * j), 0.0
@@ -337,7 +384,17 @@ def transpose_times(sizes: Ints, columns: Floats, multipliers: Floats, y: Floats
 
 
 def primal_from_multipliers(numbers: Floats, n: int, j: int, work: Floats, y: float) -> float:
-    """Return the unknown `j` that minimizes the Lagrangian: target + compliance y, clamped to its bounds."""
+    """Return the unknown that minimizes the Lagrangian.
+
+    It is target + compliance y, clamped to its bounds.
+
+    Args:
+        numbers: exponent and bounds.
+        n: number of unknowns.
+        j: index of the unknown.
+        work: targets (n,), then compliances (n,).
+        y: entry j of Aᵀ λ.
+    """
     x = work[j] + work[n + j] * y
     return min(max(x, numbers[BOUNDS + j]), numbers[BOUNDS + n + j])
 
@@ -351,7 +408,20 @@ def update_primal(
     residual: Floats,
     terms: Floats,
 ) -> float:
-    """Compute x from y = Aᵀ λ; fill residual and term sizes, and return as `compute_residual`."""
+    """Compute x from y = Aᵀ λ, and fill residual and sizes of the terms.
+
+    Args:
+        sizes: sizes of the problem.
+        numbers: exponent and bounds.
+        columns: scaled columns of A, followed by b.
+        work: workspace of `solve_weighted_least_squares`, with y.
+        x: filled (n,).
+        residual: filled with b - A x (m,).
+        terms: filled with the sizes of the terms (m,).
+
+    Returns:
+        The largest ratio of residual to terms.
+    """
     n = sizes[UNKNOWNS]
     for j in range(n):
         x[j] = primal_from_multipliers(numbers, n, j, work, work[2 * n + j])
@@ -394,9 +464,18 @@ def compute_residual(
 def fill_dual_hessian(
     sizes: Ints, numbers: Floats, columns: Floats, work: Floats, matrix: Floats
 ) -> None:
-    """Fill the lower triangle of Σ_j compliance_j a_j a_jᵀ over the unknowns j within their bounds (m, m).
+    """Fill the lower triangle of Σ_j compliance_j a_j a_jᵀ over unknowns within their bounds.
+
+    a_j is column j of A. Unknowns at a bound do not change with the multipliers.
 
     This is the second derivative of the dual function without the proximal term, with opposite sign.
+
+    Args:
+        sizes: sizes of the problem.
+        numbers: exponent and bounds.
+        columns: scaled columns of A.
+        work: workspace of `solve_weighted_least_squares`, with y.
+        matrix: filled (m, m).
     """
     m, n = sizes[EQUATIONS], sizes[UNKNOWNS]
     for k in range(m * m):
@@ -437,6 +516,7 @@ def line_search(
         at(work, 4 * n + 4 * m),
     )
     for _ in range(HALVINGS):
+        # Slope of the dual function along the step, including the proximal term.
         rise = 0.0
         for k in range(m):
             rise += step[k] * (
@@ -447,6 +527,7 @@ def line_search(
                 rise -= change[j] * primal_from_multipliers(
                     numbers, n, j, work, y[j] + step_length * change[j]
                 )
+        # The first pass only measures the initial slope.
         if step_length == 0.0:
             start, step_length = rise, 1.0
         elif abs(rise) <= 0.1 * abs(start) or (step_length == 1.0 and rise > 0.0):

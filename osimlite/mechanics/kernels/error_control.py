@@ -51,12 +51,22 @@ def shortest_step(t: float, tried: float) -> float:
 
     As in Simbody, the first steps from t = 0 may have any length. OpenSim continues with such steps
     forever; here they end after PATIENCE steps.
+
+    Args:
+        t: time (s).
+        tried: number of tried steps of the run.
     """
     return max(2.0**-52 * abs(t), 1e-300) if tried < PATIENCE else 4.0 * 2.0**-52 * max(1.0, abs(t))
 
 
 def error_weight(value: float) -> float:
-    """Return the weight of the error of a speed or auxiliary state with a value at the start of the step."""
+    """Return the weight of the error of a speed or auxiliary state.
+
+    Simbody takes errors relative to the value at the start of the step where that is above 1.
+
+    Args:
+        value: value at the start of the step.
+    """
     return 1.0 / abs(value) if abs(value) > 1.0 else 1.0
 
 
@@ -76,12 +86,14 @@ def next_step_size(h: float, error: float, accuracy: float, cut: bool, order: fl
         cut: whether the step was shortened by a limit, so that it cannot justify a longer one.
         order: order of the error.
     """
+    # A step that failed says nothing about the error: reduce it tenfold.
     if not isfinite(error):
         return 0.1 * h
     if error > accuracy:
         wanted: float = 0.9 * h * (accuracy / error) ** (1.0 / order)
         return max(min(wanted, 0.9 * h), 0.1 * h)
     wanted = 0.9 * h * (accuracy / error) ** (1.0 / order) if error > 0.0 else inf
+    # Keep the step unless it may grow by a fifth, as changes cost implicit methods a factorization.
     return h if cut or wanted < 1.2 * h else min(wanted, 5.0 * h)
 
 
@@ -90,6 +102,7 @@ def step_end(h: Floats) -> float:
 
     A step that almost reaches the limit is extended to it.
     """
+    # The extension avoids a tiny last step.
     t0, limit, step = h[REACHED], h[LAST_TIME], h[NEXT_STEP]
     return limit if limit <= t0 + 1.001 * step else t0 + step
 
@@ -181,7 +194,10 @@ def project_and_measure(
     # As in Simbody: a projection cannot repair an error that half a step would not.
     if model[MODEL.CONSTRAINED] == 0 or not error <= 16.0 * h[ACCEPTED]:
         return error
+    # A projection is exact to a tenth of the accuracy. It may start as far away as the square root
+    # of that, as in Simbody.
     tolerance = h[ACCEPTED] / 10.0
+    # The projection removes the normal component of the absolute errors, as Simbody's does.
     for k in range(model[MODEL.STATE_SIZE]):
         errors[k] = abs(errors[k])
     if not project_by_law(

@@ -45,10 +45,14 @@ def euler2(model: Ints, reals: Floats, data: Floats, y0: Floats, y1: Floats, pla
         y0: state at the start, then its derivative.
         y1: filled with the state at the end.
         place: offset of the method's record in data.
+
+    Returns:
+        `OUTCOME.OK`; the record says whether the step was accepted.
     """
     h = at(data, place)
     size = model[MODEL.STATE_SIZE]
     errors, whole = at(data, model[MODEL.WORK_STATE] + ERRORS * size), at(h, HEAD)
+    # Constraints hold to a tenth of the accuracy, as in Simbody.
     t0, t1, tolerance = h[REACHED], step_end(h), h[ACCEPTED] / 10.0
     h[EVALUATED], h[HAS_DERIVATIVE] = 1.0, 0.0
     error = inf
@@ -94,6 +98,7 @@ def take_half_steps(
     size = model[MODEL.STATE_SIZE]
     f, half = at(middle, size), 0.5 * (t1 - t0)
     f0 = at(y0, size)
+    # Both first evaluations share the derivative at the start, so that a step costs one evaluation.
     status = advance_state(model, reals, data, t1, t1 - t0, y0, f0, whole, f)
     if status == OUTCOME.OK:
         status = advance_state(model, reals, data, t0 + half, half, y0, f0, middle, f)
@@ -133,6 +138,7 @@ def advance_state(
         `OUTCOME.OK`, or the outcome of an evaluation that failed.
     """
     n, size = model[MODEL.DOFS], model[MODEL.STATE_SIZE]
+    # Speeds and auxiliary states by the derivative at the start.
     for k in range(n, size):
         new[k] = y[k] + h * f[k]
     for k in range(n):
@@ -146,6 +152,7 @@ def advance_state(
         for k in range(n):
             new[k] = y[k] + h * rates[k]
     else:
+        # Coordinates by the new speeds, which makes the method symplectic for conservative forces.
         for k in range(n):
             new[k] = y[k] + h * new[n + k]
     return OUTCOME.OK

@@ -1,4 +1,9 @@
-"""Runge-Kutta-Merson of order 4, as Simbody's RungeKuttaMersonIntegrator takes its steps, bit by bit."""
+"""Runge-Kutta-Merson of order 4, with the steps of Simbody's RungeKuttaMersonIntegrator.
+
+The arithmetic follows Simbody's bit by bit, so that step sizes are the same. With stages at 0, 1/3,
+1/3, 1/2 and 1 of a step h and derivatives f0, fa, fb, fc, fd, the result is y0 + h / 6 (f0 + 4 fc +
+fd). Source: R. H. Merson, An operational method for the study of integration processes, 1957.
+"""
 
 from __future__ import annotations
 
@@ -37,6 +42,9 @@ def merson(model: Ints, reals: Floats, data: Floats, y0: Floats, y1: Floats, pla
         y0: state at the start, then its derivative.
         y1: filled with the state at the end.
         place: offset of the method's record in data.
+
+    Returns:
+        `OUTCOME.OK`; the record says whether the step was accepted.
     """
     h = at(data, place)
     errors, stages = (

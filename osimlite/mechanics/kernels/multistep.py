@@ -1,11 +1,11 @@
-"""Multistep methods of variable order and step: numerical differentiation and Adams-Moulton formulas.
+"""Multistep methods of variable order and step: NDF (a variant of BDF) and Adams-Moulton formulas.
 
 Both store backward differences at equal steps, whose order and step change now and then. The
-numerical differentiation formulas (NDF, a variant of BDF) of orders 1 to 5 store differences of the
-state (L. F. Shampine, M. W. Reichelt, The MATLAB ODE Suite, SIAM J. Sci. Comput. 18, 1997). The
-Adams-Moulton formulas of orders 2 to 8 store differences of its derivative (E. Hairer, S. P.
-Norsett, G. Wanner, Solving Ordinary Differential Equations I, chapter III.1). The latter are much
-more accurate where they are stable; their error is estimated by the formula of one order less.
+numerical differentiation formulas (NDF) of orders 1 to 5 store differences of the state (L. F.
+Shampine, M. W. Reichelt, The MATLAB ODE Suite, SIAM J. Sci. Comput. 18, 1997). The Adams-Moulton
+formulas of orders 2 to 8 store differences of its derivative (E. Hairer, S. P. Norsett, G. Wanner,
+Solving Ordinary Differential Equations I, chapter III.1). The latter are much more accurate where
+they are stable; their error is estimated by the formula of one order less.
 
 Both solve c f(y) = psi + d by Newton's iteration, where d is the difference of y from its
 prediction. The linear equations are those of :mod:`osimlite.mechanics.kernels.condensation`.
@@ -69,6 +69,8 @@ ROWS = max(MOST_ORDER) + 3
 STATES = ROWS + 2
 """Number of states of workspace: the differences, d, and psi."""
 
+# Kappa are the coefficients of Shampine and Reichelt that reduce the error of BDF at little cost in
+# stability; the sums are those of 1 / k.
 _ONES = (1.0,) * WIDTH
 _KAPPA = (0.0, -0.1850, -1.0 / 9.0, -0.0823, -0.0415, 0.0, 0.0, 0.0)
 _SUMS = tuple(sum((1.0 / k for k in range(1, order + 1)), 0.0) for order in range(WIDTH))
@@ -114,12 +116,36 @@ PATIENCE = 3
 
 
 def bdf(model: Ints, reals: Floats, data: Floats, y0: Floats, y1: Floats, place: int) -> int:
-    """Try one step by a numerical differentiation formula, see `try_multistep`."""
+    """Try one step by a numerical differentiation formula, see `try_multistep`.
+
+    Args:
+        model: integers of the model.
+        reals: numbers of the model.
+        data: results of an evaluation.
+        y0: state at the start, then its derivative.
+        y1: filled with the state at the end, then its derivative.
+        place: offset of the method's record in data.
+
+    Returns:
+        `OUTCOME.OK`; the record says whether the step was accepted.
+    """
     return try_multistep(model, reals, data, y0, y1, place, BDF)
 
 
 def adams(model: Ints, reals: Floats, data: Floats, y0: Floats, y1: Floats, place: int) -> int:
-    """Try one step by an Adams-Moulton formula, see `try_multistep`."""
+    """Try one step by an Adams-Moulton formula, see `try_multistep`.
+
+    Args:
+        model: integers of the model.
+        reals: numbers of the model.
+        data: results of an evaluation.
+        y0: state at the start, then its derivative.
+        y1: filled with the state at the end, then its derivative.
+        place: offset of the method's record in data.
+
+    Returns:
+        `OUTCOME.OK`; the record says whether the step was accepted.
+    """
     return try_multistep(model, reals, data, y0, y1, place, ADAMS)
 
 
@@ -138,6 +164,9 @@ def try_multistep(
         y1: filled with the state at the end, then its derivative.
         place: offset of the method's record in data.
         method: BDF or ADAMS.
+
+    Returns:
+        `OUTCOME.OK`; the record says whether the step was accepted.
     """
     size = model[MODEL.STATE_SIZE]
     h = at(data, place)
@@ -152,6 +181,7 @@ def try_multistep(
         start_history(model, h, y0, rows)
     t0, accuracy, order = h[REACHED], h[ACCEPTED], int(h[ORDER])
     t1 = t0 + h[STEP]
+    # A step that almost reaches the limit is stretched or cut to it.
     if h[LAST_TIME] <= t0 + 1.001 * h[STEP]:
         t1 = h[LAST_TIME]
         rescale_differences(size, method, h, rows, (t1 - t0) / h[STEP])
@@ -160,18 +190,23 @@ def try_multistep(
     iterations, is_new = 0, False
     while True:
         predict_state(size, method, order, rows, y1, psi)
+        # Derivatives are kept over several steps: the iteration converges as long as they are
+        # roughly right.
         if h[AGE] <= 0.0 or h[AGE] > RENEWED:
             data[WORK.TIME] = t1
             is_new = linearise_state(model, reals, data, y1, at(y1, size), work, 0.0) == OUTCOME.OK
             h[AGE], h[CONDENSED] = 1.0 if is_new else 0.0, 0.0
+        # The factorization depends on the coefficient c, which changes with step and order.
         if h[AGE] > 0.0 and (h[CONDENSED] == c or condense_system(model, c, work)):
             h[CONDENSED] = c
             iterations = iterate_newton(model, reals, data, t1, c, y0, y1, d, psi, errors, work, h)
+        # Without convergence, repeat once with new derivatives.
         if iterations > 0 or is_new or h[AGE] <= 0.0:
             break
         h[AGE] = 0.0
     error = inf
     if iterations > 0:
+        # The error is a multiple of the newest difference.
         for k in range(size):
             errors[k] = ERROR_CONSTANT[constants] * DIFFERENCE[constants] * d[k]
         error = project_and_measure(model, reals, data, t1, y0, y1, errors, h, 1)
@@ -181,6 +216,7 @@ def try_multistep(
     h[AGE] += 1.0
     h[REFUSED] = 0.0
     h[REACHED] = t1
+    # The derivative follows from the formula, without another evaluation.
     for k in range(size):
         y1[size + k] = (psi[k] + d[k]) / c
         newest = DIFFERENCE[constants] * d[k]
@@ -189,12 +225,15 @@ def try_multistep(
             newest = y1[k]
             for i in range(order + 1):
                 newest -= rows[size * i + k]
+        # Backward differences are updated from the newest one down.
         rows[size * (order + 2) + k] = newest - rows[size * (order + 1) + k]
         rows[size * (order + 1) + k] = newest
         for i in range(order, 0, -1):
             rows[size * i + k] += rows[size * (i + 1) + k]
         rows[k] = y1[k]
     h[EQUAL] += 1.0
+    # A change of order or step needs order + 1 equal steps before it, for a reliable error
+    # estimate.
     if h[EQUAL] > order:
         choose_order(
             model,
@@ -211,9 +250,17 @@ def try_multistep(
 
 
 def start_history(model: Ints, h: Floats, y0: Floats, rows: Floats) -> None:
-    """Start the history with order 1 and a step that changes the state little."""
+    """Start the history with order 1 and a step that changes the state little.
+
+    Args:
+        model: integers of the model.
+        h: record of the method.
+        y0: state at the start, then its derivative.
+        rows: differences; filled.
+    """
     size = model[MODEL.STATE_SIZE]
     speed = error_norm(model, y0, at(y0, size), h, 1)
+    # A step whose change of the state is a tenth of the square root of the accuracy.
     h[STEP] = min(h[NEXT_STEP], 0.1 * sqrt(h[ACCEPTED]) / max(speed, 1.0))
     h[ORDER], h[EQUAL], h[AGE], h[REFUSED] = 1.0, 0.0, 0.0, 0.0
     for k in range(size):
@@ -224,7 +271,16 @@ def start_history(model: Ints, h: Floats, y0: Floats, rows: Floats) -> None:
 
 
 def predict_state(size: int, method: int, order: int, rows: Floats, y: Floats, psi: Floats) -> None:
-    """Compute psi, and the state at the end of a step whose newest difference is zero."""
+    """Compute psi, and the state at the end of a step whose newest difference is zero.
+
+    Args:
+        size: length of a state.
+        method: BDF or ADAMS.
+        order: order index of the formula.
+        rows: differences.
+        y: filled with the prediction.
+        psi: filled with the sum over older differences.
+    """
     first = WIDTH * method
     for k in range(size):
         y[k], psi[k] = rows[k], 0.0
@@ -290,6 +346,7 @@ def iterate_newton(
         for k in range(size):
             y1[k] += change[k]
             d[k] += change[k]
+        # A tiny residual before the correction makes a second iteration unnecessary.
         if residual <= SOLVED * h[ACCEPTED]:
             return iteration + 1
         # With outdated, too large derivatives all steps are short: check the residuals too.
@@ -297,6 +354,7 @@ def iterate_newton(
             if not (residual < previous_residual and length < previous_length):
                 return 0
             rate = max(residual / previous_residual, length / previous_length)
+            # Error of the iteration if it continues to converge at this rate.
             if rate / (1.0 - rate) * length <= CONVERGED * h[ACCEPTED]:
                 return iteration + 1
         previous_residual, previous_length = residual, length
@@ -315,6 +373,7 @@ def shorten_step(size: int, method: int, h: Floats, rows: Floats, excess: float)
     """
     h[REFUSED] += 1.0
     h[EQUAL] = 0.0
+    # After several rejections the history describes another motion, as before a contact: restart.
     if h[REFUSED] > PATIENCE:
         h[NEXT_STEP], h[ORDER] = SHRINK * h[STEP], 0.0
         return
@@ -347,6 +406,7 @@ def choose_order(
     """
     size, order, accuracy = model[MODEL.STATE_SIZE], int(h[ORDER]), h[ACCEPTED]
     best, factor = order, step_factor(error / accuracy, order)
+    # Compare the steps that each neighbouring order allows.
     for other in (order - 1, order + 1):
         if not 1 <= other <= MOST_ORDER[method]:
             continue
@@ -362,12 +422,27 @@ def choose_order(
 
 
 def step_factor(excess: float, order: int) -> float:
-    """Return the factor of the step with which an error of `excess` times the accuracy would just meet it."""
+    """Return the factor of the step with which the error would just meet the accuracy.
+
+    Args:
+        excess: error over accuracy.
+        order: order of the formula.
+    """
     return max(excess, 1e-12) ** (-1.0 / (order + 1.0))
 
 
 def rescale_differences(size: int, method: int, h: Floats, rows: Floats, factor: float) -> None:
-    """Change the step by a factor: interpolate the differences on the polynomial through the same values."""
+    """Change the step by a factor.
+
+    The differences are interpolated on the polynomial through the same values.
+
+    Args:
+        size: length of a state.
+        method: BDF or ADAMS.
+        h: record of the method; the step is changed.
+        rows: differences; changed.
+        factor: ratio of the new step to the old one.
+    """
     # Adams' differences are those of h f, and follow the state.
     order, differing = int(h[ORDER]) - method, at(rows, size * method)
     scale = factor if method == ADAMS else 1.0
@@ -379,6 +454,8 @@ def rescale_differences(size: int, method: int, h: Floats, rows: Floats, factor:
     column = at(both, WIDTH * WIDTH)
     fill_difference_matrix(order, factor, new)
     fill_difference_matrix(order, 1.0, unit)
+    # The product of both matrices maps old differences to new ones; the unit matrix inverts the
+    # conversion of differences to values.
     for i in range(order + 1):
         for j in range(order + 1):
             both[WIDTH * i + j] = 0.0
@@ -394,7 +471,13 @@ def rescale_differences(size: int, method: int, h: Floats, rows: Floats, factor:
 
 
 def fill_difference_matrix(order: int, factor: float, matrix: Floats) -> None:
-    """Fill the matrix that evaluates differences at steps that are `factor` times as long."""
+    """Fill the matrix that evaluates differences at steps that are `factor` times as long.
+
+    Args:
+        order: number of differences.
+        factor: ratio of the steps.
+        matrix: filled, in rows of WIDTH numbers.
+    """
     for j in range(order + 1):
         total = 1.0
         matrix[j] = total

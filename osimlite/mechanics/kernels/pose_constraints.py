@@ -54,12 +54,17 @@ ASIDE = 1e-5
 def fulfil_constraints(m: Fit, y: Floats) -> bool:
     """Move a pose into the ranges, to prescribed values, and onto couplers and equations.
 
+    Args:
+        m: the fit.
+        y: state; its coordinates are changed.
+
     Returns:
         Success.
     """
     p, c, v, size = m.p, m.c, m.v, m.model[MODEL.DOFS]
     ranges, resolved = at(c, p[RANGES_AT]), at(p, p[RESOLVED_AT])
     for k in range(size):
+        # Ranges first, then values that are prescribed, and those that depend on others last.
         if resolved[k] == VARIABLE or resolved[k] >= AT_END:
             y[k] = min(max(y[k], ranges[2 * k]), ranges[2 * k + 1])
     values = at(v, p[MEASURED] + 3 * p[MARKERS] + 9 * p[SENSORS] + p[GOALS])
@@ -70,7 +75,12 @@ def fulfil_constraints(m: Fit, y: Floats) -> bool:
 
 
 def set_dependents(m: Fit, y: Floats) -> None:
-    """Set all dependent coordinates by their couplers."""
+    """Set all dependent coordinates by their couplers, in the order of the couplers.
+
+    Args:
+        m: the fit.
+        y: state; its coordinates are changed.
+    """
     p, size = m.p, m.model[MODEL.DOFS]
     for number in range(p[COUPLERS]):
         i = at(p, p[p[COUPLER_AT] + number])
@@ -79,6 +89,10 @@ def set_dependents(m: Fit, y: Floats) -> None:
 
 def restore_equations(m: Fit, y: Floats) -> bool:
     """Move a pose onto the equations by minimum-norm Newton steps of the free coordinates.
+
+    Args:
+        m: the fit.
+        y: state; its coordinates are changed.
 
     Returns:
         Success.
@@ -94,6 +108,7 @@ def restore_equations(m: Fit, y: Floats) -> bool:
             off = max(off, abs(errors[k]))
         if off <= EXACT:
             return True
+        # Rounding may keep the errors above EXACT; then the search ends when they stop to halve.
         if off <= 1e-9 and off >= 0.5 * before:
             return True
         before = off
@@ -104,6 +119,7 @@ def restore_equations(m: Fit, y: Floats) -> bool:
         furthest = 0.0
         for k in range(free):
             furthest = max(furthest, abs(step[k]))
+        # Steps of at most half a radian or metre keep the linearization valid.
         part = 1.0 if furthest <= 0.5 else 0.5 / furthest
         for k in range(free):
             freedom = p[p[FREE_AT] + k]
@@ -127,6 +143,10 @@ def compute_curvature(m: Fit, y: Floats) -> None:
     """Compute the equations' part of the Hessian: their second derivatives times their multipliers.
 
     The derivatives of the cost must be known, and are lost.
+
+    Args:
+        m: the fit.
+        y: state of the pose.
     """
     p, v, size, count = m.p, m.v, m.model[MODEL.DOFS], count_equations(m)
     rows, slope, curves = at(v, p[ROWS]), at(v, p[SLOPE]), at(v, p[CURVES])
@@ -137,6 +157,7 @@ def compute_curvature(m: Fit, y: Floats) -> None:
         for k in range(free):
             pulls[i] -= rows[size * i + p[p[FREE_AT] + k]] * slope[p[p[FREE_AT] + k]]
         for j in range(count):
+            # A small diagonal keeps the normal equations regular where equations are redundant.
             total = 1e-12 if i == j else 0.0
             for k in range(free):
                 freedom = p[p[FREE_AT] + k]
@@ -145,9 +166,11 @@ def compute_curvature(m: Fit, y: Floats) -> None:
     clear_curvature(m)
     if not factorise_cholesky(count, normal, 0.0):
         return
+    # Multipliers by least squares: the gradient of the Lagrangian is as small as possible.
     solve_cholesky(count, normal, pulls)
     for k in range(free):
         freedom = p[p[FREE_AT] + k]
+        # Central differences of the rows, symmetrized by adding half on either side.
         for side in range(2):
             factor = (0.5 - side) / ASIDE
             copy_numbers(size, y, trial)

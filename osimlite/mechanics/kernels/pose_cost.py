@@ -63,9 +63,17 @@ def evaluate_cost(m: Fit, y: Floats) -> float:
     """Return the cost of a pose.
 
     Compute its gradient and both parts of its Hessian by all free coordinates.
+
+    Args:
+        m: the fit.
+        y: state of the pose; speeds are set to 1.
+
+    Returns:
+        Half the weighted sum of squared deviations.
     """
     model, data, p, v, size = m.model, m.data, m.p, m.v, m.model[MODEL.DOFS]
     evaluate_pose(m, y)
+    # Columns of balls belong to their speeds; derivatives are by coordinates.
     for k in range(p[BALLS]):
         convert_ball_columns(m, y, at(model, p[p[BALL_AT] + k]))
     slope, stiffness, bend = at(v, p[SLOPE]), at(v, p[STIFFNESS]), at(v, p[BEND])
@@ -78,6 +86,7 @@ def evaluate_cost(m: Fit, y: Floats) -> float:
             at(link_work(model, data, link), LINK_WORK.INERTIA),
             at(v, p[TURNED] + 9 * link),
         )
+        # Inertia and wrench of each link collect masses and forces of springs.
         for k in range(16):
             here[k] = 0.0
         for k in range(9):
@@ -88,6 +97,7 @@ def evaluate_cost(m: Fit, y: Floats) -> float:
     for k in range(p[GOALS]):
         freedom, weight = p[p[GOAL_AT] + k], v[p[WEIGHTS] + p[MARKERS] + p[SENSORS] + k]
         if weight > 0.0:
+            # A goal is a spring on its coordinate.
             off = y[freedom] - v[p[MEASURED] + goals + k]
             value += 0.5 * weight * off * off
             slope[freedom] += weight * off
@@ -97,7 +107,12 @@ def evaluate_cost(m: Fit, y: Floats) -> float:
 
 
 def evaluate_pose(m: Fit, y: Floats) -> None:
-    """Evaluate a pose: links, columns of the coordinates, and equations."""
+    """Evaluate a pose: links, columns of the coordinates, and equations.
+
+    Args:
+        m: the fit.
+        y: state; its speeds are set to 1.
+    """
     model, p, v, size = m.model, m.p, m.v, m.model[MODEL.DOFS]
     for k in range(size):
         # With unit speeds, curvatures of functions are second derivatives by their coordinate.
@@ -110,7 +125,13 @@ def evaluate_pose(m: Fit, y: Floats) -> None:
 
 
 def convert_ball_columns(m: Fit, y: Floats, angles: Ints) -> None:
-    """Convert the columns of the speeds of a ball to those of the rates of its angles."""
+    """Convert the columns of the speeds of a ball to those of the rates of its angles.
+
+    Args:
+        m: the fit; the columns in its data are changed.
+        y: state.
+        angles: degrees of freedom of the three angles.
+    """
     columns = at(m.data, m.model[MODEL.WORK_COLUMN])
     s1, c1 = sine_cosine(y[angles[0]])
     s2, c2 = sine_cosine(y[angles[1]])
@@ -133,6 +154,7 @@ def add_markers(m: Fit) -> float:
         if not weight > 0.0:
             continue
         point = station(model, data, link, vector(m.c, MARKER_NUMBERS * k))
+        # The spring pulls from the measured position: its force has the sign of the gradient.
         off = minus(point, vector(v, p[MEASURED] + 3 * k))
         value += 0.5 * weight * dot(off, off)
         if link < 0:
@@ -146,6 +168,7 @@ def add_markers(m: Fit) -> float:
         pull, arm = times(weight, off), minus(point, vector(here, LINK_WORK.ORIGIN))
         a, b, c = arm
         mx, my, mz = times(weight, arm)
+        # Inertia of a point mass about the common origin.
         i[0] += weight
         i[1] += mx
         i[2] += my
@@ -158,6 +181,7 @@ def add_markers(m: Fit) -> float:
         i[9] -= my * c
         store_vector(load, 0, plus(vector(load, 0), cross(arm, pull)))
         store_vector(load, 3, plus(vector(load, 3), pull))
+        # Sums of force times arm, by rows; with them a displacement of the arms changes the moment.
         px, py, pz = pull
         store_vector(turned, 0, plus(vector(turned, 0), times(px, arm)))
         store_vector(turned, 3, plus(vector(turned, 3), times(py, arm)))
@@ -166,7 +190,12 @@ def add_markers(m: Fit) -> float:
 
 
 def gather_derivatives(m: Fit, y: Floats) -> None:
-    """Compute gradient and Hessian by the degrees of freedom, inwards from the leaves."""
+    """Compute gradient and Hessian by the degrees of freedom, inwards from the leaves.
+
+    Args:
+        m: the fit.
+        y: state of the pose.
+    """
     model, data, p, v, size = m.model, m.data, m.p, m.v, m.model[MODEL.DOFS]
     freedoms, columns = at(model, model[MODEL.DOF_AT]), at(data, model[MODEL.WORK_COLUMN])
     slope, stiffness, bend = at(v, p[SLOPE]), at(v, p[STIFFNESS]), at(v, p[BEND])
@@ -177,11 +206,14 @@ def gather_derivatives(m: Fit, y: Floats) -> None:
             at(here, LINK_WORK.WRENCH),
             at(v, p[TURNED] + 9 * link),
         )
+        # A subtree without measurements contributes nothing.
         if i[0] > 0.0 or i[4] > 0.0:
             for freedom in range(j[LINK.FIRST_DOF], j[LINK.END_DOF]):
                 c = at(columns, 6 * freedom)
                 turn, shift = vector(c, 0), vector(c, 3)
                 slope[freedom] += dot(turn, vector(load, 0)) + dot(shift, vector(load, 3))
+                # As in the composite-rigid-body algorithm: the Gauss-Newton matrix is a mass
+                # matrix.
                 angular, linear = spatial_momentum(i, turn, shift)
                 carried = displaced_moment(load, turned, turn, shift)
                 k = freedom
@@ -189,6 +221,8 @@ def gather_derivatives(m: Fit, y: Floats) -> None:
                     c = at(columns, 6 * k)
                     entry = dot(vector(c, 0), angular) + dot(vector(c, 3), linear)
                     stiffness[size * freedom + k] = stiffness[size * k + freedom] = entry
+                    # Axes of one joint are carried by each other; `add_joint_curvature` treats
+                    # these.
                     if k < j[LINK.FIRST_DOF]:
                         bend[size * freedom + k] = bend[size * k + freedom] = dot(
                             vector(c, 0), carried
@@ -206,7 +240,12 @@ def gather_derivatives(m: Fit, y: Floats) -> None:
 
 
 def apply_couplers(m: Fit, y: Floats) -> None:
-    """Convert the derivatives and the equations to those by the independent coordinates."""
+    """Convert the derivatives and the equations to those by the independent coordinates.
+
+    Args:
+        m: the fit.
+        y: state of the pose.
+    """
     p, v, size = m.p, m.v, m.model[MODEL.DOFS]
     slope, stiffness, bend, rows = (
         at(v, p[SLOPE]),
@@ -217,6 +256,7 @@ def apply_couplers(m: Fit, y: Floats) -> None:
     gradient, rates = at(v, p[ROOM]), at(v, p[ROOM] + size)
     for k in range(size):
         rates[k] = 1.0
+    # Backwards, so that a dependent coordinate may itself be an argument of another coupler.
     for number in range(p[COUPLERS] - 1, -1, -1):
         i = at(p, p[p[COUPLER_AT] + number])
         dependent = i[DEPENDENT_OF]
@@ -226,6 +266,7 @@ def apply_couplers(m: Fit, y: Floats) -> None:
             if freedom < 0:
                 continue
             gain = gradient[k]
+            # Columns, then rows: the congruence transformation of the Hessian.
             for j in range(size):
                 stiffness[size * j + freedom] += gain * stiffness[size * j + dependent]
                 bend[size * j + freedom] += gain * bend[size * j + dependent]

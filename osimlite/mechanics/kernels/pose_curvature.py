@@ -1,4 +1,9 @@
-"""Second derivative of the cost of a pose due to the axes of a joint, each carried by those before it."""
+"""Second derivative of the cost of a pose due to the axes of a joint.
+
+Each axis of a joint is carried by the axes before it. With the moment m of the springs' forces at
+arms that a motion about one axis displaces, the second derivative by the angle about an axis a
+before it is a . m.
+"""
 
 from __future__ import annotations
 
@@ -40,6 +45,7 @@ def displaced_moment(load: Floats, turned: Floats, turn: Vector, shift: Vector) 
         turn: angular part of the motion.
         shift: linear part of the motion.
     """
+    # Sum of arm (force . turn) - turn (arm . force), written with the matrix of forces times arms.
     trace = turned[0] + turned[4] + turned[8]
     x, y, z = turn
     result = add_scaled(
@@ -63,6 +69,7 @@ def add_joint_curvature(m: Fit, y: Floats, link: int, load: Floats, turned: Floa
     for one in range(places[link], places[link + 1]):
         turn, shift = axis_column(m, y, link, one)
         carried = displaced_moment(load, turned, turn, shift)
+        # An axis carries itself and those after it.
         for other in range(places[link], one + 1):
             around, _ = axis_column(m, y, link, other)
             amount = dot(around, carried)
@@ -73,11 +80,19 @@ def add_joint_curvature(m: Fit, y: Floats, link: int, load: Floats, turned: Floa
 
 
 def add_axis_curvature(m: Fit, y: Floats, number: int, pull: float) -> None:
-    """Add to the Hessian the second derivative of the function of one axis."""
+    """Add to the Hessian the second derivative of the function of one axis.
+
+    Args:
+        m: the fit.
+        y: state.
+        number: number of the axis.
+        pull: generalized force of the springs along the axis.
+    """
     model, size, bend = m.model, m.model[MODEL.DOFS], at(m.v, m.p[BEND])
     axis = axis_ints(m, number)
     j = operation_ints(model, axis[0])
     first = model[j[OPERATION.ARGUMENTS]] if j[OPERATION.ARGUMENT_COUNT] > 0 else -1
+    # Translations to the ellipsoid are functions of the first two angles.
     if axis[1] >= SLIDES:
         second, part = model[j[OPERATION.ARGUMENTS] + 1], axis[1] - SLIDES
         s1, c1 = sine_cosine(y[first])
@@ -88,6 +103,7 @@ def add_axis_curvature(m: Fit, y: Floats, number: int, pull: float) -> None:
         bend[size * first + second] += both
         bend[size * second + first] += both
         bend[size * second + second] += far * component((-s2, s1 * c2, -c1 * c2), part)
+    # With unit speeds the curvature of an operation is its second derivative.
     elif axis[1] < 0 and j[OPERATION.DOF] < 0 and j[OPERATION.ARGUMENT_COUNT] == 1 and first >= 0:
         bend[size * first + first] += (
             pull * operation_work(model, m.data, axis[0])[OPERATION_WORK.CURVATURE]
@@ -95,12 +111,23 @@ def add_axis_curvature(m: Fit, y: Floats, number: int, pull: float) -> None:
 
 
 def axis_ints(m: Fit, number: int) -> Ints:
-    """Return the operation of an axis, and its part of a ball."""
+    """Return the operation of an axis, and its part of a ball.
+
+    Args:
+        m: the fit.
+        number: number of the axis.
+    """
     return at(m.p, m.p[AXES_AT] + m.model[MODEL.LINKS] + 1 + 2 * number)
 
 
 def axis_column(m: Fit, y: Floats, link: int, number: int) -> tuple[Vector, Vector]:
     """Return the twist per unit amount of one axis of a link.
+
+    Args:
+        m: the fit.
+        y: state.
+        link: link whose origin of spatial vectors is used.
+        number: number of the axis.
 
     Returns:
         Angular and linear part.
@@ -116,6 +143,7 @@ def axis_column(m: Fit, y: Floats, link: int, number: int) -> tuple[Vector, Vect
         sign = 1.0 if j[OPERATION.MOTION] == MOTION.BALL else -1.0
         return ZERO, times(sign, (a[part], a[3 + part], a[6 + part]))
     if axis[1] >= 0:
+        # A column of a ball already is the axis of one angle, see `convert_ball_columns`.
         around = vector(
             data, model[MODEL.WORK_COLUMN] + 6 * model[j[OPERATION.ARGUMENTS] + axis[1]]
         )
@@ -131,7 +159,15 @@ def axis_column(m: Fit, y: Floats, link: int, number: int) -> tuple[Vector, Vect
 
 
 def add_axis_product(m: Fit, y: Floats, one: int, two: int, amount: float) -> None:
-    """Add to the Hessian a multiple of the product of two axes' derivatives by all coordinates."""
+    """Add to the Hessian a multiple of the product of two axes' derivatives by all coordinates.
+
+    Args:
+        m: the fit.
+        y: state.
+        one: number of the first axis.
+        two: number of the second axis.
+        amount: the multiple.
+    """
     size, bend = m.model[MODEL.DOFS], at(m.v, m.p[BEND])
     for k in range(count_arguments(m, one)):
         first, gain = axis_argument(m, y, one, k)
@@ -144,7 +180,12 @@ def add_axis_product(m: Fit, y: Floats, one: int, two: int, amount: float) -> No
 
 
 def count_arguments(m: Fit, number: int) -> int:
-    """Return the number of coordinates that an axis depends on."""
+    """Return the number of coordinates that an axis depends on.
+
+    Args:
+        m: the fit.
+        number: number of the axis.
+    """
     model, axis = m.model, axis_ints(m, number)
     j = operation_ints(model, axis[0])
     if axis[1] >= SLIDES:
@@ -154,6 +195,12 @@ def count_arguments(m: Fit, number: int) -> int:
 
 def axis_argument(m: Fit, y: Floats, number: int, k: int) -> tuple[int, float]:
     """Return a coordinate that an axis depends on, and the derivative of its amount by it.
+
+    Args:
+        m: the fit.
+        y: state.
+        number: number of the axis.
+        k: number of the coordinate among those of the axis.
 
     Returns:
         Degree of freedom and derivative.

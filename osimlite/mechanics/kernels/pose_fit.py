@@ -5,6 +5,9 @@ Nocedal, S. Wright, Numerical Optimization, 2006, chapters 10.3, 16.7 and 18.3).
 is not positive definite, the Gauss-Newton approximation replaces it; where that fails, the step is
 damped by the Levenberg-Marquardt method. Coordinates that no measurement determines hardly move: of
 all poses that fit equally well the nearest is found.
+
+A descent may end in a local minimum. The first frame is therefore fitted from several starts, and
+later frames also from starts in which angles are a full turn further or a joint is upside down.
 """
 
 from __future__ import annotations
@@ -114,6 +117,9 @@ def fit_frames(
             markers (m, 3), the rotation vectors of the sensors from their measurements (k, 3), the cost,
             the number of steps, and the status.
         count: number of frames.
+
+    Returns:
+        `OUTCOME.OK`; each frame has a status of its own.
     """
     m = Fit(model, reals, data, f, p, c, v)
     size, markers, sensors = model[MODEL.DOFS], p[MARKERS], p[SENSORS]
@@ -165,6 +171,7 @@ def fit_frame(m: Fit, y: Floats) -> tuple[float, int, float]:
         return 0.0, 0, UNSEEN
     note_pattern(m, y)
     value, is_vague = inf, v[p[PATTERN] + p[MARKERS] + p[SENSORS] + p[GOALS]] > 0.0
+    # Two previous poses allow linear extrapolation of the motion, unless poses fit alike.
     if previous_count > 1 and not is_vague:
         before = at(last, size)
         for k in range(size):
@@ -197,6 +204,7 @@ def fit_frame(m: Fit, y: Floats) -> tuple[float, int, float]:
                     m, start, y, value, status, SMALL_STEPS, lightest
                 )
                 steps += more
+    # Coordinates held at ends of their ranges may have left the way to a better minimum.
     if start_off_ends(m, y, start):
         value, more, status = descend_again(m, start, y, value, status, lightest, lightest)
         steps += more
@@ -207,9 +215,11 @@ def fit_frame(m: Fit, y: Floats) -> tuple[float, int, float]:
             upright = value
             value, more, status = descend_again(m, start, y, value, status, SMALL_STEPS, lightest)
             steps += more
+            # A pose that was better upside down may need other full turns, too.
             if value < upright:
                 value, more, status = try_other_ends(m, start, y, value, status, lightest)
                 steps += more
+    # Of poses that fit alike, the first frame reports the one without full turns.
     if previous_count == 0 and remove_full_turns(m, y, last, start, value):
         value, more, status = descend_to_minimum(
             m, start, y, evaluate_cost(m, start), lightest, lightest
@@ -227,7 +237,15 @@ def fit_frame(m: Fit, y: Floats) -> tuple[float, int, float]:
 
 
 def note_pattern(m: Fit, y: Floats) -> None:
-    """Find out whether poses fit alike and which coordinates are idle, if other things are measured than before."""
+    """Find out whether poses fit alike and which coordinates are idle.
+
+    This is done if other markers, sensors or goals are measured than in the frame before. A
+    coordinate is idle if it moves nothing that is measured.
+
+    Args:
+        m: the fit.
+        y: state of a pose.
+    """
     p, v, size = m.p, m.v, m.model[MODEL.DOFS]
     count = p[MARKERS] + p[SENSORS] + p[GOALS]
     weights, pattern, is_new = at(v, p[WEIGHTS]), at(v, p[PATTERN]), False
@@ -250,6 +268,7 @@ def note_pattern(m: Fit, y: Floats) -> None:
             resolved[k] = IDLE
     for k in range(size):
         v[p[STEP] + k] = 0.0
+    # A Gauss-Newton matrix that is singular leaves some direction undetermined.
     pattern[count] = 1.0 if solve_free(m, list_free(m), LIGHTEST, 0.0, ALIKE) < 0 else 0.0
 
 
@@ -278,6 +297,7 @@ def descend_again(
     if not fulfil_constraints(m, trial):
         return value, 0, status
     new, steps, result = descend_to_minimum(m, trial, y, evaluate_cost(m, trial), damping, lightest)
+    # A better pose must be clearly better, so that rounding does not choose between equal ones.
     if new < value * (1.0 - 1e-7) - 1e-20:
         return new, steps, result
     copy_numbers(size, best, y)
@@ -311,6 +331,9 @@ def try_other_ends(
 def compute_weights(m: Fit) -> bool:
     """Compute the weights of this frame, normalized over the measured markers and sensors.
 
+    Args:
+        m: the fit.
+
     Returns:
         Whether anything is measured.
     """
@@ -319,11 +342,13 @@ def compute_weights(m: Fit) -> bool:
     markers, sensors = p[MARKERS], p[SENSORS]
     numbers, rotations = at(c, MARKER_NUMBERS * markers), at(measured, 3 * markers)
     for k in range(markers):
+        # Missing measurements are NaN.
         weights[k] = c[MARKER_NUMBERS * k + 3] if is_finite(3, at(measured, 3 * k)) else 0.0
     for k in range(sensors):
         weights[markers + k] = (
             numbers[SENSOR_NUMBERS * k + 9] if is_finite(9, at(rotations, 9 * k)) else 0.0
         )
+    # OpenSim normalizes the weights of markers and sensors, each over those that are measured.
     seen = normalize_weights(markers, weights)
     seen = normalize_weights(sensors, at(weights, markers)) or seen
     numbers, goals = at(numbers, SENSOR_NUMBERS * sensors), at(measured, 3 * markers + 9 * sensors)
@@ -334,7 +359,15 @@ def compute_weights(m: Fit) -> bool:
 
 
 def normalize_weights(count: int, weights: Floats) -> bool:
-    """Normalize weights to a sum of one; return whether any is positive."""
+    """Normalize weights to a sum of one.
+
+    Args:
+        count: number of weights.
+        weights: weights (count,); changed.
+
+    Returns:
+        Whether any weight is positive.
+    """
     total = 0.0
     for k in range(count):
         total += weights[k]
@@ -371,6 +404,7 @@ def descend_to_minimum(
             compute_curvature(m, y)
             evaluate_cost(m, y)
         find_ends(m, y)
+        # Without a convex model, add damping; the Gauss-Newton model needs little.
         if not find_step(m, y, damping, bends) and not find_step(m, y, damping, False):
             damping = max(10.0 * damping, FIRST_DAMPING)
             if damping > HEAVIEST:
@@ -385,6 +419,8 @@ def descend_to_minimum(
         # For tiny steps rounding hides whether the cost decreases.
         if new <= value or (length <= 1e-6 and new <= value * (1.0 + 1e-9) + 1e-24):
             copy_numbers(size, start, y)
+            # Convergence is judged by the ratio of successive steps: the remaining distance is
+            # estimated by a geometric series.
             value = new
             shrinking = length / before if before < inf else 1.0
             if length <= FINEST or (

@@ -107,10 +107,10 @@ FIT_HEAD = 30
 class Fit(NamedTuple):
     """Fit of poses: the mechanism with its workspace, and integers, numbers and workspace of the fit."""
 
-    model: Ints
-    reals: Floats
-    data: Floats
-    f: Floats
-    p: Ints
-    c: Floats
-    v: Floats
+    model: Ints  # the mechanism
+    reals: Floats  # its numbers
+    data: Floats  # workspace of an evaluation
+    f: Floats  # workspace of the rates of a state
+    p: Ints  # integers of the fit, see MARKERS
+    c: Floats  # numbers of the fit, see MARKER_NUMBERS
+    v: Floats  # workspace of the fit, see MEASURED

@@ -50,7 +50,14 @@ NEARLY_BACK = -0.99
 
 
 def add_sensors(m: Fit) -> float:
-    """Add the torsion springs of the sensors to the links; return their cost."""
+    """Add the torsion springs of the sensors to the links.
+
+    Args:
+        m: the fit; inertias and wrenches of links are changed.
+
+    Returns:
+        Cost of the sensors.
+    """
     model, data, p, v, value = m.model, m.data, m.p, m.v, 0.0
     for k in range(p[SENSORS]):
         weight, link = v[p[WEIGHTS] + p[MARKERS] + k], p[p[SENSOR_AT] + k]
@@ -67,6 +74,7 @@ def add_sensors(m: Fit) -> float:
             at(here, LINK_WORK.WRENCH),
             at(v, p[TURNED] + 9 * link),
         )
+        # Symmetric part of the derivative of the spring's torque: weight (1 + c [phi]^2).
         x, y, z = times(weight * squared_factor(sqrt(square)), off)
         a, b, c = off
         i[4] += weight - (y * b + z * c)
@@ -76,6 +84,7 @@ def add_sensors(m: Fit) -> float:
         i[8] += x * c
         i[9] += y * c
         store_vector(load, 0, add_scaled(vector(load, 0), weight, off))
+        # Antisymmetric part, weight [phi] / 2, which belongs to the sums of forces times arms.
         a, b, c = times(0.5 * weight, off)
         store_vector(turned, 0, plus(vector(turned, 0), (0.0, -c, b)))
         store_vector(turned, 3, plus(vector(turned, 3), (c, 0.0, -a)))
@@ -84,7 +93,13 @@ def add_sensors(m: Fit) -> float:
 
 
 def squared_factor(angle: float) -> float:
-    """Return the factor c of the squared rotation in the inverse left Jacobian."""
+    """Return the factor c of the squared rotation in the inverse left Jacobian.
+
+    It is (1 - a/2 cot(a/2)) / a^2, and 1/12 in the limit.
+
+    Args:
+        angle: angle a of the rotation (rad).
+    """
     if angle < SMALL:
         return 1.0 / 12.0
     sine, cosine = sine_cosine(0.5 * angle)
@@ -92,14 +107,22 @@ def squared_factor(angle: float) -> float:
 
 
 def sensor_rotation(m: Fit, sensor: int) -> Vector:
-    """Return the rotation vector (rad, in ground) from the measured orientation of a sensor to its own."""
+    """Return the rotation vector from the measured orientation of a sensor to its present one.
+
+    Args:
+        m: the fit.
+        sensor: number of the sensor.
+
+    Returns:
+        Rotation vector in ground (rad).
+    """
     rows = at(m.c, MARKER_NUMBERS * m.p[MARKERS] + SENSOR_NUMBERS * sensor)
     target = at(m.v, m.p[MEASURED] + 3 * m.p[MARKERS] + 9 * sensor)
     return rotation_between(m.model, m.data, m.p[m.p[SENSOR_AT] + sensor], rows, target)
 
 
 def rotation_between(model: Ints, data: Floats, link: int, rows: Floats, target: Floats) -> Vector:
-    """Return the rotation vector (rad, in ground) from a target orientation to that of a frame of a link.
+    """Return the rotation vector from a target orientation to that of a frame of a link.
 
     Args:
         model: integers of the model.
@@ -107,7 +130,11 @@ def rotation_between(model: Ints, data: Floats, link: int, rows: Floats, target:
         link: number of the link.
         rows: rotation of the frame in the link, by rows.
         target: target orientation in ground, by rows.
+
+    Returns:
+        Rotation vector in ground (rad).
     """
+    # Twice the sine times the axis, and the diagonal of the rotation, from both sets of axes.
     twist, diagonal = ZERO, ZERO
     for k in range(3):
         is_axis = direction(model, data, link, (rows[k], rows[3 + k], rows[6 + k]))
@@ -119,6 +146,7 @@ def rotation_between(model: Ints, data: Floats, link: int, rows: Floats, target:
         return rotation_near_half_turn(model, data, link, rows, target, twist, diagonal)
     if not sine > 1e-12:
         return times(0.5, twist)
+    # Near zero the cosine loses digits of the angle, near a right angle the sine does.
     angle = acos(cosine) if cosine < 0.7 else sine_angle(sine)
     return times(0.5 * angle / sine, twist)
 
@@ -144,6 +172,7 @@ def rotation_near_half_turn(
         diagonal: diagonal of the rotation.
     """
     x, y, z = diagonal
+    # The largest diagonal entry gives the longest, and so most exact, row.
     axis = 0 if x >= y and x >= z else (1 if y >= z else 2)
     row = ZERO
     for k in range(3):
@@ -156,6 +185,7 @@ def rotation_near_half_turn(
     row = minus(times(0.5, row), replace_component(ZERO, axis, cosine))
     length = sqrt(dot(row, row))
     angle = pi - sine_angle(sine)
+    # The antisymmetric part, although tiny, decides the sense of the rotation.
     return times((angle if dot(row, twist) >= 0.0 else -angle) / length, row)
 
 

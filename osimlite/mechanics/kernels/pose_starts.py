@@ -31,7 +31,14 @@ SAME = 1e-9
 
 
 def start_inwards(m: Fit, from_pose: Floats, start: Floats, inwards: float) -> None:
-    """Write a start in which no coordinate with a range is near an end of it."""
+    """Write a start in which no coordinate with a range is near an end of it.
+
+    Args:
+        m: the fit.
+        from_pose: pose (n,).
+        start: filled (n,).
+        inwards: distance from the ends, at most half of the range (rad or m).
+    """
     ranges = at(m.c, m.p[RANGES_AT])
     for k in range(m.model[MODEL.DOFS]):
         low, high, start[k] = ranges[2 * k], ranges[2 * k + 1], from_pose[k]
@@ -70,11 +77,17 @@ def start_turned(m: Fit, from_pose: Floats, start: Floats, freedom: int, angle: 
         vector(m.reals, GRAVITY_AT),
         vector(at(m.data, model[MODEL.WORK_COLUMN]), 6 * freedom),
     )
+    # The axis is within 45 degrees of the vertical.
     return dot(turn, turn) > 0.0 and 2.0 * dot(turn, down) ** 2 >= dot(turn, turn) * dot(down, down)
 
 
 def joint_to_ground(m: Fit, freedom: int) -> int:
-    """Return the link whose joint to ground has a degree of freedom, or -1."""
+    """Return the link whose joint to ground has a degree of freedom, or -1.
+
+    Args:
+        m: the fit.
+        freedom: degree of freedom.
+    """
     model, result = m.model, -1
     for link in range(model[MODEL.LINKS]):
         j = link_ints(model, link)
@@ -84,7 +97,12 @@ def joint_to_ground(m: Fit, freedom: int) -> int:
 
 
 def is_angle(m: Fit, freedom: int) -> bool:
-    """Return whether a free degree of freedom turns anything in the pose that was evaluated last."""
+    """Return whether a free degree of freedom turns anything in the pose that was evaluated last.
+
+    Args:
+        m: the fit.
+        freedom: degree of freedom.
+    """
     turn, mark = (
         vector(at(m.data, m.model[MODEL.WORK_COLUMN]), 6 * freedom),
         m.p[m.p[RESOLVED_AT] + freedom],
@@ -93,17 +111,31 @@ def is_angle(m: Fit, freedom: int) -> bool:
 
 
 def is_at_end(m: Fit, y: Floats, freedom: int) -> bool:
-    """Return whether a coordinate is at exactly one end of a finite range."""
+    """Return whether a coordinate is at exactly one end of a finite range.
+
+    Args:
+        m: the fit.
+        y: state.
+        freedom: degree of freedom.
+    """
     ranges = at(m.c, m.p[RANGES_AT])
     low, high = ranges[2 * freedom], ranges[2 * freedom + 1]
     return high - low < inf and (y[freedom] <= low + SAME) != (y[freedom] >= high - SAME)
 
 
 def start_full_turn(m: Fit, y: Floats, start: Floats, freedom: int) -> bool:
-    """Write a start in which an angle at an end of its range is a full turn further, or at the other end.
+    """Write a start in which an angle at an end of its range is a full turn further.
+
+    If the range does not contain that, it is at the other end.
 
     A subject that turns on the spot makes full turns. Other joints than those to ground do so only if
     their ranges omit little.
+
+    Args:
+        m: the fit.
+        y: state of the best pose so far.
+        start: filled (n,).
+        freedom: degree of freedom.
 
     Returns:
         Whether the degree of freedom is such an angle.
@@ -128,6 +160,12 @@ def start_upside_down(m: Fit, y: Floats, start: Floats, freedom: int) -> bool:
     Where the second of three angles is a right angle this is the same pose, and the continuation of a
     motion head over heels: the second angle goes back from there.
 
+    Args:
+        m: the fit.
+        y: state of the best pose so far.
+        start: filled (n,).
+        freedom: degree of freedom of the second angle.
+
     Returns:
         Whether the degree of freedom is at an end of its range and such angles exist.
     """
@@ -140,6 +178,7 @@ def start_upside_down(m: Fit, y: Floats, start: Floats, freedom: int) -> bool:
     for k in range(j[LINK.FIRST_DOF], j[LINK.END_DOF]):
         if k != freedom and is_angle(m, k):
             others += 1
+            # Half a turn in either direction; ranges may allow only one of them.
             start[k] = y[k] - pi if y[k] - pi >= ranges[2 * k] else y[k] + pi
             if start[k] > ranges[2 * k + 1]:
                 return False
@@ -148,6 +187,11 @@ def start_upside_down(m: Fit, y: Floats, start: Floats, freedom: int) -> bool:
 
 def start_off_ends(m: Fit, y: Floats, start: Floats) -> bool:
     """Write a start in which coordinates at ends of their ranges are inside.
+
+    Args:
+        m: the fit.
+        y: state of the best pose so far.
+        start: filled (n,).
 
     Returns:
         Whether there are any.
@@ -163,6 +207,13 @@ def start_off_ends(m: Fit, y: Floats, start: Floats) -> bool:
 
 def remove_full_turns(m: Fit, y: Floats, first: Floats, start: Floats, value: float) -> bool:
     """Write a pose without the full turns that were made from the first one, if it costs no more.
+
+    Args:
+        m: the fit.
+        y: state of the best pose.
+        first: pose that the search started from (n,).
+        start: filled (n,).
+        value: cost of the best pose.
 
     Returns:
         Whether a full turn was removed.

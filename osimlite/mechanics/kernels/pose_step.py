@@ -41,7 +41,14 @@ SOFTEST = 0.01
 
 
 def list_free(m: Fit) -> int:
-    """List the coordinates that are free and not at an end of their range; return their number."""
+    """List the coordinates that are free and not at an end of their range.
+
+    Args:
+        m: the fit; its list of free coordinates is filled.
+
+    Returns:
+        Their number.
+    """
     p, count = m.p, 0
     for k in range(m.model[MODEL.DOFS]):
         if p[p[RESOLVED_AT] + k] == VARIABLE:
@@ -77,7 +84,14 @@ def free_equations(m: Fit, free: int, has_step: int) -> tuple[Floats, Floats, Fl
 
 
 def find_ends(m: Fit, y: Floats) -> None:
-    """Mark the coordinates that stay at an end of their range: those that the gradient pulls outwards."""
+    """Mark the coordinates that stay at an end of their range.
+
+    These are the ones that the gradient pulls outwards, and those whose range is a single value.
+
+    Args:
+        m: the fit, with the gradient of the pose.
+        y: state of the pose.
+    """
     p, v = m.p, m.v
     ranges, slope = at(m.c, p[RANGES_AT]), at(v, p[SLOPE])
     for k in range(m.model[MODEL.DOFS]):
@@ -113,6 +127,8 @@ def find_step(m: Fit, y: Floats, damping: float, bends: bool) -> bool:
     step, ranges = at(v, p[STEP]), at(m.c, p[RANGES_AT])
     for k in range(size):
         step[k] = 0.0
+    # Active-set method: coordinates that would leave their ranges stop at the ends, and the others
+    # are solved again.
     while True:
         free = list_free(m)
         solution = solve_free(m, free, damping, 1.0 if bends else 0.0, SMALLEST)
@@ -157,6 +173,7 @@ def solve_free(m: Fit, free: int, damping: float, bent: float, smallest: float) 
     solution, matrix = at(v, offset), at(v, offset + size)
     for k in range(free):
         freedom = p[p[FREE_AT] + k]
+        # Steps that are known already move to the right side.
         row, more, total = at(stiffness, size * freedom), at(bend, size * freedom), -slope[freedom]
         constraint_row = at(v, p[CURVES] + (size * freedom if count > 0 else 0))
         for j in range(size):
@@ -168,6 +185,8 @@ def solve_free(m: Fit, free: int, damping: float, bent: float, smallest: float) 
             matrix[free * k + j] = row[other] + bent * more[other]
             if count > 0:
                 matrix[free * k + j] += bent * constraint_row[other]
+        # Levenberg-Marquardt damping relative to the stiffness, plus a part for coordinates without
+        # any.
         matrix[free * k + k] += damping * (row[freedom] + SOFTEST)
     if count == 0:
         if not factorise_cholesky(free, matrix, smallest):
@@ -194,15 +213,18 @@ def solve_constrained(m: Fit, free: int, offset: int, smallest: float) -> int:
     across = at(matrix, size * size)
     directions = at(across, size)
     reduced = at(directions, size * size)
+    # The shortest step that restores the equations; the rest moves in their null space.
     factor, right, work = free_equations(m, free, 1)
     rank = factorise_equations(count, free, factor, REDUNDANT * count)
     solve_minimum_norm(count, free, factor, rank, right, work, across)
     left = free - rank
     write_null_space(free, factor, rank, directions)
+    # Gradient after that step.
     for k in range(free):
         for j in range(free):
             solution[k] -= matrix[free * k + j] * across[j]
     rhs = at(reduced, left * left)
+    # Projections of gradient and Hessian on the null space.
     for k in range(left):
         row = at(directions, free * k)
         rhs[k] = 0.0

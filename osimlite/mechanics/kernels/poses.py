@@ -53,6 +53,7 @@ def look(
         data[WORK.TIME] = input[0]
         for k in range(size):
             y[k] = input[1 + k]
+        # Accelerations are inputs of inverse dynamics, and stand where f holds generalized forces.
         for k in range(moving):
             f[model[MODEL.DOFS] + k] = input[1 + size + k]
         status = call(law, model, reals, data, y, f, stage)
@@ -61,6 +62,7 @@ def look(
         row = at(results, selected * number)
         for k in range(selected):
             place = order[4 + k]
+            # Indices beyond data refer to f, so that one list selects from both.
             row[k] = data[place] if place < room else f[place - room]
     return OUTCOME.OK
 
@@ -108,6 +110,8 @@ def push_each(
         for k in range(size):
             y[k] = input[1 + k]
         for k in range(freedoms):
+            # Inverse dynamics takes accelerations and returns the missing generalized forces in the
+            # same place.
             applied[k] = input[1 + size + k]
         status = call(law, model, reals, data, y, f, 0)
         if status != OUTCOME.OK:
@@ -117,6 +121,7 @@ def push_each(
         for actuator in range(actuators):
             actuator_record = at(order, 2 + 4 * actuator)
             to = at(row, freedoms + actuator * (freedoms + 1))
+            # One actuator at a time, from empty wrenches.
             clear_wrenches(model, data)
             for k in range(freedoms):
                 applied[k] = 0.0
@@ -124,6 +129,7 @@ def push_each(
                 to[freedoms] = data[actuator_record[3]]
                 pull_path(model, reals, data, y, f, actuator_record[2], data[actuator_record[3]])
             else:
+                # All other controls are 0, and forces are linear in the control.
                 data[actuator_record[1]] = 1.0
                 status = call(
                     model[actuator_record[0] + ITEM.LAW],
@@ -171,6 +177,7 @@ def watch(
     Returns:
         `OUTCOME.OK`, or the last outcome that differs from it.
     """
+    # The list has three parts: indices of results, indices to clear, and items.
     size, selected, cleared = model[MODEL.STATE_SIZE], order[0], order[1]
     places, clears = at(order, 2), at(order, 2 + selected)
     items = at(order, 2 + selected + cleared)
@@ -178,6 +185,7 @@ def watch(
     for number in range(count):
         for k in range(size):
             y[k] = states[size * number + k]
+        # Records of items that do not run keep old values, unless they are cleared.
         for k in range(cleared):
             data[clears[k]] = 0.0
         status = call(model[MODEL.LAWS], model, reals, data, y, f, STAGE.VELOCITY)
@@ -189,6 +197,7 @@ def watch(
                 item = model[model[MODEL.ITEM_AT] + k]
                 status = call(model[item + ITEM.LAW], model, reals, data, y, f, item)
         for k in range(selected):
+            # A state that fails must not look like a result.
             results[selected * number + k] = data[places[k]] if status == OUTCOME.OK else nan
         outcome = outcome if status == OUTCOME.OK else status
     return outcome

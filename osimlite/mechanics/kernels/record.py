@@ -249,7 +249,7 @@ def note_events(
     counts, events = m.counts, m.events
     size, pairs = m.model[MODEL.STATE_SIZE], m.model[MODEL.CONTACTS]
     stop, first, total, event = inf, counts[EVENTS], pairs + m.sizes[WATCHES], m.sizes[EVENT]
-    # WORK_STATE has room for STATES states; the integrators use the first four.
+    # WORK_STATE has room for STATES states, and `integrate_run` uses the first four.
     ya = at(m.data, m.model[MODEL.WORK_STATE] + 4 * size)
     fa, result = at(ya, size), at(after, total)
     for number in range(total):

@@ -139,7 +139,15 @@ def record_sensors(
 
 
 def add_noise(i: Ints, p: Floats, step: int, count: int, controls: Floats) -> None:
-    """Add noise to the controls of a control step, as SCONE's NoiseController does."""
+    """Add noise to the controls of a control step, as SCONE's NoiseController does.
+
+    Args:
+        i: integers of the reflexes.
+        p: numbers of the reflexes.
+        step: number of the control step.
+        count: number of controls.
+        controls: controls (count,); changed.
+    """
     if i[REFLEXES.IS_NOISY] > 0:
         for k in range(count):
             width = p[LIMITS.CONTROL_NOISE] + p[LIMITS.CONTROL_PART] * controls[k]
@@ -157,12 +165,14 @@ def delayed_sensor(i: Ints, frames: int, history: Floats, sensor: int, delay: fl
         sensor: number of the sensor.
         delay: delay (control steps).
     """
+    # Before the start a delayed sensor has its first value.
     back, latest = min(delay, frames - 1.0), frames - 1
     whole = floor(back + NEAR)
     part = min(max(back - whole, 0.0), 1.0)
     near = int(latest - whole)
     size, width = i[REFLEXES.KEPT], i[REFLEXES.SENSORS]
     value = history[width * (near % size) + sensor]
+    # The ring buffer holds KEPT rows, the newest one at frames - 1.
     other = history[width * (max(near - 1, 0) % size) + sensor]
     return value + part * (other - value)
 
@@ -181,6 +191,7 @@ def update_leg_states(
         history: ring buffer of sensors.
         legs: states of the legs (2,); changed.
     """
+    # Loads are the first two sensors, and are delayed like all others.
     one, two = (
         delayed_sensor(i, frames, history, 0, p[0]),
         delayed_sensor(i, frames, history, 1, p[0]),
@@ -222,7 +233,9 @@ def next_leg_state(
     """
     stands, swings = load > limits[LIMITS.STANDS], load <= limits[LIMITS.SWINGS]
     late, lands = here < limits[LIMITS.LATE], here > limits[LIMITS.LANDS]
+    # Liftoff begins as soon as the other leg stands with its foot ahead.
     follows = other_stands and here < other
+    # The first control step decides by the load alone.
     if state == UNKNOWN and not stands:
         return LANDING if lands else SWING
     if is_direct and swings and EARLY_STANCE <= state <= LATE_STANCE:
@@ -235,6 +248,7 @@ def next_leg_state(
         return SWING if swings else LIFTOFF
     if state == SWING:
         if stands:
+            # A foot that touches behind the other one has stumbled, and stays in swing.
             return EARLY_STANCE if here > other else SWING
         return LANDING if lands else SWING
     return EARLY_STANCE if stands else LANDING
@@ -257,11 +271,13 @@ def add_reflexes(
     gates, numbers = at(terms, TERM.SIZE * count), at(p, LIMITS.HEAD)
     for k in range(count):
         term, own = at(terms, TERM.SIZE * k), at(numbers, OF_EACH * k)
+        # The states in which a term is active are bits of an integer.
         if term[TERM.STATES] >> int(legs[term[TERM.LEG]]) & 1 == 0:
             continue
         value = own[1]
         if term[TERM.SENSOR] >= 0:
             gate = term[TERM.GATE]
+            # A suppressed term is skipped, without changing the other terms.
             if gate >= 0 and is_suppressed(
                 i, at(gates, OF_GATE * gate), at(numbers, OF_EACH * (count + gate)), frames, history
             ):
@@ -274,6 +290,7 @@ def add_reflexes(
                 value = max(value, 0.0)
         else:
             since = frames - 1.0 - own[0]
+            # The term begins at its delay, NEAR of which is rounding.
             if since < -NEAR:
                 continue
             for _ in range(term[TERM.KIND]):
@@ -282,7 +299,17 @@ def add_reflexes(
 
 
 def is_suppressed(i: Ints, gate: Ints, own: Floats, frames: int, history: Floats) -> bool:
-    """Return whether a gate suppresses a term: its coordinate is beyond the range and moves further away."""
+    """Return whether a gate suppresses a term.
+
+    It does if its coordinate is beyond the range and moves further away.
+
+    Args:
+        i: integers of the reflexes.
+        gate: integers of the gate.
+        own: numbers of the gate: delay, smallest and largest value.
+        frames: number of sensor rows.
+        history: ring buffer of sensors.
+    """
     value = delayed_sensor(i, frames, history, gate[0], own[0])
     speed = delayed_sensor(i, frames, history, gate[1], own[0])
     return (value < own[1] and speed < 0.0) or (value > own[2] and speed >= 0.0)
@@ -297,7 +324,9 @@ def draw_normal(seed: int, what: int, step: int, number: int) -> float:
         step: number of the control step.
         number: number of the control or sensor.
     """
+    # A counter-based generator: noise depends on step and number only, not on the order of calls.
     one, two = philox(int(step) & WORD, int(number), what, 0, seed & WORD, (seed >> 32) & WORD)
+    # Add 1 to the first word, since the logarithm of 0 is infinite.
     return sqrt(-2.0 * log((one + 1.0) / (WORD + 1.0))) * cos(2.0 * pi * two / (WORD + 1.0))
 
 

@@ -116,6 +116,9 @@ def rosenbrock(model: Ints, reals: Floats, data: Floats, y0: Floats, y1: Floats,
         y0: state at the start, then its derivative.
         y1: filled with the state at the end.
         place: offset of the method's record in data.
+
+    Returns:
+        `OUTCOME.OK`; the record says whether the step was accepted.
     """
     size = model[MODEL.STATE_SIZE]
     h = at(data, place)
@@ -123,10 +126,13 @@ def rosenbrock(model: Ints, reals: Floats, data: Floats, y0: Floats, y1: Floats,
     errors, f1 = at(data, model[MODEL.WORK_STATE] + ERRORS * size), at(y1, size)
     t0, accuracy, step = h[REACHED], h[ACCEPTED], h[NEXT_STEP]
     h[EVALUATED], h[HAS_DERIVATIVE] = 2.0, 0.0
+    # A step that almost reaches the limit is stretched or cut to it.
     t1 = h[LAST_TIME] if h[LAST_TIME] <= t0 + 1.001 * step else t0 + step
+    # A step that was cut much shorter is no basis for the size of the next one.
     cut = t1 - t0 < 0.95 * step
     step = t1 - t0
     c, error = DIAGONAL * step, inf
+    # After a rejection the derivatives at the start are still valid.
     if h[IS_NEW] == 0.0:
         data[WORK.TIME] = t0
         copy_numbers(size, y0, y1)
@@ -147,6 +153,7 @@ def rosenbrock(model: Ints, reals: Floats, data: Floats, y0: Floats, y1: Floats,
                 y1[k] += ENDS[i] * stages[size * i + k]
                 errors[k] += MISSES[i] * stages[size * i + k]
         error = project_and_measure(model, reals, data, t1, y0, y1, errors, h, 1)
+    # The error has order 3, and is bounded from below so that the factor stays finite.
     factor = SAFETY * (accuracy / max(error, 1e-9 * accuracy)) ** (1.0 / 3.0)
     if not error <= accuracy:
         # Near the resolution of time, the actual step is longer than the requested one.
@@ -190,6 +197,7 @@ def compute_stages(
     size, f = model[MODEL.STATE_SIZE], at(y, model[MODEL.STATE_SIZE])
     for i in range(STAGES):
         stage, rates = at(stages, size * i), f if TIMES[i] > 0.0 else at(y0, size)
+        # Stages at the start use the derivative that is known there.
         if TIMES[i] > 0.0:
             for k in range(size):
                 y[k] = y0[k]

@@ -97,6 +97,9 @@ def run_several(
         endings: filled with the ending of each run, see `DONE`.
         first: number of the first run.
         last: end of the runs.
+
+    Returns:
+        `OUTCOME.OK`; each run has an ending of its own.
     """
     for k in range(first, last):
         m = select_run(
@@ -143,7 +146,24 @@ def select_run(
 ) -> Motion:
     """Return one of several runs.
 
-    The arguments are those of `run_several`, and the number k of the run.
+    Args:
+        model: integers of the model.
+        reals: numbers of the runs, in rows of `each`.
+        data: workspace of an evaluation and of the method, shared.
+        each: length of a row of numbers, 0 if all runs share one.
+        sizes: sizes and settings, see `MOST_TRIES`.
+        clocks: per run time and next step to try (s).
+        counts: per run the counts, see `TAKEN`.
+        states: per run the state.
+        times: times of the reports (s).
+        reports: per run the states at these times.
+        log: log of the steps, shared.
+        forces: forces of contacts at the steps of the log, shared.
+        events: per run the events.
+        peaks: per run the largest forces of contacts.
+        watches: watches, see `Motion`.
+        levels: numbers of the watches.
+        k: number of the run.
     """
     size, pairs = model[MODEL.STATE_SIZE], model[MODEL.CONTACTS]
     return Motion(
@@ -181,6 +201,7 @@ def integrate_run(m: Motion, y: Floats, is_going: bool) -> int:
     y0, f0, y1, f1 = work, at(work, size), at(work, 2 * size), at(work, 3 * size)
     before = at(work, STATES * size)
     after = at(before, model[MODEL.CONTACTS] + sizes[WATCHES])
+    # The caller says whether the initial state fulfils the constraints; else project it.
     is_kept = model[MODEL.CONSTRAINED] == 0 or sizes[START_HOLDS] > 0
     if not is_kept and not project_by_law(
         model, m.reals, m.data, clock[0], y, f0, 0, h[ACCEPTED] / 10.0, inf
@@ -188,6 +209,7 @@ def integrate_run(m: Motion, y: Floats, is_going: bool) -> int:
         return FAILED
     copy_numbers(size, y, y0)
     status = OUTCOME.OK if is_going else evaluate_state(m, clock[0], y0, f0, STAGE.ACCELERATION)
+    # A run that continues keeps the memory of its method.
     if counts[TAKEN] == 0 and counts[EVALUATIONS] == 0:
         counts[EVALUATIONS], h[MEMORY] = 0 if is_going else 1, 0.0
     if status != OUTCOME.OK or not is_finite(size, f0):
@@ -195,10 +217,12 @@ def integrate_run(m: Motion, y: Floats, is_going: bool) -> int:
     h[IS_EVALUATED] = 0.0 if is_going else 1.0
     compute_levels(m, y0, before)
     note_peaks(m, clock[0])
+    # Reports at or before the start get the initial state.
     while counts[REPORTED] < sizes[TIMES] and m.times[counts[REPORTED]] <= clock[0]:
         copy_numbers(size, y0, at(m.reports, size * counts[REPORTED]))
         counts[REPORTED] += 1
     while clock[0] < h[LAST_TIME]:
+        # A full log interrupts the run; the caller empties it and continues.
         if sizes[MOST_LOGGED] > 0 and sizes[MOST_LOGGED] == counts[LOGGED]:
             return FULL
         t0 = clock[0]
@@ -219,6 +243,7 @@ def integrate_run(m: Motion, y: Floats, is_going: bool) -> int:
         if sizes[MOST_LOGGED] > 0:
             note_step(m, t1, y1, f1)
         end, stopped = t1, False
+        # Contacts and constraints change the results after the method's last evaluation.
         h[IS_EVALUATED] = 1.0 if h[HAS_DERIVATIVE] == 0.0 and model[MODEL.CONSTRAINED] == 0 else 0.0
         # Locate events within the step; one of them may end the run.
         if sizes[MOST_EVENTS] > 0 or sizes[WATCHES] > 0:
@@ -227,9 +252,11 @@ def integrate_run(m: Motion, y: Floats, is_going: bool) -> int:
             end = note_events(m, t0, y0, f0, t1, y1, f1, before, after)
             stopped = end <= t1
             end = min(end, t1)
+            # Levels at the end are those at the start of the next step.
             copy_numbers(model[MODEL.CONTACTS] + sizes[WATCHES], after, before)
         while counts[REPORTED] < sizes[TIMES] and m.times[counts[REPORTED]] <= end:
             t, report = m.times[counts[REPORTED]], at(m.reports, size * counts[REPORTED])
+            # A report at the end of a step is the state itself, not an interpolated one.
             if t == t1:
                 copy_numbers(size, y1, report)
             else:
@@ -246,6 +273,7 @@ def integrate_run(m: Motion, y: Floats, is_going: bool) -> int:
         y0, y1 = y1, y0
         f0, f1 = f1, f0
         copy_numbers(size, y0, y)
+    # The caller finds the derivative in the same place, whatever the number of steps.
     copy_numbers(size, f0, at(work, size))
     return DONE
 
@@ -256,6 +284,15 @@ def is_evaluated(m: Motion, t1: float, y1: Floats, f1: Floats) -> bool:
     It returns whether its derivative is finite.
 
     A method's derivative is not used where contacts or watches need the results of an evaluation.
+
+    Args:
+        m: the run.
+        t1: time at the end of the step (s).
+        y1: state at the end.
+        f1: filled with its derivative.
+
+    Returns:
+        Whether the derivative is finite.
     """
     if (
         m.data[m.sizes[METHOD_AT] + HAS_DERIVATIVE] > 0.0
@@ -278,10 +315,11 @@ def take_step(m: Motion, t0: float, y0: Floats, y1: Floats) -> float:
         y1: filled with the state at the end.
 
     Returns:
-        The time at the end of the step (s); t0 - 1 if there is none, t0 after too many tried steps.
+        The time at the end of the step (s); t0 - 1 without an accepted step, t0 after too many tried steps.
     """
     counts, clock, sizes = m.counts, m.clock, m.sizes
     h = at(m.data, sizes[METHOD_AT])
+    # A step at the resolution of time that is rejected ends the run.
     smallest = max(shortest_step(t0, counts[ATTEMPTED]), h[SHORTEST])
     h[REACHED], h[NEXT_STEP] = t0, clock[1]
     while counts[ATTEMPTED] < sizes[MOST_TRIES]:

@@ -114,9 +114,12 @@ def read_source(model: Ints, data: Floats, source: Ints, p: Floats, row: Floats)
         return row[index]
     if kind == SPINDLE:
         speed = row[source[SOURCE.MORE]]
+        # Prochazka's formula contains the square root of the velocity, odd in its sign. Rates are
+        # not negative.
         return max(row[index] + SPINDLE_GAIN * (sqrt(speed) if speed > 0.0 else -sqrt(-speed)), 0.0)
     numbers = at(p, source[SOURCE.MORE])
     if kind == ANGLE:
+        # Angles of successive rotations, by the entries of the rotation matrix of the link.
         xx, yx, zx = direction(model, data, index, vector(numbers, 0))
         _, yy, _ = direction(model, data, index, vector(numbers, 3))
         _, yz, _ = direction(model, data, index, vector(numbers, 6))
@@ -155,6 +158,7 @@ def fill_sensor_row(model: Ints, data: Floats, y: Floats, i: Ints, p: Floats, ro
         row[i[SENSES.ACTIVATIONS] + k] = data[places[3]]
         row[i[SENSES.ACTIVE] + k] = data[places[4]]
     copy_numbers(2 * freedoms, y, at(row, i[SENSES.VALUES]))
+    # A coordinate without a limit force has none.
     limits, moments = at(muscle_ints, OF_MUSCLE * muscles), at(row, i[SENSES.MOMENTS])
     for k in range(freedoms):
         moments[k] = 0.0
@@ -167,31 +171,56 @@ def fill_sensor_row(model: Ints, data: Floats, y: Floats, i: Ints, p: Floats, ro
         store_vector(row, i[SENSES.PLACES] + 3 * k, position)
         total = add_scaled(total, centres[3 * bodies + k], position)
         rise += centres[3 * bodies + k] * velocity(model, data, links[k], position)[1]
+    # The mass centre is the mean of those of the bodies, weighted by mass.
     store_vector(row, i[SENSES.CENTRE], divide(total, p[SENSED.MASS]))
     row[i[SENSES.RISE]] = rise / p[SENSED.MASS]
     for k in range(i[SENSES.LEGS]):
         leg, push = at(links, bodies + OF_LEG * k), ZERO
+        # All contacts of a foot together carry its leg.
         for pair in range(leg[2], leg[3]):
             push = plus(push, contact_force(model, data, pair))
         row[i[SENSES.LOADS] + k] = norm(push) / p[SENSED.WEIGHT]
 
 
 def contact_force(model: Ints, data: Floats, pair: int) -> Vector:
-    """Return the force of a contact on its surface 2 (N)."""
+    """Return the force of a contact on its surface 2 in ground (N).
+
+    Args:
+        model: integers of the model.
+        data: results of an evaluation.
+        pair: number of the contact.
+    """
     return vector(data, model[MODEL.WORK_CONTACT] + CONTACT_WORK.SIZE * pair + CONTACT_WORK.FORCE)
 
 
 def foot_position(i: Ints, row: Floats, leg: int) -> float:
-    """Return the position of the foot of a leg along x (m)."""
+    """Return the position of the foot of a leg along x of ground (m).
+
+    Args:
+        i: plan of the sensor row.
+        row: sensor row.
+        leg: number of the leg.
+    """
     return row[i[SENSES.PLACES] + 3 * leg_ints(i, leg)[1]]
 
 
 def foot_lead(i: Ints, row: Floats, leg: int) -> float:
-    """Return how far the foot of a leg is ahead of the pelvis along x (m)."""
+    """Return how far the foot of a leg is ahead of the pelvis along x of ground (m).
+
+    Args:
+        i: plan of the sensor row.
+        row: sensor row.
+        leg: number of the leg.
+    """
     return foot_position(i, row, leg) - row[i[SENSES.PLACES] + 3 * leg_ints(i, leg)[0]]
 
 
 def leg_ints(i: Ints, leg: int) -> Ints:
-    """Return the integers of a leg."""
+    """Return the integers of a leg.
+
+    Args:
+        i: plan of the sensor row.
+        leg: number of the leg.
+    """
     before = SENSES.HEAD + OF_MUSCLE * i[SENSES.MUSCLES] + 2 * i[SENSES.LIMITS] + i[SENSES.BODIES]
     return at(i, before + OF_LEG * leg)

@@ -58,22 +58,24 @@ The history of the sensors follows, then the workspace of the criteria.
 
 
 class Walk(NamedTuple):
-    """Inputs and records of a walk."""
+    """Inputs and records of a walk.
 
-    m: Motion
-    senses: Ints  # see `senses`
-    known: Floats
-    driven: Ints  # where the numbers of the model have each control (c,)
-    plan: Ints  # see `reflexes`
-    numbers: Floats
-    criteria: Ints  # see `criteria`
-    bounds: Floats
-    room: Floats  # see LEGS
-    row: Floats  # what is felt
-    excitations: Floats  # that are held (c,)
-    # per control step the state at its start, excitations, loads; for other runs see
-    # `begin_control_step`
-    record: Floats
+    The record has per control step the state at its start, excitations and loads; for other runs
+    see `begin_control_step`.
+    """
+
+    m: Motion  # run of the walk
+    senses: Ints  # plan of the sensor row, see `sensors`
+    known: Floats  # numbers of the sensor row
+    driven: Ints  # offset of each control in the numbers of the model (c,)
+    plan: Ints  # integers of the reflexes, see `reflexes`
+    numbers: Floats  # numbers of the reflexes
+    criteria: Ints  # integers of the criteria, see `criteria`
+    bounds: Floats  # numbers of the criteria
+    room: Floats  # memory of reflexes and criteria, see LEGS
+    row: Floats  # sensor row
+    excitations: Floats  # excitations during the control step (c,)
+    record: Floats  # record of control steps
     progress: Ints  # see STEPS
 
 
@@ -110,8 +112,12 @@ def hold_several(
         going: filled with 1 for a copy that reaches the end of the step, else 0.
         first: number of the first copy.
         last: end of the copies.
+
+    Returns:
+        `OUTCOME.OK`.
     """
     for k in range(first, last):
+        # All copies share the numbers of the model, so controls are written before each copy runs.
         for number in range(held_by):
             reals[places[number]] = controls[held_by * k + number]
         m = select_motion(model, reals, data, sizes, clocks, counts, peaks, places, k)
@@ -132,9 +138,22 @@ def select_motion(
     unused: Ints,
     k: int,
 ) -> Motion:
-    """Return the run of one of several copies, without reports, log, events and watches."""
+    """Return the run of one of several copies, without reports, log, events and watches.
+
+    Args:
+        model: integers of the model.
+        reals: numbers of the model.
+        data: workspace of an evaluation and of the method.
+        sizes: sizes and settings, see `record.MOST_TRIES`.
+        clocks: per copy time and next step to try (s).
+        counts: per copy the counts, see `record.TAKEN`.
+        peaks: per copy the largest forces of contacts.
+        unused: any vector, in place of watches.
+        k: number of the copy.
+    """
     peak = at(peaks, 2 * k * model[MODEL.CONTACTS])
     clock, count = at(clocks, 2 * k), at(counts, COUNTED * k)
+    # Vectors of records without rows are never read or written; any vector serves.
     return Motion(
         model, reals, data, sizes, clock, count, peak, peak, peak, peak, peak, peak, unused, peak
     )
@@ -143,9 +162,15 @@ def select_motion(
 def integrate_control_step(m: Motion, y: Floats, has_derivative: bool) -> bool:
     """Integrate a state over one control step, as a run of its own.
 
+    Args:
+        m: the run.
+        y: state; changed.
+        has_derivative: whether the derivative at the end of the previous step is that at the start.
+
     Returns:
         Whether it reaches the end.
     """
+    # Every control step starts at time 0, so that times have the same digits in all steps.
     m.clock[0] = 0.0
     for k in range(COUNTED):
         m.counts[k] = 0
@@ -236,8 +261,18 @@ def walk_several(
 
 
 def begin_walk(a: Walk, y: Floats, order: int) -> int:
-    """Fill the sensor row of a state, and start reflexes or criteria; return the outcome."""
+    """Fill the sensor row of a state, and start reflexes or criteria.
+
+    Args:
+        a: the walk.
+        y: state.
+        order: FEEL, BEGIN or START.
+
+    Returns:
+        Outcome of the evaluation.
+    """
     m = a.m
+    # Sensors before the first control step are those without excitations.
     for k in range(a.senses[SENSES.CONTROLS]):
         m.reals[a.driven[k]] = 0.0
     status = evaluate_state(m, 0.0, y, at(m.data, m.model[MODEL.WORK_STATE]), STAGE.FORCE)
@@ -260,9 +295,16 @@ def take_control_steps(a: Walk, y: Floats, steps: int, is_recorded: bool) -> Non
 
     As in SCONE, a step may begin with the derivative at the end of the previous one, which belongs to
     the previous excitations.
+
+    Args:
+        a: the walk.
+        y: state; changed.
+        steps: largest number of control steps.
+        is_recorded: whether each step is recorded.
     """
     m, progress, lags = a.m, a.progress, a.known[SENSED.LAGS] > 0.0
     size, controls = m.model[MODEL.STATE_SIZE], a.senses[SENSES.CONTROLS]
+    # Evaluate the end of the step before with its excitations, which a lagging step begins with.
     if lags:
         apply_excitations(a)
         previous = at(m.data, m.model[MODEL.WORK_STATE])
@@ -285,6 +327,7 @@ def take_control_steps(a: Walk, y: Floats, steps: int, is_recorded: bool) -> Non
         has_reached_end = integrate_control_step(m, y, lags)
         progress[STEPS] += 1
         progress[FORCES] += m.counts[EVALUATIONS]
+        # A motion that fails ends the walk, as a fall does.
         if not has_reached_end:
             progress[GOING] = 0
             return
@@ -296,6 +339,7 @@ def take_control_steps(a: Walk, y: Floats, steps: int, is_recorded: bool) -> Non
             m.model, m.data, a.plan, a.numbers, progress[FRAMES], a.row, at(a.room, LEGS)
         )
         progress[FRAMES] += 1
+        # Time in control steps, which has no accumulated rounding.
         t = progress[STEPS] * a.known[SENSED.STEP]
         if update_criteria(
             a.senses, a.known, a.criteria, a.bounds, t, a.row, a.excitations, criteria_work(a)
@@ -322,6 +366,7 @@ def update_excitations(a: Walk) -> None:
     for k in range(count):
         a.excitations[k] = 0.0
     add_reflexes(a.plan, a.numbers, frames, history, a.room, a.excitations)
+    # Noise is added before bounds apply, as in SCONE.
     add_noise(a.plan, a.numbers, a.progress[STEPS], count, a.excitations)
     least = at(a.known, SENSED.HEAD + 2 * a.senses[SENSES.MUSCLES])
     most = at(least, count)
@@ -362,7 +407,39 @@ def run_by_reflexes(
 ) -> int:
     """Integrate the runs `first` to `last` - 1, as `run_several` does, each controlled by its reflexes.
 
-    The arguments are those of `run_several` and of `walk_several`, with one row per run.
+    Args:
+        model: integers of the model.
+        reals: numbers of the runs, in rows of `each`.
+        data: workspace of an evaluation and of the method, shared.
+        each: length of a row of numbers.
+        sizes: sizes and settings, see `record.MOST_TRIES`.
+        clocks: per run time and next step to try (s).
+        counts: per run the counts, see `record.TAKEN`.
+        states: per run the state; changed.
+        times: times of the reports (s).
+        reports: per run the states at these times.
+        log: log of the steps, shared.
+        forces: forces of contacts at the steps of the log, shared.
+        events: per run the events.
+        peaks: per run the largest forces of contacts.
+        watches: watches, see `record.Motion`.
+        levels: numbers of the watches.
+        endings: filled with the ending of each run, see `record.DONE`.
+        senses: plan of the sensor rows, see `sensors.SENSES`.
+        known: per run the numbers of the sensor row, see `sensors.SENSED`.
+        driven: offsets in reals of the excitations.
+        plan: integers of the reflexes, see `reflexes.REFLEXES`.
+        numbers: per run the numbers of the reflexes, see `reflexes.LIMITS`.
+        room: per run the memory of the reflexes.
+        rows: per run the sensor row.
+        excitations: per run the excitations.
+        record: per run the record of control steps, see `begin_control_step`.
+        progress: per run the progress, see STEPS.
+        first: number of the first run.
+        last: end of the runs.
+
+    Returns:
+        `OUTCOME.OK`; each run has an ending of its own.
     """
     for k in range(first, last):
         m = select_run(
@@ -404,7 +481,14 @@ def run_by_reflexes(
 
 
 def control_record_size(senses: Ints, plan: Ints) -> int:
-    """Return the length of the record of a control step."""
+    """Return the length of the record of a control step.
+
+    It contains sensors, states of legs, excitations, and the next step to try.
+
+    Args:
+        senses: plan of the sensor row.
+        plan: integers of the reflexes.
+    """
     return int(plan[REFLEXES.SENSORS] + LEGS + senses[SENSES.CONTROLS] + 1)
 
 
@@ -412,6 +496,13 @@ def integrate_with_reflexes(a: Walk, y: Floats) -> int:
     """Integrate from the state y as `integrate_run` does, with new controls at each control step.
 
     A control step also begins at the very end of the run.
+
+    Args:
+        a: the walk; criteria are not used.
+        y: state; changed.
+
+    Returns:
+        The ending, see `record.DONE`.
     """
     m, progress = a.m, a.progress
     h = at(m.data, m.sizes[METHOD_AT])
@@ -423,6 +514,7 @@ def integrate_with_reflexes(a: Walk, y: Floats) -> int:
             break
         else:
             apply_excitations(a)
+            # Integrate to the end of the control step or of the run, the earlier of both.
             h[LAST_TIME] = min(progress[STEPS] * a.known[SENSED.STEP], end)
             ending = integrate_run(m, y, False)
     h[LAST_TIME] = end
@@ -430,10 +522,17 @@ def integrate_with_reflexes(a: Walk, y: Floats) -> int:
 
 
 def begin_control_step(a: Walk, y: Floats) -> bool:
-    """Begin a control step and record it; return whether the evaluation succeeded.
+    """Begin a control step and record it.
 
     The record holds the remembered sensors, the states of the legs, the excitations, and the step that
     the method would try next.
+
+    Args:
+        a: the walk.
+        y: state.
+
+    Returns:
+        Whether the evaluation succeeded.
     """
     m, progress, sensors = a.m, a.progress, a.plan[REFLEXES.SENSORS]
     # The motion has a kink here: the method must forget its history.
