@@ -1,4 +1,4 @@
-"""From model to mechanism: a tree of bodies and mobilizers, what the kernels find of it in numpy."""
+"""Mechanisms: trees of bodies and mobilizers that are built from models, computed with numpy."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A rod that bends evenly, as OpenSim's ConstantCurvatureJoint needs it."""
+"""End of a rod that bends with constant curvature, for OpenSim's ConstantCurvatureJoint."""
 
 from __future__ import annotations
 
@@ -10,25 +10,27 @@ from osimlite.mechanics.kernels.constant_curvature import evaluate_arc
 from osimlite.mechanics.kernels.functions import ARC
 from osimlite.mechanics.multibody.functions import Arguments, Evaluated, Function, make_floats
 
+# 16 terms are exact in double precision for angles up to half a turn.
 _SERIES = [(-1.0) ** n / math.factorial(2 * n + first) for first in (1, 2) for n in range(16)]
 """Coefficients of the powers of θ² in (sin θ) / θ, then in (1 - cos θ) / θ²."""
 
 
 @dataclass(frozen=True)
 class ArcPoint(Function):
-    """One component of the end of a rod that starts upright and bends evenly, as a function of its two end angles.
+    """One component of the end of a rod with constant curvature, as a function of two angles.
 
-    The rod stands along Y; its end points along the Y axis that is turned first about X by one
-    angle, then about the new Z by the other. Bent by θ in all, it is an arc of radius length / θ.
+    The unbent rod stands along Y from the origin. Its end points along the Y axis that is rotated
+    first about X by the first angle a, then about the new Z by the second angle b. With the total
+    angle θ, cos θ = cos a cos b, the rod is an arc of radius length / θ.
     """
 
-    component: int  # 0 to 2
-    length: float  # m
-    neutral: tuple[float, float]  # what is added to the two arguments (rad)
+    component: int  # of the position of the end: 0, 1 or 2
+    length: float  # length of the rod, m
+    neutral: tuple[float, float]  # angles that are added to the two arguments, rad
 
     @property
     def table(self) -> Sequence[float]:
-        """A bent rod."""
+        """Table of the function: component, length, neutral angles and the series."""
         return [
             ARC,
             1.0,
@@ -40,7 +42,7 @@ class ArcPoint(Function):
         ]
 
     def evaluate(self, arguments: Arguments) -> Evaluated:
-        """Value, gradient (2,) and Hessian (2, 2) at the two angles."""
+        """Return the value, the gradient (2,) and the Hessian (2, 2) at the two angles (rad)."""
         one, two = (float(own + start) for own, start in zip(arguments, self.neutral, strict=True))
         value, a, b, aa, ab, bb = evaluate_arc(make_floats(self.table), one, two)
         return value, [a, b], [[aa, ab], [ab, bb]]

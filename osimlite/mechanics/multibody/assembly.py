@@ -1,14 +1,14 @@
-"""States that fulfil the constraints: the nearest pose, the nearest speeds.
+"""States that fulfil the constraints: the nearest pose and the nearest speeds.
 
 OpenSim assembles a model by minimising half the sum of squared changes of the coordinates under the
-constraints; coordinates that depend on others and those free to satisfy constraints do not count,
+constraints. Coordinates that depend on others, and those free to satisfy constraints, do not count;
 locked ones keep their values, and clamped ones stay in their range. Here Newton's method leads to
 the constraints and then along them to the minimum.
 
-OpenSim's optimizer (IPOPT, to `assembly_accuracy`) ends within that of the minimum, but for clamped
-coordinates: of these a barrier of about 1e-10 keeps it off, by 1e-10 / d from an end at distance d,
-by 1e-5 where the minimum is at an end. Where exactly depends on the whole way there, which is not
-followed here.
+OpenSim's optimizer is IPOPT with the tolerance `assembly_accuracy`, so that its result is within
+that of the minimum. Clamped coordinates are an exception: a barrier term of about 1e-10 keeps them
+away from an end of their range, by 1e-10 / d at the distance d, and by 1e-5 if the minimum is at
+the end. The exact distance depends on all iterates of IPOPT, which are not reproduced here.
 """
 
 from __future__ import annotations
@@ -29,21 +29,22 @@ if TYPE_CHECKING:
     from osimlite.mechanics.multibody.mechanism import Mechanism
 
 _STEPS = 100
+"""Largest number of Newton steps."""
 _EASE = 100.0
-"""How much more readily coordinates move that do not count."""
+"""Factor by which coordinates that do not count move more easily."""
 _FURTHEST = 0.5
-"""The longest step of a coordinate (m or rad)."""
+"""Largest change of a coordinate in one step (m or rad)."""
 _FINEST = 1e-12
-"""What a constraint may be off for rounding (m or rad)."""
+"""Error of a constraint that counts as rounding (m or rad)."""
 
 
 class UnmetConstraintsError(SimulationError):
-    """No pose fulfils the constraints of a model.
+    """Error of a model no pose of which fulfils the constraints.
 
     Args:
         model: name of the model.
-        errors: for each constraint that is not met, by its path, how far the best pose is from
-            meeting it (m, or rad for constraints of angles).
+        errors: error of the best pose for each violated constraint, by its path (m, or rad for
+            constraints of angles).
     """
 
     def __init__(self, model: str, errors: Mapping[str, float]) -> None:
@@ -56,14 +57,19 @@ class UnmetConstraintsError(SimulationError):
 
 
 def assemble_pose(mechanism: Mechanism, q: Array, time: float, kept: Collection[int] = ()) -> Array:
-    """The coordinate values (n,) nearest to `q` (n,) that fulfil the constraints at `time` (s).
+    """Return the coordinate values (n,) nearest to a pose that fulfil the constraints.
 
-    The coordinates with indices `kept` keep their values, as locked ones do. Where no pose within
-    the ranges of the clamped coordinates fulfils the constraints, the ranges give way, as in
-    OpenSim.
+    Where no pose within the ranges of the clamped coordinates fulfils the constraints, the ranges
+    are ignored, as in OpenSim.
+
+    Args:
+        mechanism: mechanism.
+        q: pose to start from (n,).
+        time: time of prescribed coordinates (s).
+        kept: indices of coordinates that keep their values, as locked ones do.
 
     Raises:
-        SimulationError: there are none, or they are too far to be found.
+        SimulationError: no pose near `q` fulfils the constraints.
     """
     infos = mechanism.coordinates
     held = {
@@ -71,6 +77,7 @@ def assemble_pose(mechanism: Mechanism, q: Array, time: float, kept: Collection[
     }
     unclamped: Array | None = None
     while True:
+        # First without ranges: if that fails, no range can help.
         try:
             result = _find_nearest_pose(mechanism, q, time, held)
         except SimulationError:
@@ -88,15 +95,20 @@ def assemble_pose(mechanism: Mechanism, q: Array, time: float, kept: Collection[
             return result
         if unclamped is None:
             unclamped = result
-        # Whichever would leave its range furthest stays at the end of it; then the others may fit.
+        # Fix the coordinate that leaves its range furthest at the end of it; then the others may
+        # fit.
         worst = max(outside, key=lambda place: abs(outside[place] - result[place]))
         held[worst] = outside[worst]
 
 
 def find_unclamped(mechanism: Mechanism, q: Array) -> list[int]:
-    """Return the indices of the clamped coordinates whose values (n,) lie outside their ranges.
+    """Return the indices of the clamped coordinates whose values are outside their ranges.
 
-    Prescribed coordinates are left out: no clamp binds them in OpenSim.
+    Prescribed coordinates are omitted, because OpenSim does not clamp them.
+
+    Args:
+        mechanism: mechanism.
+        q: coordinate values (n,).
     """
     return [
         index
@@ -108,20 +120,26 @@ def find_unclamped(mechanism: Mechanism, q: Array) -> list[int]:
 
 
 def project_speeds(state: Kinematics, kept: Collection[int] = ()) -> Array:
-    """The generalized speeds (n,) nearest to those of `state` that fulfil the constraints.
+    """Return the generalized speeds (n,) nearest to those of a state that fulfil the constraints.
 
-    As in Simbody, the change of a speed that is greater than 1 counts relative to it.
+    As in Simbody, a change of a speed that is greater than 1 counts relative to the speed.
+
+    Args:
+        state: state with the speeds to project.
+        kept: indices of coordinates whose speeds do not change.
 
     Raises:
-        SimulationError: there are none in which the speeds with indices `kept` are as they were.
+        SimulationError: the constraints do not allow the speeds of `kept`.
     """
     constraints = state.mechanism.constraints
     if not constraints:
         return state.u
     rows, wanted = stack_equations([item.velocity_equations(state) for item in constraints])
     scales = np.maximum(np.abs(state.u), 1.0)
+    # A scale of 0 takes the speed out of the unknowns.
     scales[list(kept)] = 0.0
     missing = wanted - rows @ state.u
+    # In the scaled unknowns the shortest solution is Simbody's weighted one.
     change, _ = solve_with_null_space(rows * scales, missing)
     u: Array = state.u + scales * change
     if kept and np.abs(rows @ u - wanted).max(initial=0.0) > 1e-9 * (
@@ -138,14 +156,21 @@ def project_speeds(state: Kinematics, kept: Collection[int] = ()) -> Array:
 def _find_nearest_pose(
     mechanism: Mechanism, wanted: Array, time: float, held: Mapping[int, float]
 ) -> Array:
-    """The nearest pose with some coordinates held at given values, whatever their ranges."""
+    """Return the nearest pose with some coordinates fixed, whatever their ranges.
+
+    Args:
+        mechanism: mechanism.
+        wanted: pose to start from (n,).
+        time: time of prescribed coordinates (s).
+        held: value of each fixed coordinate, by its index.
+    """
     search = _Search(mechanism, wanted, time, held)
     q = search.restore_pose(search.start)
     if search.assembled:
         return q
     for _ in range(_STEPS):
         if search.compute_cost(q) < search.tolerance**2:
-            # Nothing that counts has moved.
+            # No coordinate that counts has moved.
             return q
         step = search.compute_step(q)
         if np.abs(step).max(initial=0.0) < 1e-13 * (1.0 + float(np.abs(q).max(initial=0.0))):
@@ -157,19 +182,25 @@ def _find_nearest_pose(
                 break
             size *= 0.5
             if size < 1e-3:
-                # Nothing nearer within rounding.
+                # Rounding: no pose is measurably nearer.
                 return q
         q = trial
     return q
 
 
 def tolerance_of(mechanism: Mechanism) -> float:
-    """Return what an equation of an assembled pose may be off (m or rad)."""
+    """Return the accepted error of an equation of an assembled pose (m or rad).
+
+    OpenSim's tolerance is a tenth of the assembly accuracy.
+    """
     return max(mechanism.assembly_accuracy / 10.0, _FINEST)
 
 
 class _Search:
-    """Half the sum of squared changes of the coordinates that count, on the surface where the constraints hold."""
+    """Search for the nearest pose on the surface where the constraints hold.
+
+    The cost is half the sum of squared changes of the coordinates that count.
+    """
 
     def __init__(
         self, mechanism: Mechanism, wanted: Array, time: float, held: Mapping[int, float]
@@ -180,13 +211,13 @@ class _Search:
         self.start = wanted.copy()
         self.start[list(held)] = list(held.values())
         self.tolerance = tolerance_of(mechanism)
-        # OpenSim leaves such a pose as it is; its integrator takes the shortest way to the
-        # constraints.
+        # OpenSim leaves an assembled pose unchanged; its integrator then projects it by the
+        # shortest way onto the constraints.
         self.assembled = bool(
             np.abs(_compute_position_errors(self._compute_state(self.start))).max(initial=0.0)
             <= self.tolerance
         )
-        # Otherwise what does not count gives way first; what depends on others follows them.
+        # Otherwise coordinates that do not count move first: dependent ones follow their couplers.
         if not self.assembled:
             for item in mechanism.constraints:
                 if (
@@ -200,13 +231,14 @@ class _Search:
         self.ease = np.where(self.assembled | (self.counted[self.free] > 0.0), 1.0, _EASE)
 
     def compute_cost(self, q: Array) -> float:
-        """What is to be as small as possible."""
+        """Return half the sum of squared changes of the coordinates that count."""
         return 0.5 * float(np.sum(self.counted * (q - self.wanted) ** 2))
 
     def compute_step(self, q: Array) -> Array:
-        """Newton's step (n,) along the surface, with the curvature of the constraints."""
+        """Return Newton's step (n,) along the surface, with the curvature of the constraints."""
         rows = self._compute_rows(self._compute_state(q))
         gradient, weights = (self.counted * (q - self.wanted))[self.free], self.counted[self.free]
+        # Multipliers by least squares, so that redundant constraints do no harm.
         multipliers = np.asarray(
             np.linalg.lstsq(rows.T, -gradient, rcond=1e-9)[0], dtype=np.float64
         )
@@ -214,31 +246,38 @@ class _Search:
         curvature = along.T @ (weights[:, None] * along)
         if np.abs(multipliers).max(initial=0.0) > 1e-12:
             bends = [self._differentiate_pull(q, direction, multipliers) for direction in along.T]
+            # Second derivatives of the constraints times their multipliers, by finite differences.
             curvature = curvature + along.T @ np.array(bends).T.reshape(len(self.free), -1)
         values, vectors = np.linalg.eigh(0.5 * (curvature + curvature.T))
         slopes = np.asarray(vectors.T @ (along.T @ gradient), dtype=np.float64)
-        # Downhill where the surface bends away; not at all along what does not count.
+        # Where the surface bends away (negative curvature) the step leads downhill; directions
+        # without curvature do not change the cost, and are left alone.
         flat = np.abs(values) < 1e-7
         lengths: Array = np.where(flat, 0.0, slopes / np.where(flat, 1.0, np.abs(values)))
         return self._spread_over_coordinates(-(along @ (vectors @ lengths)))
 
     def restore_pose(self, q: Array) -> Array:
-        """The pose on the surface that Newton's method leads to, in the shortest steps.
+        """Return the pose on the surface that Newton's method with shortest steps reaches.
+
+        Args:
+            q: pose to start from (n,).
 
         Raises:
-            SimulationError: it leads nowhere.
+            SimulationError: the search does not converge.
         """
         state = self._compute_state(q)
         errors = _compute_position_errors(state)
         for _ in range(_STEPS):
             step, _ = solve_with_null_space(self._compute_rows(state) * self.ease, -errors)
             step *= self.ease
-            # Far away the equations say little about where to go; small steps, even to worse
-            # places, find out.
+            # Far from the surface the linearization is poor: take short steps, even where errors
+            # grow.
             size = min(1.0, _FURTHEST / float(np.abs(step).max(initial=_FURTHEST)))
             trial = q + size * self._spread_over_coordinates(step)
             state = self._compute_state(trial)
             new = _compute_position_errors(state)
+            # Within the tolerance, go on only while errors at least halve; then rounding is
+            # reached.
             near = np.abs(errors).max(initial=0.0) <= self.tolerance
             if near and np.abs(new).max(initial=0.0) >= 0.5 * np.abs(errors).max(initial=0.0):
                 break
@@ -259,13 +298,22 @@ class _Search:
         return Kinematics(self.mechanism, q, np.zeros(len(q)), self.time)
 
     def _compute_rows(self, state: Kinematics) -> Array:
-        """Derivatives of the errors by the free coordinates (p, f)."""
+        """Return the derivatives of the errors by the free coordinates (p, f)."""
         by_speeds = _compute_constraint_matrix(state)
+        # Derivatives by speeds and coordinates differ for ball joints: G = E N⁻¹, with qdot = N u.
         by_values = np.linalg.solve(self.mechanism.rate_matrix(state.q).T, by_speeds.T).T
         return np.asarray(by_values[:, self.free], dtype=np.float64)
 
     def _differentiate_pull(self, q: Array, direction: Array, multipliers: Array) -> Array:
-        """How the multipliers' pull on the free coordinates changes along a direction of them (f,)."""
+        """Return the derivative of the multipliers' generalized force on the free coordinates.
+
+        It is a central difference along a direction.
+
+        Args:
+            q: pose (n,).
+            direction: direction in the free coordinates (f,).
+            multipliers: multipliers of the equations (p,).
+        """
         change = 1e-6 * self._spread_over_coordinates(direction)
         ahead, behind = (
             self._compute_rows(self._compute_state(place)).T @ multipliers
@@ -285,7 +333,7 @@ def _compute_position_errors(state: Kinematics) -> Array:
 
 
 def _compute_constraint_matrix(state: Kinematics) -> Array:
-    """Matrix (p, n) from the speeds to the rates of all position errors."""
+    """Return the matrix (p, n) from the speeds to the rates of all position errors."""
     rows = [np.zeros((0, len(state.q)))]
     for item in state.mechanism.constraints:
         count = len(item.position_errors(state))

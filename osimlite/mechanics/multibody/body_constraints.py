@@ -1,6 +1,7 @@
 """Constraints between points and directions of two bodies.
 
-Stations and axes are given in the frames of the bodies; -1 stands for ground.
+Stations and axes are in the frames of the bodies. The body index -1 stands for ground. The
+equations are in :mod:`osimlite.mechanics.kernels.constraint_equations`.
 """
 
 from __future__ import annotations
@@ -20,10 +21,17 @@ if TYPE_CHECKING:
 
 
 def find_carrier(mechanism: Mechanism, bodies: Iterable[int]) -> int:
-    """The outermost body that carries bodies, or is one of them; -1 for ground."""
+    """Return the outermost body that carries some bodies, or is one of them; -1 for ground.
+
+    It is the nearest common ancestor in the tree of bodies.
+
+    Args:
+        mechanism: mechanism.
+        bodies: indices of bodies, or -1.
+    """
     result = set(bodies)
     while len(result) > 1:
-        # Bodies follow what carries them.
+        # Bodies have larger indices than the bodies that carry them.
         outer = max(result)
         result = result - {outer} | {mechanism.bodies[outer].parent}
     return result.pop()
@@ -39,41 +47,42 @@ class _Between(Constraint, Generic[P]):
 
     @property
     def bodies(self) -> tuple[int, ...]:
-        """The two bodies."""
+        """Indices of the two bodies."""
         return self.first.body, self.second.body
 
 
 @dataclass(frozen=True, eq=False)
 class PointConstraint(_Between[StationPlacement]):
-    """Keeps two stations on each other, as a ball joint would."""
+    """Holds two stations together, as a ball joint does."""
 
     name: str = "point constraint"
 
 
 @dataclass(frozen=True, eq=False)
 class DistanceConstraint(_Between[StationPlacement]):
-    """Keeps two stations at a distance (m), as a rod between ball joints would."""
+    """Keeps two stations at a distance, as a rod between ball joints does."""
 
-    distance: float
+    distance: float  # m
     name: str = "distance constraint"
 
 
 @dataclass(frozen=True, eq=False)
 class PointOnLineConstraint(Constraint):
-    """Keeps a station of the follower on a line fixed in a body."""
+    """Keeps a station of a follower body on a line that is fixed in another body."""
 
-    line: StationPlacement  # a point of the line
+    line: StationPlacement  # point of the line
     along: Array  # direction (3,) of the line in the frame of its body
-    follower: StationPlacement  # the station on the line
+    follower: StationPlacement  # station that stays on the line
     name: str = "point on line constraint"
 
     @property
     def bodies(self) -> tuple[int, ...]:
-        """The two bodies."""
+        """Indices of the body of the line and of the follower."""
         return self.line.body, self.follower.body
 
     def find_normal_directions(self) -> list[Array]:
-        """Two unit directions (3,) across the line, in the frame of its body."""
+        """Return two unit directions (3,) perpendicular to the line, in the frame of its body."""
+        # The axis that deviates most from the line gives the longest, and so most exact, product.
         start = np.eye(3)[int(np.argmin(np.abs(self.along)))]
         across = cross(self.along, start)
         return _make_unit_vectors(across, cross(self.along, across))
@@ -81,32 +90,38 @@ class PointOnLineConstraint(Constraint):
 
 @dataclass(frozen=True, eq=False)
 class WeldConstraint(_Between[FramePlacement]):
-    """Keeps two frames on each other: each axis of one square to the next axis of the other, and the origins."""
+    """Holds two frames together.
+
+    The equations are three scalar products that vanish, of each axis of one frame with the next
+    axis of the other, and the distance of the origins.
+    """
 
     name: str = "weld constraint"
 
 
 @dataclass(frozen=True, eq=False)
 class RollingConstraint(Constraint):
-    """OpenSim's RollingOnSurfaceConstraint: a roller on a plane that neither slips nor turns about the normal.
+    """OpenSim's RollingOnSurfaceConstraint: a roller on a plane, without slip and without spin.
 
-    The roller's origin stays at `height` along `normal` (3,) of the surface's frame, its Z axis
-    square to the surface's X axis; and along the surface's X and Z axes the two bodies have the
-    same velocity at the origin of the surface (which is where OpenSim puts the point of contact,
-    wherever the roller is). The accelerations are those that keep all this up; Simbody's do not,
-    because it compares material points and leaves out that the roller has another one at the
-    contact every moment.
+    The roller's origin stays at `height` along the normal of the surface's frame, and its Z axis
+    perpendicular to the surface's X axis. Along the surface's X and Z axes the two bodies have the
+    same velocity at the origin of the surface frame, where OpenSim assumes the point of contact
+    wherever the roller is.
+
+    The equations of accelerations are the exact derivatives of these. Simbody's are not, because it
+    compares the accelerations of material points, although another material point is in contact at
+    each moment.
     """
 
-    surface: int
-    roller: int
-    normal: Array
-    height: float
+    surface: int  # index of the body of the surface
+    roller: int  # index of the rolling body
+    normal: Array  # normal (3,) in the frame of the surface
+    height: float  # distance of the roller's origin from the surface frame along the normal, m
     name: str = "rolling constraint"
 
     @property
     def bodies(self) -> tuple[int, ...]:
-        """Surface and roller."""
+        """Indices of the surface and of the roller."""
         return self.surface, self.roller
 
 

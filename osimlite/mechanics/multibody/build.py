@@ -1,4 +1,4 @@
-"""From the model to the mechanism: sockets followed, frames folded into bodies, joints sorted into a tree."""
+"""Builder of mechanisms: follows sockets, folds frames into bodies, sorts joints into a tree."""
 
 from __future__ import annotations
 
@@ -42,36 +42,38 @@ from osimlite.schema.model import Model, expect_model
 def build_mechanism(
     model: Model, *, opensim_derivatives: bool = False, rolling: bool = False
 ) -> Mechanism:
-    """The tree of bodies and mobilizers that a model describes, with its constraints.
+    """Build the tree of bodies and mobilizers that a model describes, with its constraints.
 
-    Bodies come level by level from ground, within a level in the order of the joints that carry
-    them; coordinates come in the order of OpenSim's CoordinateSet. A joint whose child is nearer to
-    ground than its parent is reversed. Bodies that no joint connects to ground get a FreeJoint,
-    named as OpenSim names it.
+    Bodies are ordered level by level from ground, within a level in the order of the joints that
+    carry them; coordinates are in the order of OpenSim's CoordinateSet. A joint whose child is
+    nearer to ground than its parent is reversed. Bodies that no joint connects to ground get a
+    FreeJoint with OpenSim's name.
 
-    Where a joint closes a loop, a WeldJoint becomes a constraint; for any other joint its child
-    body is split into halves, one of which the joint carries, and the halves are welded by a
-    constraint. (OpenSim 4.6 does the same, but then counts the child of the WeldJoint twice, and
-    gives the half a wrong inertia: so it is with `opensim_derivatives`.) Forces and geometry play
-    no part.
+    Where a joint closes a loop, a WeldJoint becomes a constraint. For any other joint its child
+    body is split into halves: the joint carries one of them, and a constraint welds the halves.
+    OpenSim 4.6 does the same, but counts the child of the WeldJoint twice and gives the half a
+    wrong inertia, which `opensim_derivatives` reproduces. Forces and geometry have no influence.
 
     Args:
         model: the model.
-        opensim_derivatives: compute two second derivatives as OpenSim 4.6 does, which are wrong.
-            Simbody differentiates the angular velocity of a CustomJoint as if its first coordinate
-            alone drove the first rotation and the first two alone the first two, so accelerations
-            are off where one coordinate drives several rotations (the knee of Rajagopal's
-        model: up to 1 % at usual speeds) and energy is not conserved. And OpenSim takes the
-            gradient of a MultivariatePolynomialFunction for each column of its Hessian. Without
-            this switch both are right.
-        rolling: let every RollingOnSurfaceConstraint act. OpenSim leaves them off until a program
-            turns them on.
+        opensim_derivatives: whether to reproduce two wrong second derivatives of OpenSim 4.6.
+            First, Simbody differentiates the angular velocity of a CustomJoint as if only its first
+            coordinate drove the first rotation, and only the first two the first two. Accelerations
+            are therefore wrong where one coordinate drives several rotations (for the knee of
+            Rajagopal's model by up to 1 % at usual speeds), and energy is not conserved. Second,
+            OpenSim uses the gradient of a MultivariatePolynomialFunction for each column of its
+            Hessian. Without this option both are correct.
+        rolling: whether every RollingOnSurfaceConstraint acts. OpenSim leaves them off until a
+            program enables them.
+
+    Returns:
+        The mechanism.
 
     Raises:
-        ModelError: something names what does not exist, a joint connects a body with itself or has
-            the wrong number of coordinates, a mass, an inertia, a function is impossible.
-        UnsupportedError: a joint, a constraint, a frame or a function of another class; a loop
-            closed by a FreeJoint or by a joint whose child is ground.
+        ModelError: a reference has no target, a joint connects a body with itself or has the wrong
+            number of coordinates, or a mass, an inertia or a function is impossible.
+        UnsupportedError: a joint, constraint, frame or function is of an unknown class, or a loop
+            is closed by a FreeJoint or by a joint whose child is ground.
     """
     expect_model(model)
     return _Builder(model, opensim_derivatives, rolling).build()
@@ -79,16 +81,16 @@ def build_mechanism(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Edge:
-    """A joint of some kind, with the bodies (or ground) and frames it connects and the places of its coordinates."""
+    """A joint with the bodies (or ground) and frames that it connects."""
 
-    kind: str
-    path: str
-    parent: str
-    child: str
-    parent_frame: Array
-    child_frame: Array
-    motions: tuple[Motion, ...]
-    coordinates: tuple[int, ...]
+    kind: str  # OpenSim's class name
+    path: str  # absolute path of the joint
+    parent: str  # path of the parent body, or of ground
+    child: str  # path of the child body, or of ground
+    parent_frame: Array  # the joint's parent frame in the parent body (4, 4)
+    child_frame: Array  # the joint's child frame in the child body (4, 4)
+    motions: tuple[Motion, ...]  # factors of the joint's transform
+    coordinates: tuple[int, ...]  # indices of its coordinates in the mechanism
 
     def build_mobilizer(self, *, reversed: bool) -> Mobilizer:
         return Mobilizer(
@@ -113,11 +115,13 @@ class _Builder:
         self.constraints: list[Constraint] = []
 
     def build(self) -> Mechanism:
+        # Refuse unknown classes before anything else, with their own messages.
         for component in self.tree.components:
             self._refuse(component)
         for component in self.tree.components:
             if isinstance(component, Body):
                 self.bodies[self.placements.path(component)] = component
+            # All frames are resolved, because forces and geometry refer to them by path.
             if isinstance(component, PhysicalFrame):
                 self.placements.resolve_frame(component)
         edges = [
@@ -155,7 +159,7 @@ class _Builder:
         )
 
     def _refuse(self, component: Component) -> None:
-        """Stop at what would move the bodies differently and is not known."""
+        """Raise an error for an unknown component that would move the bodies differently."""
         if not isinstance(component, Unknown):
             return
         holder, path = self.tree.parent_of(component), self.placements.path(component)
@@ -180,6 +184,7 @@ class _Builder:
             joint, path, opensim_derivatives=self.opensim_derivatives
         )
         first, count = len(self.coordinates), len(coordinates)
+        # The second angle of a ball joint must not start at its singularity.
         middle = {
             motion.coordinates[1] for motion in motions if isinstance(motion, SphericalMotion)
         }
@@ -221,7 +226,11 @@ class _Builder:
         )
 
     def _build_bodies(self, edges: list[_Edge]) -> list[MobileBody]:
-        """The bodies, each with the mobilizer that carries it; welds for the joints that close loops."""
+        """Return the bodies with their mobilizers, and add constraints for joints that close loops.
+
+        Args:
+            edges: joints of the model.
+        """
         ground = self.placements.path(self.model.ground)
         masses = {path: body.mass for path, body in self.bodies.items()}
         joined = {path for edge in edges for path in (edge.parent, edge.child)}
@@ -229,6 +238,7 @@ class _Builder:
             *edges,
             *(self._add_free_joint(path, ground) for path in self.bodies if path not in joined),
         ]
+        # Groups of bodies that no chain of joints connects to ground get one FreeJoint each.
         while True:
             branches, loops = spanning_tree(edges, ground, masses)
             index = {ground: GROUND} | {
@@ -253,6 +263,8 @@ class _Builder:
                 first = FramePlacement(index[edge.parent], edge.parent_frame)
                 second = FramePlacement(index[edge.child], edge.child_frame)
                 self.constraints.append(WeldConstraint(first, second, edge.path))
+                # OpenSim 4.6 carries the child's mass once more by the joint that it has turned
+                # into a constraint.
                 if self.opensim_derivatives:
                     twice = mass_properties(self.bodies[edge.child], edge.child)
                     carried = edge.build_mobilizer(reversed=False)
@@ -270,7 +282,12 @@ class _Builder:
         return bodies
 
     def _add_free_joint(self, body: str, ground: str) -> _Edge:
-        """The joint that OpenSim makes for a body that nothing connects to ground."""
+        """Return the FreeJoint that OpenSim adds for a body without connection to ground.
+
+        Args:
+            body: path of the body.
+            ground: path of ground.
+        """
         name, motions = f"free_{_find_last_body(body)}", MOTIONS["FreeJoint"]
         path, first = f"{self.placements.path(self.model.joint_set)}/{name}", len(self.coordinates)
         for index, motion_type in enumerate(motion_types(motions, 6)):
@@ -280,7 +297,13 @@ class _Builder:
         return _Edge("FreeJoint", path, ground, body, still, still, motions, own_places)
 
     def _split_child(self, edge: _Edge, index: dict[str, int], bodies: list[MobileBody]) -> None:
-        """Let the joint carry a part of its child, and weld that to the rest."""
+        """Split the child of a joint that closes a loop, and weld the parts.
+
+        Args:
+            edge: joint that closes the loop; it carries the new part.
+            index: index of each body, by path.
+            bodies: bodies; the part is appended, and masses are divided.
+        """
         place, whole = index[edge.child], mass_properties(self.bodies[edge.child], edge.child)
         parts = [
             place,
@@ -299,8 +322,8 @@ class _Builder:
         parts.append(len(bodies) - 1)
         share = whole.share(len(parts))
         for part in parts:
-            # OpenSim gives its parts, but for the body itself, the inertia about the origin of 1 kg
-            # of the body.
+            # OpenSim gives all parts but the body itself the inertia about the origin per kg of
+            # body.
             wrong = self.opensim_derivatives and part != place
             inertia = whole.about_origin() / whole.mass if wrong and whole.mass else share.inertia
             bodies[part] = replace(bodies[part], mass_properties=replace(share, inertia=inertia))
@@ -320,21 +343,22 @@ class _Builder:
             if isinstance(constraint, RollingConstraint) and not self.rolling:
                 continue
             self.constraints.append(constraint)
+            # OpenSim's assembly does not penalize the change of a dependent coordinate.
             if isinstance(constraint, Coupler):
                 place = constraint.dependent
                 self.coordinates[place] = replace(self.coordinates[place], yielding=True)
 
 
 RIGHT_ANGLE_GAP = 1e-6
-"""Distance (rad) from 90 degrees at which the second of three angles starts at the nearest."""
+"""Smallest distance (rad) from 90 degrees at which the second of three angles starts."""
 
 
 def avoid_right_angle(angle: float) -> float:
-    """Return an angle (rad) that is at least `RIGHT_ANGLE_GAP` away from 90 and -90 degrees.
+    """Return an angle that is at least `RIGHT_ANGLE_GAP` away from 90 and -90 degrees (rad).
 
-    OpenSim describes ball and free joints by quaternions, which have no singular pose; the rates of
-    three angles are infinite where the second is exactly there. A motion that starts beside it is
-    the same within the gap.
+    OpenSim describes ball and free joints by quaternions, which have no singular pose. The rates of
+    three angles are infinite where the second is exactly a right angle. A motion that starts next
+    to it is the same within the gap.
     """
     gap = 0.5 * pi - abs(angle)
     if abs(gap) >= RIGHT_ANGLE_GAP:
@@ -343,10 +367,14 @@ def avoid_right_angle(angle: float) -> float:
 
 
 def mass_properties(body: Body, path: str) -> MassProperties:
-    """Mass properties of a body of a model.
+    """Return the mass properties of a body of a model.
+
+    Args:
+        body: body.
+        path: its path, for messages.
 
     Raises:
-        ModelError: they are none.
+        ModelError: mass, mass centre or inertia is impossible.
     """
     mass = body.mass
     if not 0.0 <= mass < np.inf:

@@ -1,4 +1,4 @@
-"""What a constraint becomes: a law with integers and numbers."""
+"""Conversion of constraints to records of the kernels: a law with integers and numbers."""
 
 from __future__ import annotations
 
@@ -30,44 +30,49 @@ if TYPE_CHECKING:
     from osimlite.mechanics.multibody.links import Places
 
 Balls = Mapping[tuple[int, ...], int]
-"""By the degrees of freedom of a ball, where the place of its arguments is."""
+"""Offset of the arguments of each ball, by its degrees of freedom."""
 
 
 class ConstraintRecord(NamedTuple):
-    """One constraint."""
+    """Record of one constraint, before it has a position in the vectors."""
 
-    law: str  # its name
-    ints: list[int]  # of its own
-    numbers: list[float]  # of its own
-    equations: int = 1  # how many
-    positions: int = 1  # how many of these, from the first on, bind positions
-    room: int = 0  # length of its room in the work vector
-    room_at: int = -1  # which of its integers is the place of that
+    law: str  # name of its law
+    ints: list[int]  # its own integers
+    numbers: list[float]  # its own numbers
+    equations: int = 1  # number of equations
+    positions: int = 1  # number of these, from the first on, that constrain positions
+    room: int = 0  # length of its workspace
+    room_at: int = -1  # index among its integers of the offset of the workspace
 
 
 class _Vector(NamedTuple):
-    """An axis in a link, or an arm from a point of one link to one of another."""
+    """Axis in a link, or arm from a point of one link to a point of another."""
 
     ints: list[int]
     numbers: list[float]
 
 
 class _Equation(NamedTuple):
-    kind: int
+    kind: int  # PRODUCT, DISTANCE or SLIP
     first: _Vector
     second: _Vector
-    wanted: float = 0.0
+    wanted: float = 0.0  # value of the scalar product (m²) or length (m)
 
 
 def constraint_record(constraint: Constraint, places: Places, balls: Balls) -> ConstraintRecord:
-    """The constraint that keeps up a constraint.
+    """Return the record of a constraint.
+
+    Args:
+        constraint: constraint of the mechanism.
+        places: degrees of freedom and links of the mechanism.
+        balls: offsets of the arguments of balls.
 
     Raises:
-        UnsupportedError: there is no law for it, or for its function.
+        UnsupportedError: there is no law for the constraint or for its function.
     """
     match constraint:
         case Lock():
-            # Every value is right, as long as it stays.
+            # A lock is a prescribed speed of zero without a position equation: any value is right.
             own = _coordinate(constraint.coordinate, places, balls)
             return ConstraintRecord(
                 "prescribe", own, table_of_one(Constant(0.0), constraint.name), positions=0
@@ -102,8 +107,18 @@ def constraint_record(constraint: Constraint, places: Places, balls: Balls) -> C
 
 
 def room_for(equations: int, size: int, entries: int) -> dict[str, int]:
-    """Lengths of the parts of the work vector, by their fields in the record of all constraints."""
+    """Return the lengths of the workspaces of all constraints together.
+
+    Args:
+        equations: number m of equations.
+        size: number n of degrees of freedom.
+        entries: number of stored entries of the mass matrix.
+
+    Returns:
+        Length of each workspace, by the name of its field in `CONSTRAINED`.
+    """
     rows = equations * size
+    # The larger of both solvers' needs: by multipliers, and in the null space.
     by_multipliers, by_directions = 2 * (equations + size), 2 * (equations + size + size * size)
     return {
         "WORK_ROWS": rows,
@@ -129,6 +144,7 @@ def _coupler(constraint: Coupler, places: Places, balls: Balls) -> ConstraintRec
     others = constraint.independent
     table = function_table(constraint.function, f"the function of '{constraint.name}'")
     dependent = _coordinate(constraint.dependent, places, balls)
+    # The 0 is replaced by the offset of the workspace for the gradient.
     ints = [*dependent, 0, len(others), *map(places.freedom, others)]
     for place in others:
         ints += _coordinate(place, places, balls)
@@ -165,8 +181,15 @@ def _arm(places: Places, first: StationPlacement, second: StationPlacement) -> _
 
 
 def _meeting(places: Places, first: StationPlacement, second: StationPlacement) -> list[_Equation]:
-    """No component of an arm along ground's axes is left."""
+    """Return three equations: the arm between two points vanishes along each axis of ground.
+
+    Args:
+        places: degrees of freedom and links of the mechanism.
+        first: first point.
+        second: second point.
+    """
     arm = _arm(places, first, second)
+    # Rates relative to the coincident point keep the equations exact while a small error remains.
     arm.ints[0] = MEETING
     axes = (_Vector([AXIS, GROUND, GROUND], [*axis, 0.0, 0.0, 0.0]) for axis in np.eye(3).tolist())
     return [_Equation(PRODUCT, axis, arm) for axis in axes]
@@ -174,6 +197,8 @@ def _meeting(places: Places, first: StationPlacement, second: StationPlacement) 
 
 def _weld(constraint: b.WeldConstraint, places: Places) -> list[_Equation]:
     (one, inner), (two, outer) = constraint.first, constraint.second
+    # Two frames have the same orientation if each axis of one is perpendicular to the next axis of
+    # the other.
     turns = [
         _Equation(
             PRODUCT,

@@ -1,7 +1,7 @@
-"""Constraints: what forbids some of the motions that the joints allow.
+"""Constraints on coordinates, and the interface of all constraints.
 
-Here are those that speak of coordinates; those between bodies are in
-:mod:`osimlite.mechanics.multibody.body_constraints`. The kernels have their equations, see
+A constraint forbids some of the motions that the joints allow. Constraints between bodies are in
+:mod:`osimlite.mechanics.multibody.body_constraints`. The kernels compute the equations, see
 :mod:`osimlite.mechanics.multibody.constraint_records`.
 """
 
@@ -18,51 +18,63 @@ if TYPE_CHECKING:
 
 
 class Equations(NamedTuple):
-    """m equations at one state, of which the first p bind positions: G u = b for speeds, G udot = c for their rates."""
+    """m equations at one state, the first p of which constrain positions.
 
-    errors: Array  # of positions (p,); their rates are G u - b
+    Speeds fulfil G u = b, and their derivatives G udot = c.
+    """
+
+    errors: Array  # errors of the positions (p,), whose rates are G u - b
     rows: Array  # G (m, n)
     rates: Array  # b (m,)
     drifts: Array  # c (m,)
 
 
 class Constraint(Protocol):
-    """Equations that the coordinates, the generalized speeds and their derivatives fulfil."""
+    """Equations that coordinates, generalized speeds and their derivatives fulfil."""
 
     @property
     def bodies(self) -> tuple[int, ...]:
-        """Indices of the bodies that it speaks of."""
+        """Indices of the bodies in the equations."""
 
     @property
     def coordinates(self) -> tuple[int, ...]:
-        """Indices of the coordinates that it speaks of."""
+        """Indices of the coordinates in the equations."""
         return ()
 
     @property
     def name(self) -> str:
-        """What the constraint is called in messages."""
+        """Name of the constraint in messages."""
 
     def position_errors(self, state: Kinematics) -> Array:
-        """Return e (p,), which is zero where the constraint holds; its rate is G u - b of the first p rows below."""
+        """Return the errors of the positions (p,), which are zero where the constraint holds."""
         return state.equations(self).errors
 
     def velocity_equations(self, state: Kinematics) -> tuple[Array, Array]:
-        """Return G (m, n) and b (m,) with G u = b; m > p if some equations bind only the speeds."""
+        """Return the equations of the speeds.
+
+        Returns:
+            G (m, n) and b (m,) with G u = b; m > p if some equations constrain only the speeds.
+        """
         equations = state.equations(self)
         return equations.rows, equations.rates
 
     def acceleration_equations(self, state: Kinematics) -> tuple[Array, Array]:
-        """Return G (m, n) and b (m,) with G udot = b."""
+        """Return the equations of the accelerations.
+
+        Returns:
+            G (m, n) and c (m,) with G udot = c.
+        """
         equations = state.equations(self)
         return equations.rows, equations.drifts
 
 
 @dataclass(frozen=True)
 class Lock(Constraint):
-    """Holds one coordinate where it is.
+    """Keeps the value of one coordinate constant.
 
-    It acts on the value of the coordinate, not on its speed: a locked angle of a ball joint stands
-    still, whichever angular velocities that takes. Every value is right, as long as it stays.
+    It acts on the value of the coordinate, not on its speed: a locked angle of a ball joint does
+    not change, whatever angular velocity this requires. Any value is accepted as long as it stays
+    constant.
     """
 
     bodies: ClassVar[tuple[int, ...]] = ()
@@ -71,13 +83,16 @@ class Lock(Constraint):
 
     @property
     def coordinates(self) -> tuple[int, ...]:
-        """The one that is locked."""
+        """Index of the locked coordinate."""
         return (self.coordinate,)
 
 
 @dataclass(frozen=True)
 class Prescribed(Constraint):
-    """Makes one coordinate follow a function of time (s): the error is the coordinate minus the function."""
+    """Makes one coordinate follow a function of time (s).
+
+    The error is the coordinate minus the function.
+    """
 
     bodies: ClassVar[tuple[int, ...]] = ()
     coordinate: int
@@ -86,13 +101,16 @@ class Prescribed(Constraint):
 
     @property
     def coordinates(self) -> tuple[int, ...]:
-        """The one that is prescribed."""
+        """Index of the prescribed coordinate."""
         return (self.coordinate,)
 
 
 @dataclass(frozen=True)
 class Coupler(Constraint):
-    """Makes one coordinate a function of others: the error is the function minus the dependent coordinate."""
+    """Makes one coordinate a function of others.
+
+    The error is the function minus the dependent coordinate.
+    """
 
     bodies: ClassVar[tuple[int, ...]] = ()
     dependent: int
@@ -102,5 +120,5 @@ class Coupler(Constraint):
 
     @property
     def coordinates(self) -> tuple[int, ...]:
-        """Those that others follow, and the one that follows."""
+        """Indices of the independent coordinates, then of the dependent one."""
         return (*self.independent, self.dependent)

@@ -36,19 +36,22 @@ if TYPE_CHECKING:
 
 
 LARGEST = 1e100
-"""Numbers beyond this, in SI units, are not computed with, nor inertias below its inverse: their squares overflow."""
+"""Largest number, in SI units, in the equations of motion; the squares of larger ones overflow.
+
+The inverse of it bounds inertias from below.
+"""
 
 
 class Wrench(NamedTuple):
-    """A force (N) on a body at its origin and a torque (N·m) about it, both (3,) along ground's axes."""
+    """Force on a body at its origin and torque about it, both (3,) along the axes of ground."""
 
-    force: Sequence[float] | Array
-    torque: Sequence[float] | Array
+    force: Sequence[float] | Array  # N
+    torque: Sequence[float] | Array  # N m
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MassCentres:
-    """The b bodies of a mechanism at one state, seen from their mass centres, along ground's axes."""
+    """Mass centres of the b bodies of a mechanism at one state, along the axes of ground."""
 
     state: Kinematics
     masses: Array  # (b,), kg
@@ -56,38 +59,44 @@ class MassCentres:
 
     @classmethod
     def of(cls, state: Kinematics) -> MassCentres:
-        """See a mechanism at `state` from its mass centres."""
+        """Return the mass centres of a state."""
         masses, centres, _ = state.mechanism.inertial
         return cls(state, masses, (state.rotations[:-1] @ centres[:, :, None])[:, :, 0])
 
     def positions(self) -> Array:
-        """The mass centres in ground (b, 3)."""
+        """Return the positions of the mass centres in ground (b, 3), in m."""
         return self.state.origins[:-1] + self.arms
 
     def velocities(self) -> Array:
-        """The velocities of the mass centres in ground (b, 3)."""
+        """Return the velocities of the mass centres in ground (b, 3), in m/s."""
         w, v = np.split(self.state.velocities[:-1], 2, axis=1)
         return v + np.cross(w, self.arms)
 
     def kinetic_energy(self) -> float:
-        """Kinetic energy (J)."""
+        """Return the kinetic energy (J), of translation and rotation of all bodies."""
         w, v = self.state.velocities[:-1, :3], self.velocities()
         return 0.5 * float(np.sum(w * self._spins()) + np.sum(self.masses[:, None] * v * v))
 
     def momentum(self) -> tuple[Array, Array]:
-        """Linear momentum (3,) in kg·m/s, and angular momentum (3,) about ground's origin in kg·m²/s."""
+        """Return the momentum of all bodies.
+
+        Returns:
+            Linear momentum (3,) in kg m/s, and angular momentum (3,) about the origin of ground in
+            kg m²/s.
+        """
         linear = self.masses[:, None] * self.velocities()
         return linear.sum(axis=0), (self._spins() + np.cross(self.positions(), linear)).sum(axis=0)
 
     def _spins(self) -> Array:
-        """The angular momenta of the bodies about their mass centres (b, 3)."""
+        """Return the angular momenta of the bodies about their mass centres (b, 3), in kg m²/s."""
         turned = self.state.rotations[:-1]
+        # Inertias are stored along body axes: R I Rᵀ along those of ground.
         inertias = turned @ self.state.mechanism.inertial[2] @ turned.transpose(0, 2, 1)
         return (inertias @ self.state.velocities[:-1, :3, None])[:, :, 0]
 
 
 def mass_matrix(state: Kinematics) -> Array:
-    """M (n, n) of the kinetic energy ½ uᵀ M u."""
+    """Return the mass matrix M (n, n) of the kinetic energy uᵀ M u / 2."""
     program, data = state.program, _load_inertias(state, np.zeros(3))
     with check_finite(data):
         composite_rigid_body(program.model, data, make_floats([0.0] * len(state.q)))
@@ -95,17 +104,30 @@ def mass_matrix(state: Kinematics) -> Array:
 
 
 def missing_forces(state: Kinematics, udot: Array, gravity: Array) -> Array:
-    """Generalized forces (n,) that give the speeds the derivatives `udot` (n,) against `gravity` (3,)."""
+    """Return the generalized forces (n,) that give the speeds the derivatives `udot`.
+
+    Args:
+        state: state.
+        udot: derivatives of the speeds (n,).
+        gravity: acceleration of gravity in ground (3,), m/s².
+    """
     program = state.program
     model, udots = program.model, make_floats(udot[program.order].tolist())
     data, missing = _load_inertias(state, gravity, udots), make_floats([0.0] * len(udot))
     with check_finite(data):
         add_generalized_forces(model, data, missing)
+    # The kernel computes loads without `udot`, so what is missing has the opposite sign.
     return -np.array(missing)[program.freedoms]
 
 
 def _load_inertias(state: Kinematics, gravity: Array, udot: Floats | None = None) -> Floats:
-    """The work vector with the inertias of the links, and the wrenches that are missing for their accelerations."""
+    """Return the work vector with inertias of the links and the inertial wrenches.
+
+    Args:
+        state: state.
+        gravity: acceleration of gravity in ground (3,), m/s².
+        udot: derivatives of the speeds, by degrees of freedom; None for zero.
+    """
     model, reals, data = (
         state.program.model,
         state.program.reals,
@@ -114,7 +136,7 @@ def _load_inertias(state: Kinematics, gravity: Array, udot: Floats | None = None
     with check_finite(data):
         for link in range(model[MODEL.LINKS]):
             acceleration = link_work(model, data, link)[LINK_WORK.ACCELERATION + 3 :]
-            # In place of gravity, links are pushed upwards.
+            # An upward acceleration of all links has the same effect as gravity.
             for k, part in enumerate(gravity.tolist()):
                 acceleration[k] -= part
         if udot is not None:
@@ -124,14 +146,19 @@ def _load_inertias(state: Kinematics, gravity: Array, udot: Floats | None = None
 
 
 def accelerations(state: Kinematics, applied: Array) -> Array:
-    """Derivatives of the speeds (n,) under gravity, `applied` generalized forces (n,) and the constraints.
+    """Return the derivatives of the speeds (n,) under gravity, forces and constraints.
 
-    Equations that follow from others or contradict them are fulfilled in the sense of least
-    squares. Where the mass matrix cannot be divided by, the motion is solved for in the null space
-    of the constraints: they may drive what has no mass.
+    Redundant and contradictory equations are fulfilled in the least-squares sense. Where the mass
+    matrix is singular, the motion is solved for in the null space of the constraints, since these
+    may drive a coordinate that moves no mass.
+
+    Args:
+        state: state.
+        applied: applied generalized forces (n,).
 
     Raises:
-        SimulationError: a motion that nothing forbids moves no mass, or something is no number.
+        SimulationError: a motion that the constraints allow moves no mass, or a number is not
+            finite.
     """
     program, mechanism, size = state.program, state.mechanism, len(state.q)
     model, data = program.model, _load_inertias(state, mechanism.gravity)
@@ -162,8 +189,12 @@ def accelerations(state: Kinematics, applied: Array) -> Array:
 def require_numbers(mechanism: Mechanism, *arrays: Array) -> None:
     """Check arrays of the equations of motion.
 
+    Args:
+        mechanism: mechanism, for the message.
+        arrays: arrays to check.
+
     Raises:
-        SimulationError: an entry is not finite, or too large to be computed with.
+        SimulationError: an entry is not finite, or larger than LARGEST.
     """
     if not all((np.abs(array) < LARGEST).all() for array in arrays):
         raise SimulationError(
@@ -173,10 +204,10 @@ def require_numbers(mechanism: Mechanism, *arrays: Array) -> None:
 
 
 def describe_massless_motion(coordinate: str) -> SimulationError:
-    """The error of a motion that can be as fast as it likes.
+    """Return the error of a motion that moves no mass.
 
     Args:
-        coordinate: name of the one that moves most in it.
+        coordinate: name of the coordinate that moves most in it.
     """
     return SimulationError(
         f"coordinate '{coordinate}' moves no mass, or a negative inertia, or its axis lies in this pose along another "
@@ -185,9 +216,16 @@ def describe_massless_motion(coordinate: str) -> SimulationError:
 
 
 def _name_of_massless(mechanism: Mechanism, matrix: Array, rows: Array) -> str:
-    """Name of the coordinate that moves most in the motion which moves least, of those that `rows` (m, n) allow."""
+    """Return the name of the coordinate that moves most in the motion with the least inertia.
+
+    Args:
+        mechanism: mechanism.
+        matrix: mass matrix (n, n).
+        rows: matrix G of the constraint equations (m, n); only motions with G u = 0 count.
+    """
     _, free = solve_with_null_space(rows, np.zeros(len(rows)))
     matrix = free.T @ matrix @ free
+    # Scale the matrix, so that metres and radians are comparable.
     scale = np.sqrt(np.where(matrix.diagonal() > 0.0, matrix.diagonal(), 1.0))
     _, vectors = np.linalg.eigh(matrix / np.outer(scale, scale))
     motion = free @ (vectors[:, 0] / scale)

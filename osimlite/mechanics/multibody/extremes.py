@@ -1,4 +1,4 @@
-"""Numbers that no computation is meant for: nothing that they lead to is a warning or an error of numpy's."""
+"""Computation with extreme numbers of a model, without warnings and exceptions of numpy."""
 
 from __future__ import annotations
 
@@ -17,16 +17,18 @@ P = ParamSpec("P")
 R = TypeVar("R")
 C = TypeVar("C", bound=type)
 
-_LEAST, _MOST = 1e-100, 1e25
-"""Sizes of numbers that models have; what is beyond is named where something cannot be computed."""
+_LEAST = 1e-100
+"""Smallest usual size of a number of a model that is not 0."""
+_MOST = 1e25
+"""Largest usual size of a number of a model; messages name numbers beyond these sizes."""
 
 
 def any_numbers(function: Callable[P, R]) -> Callable[P, R]:
-    """Let a function compute with whatever numbers a model has.
+    """Return a function that computes with any numbers of a model.
 
-    What overflows is infinite, or no number, without a warning; whoever needs it finite checks
-    that. Where equations have no solution then, there is a ModelError, which names the most extreme
-    number of a model among the arguments.
+    Overflow gives infinite or undefined numbers without a warning; callers that need finite ones
+    check for them. Where equations then have no solution, the function raises a ModelError, which
+    names the most extreme number of a model among the arguments.
     """
 
     @wraps(function)
@@ -35,6 +37,7 @@ def any_numbers(function: Callable[P, R]) -> Callable[P, R]:
             with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
                 return function(*values, **named)
         except (ArithmeticError, ValueError) as fault:
+            # Errors of osimlite have messages for users; others come from the arithmetic.
             is_meant = isinstance(fault, OsimliteError)
             is_numeric = (
                 isinstance(fault, ArithmeticError | np.linalg.LinAlgError) or str(fault) in _OF_MATH
@@ -57,7 +60,7 @@ _OF_MATH = {"math domain error", "math range error", "cannot convert float NaN t
 
 
 def methods_of_any_numbers(cls: C) -> C:
-    """Let all public methods of a class compute with whatever numbers a model has."""
+    """Wrap all public methods of a class by `any_numbers`."""
     for name, method in [*vars(cls).items()]:
         if callable(method) and not name.startswith("_"):
             setattr(cls, name, any_numbers(method))
@@ -65,7 +68,7 @@ def methods_of_any_numbers(cls: C) -> C:
 
 
 def find_extreme_number(model: Model) -> str:
-    """The number of a model that is furthest from what models have, with its place; empty if all are usual."""
+    """Return the most extreme number of a model with its component, empty if all are usual."""
     tree = model.tree()
     result = [
         (size, f"{name} of '{tree.path_of(component)}', {number:g},")
@@ -77,7 +80,7 @@ def find_extreme_number(model: Model) -> str:
 
 
 def _size(number: float) -> float:
-    """How far beyond what is usual a number is, 0 for one that is not."""
+    """Return the ratio by which a number is beyond the usual sizes, 0 for a usual one."""
     if not isfinite(number):
         return np.inf
     size = abs(number)
@@ -85,10 +88,10 @@ def _size(number: float) -> float:
 
 
 def _list_numbers(component: Component) -> Iterator[tuple[str, float]]:
-    """Every number of a component, and of what it holds that is no component."""
+    """List the numbers of a component, and of its parts that are not components."""
     for name, info in type(component).model_fields.items():
         held: Any = getattr(component, name)
-        # That some defaults are infinite is as it should be.
+        # Some defaults are infinite, and correct.
         pending = [] if held == info.default else [held]
         while pending:
             value = pending.pop()

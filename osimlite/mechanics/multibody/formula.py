@@ -1,12 +1,12 @@
-"""Formulas of expression-based forces.
+"""Reader of formulas of expression-based forces.
 
 The grammar is that of Lepton, which OpenSim uses: numbers, variables, + - * / ^, parentheses,
-functions, and after semicolons definitions ``name = formula`` that the text before them may use. ^
-binds most closely and from the right, a sign less closely than ^ and more closely than *. White
-space means nothing.
+functions, and after semicolons definitions ``name = formula`` for the text before them. ^ binds
+most closely and from the right; a sign binds less closely than ^ and more closely than *. White
+space is ignored.
 
-As Lepton does, a formula is simplified as it is read: ``0*x`` is 0, ``x-x`` is 0 and ``x/x`` is 1,
-whatever x is. What drops out may be NaN, or a name that nothing has.
+As in Lepton, a formula is simplified while it is read: ``0*x`` is 0, ``x-x`` is 0 and ``x/x`` is 1,
+whatever x is. What is simplified away may be NaN, or an unknown name.
 """
 
 from __future__ import annotations
@@ -54,12 +54,12 @@ DERIVATIVES = {
     "reciprocal": ("-1/(x*x)",),
     "magnitude": ("2*step(x)-1",),
 }
-"""The derivatives of a law by its arguments x and y; steps have none."""
+"""Derivatives of each law by its arguments x and y; step functions have none."""
 
 LAWS = {"/": "divide", "^": "power"}
-"""The law for a sign, where that is not called like it."""
+"""Name of the law of a sign, where it is not the sign itself."""
 _UNKNOWN = "unknown"
-"""The law of a step that stands for a name that nothing has."""
+"""Law of a step that stands for an unknown name."""
 _SIGNS: dict[str, Callable[..., float]] = {
     "+": lambda a, b: a + b,
     "-": lambda a, b: a - b,
@@ -67,8 +67,11 @@ _SIGNS: dict[str, Callable[..., float]] = {
     "negative": lambda a: -a,
 }
 PRECEDENCE = {"+": 0, "-": 0, "*": 1, "/": 1, "^": 3}
-SIGN, OPEN = 2, -1
-"""Of a sign before an operand, and of what only a parenthesis closes."""
+"""Precedence of each operator; a higher one binds more closely."""
+SIGN = 2
+"""Precedence of a sign before an operand."""
+OPEN = -1
+"""Precedence of a parenthesis, which only its end closes."""
 
 _TOKEN = re.compile(
     r"(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)|(?P<name>[^-+*/^(),\d.][^-+*/^(),]*)|(?P<sign>.)"
@@ -76,20 +79,19 @@ _TOKEN = re.compile(
 
 
 class Step(NamedTuple):
-    """One number of a formula."""
+    """One operation of a formula, which fills one register."""
 
     law: str  # "number", "negative", "+", "-", "*", or the name of a law
-    arguments: tuple[int, ...] = ()  # registers that it is applied to
-    value: float = 0.0  # the number, if it is one
+    arguments: tuple[int, ...] = ()  # registers of the operands
+    value: float = 0.0  # value of a number
 
 
 @dataclass(frozen=True)
 class Formula:
-    """A formula as a list of steps, so that neither its length nor its depth has a limit."""
+    """Formula as a list of steps, so that neither its length nor its depth has a limit."""
 
-    variables: tuple[str, ...]  # names of what it is computed from, in the first registers
-    # each gives the number of the next register; the last one gives the result
-    steps: tuple[Step, ...]
+    variables: tuple[str, ...]  # names of the variables, which are in the first registers
+    steps: tuple[Step, ...]  # each fills the next register; the last one gives the result
 
     @classmethod
     def parse(cls, text: str, variables: Sequence[str], where: str) -> Formula:
@@ -97,16 +99,17 @@ class Formula:
 
         Args:
             text: the formula.
-            variables: names it may use.
-            where: the path and property it stands in, for messages.
+            variables: names that it may use.
+            where: path and property of the formula, for messages.
 
         Raises:
-            UnknownVariableError: it needs a variable that there is not.
-            ModelError: it is no formula.
+            UnknownVariableError: it needs an unknown variable.
+            ModelError: the text is no formula.
         """
         main, *definitions = re.sub(r"\s", "", text).split(";")
         reader = _Reader(variables)
         try:
+            # A definition may use those after it, so that the last one is read first.
             for definition in reversed([item for item in definitions if item]):
                 name, equals, body = definition.partition("=")
                 if not name or not equals:
@@ -119,12 +122,20 @@ class Formula:
         return cls(tuple(variables), steps)
 
     def derivative(self, variable: int) -> Formula:
-        """The derivative by one of the variables."""
+        """Return the derivative by one of the variables.
+
+        Forward differentiation: each step adds the products of its partial derivatives and the
+        derivatives of its arguments.
+
+        Args:
+            variable: index of the variable.
+        """
         reader = _Reader(self.variables)
         reader.append_steps(self.steps)
         first = len(self.variables)
         derivatives = {variable: reader.add("number", value=1.0)}
         for index, step in enumerate(self.steps, start=first):
+            # The rules are formulas in x and y, which are the registers of the arguments here.
             reader.known = dict(zip("xy", step.arguments, strict=False))
             for argument, rule in zip(step.arguments, DERIVATIVES.get(step.law, ()), strict=False):
                 if argument in derivatives:
@@ -142,40 +153,45 @@ class Formula:
 
 
 class UnknownVariableError(ModelError):
-    """A formula can be read and names a variable that there is not."""
+    """Error of a formula that can be read but contains an unknown variable."""
 
 
 class _Wrong(Exception):
-    """What is wrong with a formula."""
+    """Error of a formula, without its position in the model."""
 
 
 class _UnknownName(_Wrong):
-    """A formula needs a name that nothing has."""
+    """Error of a formula that needs an unknown name."""
 
 
 def _compute(law: str, *numbers: float | None) -> float:
-    """Return what a law gives for numbers."""
+    """Return the result of a law for numbers.
+
+    Args:
+        law: sign or name of a law.
+        numbers: its arguments.
+    """
     return float((_SIGNS.get(law) or getattr(formulas, law))(*numbers))
 
 
 class _Waiting(NamedTuple):
-    """What waits for an operand: a law of one or two numbers, or what a parenthesis opened."""
+    """Operation that waits for an operand: a law of one or two numbers, or an open parenthesis."""
 
     law: str
     precedence: int
     before: int
-    """Count of the operands that were there before its own."""
+    """Number of operands before its own."""
     name: str = ""
-    """Of the function, if it is a call."""
+    """Name of the function, if it is a call."""
 
 
 class _Reader:
-    """Reads formulas of the same variables, with a stack of operands and one of what waits for them.
+    """Reader of formulas of the same variables, with a stack of operands and one of operations.
 
     Attributes:
         known: registers of the names that may be used.
-        unknown: names that were used and that nothing has.
-        steps: of all formulas so far.
+        unknown: unknown names that were used.
+        steps: steps of all formulas so far.
     """
 
     def __init__(self, variables: Sequence[str]) -> None:
@@ -190,7 +206,13 @@ class _Reader:
         self._waiting: list[_Waiting] = []
 
     def add(self, law: str, *arguments: int, value: float = 0.0) -> int:
-        """Add a step, or what is simpler and as good, and return its register."""
+        """Add a step, or a simpler one with the same result, and return its register.
+
+        Args:
+            law: law of the step.
+            arguments: registers of the operands.
+            value: value of a number.
+        """
         if law in ("number", _UNKNOWN):
             return self._append(law, value=value)
         constants = [self._constant(argument) for argument in arguments]
@@ -207,11 +229,13 @@ class _Reader:
             self.steps.append(step)
 
     def ending_with(self, result: int) -> tuple[Step, ...]:
-        """Return the steps that a result needs, of which the last gives it.
+        """Return the steps that a result needs; the last one gives it.
+
+        Args:
+            result: register of the result.
 
         Raises:
-            _Wrong: one of them stands for a name that nothing has, or is NaN whatever the variables
-                are.
+            _Wrong: a step stands for an unknown name, or is NaN for all values of the variables.
         """
         needed, waiting = set[int](), [result]
         while waiting:
@@ -229,12 +253,18 @@ class _Reader:
                 step._replace(arguments=tuple(places[argument] for argument in step.arguments))
             )
         if not steps:
-            # The result is a variable, and the last step has to give it.
+            # The result is a variable, but a formula ends with a step: add 0.
             steps = [Step("number"), Step("+", (result, self._first))]
         return tuple(steps)
 
     def _append(self, law: str, *arguments: int, value: float = 0.0) -> int:
-        """Add a step, unless there is the same, and return its register."""
+        """Add a step unless the same one exists, and return its register.
+
+        Args:
+            law: law of the step.
+            arguments: registers of the operands.
+            value: value of a number.
+        """
         step = Step(law, arguments, value)
         if step not in self._registers:
             self._registers[step] = self._first + len(self.steps)
@@ -242,7 +272,10 @@ class _Reader:
         return self._registers[step]
 
     def _derive(self, value: float) -> int:
-        """Return the register of a number that a rule gives, apart from those that are written."""
+        """Return the register of a number that a rule gives.
+
+        Such numbers are distinguished from written ones, to which Lepton applies no rules.
+        """
         if value not in self._numbers:
             self._numbers[value] = self._first + len(self.steps)
             self._derived.add(self._numbers[value])
@@ -265,18 +298,28 @@ class _Reader:
         return step.value if step.law == "number" else None
 
     def _argument(self, law: str, register: int) -> int | None:
-        """Return the register that a law of one number is applied to, None if a register is of another law."""
+        """Return the argument of a step of one law, None for a step of another law.
+
+        Args:
+            law: law of one number.
+            register: register of the step.
+        """
         step = self._step(register)
         return step.arguments[0] if step.law == law else None
 
     def _factor_of_multiple(self, register: int) -> tuple[float, int] | None:
-        """Return the factor and the register of a multiple, None if it is none."""
+        """Return the factor and the register of a multiple, None for another step."""
         step = self._step(register)
         factor = self._constant(step.arguments[0]) if step.law == "*" else None
         return None if factor is None else (factor, step.arguments[1])
 
     def _scale(self, factor: float, register: int) -> int:
-        """Return the register of a multiple; a multiple of a multiple has one factor."""
+        """Return the register of a multiple; a multiple of a multiple has one factor.
+
+        Args:
+            factor: factor.
+            register: register of the multiplied step.
+        """
         inner = self._factor_of_multiple(register)
         if inner is not None:
             factor, register = factor * inner[0], inner[1]
@@ -287,7 +330,13 @@ class _Reader:
     def _simplify(
         self, law: str, arguments: Sequence[int], constants: Sequence[float | None]
     ) -> int:
-        """Add a step of which not all arguments are numbers, by the rules of Lepton's optimizer."""
+        """Add a step with an argument that is not a number, by the rules of Lepton's optimizer.
+
+        Args:
+            law: law of the step.
+            arguments: registers of the operands.
+            constants: values of operands that are numbers, else None.
+        """
         match law:
             case "+":
                 return self._add_up(*arguments, *constants)
@@ -301,6 +350,7 @@ class _Reader:
                 return self._raise(*arguments, *constants)
             case "negative":
                 return self._negate(*arguments)
+            # Lepton's rule: the root of a square is the absolute value.
             case "square_root" if (inner := self._argument("square", arguments[0])) is not None:
                 return self._append("magnitude", inner)
             case "square" if (inner := self._argument("square_root", arguments[0])) is not None:
@@ -312,6 +362,7 @@ class _Reader:
             return two
         if second == 0.0:
             return one
+        # Lepton puts the constant first.
         if second is not None:
             return self._append("+", two, one)
         if first is None:
@@ -412,7 +463,10 @@ class _Reader:
         return self._append("negative", one)
 
     def _expect_meaning(self, step: Step) -> None:
-        """Refuse a step that stands for an unknown name, or for NaN: Lepton then never ends to simplify."""
+        """Raise an error for a step without meaning.
+
+        Lepton does not terminate for NaN.
+        """
         if step.law == _UNKNOWN:
             word = self.unknown[int(step.value)]
             near = suggest_name(word, self.known)
@@ -424,7 +478,11 @@ class _Reader:
             raise _Wrong("a part of it without variables is not a number, such as 0/0; remove it")
 
     def read(self, text: str) -> int:
-        """The register of a formula."""
+        """Read a formula and return the register of its result.
+
+        Raises:
+            _Wrong: the text is no formula.
+        """
         called, wants_operand = "", True
         for token in _TOKEN.finditer(text):
             word = token.group()
@@ -439,7 +497,7 @@ class _Reader:
                 self._operands.append(self._number_of(token))
                 wants_operand = False
             elif not wants_operand and word in PRECEDENCE:
-                # ^ takes what stands right of it first, the others what stands left.
+                # ^ is applied from the right, so it waits for a following ^; the others do not.
                 self._apply(PRECEDENCE[word] + (word == "^"))
                 self._wait(LAWS.get(word, word), PRECEDENCE[word], 1)
                 wants_operand = True
@@ -459,7 +517,7 @@ class _Reader:
         if token["number"]:
             return self.add("number", value=float(word))
         if word not in self.known:
-            # It may drop out, or be in a definition that nothing uses.
+            # It may be simplified away, or be in an unused definition.
             if word not in self.unknown:
                 self.unknown.append(word)
             return self.add(_UNKNOWN, value=float(self.unknown.index(word)))
@@ -474,7 +532,7 @@ class _Reader:
         self._wait(FUNCTIONS.get(called, ""), OPEN, 0, called)
 
     def _apply(self, least: int) -> None:
-        """Apply what binds at least as closely as this to the operands it waits for."""
+        """Apply all waiting operations that bind at least as closely as a precedence."""
         while self._waiting and self._waiting[-1].precedence >= least:
             self._take(self._waiting.pop())
 
@@ -483,7 +541,7 @@ class _Reader:
         self._operands[waiting.before :] = [self.add(waiting.law, *arguments)]
 
     def _end_part(self, sign: str) -> bool:
-        """End an argument or a parenthesis; whether another operand must follow."""
+        """End an argument or a parenthesis, and return whether another operand must follow."""
         self._apply(0)
         if not self._waiting or (sign == "," and not self._waiting[-1].name):
             raise _Wrong(f"there is an unexpected '{sign}'; remove it")
@@ -499,7 +557,14 @@ class _Reader:
 
 
 def program(formula: Formula) -> tuple[list[int], list[float]]:
-    """Steps and constants of a formula, as `compute` takes them."""
+    """Return a formula as the kernels need it.
+
+    Args:
+        formula: the formula.
+
+    Returns:
+        Operation and two registers of each step, and the constants, see `programs.run_program`.
+    """
     steps: list[int] = []
     constants: list[float] = []
     for step in formula.steps:

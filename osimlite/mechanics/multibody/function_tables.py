@@ -1,4 +1,7 @@
-"""Functions as tables of numbers, which the kernels evaluate; see :mod:`osimlite.mechanics.kernels.functions`."""
+"""Tables of functions, by which the kernels evaluate them.
+
+The format is described in :mod:`osimlite.mechanics.kernels.functions`.
+"""
 
 from __future__ import annotations
 
@@ -10,10 +13,14 @@ from osimlite.mechanics.multibody import functions as f
 
 
 def function_table(function: f.Function, where: str) -> list[float]:
-    """The table of a function of coordinates.
+    """Return the table of a function of coordinates.
+
+    Args:
+        function: the function.
+        where: its description for messages.
 
     Raises:
-        UnsupportedError: there is none.
+        UnsupportedError: the kernels cannot evaluate it.
     """
     return _has_table(f.table_at_knots(function), function, where)
 
@@ -28,14 +35,18 @@ def _has_table(table: list[float], function: f.Function, where: str) -> list[flo
 
 
 def table_of_one(function: f.Function, where: str) -> list[float]:
-    """The table of a function of one number, for `value_at`.
+    """Return the table of a function of one number, for `functions.evaluate_function`.
+
+    Args:
+        function: the function.
+        where: its description for messages.
 
     Raises:
-        ModelError: one of its numbers is not finite.
-        UnsupportedError: there is no kind for it.
+        ModelError: a number of the function is not finite.
+        UnsupportedError: the kernels cannot evaluate it.
     """
     table = _table_of_one(function, where)
-    # A sum that is finite has finite parts only.
+    # The sum of finite numbers may overflow, hence the second test.
     if not isfinite(sum(table)) and not all(map(isfinite, table)):
         raise ModelError(f"{where} has a number that is not finite; give one that is")
     return table
@@ -46,6 +57,7 @@ def _table_of_one(function: f.Function, where: str) -> list[float]:
         kind, factor, *rest = _table_of_one(function.function, where)
         return [kind, function.scale * factor, *rest]
     if isinstance(function, f.WeightedSum):
+        # Functions of several numbers are written as polynomials of one.
         function = f.Linear(function.weights[0], function.start)
     elif isinstance(function, f.MultivariatePolynomial):
         coefficients = [0.0] * (1 + max(power for (power,) in function.powers))

@@ -1,6 +1,6 @@
-"""Functions of coordinates with first and second derivatives, as joints and constraints need them.
+"""Functions of coordinates with first and second derivatives, for joints and constraints.
 
-They are OpenSim's functions of the same names, and the kernels evaluate them.
+They are OpenSim's functions of the same names. The kernels evaluate them by tables.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ Evaluated = tuple[float, list[float], list[list[float]]]
 
 
 class Function(ABC):
-    """A twice differentiable function of one or several numbers."""
+    """Twice differentiable function of one or several numbers."""
 
     @abstractmethod
     def evaluate(self, arguments: Arguments) -> Evaluated:
@@ -45,35 +45,42 @@ class Function(ABC):
 
     @property
     def table(self) -> Sequence[float]:
-        """The numbers by which the kernels know it, see :mod:`osimlite.mechanics.kernels.functions`; empty if they do not."""
+        """Numbers by which the kernels evaluate the function; empty if they cannot.
+
+        See :mod:`osimlite.mechanics.kernels.functions`.
+        """
         return ()
 
     @property
     def slope(self) -> float | None:
-        """The constant slope of a linear function of one argument, None for every other function."""
+        """Constant slope of a linear function of one argument, None for any other function."""
         return None
 
 
 class Univariate(Function):
-    """A function of one number."""
+    """Function of one number."""
 
     @property
     @abstractmethod
     def table(self) -> Sequence[float]:
-        """The numbers by which the kernels know it."""
+        """Numbers by which the kernels evaluate the function."""
 
     def evaluate(self, arguments: Arguments) -> Evaluated:
-        """Value, first and second derivative at the one argument."""
+        """Return the value, the first and the second derivative at the one argument."""
         value, first, second = self.derivatives(float(arguments[0]))
         return value, [first], [[second]]
 
     def derivatives(self, x: float) -> tuple[float, float, float]:
-        """Value, first and second derivative at `x`, all three as plain numbers; NaN where `x` is not finite."""
+        """Return the value and derivatives at a number.
+
+        Returns:
+            Value, first and second derivative as plain floats; NaN if `x` is not finite.
+        """
         numbers: Any = memoryview(self._numbers)
         try:
             return evaluate_function(numbers, x) if math.isfinite(x) else _NOTHING
         except ValueError:
-            # The sine of what is too large for a float.
+            # Python's sine raises ValueError for infinite arguments, to which a factor may lead.
             return _NOTHING
 
     @cached_property
@@ -82,15 +89,19 @@ class Univariate(Function):
 
 
 class Multivariate(Function):
-    """A sum of products of powers of several numbers."""
+    """Sum of products of powers of several numbers."""
 
     @property
     @abstractmethod
     def table(self) -> Sequence[float]:
-        """The numbers by which the kernels know it."""
+        """Numbers by which the kernels evaluate the function."""
 
     def evaluate(self, arguments: Arguments) -> Evaluated:
-        """Value, gradient (k,) and Hessian (k, k)."""
+        """Return the value, the gradient (k,) and the Hessian (k, k).
+
+        The kernel gives second derivatives by time for rates of the arguments; each entry of the
+        Hessian follows from the rates of one or two arguments.
+        """
         size = len(arguments)
         places: Any = range(size)
         given, table, gradient = (
@@ -100,7 +111,7 @@ class Multivariate(Function):
         )
 
         def at_rates(*moving: int) -> tuple[float, float]:
-            """Value, and second derivative while some arguments change by 1."""
+            """Return the value, and its second derivative while some arguments change by 1."""
             rates = make_floats([float(k in moving) for k in places])
             value, _, curvature = evaluate_monomials(size, places, table, given, rates, gradient)
             return value, curvature
@@ -109,18 +120,30 @@ class Multivariate(Function):
         for k in places:
             hessian[k][k] = at_rates(k)[1]
         for one, two in combinations(places, 2):
+            # The mixed entry is half of what both rates give together beyond each alone.
             both = at_rates(one, two)[1] - hessian[one][one] - hessian[two][two]
             hessian[one][two] = hessian[two][one] = 0.5 * both
         return value, list(gradient), hessian
 
 
 def make_floats(numbers: Arguments | bytes) -> Any:
-    """Numbers in a row, for kernels that run as Python: they are read one by one sooner than those of an array."""
+    """Return numbers in a buffer for kernels that run as Python.
+
+    Single entries of it are read faster than those of an array.
+    """
     return memoryview(array("d", numbers))
 
 
 def make_zero_derivatives(size: int, value: float = 0.0) -> Evaluated:
-    """What a function of `size` numbers evaluates to that does not change with them."""
+    """Return the value and zero derivatives of a function of `size` constant arguments.
+
+    Args:
+        size: number k of arguments.
+        value: value.
+
+    Returns:
+        Value, gradient (k,) and Hessian (k, k) of zeros.
+    """
     return value, [0.0] * size, [[0.0] * size for _ in range(size)]
 
 
@@ -129,35 +152,35 @@ _NOTHING = math.nan, math.nan, math.nan
 
 @dataclass(frozen=True)
 class Constant(Function):
-    """The same value for any number of arguments."""
+    """Function with the same value for any number of arguments."""
 
     value: float
 
     def evaluate(self, arguments: Arguments) -> Evaluated:
-        """The value, and zeros for the derivatives."""
+        """Return the value, and zeros for the derivatives."""
         return make_zero_derivatives(len(arguments), self.value)
 
     @property
     def table(self) -> Sequence[float]:
-        """One piece."""
+        """Table with one piece of degree 0."""
         return _tabulate_pieces((0.0,), ((self.value,),))
 
 
 @dataclass(frozen=True)
 class Linear(Univariate):
-    """``rate * x + start``."""
+    """Linear function ``rate * x + start``."""
 
     rate: float = 1.0
     start: float = 0.0
 
     @property
     def table(self) -> Sequence[float]:
-        """One piece."""
+        """Table with one piece of degree 1."""
         return _tabulate_pieces((0.0,), ((self.start, self.rate),))
 
     @property
     def slope(self) -> float | None:
-        """The rate."""
+        """Slope of the function, which is the rate."""
         return self.rate
 
 
@@ -172,7 +195,7 @@ class Polynomial(Univariate):
 
     @property
     def table(self) -> Sequence[float]:
-        """One piece."""
+        """Table with one piece, from the constant up."""
         return _tabulate_pieces((0.0,), (self.coefficients[::-1],))
 
 
@@ -187,20 +210,20 @@ class Sine(Univariate):
 
     @property
     def table(self) -> Sequence[float]:
-        """A sine."""
+        """Table of a sine: amplitude, angular frequency, phase and offset."""
         return SINE, 1.0, self.amplitude, self.omega, self.phase, self.offset
 
 
 @dataclass(frozen=True)
 class WeightedSum(Multivariate):
-    """The sum of all arguments times their `weights`, plus `start`."""
+    """Sum of all arguments times their `weights`, plus `start`."""
 
     weights: tuple[float, ...]
     start: float = 0.0
 
     @property
     def table(self) -> Sequence[float]:
-        """Each argument in a monomial, and none in the last."""
+        """Table of monomials: one for each argument, and one for the constant."""
         size = len(self.weights)
         powers = (float(term == place) for term in range(size + 1) for place in range(size))
         return [MONOMIALS, 1.0, size + 1.0, *self.weights, self.start, *powers]
@@ -208,7 +231,7 @@ class WeightedSum(Multivariate):
 
 @dataclass(frozen=True)
 class Step(Univariate):
-    """A change from `start_value` to `end_value` between two arguments, smooth to the second derivative."""
+    """Quintic step from `start_value` to `end_value`, twice differentiable."""
 
     start: float
     end: float
@@ -217,18 +240,19 @@ class Step(Univariate):
 
     @property
     def table(self) -> Sequence[float]:
-        """A step."""
+        """Table of a step: arguments and values of both ends."""
         return STEP, 1.0, self.start, self.end, self.start_value, self.end_value
 
 
 @dataclass(frozen=True)
 class MultivariatePolynomial(Multivariate):
-    """The sum of `coefficients` times monomials of all arguments."""
+    """Sum of `coefficients` times monomials of all arguments."""
 
-    coefficients: tuple[float, ...]  # one for each monomial
+    coefficients: tuple[float, ...]  # of the monomials
     powers: tuple[tuple[int, ...], ...]  # of each argument in each monomial
-    # give for the Hessian what OpenSim 4.6 takes for it, which is the gradient in every column
-    opensim_derivatives: bool = False
+    opensim_derivatives: bool = (
+        False  # whether the Hessian is OpenSim 4.6's: gradient in each column
+    )
 
     @classmethod
     def complete(
@@ -239,10 +263,18 @@ class MultivariatePolynomial(Multivariate):
         *,
         opensim_derivatives: bool = False,
     ) -> MultivariatePolynomial:
-        """With all monomials up to `order`, sorted by the power of the first argument, then of the next.
+        """Return the polynomial with all monomials up to an order.
+
+        Monomials are sorted by the power of the first argument, then of the next, as in OpenSim.
+
+        Args:
+            coefficients: coefficient of each monomial.
+            dimension: number of arguments.
+            order: largest sum of powers.
+            opensim_derivatives: whether to reproduce OpenSim's wrong Hessian.
 
         Raises:
-            ModelError: there are not as many coefficients as monomials.
+            ModelError: the number of coefficients differs from that of the monomials.
         """
         powers = tuple(
             item for item in product(range(order + 1), repeat=dimension) if sum(item) <= order
@@ -256,13 +288,13 @@ class MultivariatePolynomial(Multivariate):
 
     @property
     def table(self) -> Sequence[float]:
-        """All monomials."""
+        """Table of all monomials with their powers."""
         kind = MONOMIALS_OF_OPENSIM if self.opensim_derivatives else MONOMIALS
         powers = (float(power) for each in self.powers for power in each)
         return [kind, 1.0, float(len(self.powers)), *self.coefficients, *powers]
 
     def evaluate(self, arguments: Arguments) -> Evaluated:
-        """Value, gradient (k,) and Hessian (k, k)."""
+        """Return the value, the gradient (k,) and the Hessian (k, k)."""
         value, gradient, hessian = super().evaluate(arguments)
         return (
             value,
@@ -275,13 +307,13 @@ class MultivariatePolynomial(Multivariate):
 
 @dataclass(frozen=True)
 class Scaled(Function):
-    """``scale`` times another function."""
+    """Multiple of another function."""
 
     scale: float
     function: Function
 
     def evaluate(self, arguments: Arguments) -> Evaluated:
-        """`scale` times value, gradient and Hessian of the function."""
+        """Return `scale` times value, gradient and Hessian of the function."""
         value, gradient, hessian = self.function.evaluate(arguments)
         scale = self.scale
         return (
@@ -292,21 +324,21 @@ class Scaled(Function):
 
     @property
     def table(self) -> Sequence[float]:
-        """That of the function, with another factor."""
+        """Table of the function with another factor."""
         head, rest = self.function.table[:2], self.function.table[2:]
         return [head[0], self.scale * head[1], *rest] if head else ()
 
 
 @dataclass(frozen=True)
 class PiecewiseLinear(Univariate):
-    """Straight lines between the points (`x`, `y`); the first and the last line go on outside."""
+    """Straight lines between the points (`x`, `y`); the first and last line continue outside."""
 
     x: tuple[float, ...]
     y: tuple[float, ...]
 
     @property
     def table(self) -> Sequence[float]:
-        """The lines, without the last point; where two x are equal the value jumps to the later y."""
+        """Table of the lines; where two x are equal the value jumps to the later y."""
         ends = zip(pairwise(self.x), pairwise(self.y), strict=True)
         lines = [(x0, y0, (y1 - y0) / (x1 - x0)) for (x0, x1), (y0, y1) in ends if x1 > x0]
         return _tabulate_pieces([x0 for x0, _, _ in lines], [(y0, slope) for _, y0, slope in lines])
@@ -314,22 +346,22 @@ class PiecewiseLinear(Univariate):
 
 @dataclass(frozen=True)
 class PiecewiseConstant(Univariate):
-    """Steps: ``y[k]`` from ``x[k]`` up to the next abscissa, the end values outside."""
+    """Steps: ``y[k]`` from ``x[k]`` up to the next abscissa, and the end values outside."""
 
     x: tuple[float, ...]
     y: tuple[float, ...]
 
     @property
     def table(self) -> Sequence[float]:
-        """The steps."""
+        """Table with one constant piece per point."""
         return _tabulate_pieces(self.x, [(y,) for y in self.y])
 
 
 class SimmSpline(Univariate):
-    """Cubic spline through (`x`, `y`) with straight lines, of the end slopes, outside.
+    """Cubic spline through (`x`, `y`), continued outside by lines with the end slopes.
 
     The ends have the third derivative of the cubic through the first (last) four points (Forsythe,
-    Malcolm and Moler, Computer Methods for Mathematical Computations, 1977, chapter 4); three
+    Malcolm and Moler, Computer Methods for Mathematical Computations, 1977, chapter 4). Three
     points give a parabola, two a line. Intervals narrower than 1e-7 count as 1e-7 wide, as in
     OpenSim.
     """
@@ -353,40 +385,45 @@ class SimmSpline(Univariate):
 
     @property
     def pieces(self) -> tuple[tuple[float, float, float, float], ...]:
-        """For every point k the factors of 1, t, t² and t³ from it on, t = argument - x[k].
+        """Coefficients of 1, t, t² and t³ of each piece, with t = argument - x[k].
 
-        Of the last point the first two count; they are the line beyond it. The line before the
-        first point has the first two of that.
+        The last piece is the line beyond the last point, with two nonzero coefficients. The line
+        before the first point has the first two coefficients of the first piece.
         """
         return tuple(self._pieces)
 
     @property
     def table(self) -> Sequence[float]:
-        """The pieces, and the lines outside."""
+        """Table of the pieces, and of the lines outside."""
         first, *_, last = self._pieces
-        # At the last point it still is the piece before it.
+        # At the last point OpenSim evaluates the piece before it, hence the next larger float.
         knots = self.x[0], *self.x[:-1], math.nextafter(self.x[-1], math.inf)
         return _tabulate_pieces(knots, [first[:2], *self._pieces[:-1], last[:2]])
 
 
 def _tabulate_pieces(knots: Sequence[float], pieces: Sequence[Sequence[float]]) -> list[float]:
-    """The table of the polynomials after each knot, from the constant up; the first one goes on before its knot."""
+    """Return the table of polynomials after each knot.
+
+    Args:
+        knots: first argument of each piece; the first piece also holds before its knot.
+        pieces: coefficients of each piece, from the constant up.
+    """
     width = max(map(len, pieces))
     rows = [(*piece, *[0.0] * (width - len(piece))) for piece in pieces]
     return [PIECES, 1.0, float(len(knots)), float(width), *knots, *chain.from_iterable(rows)]
 
 
 def table_at_knots(function: Function) -> list[float]:
-    """The table of a function, by which the kernels take at a knot the piece that OpenSim takes there.
+    """Return the table of a function with OpenSim's choice of pieces at knots.
 
-    They take the one after it; where OpenSim takes that before it, the knot is moved by its last
-    digit. It shows where slopes or values jump.
+    Kernels evaluate the piece after a knot. Where OpenSim evaluates the piece before it, the knot
+    is moved to the next larger float. This matters where slopes or values jump.
     """
     table, inner = [*function.table], function
     while isinstance(inner, Scaled):
         inner = inner.function
     if isinstance(inner, PiecewiseLinear | PiecewiseConstant | SimmSpline):
-        # That of a spline has the first knot twice.
+        # The table of a spline contains the first knot twice.
         first = 5 if isinstance(inner, SimmSpline) else 4
         for k in range(1, len(inner.x) - 1):
             if _find_interval(inner.x, inner.x[k]) < k:
@@ -395,7 +432,14 @@ def table_at_knots(function: Function) -> list[float]:
 
 
 def _find_interval(knots: Sequence[float], x: float) -> int:
-    """The index of the first point of the piece that OpenSim takes at a knot: a search by halves meets it first."""
+    """Return the index of the first point of the piece that OpenSim evaluates at a knot.
+
+    OpenSim's search by bisection may meet the piece before the knot first.
+
+    Args:
+        knots: knots, which increase.
+        x: one of them.
+    """
     if x <= knots[0] or x >= knots[-1]:
         return 0 if x <= knots[0] else len(knots) - 2
     low, high = 0, len(knots)
@@ -413,16 +457,24 @@ def _find_interval(knots: Sequence[float], x: float) -> int:
 def _spline_curvature(
     points: Sequence[float], widths: Sequence[float], slopes: Sequence[float]
 ) -> list[float]:
-    """A sixth of the second derivative at each of n points: smooth inside, end conditions as above."""
+    """Return a sixth of the second derivative of a spline at each of n points.
+
+    Inside, the second derivative is continuous; for the ends see `SimmSpline`.
+
+    Args:
+        points: abscissae (n,).
+        widths: widths of the intervals (n - 1,).
+        slopes: slopes of the chords (n - 1,).
+    """
     n = len(points)
     if n == 2:
         return [0.0, 0.0]
-    # The equations of the points: the diagonal, what is right of them; beside the diagonal are the
+    # Tridiagonal equations: the diagonal, and the right sides; the entries off the diagonal are the
     # widths.
     diagonal = [-widths[0], *(2.0 * (one + two) for one, two in pairwise(widths)), -widths[-1]]
     right = [0.0, *(after - before for before, after in pairwise(slopes)), 0.0]
     if n > 3:
-        # Where three points lie on each other there is no spline.
+        # With three coincident points no spline exists: NaN.
         second = [
             right[k + 1] / ((points[k + 2] - points[k]) or math.nan) for k in (0, 1, n - 4, n - 3)
         ]
@@ -435,6 +487,7 @@ def _spline_curvature(
             * (second[3] - second[2])
             / ((points[-1] - points[-4]) or math.nan)
         )
+    # Gaussian elimination without pivoting, as the equations are diagonally dominant inside.
     for k in range(1, n):
         share = widths[k - 1] / diagonal[k - 1]
         diagonal[k] -= share * widths[k - 1]

@@ -1,7 +1,7 @@
 """Mobilizers: the joints of a model as products of elementary motions.
 
-What the coordinates of a joint type do is a line of its class in the schema, or a short function
-here; nothing else in the package knows joint types. The conventions (order of coordinates, meaning
+The motions of a joint type are an attribute of its class in the schema, or a short function here;
+nothing else in the package depends on joint types. The conventions (order of coordinates, meaning
 of speeds) are OpenSim's.
 """
 
@@ -52,7 +52,10 @@ from osimlite.schema.joints import (
 
 
 def _make_plain_motions(kind: type[Joint]) -> tuple[Motion, ...]:
-    """The motions of a joint type by what its schema says: shifts, then turns, of a ball all at once."""
+    """Return the motions of a joint type without properties, as its schema declares them.
+
+    Translations come first, then rotations; those of a ball joint are one motion.
+    """
     axes, words = {"x": X, "y": Y, "z": Z}, [*enumerate((kind.moves or "").split())]
     slides = [translate(axes[word[1]], own) for own, word in words if word[0] == "t"]
     turns = [rotate_about(axes[word[1]], own) for own, word in words if word[0] == "r"]
@@ -74,24 +77,39 @@ MOTIONS: dict[str, tuple[Motion, ...]] = {
         FreeJoint,
     )
 }
-"""X_FM of the joint types that have no properties of their own."""
+"""Factors of X_FM of the joint types that have no properties of their own."""
 
 
 def make_ellipsoid_motions(radii: ArrayLike) -> tuple[Motion, ...]:
-    """Motions of an EllipsoidJoint: rx, ry, rz on the ellipsoid with `radii` (m) along F."""
+    """Return the motions of an EllipsoidJoint: rx, ry, rz on an ellipsoid.
+
+    Args:
+        radii: half axes of the ellipsoid along the axes of F (3,), m.
+
+    Returns:
+        Factors of X_FM.
+    """
     return (SphericalMotion((0, 1, 2), np.array(radii, dtype=float)),)
 
 
 def make_scapulothoracic_motions(
     radii: ArrayLike, winging_origin: ArrayLike, winging_direction: float
 ) -> tuple[Motion, ...]:
-    """Motions of a ScapulothoracicJoint.
+    """Return the motions of a ScapulothoracicJoint.
+
+    The scapula moves on an ellipsoid of the thorax by three rotations, and then wings about an
+    axis in the XY plane of its frame.
 
     Args:
-        radii: of the thoracic ellipsoid along F (m).
-        winging_origin: x, y of a point of the winging axis (m).
+        radii: half axes of the thoracic ellipsoid along F (3,), m.
+        winging_origin: x and y of a point of the winging axis, m.
         winging_direction: angle of the winging axis (rad).
+
+    Returns:
+        Factors of X_FM.
     """
+    # The angles refer to a frame that is rotated by a quarter turn about Z, and rotated back behind
+    # them; the half axes change places with it.
     quarter = rotation_about(np.array(Z), math.pi / 2)
     x, y = np.asarray(winging_origin, dtype=float).tolist()
     axis = (-math.sin(winging_direction), math.cos(winging_direction), 0.0)
@@ -106,11 +124,16 @@ def make_scapulothoracic_motions(
 
 
 def constant_curvature(length: float, neutral: Sequence[float]) -> tuple[Motion, ...]:
-    """Motions of a ConstantCurvatureJoint: the end of a rod that bends about X, then Z, and twists about Y.
+    """Return the motions of a ConstantCurvatureJoint.
+
+    The end of a rod bends about X, then about Z, and twists about Y.
 
     Args:
-        length: of the rod (m).
-        neutral: the three angles (rad) where the coordinates are zero.
+        length: length of the rod (m).
+        neutral: the three angles where the coordinates are zero (rad).
+
+    Returns:
+        Factors of X_FM.
     """
     bend, swing, twist = (float(angle) for angle in neutral)
     slides = (
@@ -125,11 +148,11 @@ def constant_curvature(length: float, neutral: Sequence[float]) -> tuple[Motion,
 
 
 class TransformAxis(NamedTuple):
-    """One axis of a CustomJoint: `function` of `coordinates` (places in the joint) along or about `axis`."""
+    """One axis of a CustomJoint: a function of coordinates along or about an axis."""
 
-    coordinates: tuple[int, ...]
-    axis: ArrayLike
-    function: Function
+    coordinates: tuple[int, ...]  # indices among the coordinates of the joint
+    axis: ArrayLike  # direction (3,) in F
+    function: Function  # amount, rad or m
 
 
 def make_custom_motions(
@@ -138,10 +161,18 @@ def make_custom_motions(
     *,
     opensim_derivatives: bool = False,
 ) -> tuple[Motion, ...]:
-    """Motions of a CustomJoint: three translations along axes of F, then three body-fixed rotations.
+    """Return the motions of a CustomJoint.
 
-    With `opensim_derivatives` the velocity-dependent accelerations are Simbody's; see
-    :class:`osimlite.mechanics.multibody.motions.SimbodyAccelerationError`.
+    They are three translations along axes of F, then three body-fixed rotations.
+
+    Args:
+        rotations: the three rotation axes.
+        translations: the three translation axes.
+        opensim_derivatives: whether velocity-dependent accelerations are Simbody's, see
+            :class:`osimlite.mechanics.multibody.motions.SimbodyAccelerationError`.
+
+    Returns:
+        Factors of X_FM.
 
     Raises:
         ModelError: an axis has no direction.
@@ -166,10 +197,18 @@ def _make_translation(kind: Literal["rotate", "translate"], axis: TransformAxis)
 
 
 def motion_types(motions: Sequence[Motion], count: int) -> tuple[MotionType, ...]:
-    """What each of `count` coordinates of a joint does.
+    """Return the motion type of each coordinate of a joint.
 
-    A coordinate that drives an axis with slope exactly 1 or -1 has the motion of that axis (of the
-    last such axis, translations counting after rotations); any other is coupled.
+    A coordinate that drives an axis with slope exactly 1 or -1 has the motion type of that axis (of
+    the last such axis, where translations come after rotations); any other coordinate is coupled.
+    These are OpenSim's rules.
+
+    Args:
+        motions: motions of the joint.
+        count: number of its coordinates.
+
+    Returns:
+        Motion type of each coordinate.
     """
     types: list[MotionType] = ["coupled"] * count
     axes = [
@@ -183,28 +222,29 @@ def motion_types(motions: Sequence[Motion], count: int) -> tuple[MotionType, ...
 
 @dataclass(frozen=True, eq=False)
 class Mobilizer:
-    """How a body moves in the body (or ground) that carries it.
+    """Connection of a body to the body (or ground) that carries it.
 
-    The joint says T_PC = X_PF X_FM(q) X_CM⁻¹ for its parent P and child C; `motions` are the
-    factors of X_FM. `reversed` tells that the joint's child carries its parent in the tree: nothing
-    else changes, the speeds still are those of M in F.
+    The transform of the joint is T_PC = X_PF X_FM(q) X_CM⁻¹ for its parent P and child C; `motions`
+    are the factors of X_FM. With `reversed` the joint's child carries its parent in the tree; the
+    speeds are those of M in F all the same.
     """
 
     joint: str  # absolute path of the joint
     joint_type: str  # OpenSim's class name of the joint, for messages
     motions: tuple[Motion, ...]  # factors of X_FM
     coordinates: tuple[int, ...] = ()  # index in the mechanism of each of the joint's coordinates
-    # X_PF (4, 4), the joint's parent frame in its body (or ground)
-    parent_frame: Array = field(default_factory=make_transform)
-    # X_CM (4, 4), the joint's child frame in its body (or ground)
-    child_frame: Array = field(default_factory=make_transform)
-    reversed: bool = False
+    parent_frame: Array = field(default_factory=make_transform)  # X_PF (4, 4), in the parent body
+    child_frame: Array = field(default_factory=make_transform)  # X_CM (4, 4), in the child body
+    reversed: bool = False  # whether the child carries the parent
 
     def elementary(self) -> tuple[Fixed | AxisMotion, ...]:
-        """The way from the carrying to the carried body as fixed transforms and one-axis motions, in order.
+        """Return the transform from the carrying to the carried body as one-axis motions.
 
-        The numbers in ``coordinates`` of each motion are places among `coordinates` of this
-        mobilizer. This is all that a program with one-axis joints needs to know.
+        ``coordinates`` of each motion are indices among the `coordinates` of this mobilizer.
+        Programs with one-axis joints need nothing else.
+
+        Returns:
+            Fixed transforms and one-axis motions, in order.
         """
         motions = (
             Fixed(self.parent_frame),
@@ -215,7 +255,14 @@ class Mobilizer:
         return tuple(part.inverse() for part in reversed(chain)) if self.reversed else tuple(chain)
 
     def rate_matrix(self, q: Array) -> Array:
-        """N (k, k) with qdot = N u; SimulationError, which names the joint, where N is singular."""
+        """Return N (k, k) with qdot = N u.
+
+        Args:
+            q: coordinates of the joint (k,).
+
+        Raises:
+            SimulationError: N is singular at this pose; the message names the joint.
+        """
         matrix = np.eye(len(q))
         with _name_joint_in_errors(self.joint):
             for motion in self.motions:
@@ -225,7 +272,15 @@ class Mobilizer:
         return matrix
 
     def rate_bias(self, q: Array, u: Array) -> Array:
-        """Ndot u (k,), so that qddot = N udot + Ndot u."""
+        """Return Ndot u (k,), so that qddot = N udot + Ndot u.
+
+        Args:
+            q: coordinates of the joint (k,).
+            u: speeds of the joint (k,).
+
+        Raises:
+            SimulationError: N is singular at this pose; the message names the joint.
+        """
         bias = np.zeros(len(q))
         with _name_joint_in_errors(self.joint):
             for motion in self.motions:
@@ -236,12 +291,15 @@ class Mobilizer:
 
     @cached_property
     def speeds_are_rates(self) -> bool:
-        """Whether qdot = u for every coordinate of the joint."""
+        """Tell whether qdot = u for every coordinate of the joint."""
         return all(type(motion).rates is Motion.rates for motion in self.motions)
 
     @cached_property
     def turning(self) -> tuple[tuple[int, ...], ...]:
-        """Index in the mechanism of the coordinates whose rates together follow from as many speeds, set by set."""
+        """Groups of coordinates whose rates follow together from as many speeds.
+
+        Each group has indices in the mechanism; a ball joint has one group of three.
+        """
         return tuple(
             tuple(self.coordinates[place] for place in motion.coordinates)
             for motion in self.motions
@@ -251,7 +309,7 @@ class Mobilizer:
 
 @contextmanager
 def _name_joint_in_errors(joint: str) -> Iterator[None]:
-    """Puts the joint's path in front of what a motion has to complain about."""
+    """Prepend the path of a joint to the messages of errors of its motions."""
     try:
         yield
     except SimulationError as error:

@@ -1,8 +1,9 @@
-"""Where every body of a mechanism is and how it moves, as the kernels find it.
+"""Poses, velocities and constraint equations of a mechanism at one state.
 
-Arrays over bodies have one row more than there are bodies: the last is ground, which -1, the parent
-index of a body that ground carries, picks out. All vectors are along the axes of ground; spatial
-velocities and accelerations stack the angular part over the linear part of the body's origin.
+The kernels compute them, run as Python. Arrays over bodies have one row more than there are bodies:
+the last row is ground, so that the index -1 selects it. All vectors are along the axes of ground;
+spatial velocities and accelerations stack the angular part over the linear part of the body's
+origin.
 """
 
 from __future__ import annotations
@@ -33,11 +34,16 @@ if TYPE_CHECKING:
 
 
 Vectors = tuple[Floats, Floats, Floats]
+"""Work vector, state and rates."""
 
 
 @contextmanager
 def check_finite(data: Floats) -> Iterator[None]:
-    """Whatever Python cannot compute, as an angle that is infinite, leaves no numbers in a work vector."""
+    """Set a work vector to NaN if the arithmetic in the context raises an error.
+
+    Python raises errors where machine code gives numbers that are not finite, for example for the
+    sine of an infinite angle.
+    """
     try:
         yield
     except (ArithmeticError, ValueError):
@@ -45,27 +51,27 @@ def check_finite(data: Floats) -> Iterator[None]:
 
 
 class Kinematics:
-    """A mechanism of b bodies and n coordinates at one state.
+    """State of a mechanism of b bodies and n coordinates.
 
     Args:
-        mechanism: what moves.
+        mechanism: mechanism.
         q: coordinate values (n,).
         u: generalized speeds (n,).
-        time: what prescribed motions go by (s).
+        time: time of prescribed motions (s).
     """
 
     def __init__(self, mechanism: Mechanism, q: Array, u: Array, time: float = 0.0) -> None:
-        # What follows from them is computed when it is asked for: nobody may change them until
-        # then.
+        # Results are computed when they are requested, so later changes of the arguments must not
+        # matter.
         self.mechanism, self.q, self.u, self.time = mechanism, q.copy(), u.copy(), time
 
     def __reduce__(self) -> tuple[Any, ...]:
-        # Neither the vectors nor the program can be copied, but found again.
+        # Neither the vectors nor the program can be pickled, but both can be computed again.
         return Kinematics, (self.mechanism, self.q, self.u, self.time)
 
     @cached_property
     def program(self) -> Program:
-        """The mechanism, packed."""
+        """Program of the mechanism: its integers and numbers for the kernels."""
         return self.mechanism.program
 
     @cached_property
@@ -76,7 +82,7 @@ class Kinematics:
 
     @cached_property
     def vectors(self) -> Vectors:
-        """Work vector, state, and rates, when the links have been moved; no numbers where they cannot be."""
+        """Work vector, state and rates after the links have been moved; NaN where that fails."""
         model, reals, (data, y, f) = self.program.model, self.program.reals, self._unmoved
         with check_finite(data):
             place_links(model, reals, data, y, f)
@@ -84,7 +90,7 @@ class Kinematics:
         return data, y, f
 
     def equations(self, constraint: Constraint) -> Equations:
-        """The equations of a constraint."""
+        """Return the equations of a constraint, which need not be one of the mechanism."""
         program = self.program.with_constraint(constraint)
         if program is self.program:
             errors, rows, rates, drifts = self.all_equations
@@ -92,13 +98,14 @@ class Kinematics:
             return Equations(
                 errors[first:end_position], rows[first:end], rates[first:end], drifts[first:end]
             )
+        # A foreign constraint needs a program of its own, and so another evaluation.
         other = Kinematics(self.mechanism, self.q, self.u, self.time)
         other.program = program
         return other.equations(constraint)
 
     @cached_property
     def all_equations(self) -> Equations:
-        """The equations of all constraints; of those that bind speeds only, the errors mean nothing."""
+        """Equations of all constraints; those that constrain speeds only have undefined errors."""
         program = self.program
         balls = [
             item
@@ -106,8 +113,9 @@ class Kinematics:
             if not program.bound.isdisjoint(item.coordinates)
         ]
         for ball in balls:
-            # The rates of its coordinates must be defined.
+            # Raises an error where the rates of its coordinates are not defined.
             ball.rate_matrix(self.q[list(ball.coordinates)])
+        # Constraints on coordinates only do not need the links.
         data, y, f = self.vectors if balls or program.on_bodies else self._unmoved
         if program.constraints:
             with check_finite(data):
@@ -116,19 +124,19 @@ class Kinematics:
 
     @cached_property
     def rotations(self) -> Array:
-        """Of each body in ground (b + 1, 3, 3)."""
+        """Rotation of each body in ground (b + 1, 3, 3)."""
         return self._links[:, :9].reshape(-1, 3, 3) @ self.program.frames[:, :3, :3]
 
     @cached_property
     def origins(self) -> Array:
-        """Of each body in ground (b + 1, 3), m."""
+        """Origin of each body in ground (b + 1, 3), m."""
         rows = self._links
         turned = rows[:, :9].reshape(-1, 3, 3) @ self.program.frames[:, :3, 3:]
         return rows[:, LINK_WORK.POSITION : LINK_WORK.POSITION + 3] + turned[:, :, 0]
 
     @cached_property
     def jacobians(self) -> Array:
-        """From the n speeds to the velocity of each body (b + 1, 6, n)."""
+        """Jacobian of each body, from the n speeds to its velocity (b + 1, 6, n)."""
         program, size = self.program, len(self.q)
         first = program.model[MODEL.WORK_COLUMN]
         columns = (
@@ -136,6 +144,7 @@ class Kinematics:
             .reshape(size, 6)[program.freedoms]
             .T
         )
+        # From the common origin of the spatial vectors to the origins of the bodies.
         result = np.empty((len(program.links), 6, size))
         result[:, :3], result[:, 3:] = (
             columns[:3],
@@ -146,23 +155,24 @@ class Kinematics:
 
     @cached_property
     def velocities(self) -> Array:
-        """Of each body in ground (b + 1, 6)."""
+        """Velocity of each body in ground (b + 1, 6), rad/s and m/s."""
         result = self._links[:, LINK_WORK.VELOCITY : LINK_WORK.VELOCITY + 6].copy()
         result[:, 3:] += np.cross(result[:, :3], self._arms)
         return result
 
     @cached_property
     def biases(self) -> Array:
-        """The accelerations (b + 1, 6) that the bodies have while all udot are zero."""
+        """Acceleration of each body while all udot are zero (b + 1, 6), rad/s² and m/s²."""
         result = self._links[:, LINK_WORK.ACCELERATION : LINK_WORK.ACCELERATION + 6].copy()
-        # Those of the links are of points that pass an origin.
+        # Accelerations of links are spatial: those of the points that pass a fixed origin. Add w x v
+        # for the material point.
         w, v = np.split(self.velocities, 2, axis=1)
         result[:, 3:] += np.cross(result[:, :3], self._arms) + np.cross(w, v)
         return result
 
     @cached_property
     def _links(self) -> Array:
-        """What the kernels find of the link of each body, and of ground as the last (b + 1, LINK_WORK.SIZE)."""
+        """Results of the link of each body, and of ground as the last (b + 1, LINK_WORK.SIZE)."""
         model = self.program.model
         first, count, size = model[MODEL.WORK_LINK], model[MODEL.LINKS], LINK_WORK.SIZE
         result = np.zeros((count + 1, size))
@@ -174,34 +184,56 @@ class Kinematics:
 
     @cached_property
     def _arms(self) -> Array:
-        """From the origin of the spatial vectors to that of each body (b + 1, 3), m."""
+        """Vector from the origin of the spatial vectors to that of each body (b + 1, 3), m."""
         return self.origins - self._links[:, LINK_WORK.ORIGIN : LINK_WORK.ORIGIN + 3]
 
     def transform(self, body: int) -> Array:
-        """The body in ground (4, 4)."""
+        """Return the transform of a body in ground (4, 4)."""
         return make_transform(self.rotations[body], self.origins[body])
 
     def point(self, body: int, station: Array) -> Array:
-        """Position in ground (3,) of a `station` (3,) given in the body's frame."""
+        """Return the position in ground of a point of a body (3,), m.
+
+        Args:
+            body: index of the body, -1 for ground.
+            station: point in the frame of the body (3,), m.
+        """
         return self.origins[body] + self.rotations[body] @ station
 
     def point_velocity(self, body: int, station: Array) -> Array:
-        """Velocity in ground (3,) of a `station` (3,) given in the body's frame."""
+        """Return the velocity in ground of a point of a body (3,), m/s.
+
+        Args:
+            body: index of the body, -1 for ground.
+            station: point in the frame of the body (3,), m.
+        """
         velocity: Array = self.velocities[body]
         return velocity[3:] + cross(velocity[:3], self.rotations[body] @ station)
 
     def point_bias(self, body: int, station: Array) -> Array:
-        """Acceleration in ground (3,) of a `station` (3,) of the body while all udot are zero."""
+        """Return the acceleration of a point of a body in ground while all udot are zero.
+
+        It has the shape (3,), in m/s².
+
+        Args:
+            body: index of the body, -1 for ground.
+            station: point in the frame of the body (3,), m.
+        """
         arm, w = self.rotations[body] @ station, self.velocities[body][:3]
         bias: Array = self.biases[body]
         return bias[3:] + cross(bias[:3], arm) + cross(w, cross(w, arm))
 
     def point_jacobian(self, body: int, station: Array) -> Array:
-        """Matrix (6, n) from the speeds to the body's angular velocity and the velocity of its `station`."""
+        """Return the matrix (6, n) from the speeds to angular velocity and a point's velocity.
+
+        Args:
+            body: index of the body, -1 for ground.
+            station: point in the frame of the body (3,), m.
+        """
         matrix: Array = self.jacobians[body].copy()
         matrix[3:] -= skew_matrix(self.rotations[body] @ station) @ matrix[:3]
         return matrix
 
     def accelerations(self, udot: Array) -> Array:
-        """Spatial accelerations of all bodies (b + 1, 6) for the derivatives `udot` (n,) of the speeds."""
+        """Return the accelerations of all bodies (b + 1, 6) for derivatives of the speeds (n,)."""
         return self.biases + self.jacobians @ udot

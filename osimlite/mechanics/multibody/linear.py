@@ -1,4 +1,4 @@
-"""Linear equations that may repeat or contradict each other."""
+"""Linear equations that may be redundant or contradictory."""
 
 from __future__ import annotations
 
@@ -11,25 +11,40 @@ from osimlite.mechanics.multibody.spatial import Array
 
 
 def stack_equations(equations: Sequence[tuple[Array, Array]]) -> tuple[Array, Array]:
-    """G (m, n) and b (m,) of several sets of equations in one."""
+    """Stack several sets of equations.
+
+    Args:
+        equations: left and right sides of each set.
+
+    Returns:
+        Matrix G (m, n) and right sides b (m,) of all equations.
+    """
     return np.concatenate([rows for rows, _ in equations]), np.concatenate(
         [values for _, values in equations]
     )
 
 
 def solve_with_null_space(rows: Array, values: Array) -> tuple[Array, Array]:
-    """The shortest solution (n,) of `rows` (m, n) x = `values` (m,), and the directions (n, f) left free.
+    """Solve equations by the shortest least-squares solution.
 
-    Where equations contradict each other, the solution has the least squares of their errors, each
-    equation counted with a left side of unit length; those that are rounding errors are left out.
-    The directions are orthonormal.
+    Each equation is weighted to a left side of unit length; equations that are rounding errors are
+    omitted.
+
+    Args:
+        rows: left sides (m, n).
+        values: right sides (m,).
+
+    Returns:
+        The solution (n,), and an orthonormal basis of the null space (n, f).
     """
     count, size = rows.shape
     if not (count and size):
         return np.zeros(size), np.eye(size)
     lengths = np.linalg.norm(rows, axis=1)
+    # An equation of rounding errors is scaled down instead of up, so that it does not count.
     lengths[lengths <= ROUNDING * max(lengths.max(), 1.0)] = max(1.0, lengths.max())
     rows, values = rows / lengths[:, None], values / lengths
+    # Independent equations are solved by a QR factorization, which is faster than the SVD.
     if count <= size:
         basis, triangle = np.linalg.qr(rows.T, mode="complete")
         triangle = triangle[:count]
@@ -41,8 +56,11 @@ def solve_with_null_space(rows: Array, values: Array) -> tuple[Array, Array]:
 
 
 def solve_least_norm(rows: Array, values: Array, tolerance: float) -> Array:
-    """The shortest x (n,) for which `rows` (m, n) x comes nearest to `values` (m,).
+    """Return the shortest x (n,) for which `rows` x comes nearest to `values`.
 
-    What the rows say in directions weaker than `tolerance` times the strongest counts for nothing.
+    Args:
+        rows: matrix (m, n).
+        values: right sides (m,).
+        tolerance: singular values below this part of the largest one count as zero.
     """
     return np.asarray(np.linalg.lstsq(rows, values, rcond=tolerance)[0], dtype=np.float64)

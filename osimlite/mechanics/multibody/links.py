@@ -1,4 +1,4 @@
-"""A mechanism as links and their motions, packed into the vectors that the kernels work on."""
+"""Links of a mechanism, and their packing into the vectors of the kernels."""
 
 from __future__ import annotations
 
@@ -54,99 +54,121 @@ LAWS_OF_FUNCTIONS = {
     MONOMIALS_OF_OPENSIM: "amount_by_several",
     ARC: "amount_by_arc",
 }
-"""The law of each kind of function that takes several coordinates."""
+"""Law of each kind of function that takes several coordinates."""
 
 
 class Placement(NamedTuple):
-    """The link that a body belongs to (-1 for ground), and the body's frame (4, 4) in it."""
+    """Link that a body belongs to, and the body's frame in it."""
 
-    link: int
-    frame: Array
+    link: int  # index of the link, -1 for ground
+    frame: Array  # frame of the body in the link (4, 4)
 
 
 @dataclass(frozen=True)
 class Places:
-    """Where coordinates and bodies are."""
+    """Degrees of freedom of coordinates, and links of bodies."""
 
-    mechanism: Mechanism  # of the model
-    freedoms: Mapping[int, int]  # degree of freedom of each coordinate that is free
-    placements: list[Placement]  # of the bodies
+    mechanism: Mechanism  # mechanism of the model
+    freedoms: Mapping[int, int]  # degree of freedom of each free coordinate, by its index
+    placements: list[Placement]  # link and frame of each body
 
     def freedom(self, coordinate: int) -> int:
-        """Degree of freedom of a coordinate, -1 if it is locked."""
+        """Return the degree of freedom of a coordinate, -1 if it is locked."""
         return self.freedoms.get(coordinate, -1)
 
     def locked_value(self, coordinate: int) -> float:
-        """Value that a coordinate has if it is locked."""
+        """Return the value that a coordinate has if it is locked (rad or m)."""
         return float(self.mechanism.coordinates[coordinate].default_value)
 
     def placement(self, body: int) -> Placement:
-        """Link and frame of a body, or of ground."""
+        """Return the link and frame of a body, or of ground."""
         return self.placements[body] if body != GROUND else Placement(GROUND, np.eye(4))
 
     def station(self, body: int, point: Sequence[float]) -> tuple[int, tuple[float, ...]]:
-        """Link of a body, and a point of the body in the link."""
+        """Return a point of a body in the link of the body.
+
+        Args:
+            body: index of the body, -1 for ground.
+            point: point in the frame of the body (3,), m.
+
+        Returns:
+            Index of the link, and the point in the link (3,), m.
+        """
         link, frame = self.placement(body)
         return link, tuple((frame[:3, :3] @ np.array(point) + frame[:3, 3]).tolist())
 
     def direction(self, body: int, vector: Sequence[float]) -> tuple[float, ...]:
-        """A direction of a body in its link."""
+        """Return a direction of a body in the link of the body.
+
+        Args:
+            body: index of the body, -1 for ground.
+            vector: direction in the frame of the body (3,).
+
+        Returns:
+            Direction in the link (3,).
+        """
         return tuple((self.placement(body).frame[:3, :3] @ np.array(vector)).tolist())
 
     def frame(self, body: int, frame: Array) -> tuple[int, list[float]]:
-        """Link of a body, and axes and origin in the link of a frame (4, 4) of the body."""
+        """Return a frame of a body in the link of the body.
+
+        Args:
+            body: index of the body, -1 for ground.
+            frame: frame in the body (4, 4).
+
+        Returns:
+            Index of the link; the three axes and the origin in the link, one after the other (12,).
+        """
         link, of_body = self.placement(body)
         return link, (of_body @ frame)[:3].T.ravel().tolist()
 
 
 @dataclass
 class Operation:
-    """A fixed transform, and one motion after it."""
+    """Fixed transform, and one motion after it; see `layout.OPERATION`."""
 
-    kind: int
-    before: Array
-    arguments: list[int]  # places in the mechanism
-    function: Any = None
-    radii: Array = field(default_factory=lambda: np.zeros(3))
+    kind: int  # type of the motion, see `layout.MOTION`
+    before: Array  # fixed transform before it (4, 4)
+    arguments: list[int]  # indices of its coordinates in the mechanism
+    function: Any = None  # function that gives its amount, None if a coordinate does
+    radii: Array = field(default_factory=lambda: np.zeros(3))  # half axes of an ellipsoid, m
     axis: Array = field(default_factory=lambda: np.array((0.0, 0.0, 1.0)))  # of a slide
-    turns: list[Operation | None] = field(default_factory=list)  # of a drift
-    # by a drift: its sign, and two places in the mechanism
-    looked_at: list[int] = field(default_factory=list)
-    joint: str = ""
+    turns: list[Operation | None] = field(default_factory=list)  # rotations of a drift's joint
+    looked_at: list[int] = field(default_factory=list)  # of a drift: sign, two coordinates
+    joint: str = ""  # path of the joint
 
 
 @dataclass
 class Link:
-    """A body, or several that never move in one another, with its way from the link that carries it."""
+    """Body, or several that never move relative to each other, with its joint."""
 
-    parent: int
-    operations: list[Operation]
-    mass: float = 0.0
-    first: Array = field(default_factory=lambda: np.zeros(3))  # first moment
-    # inertia about the link's origin
-    second: Array = field(default_factory=lambda: np.zeros((3, 3)))
+    parent: int  # index of the link that carries it, -1 for ground
+    operations: list[Operation]  # motions of the joint, in order
+    mass: float = 0.0  # kg
+    first: Array = field(default_factory=lambda: np.zeros(3))  # first moment of mass, kg m
+    second: Array = field(default_factory=lambda: np.zeros((3, 3)))  # inertia about origin, kg m²
 
 
 class Tree(NamedTuple):
-    """The links of a mechanism."""
+    """Links of a mechanism."""
 
-    links: list[Link]
-    ends: list[int]  # of the degrees of freedom of each link, behind the first of all
-    order: tuple[int, ...]  # place in the mechanism of the coordinate of each degree of freedom
-    places: Places  # of all that stands on the links
+    links: list[Link]  # links, parents first
+    ends: list[int]  # 0, then the end of the degrees of freedom of each link
+    order: tuple[int, ...]  # index in the mechanism of the coordinate of each degree of freedom
+    places: Places  # degrees of freedom and links by coordinates and bodies
 
 
 def tree_of(mechanism: Mechanism, free: Collection[int], *, apart: bool = False) -> Tree:
-    """The links of a mechanism.
+    """Return the links of a mechanism.
 
     Args:
-        mechanism: what moves.
-        free: places of the coordinates that are degrees of freedom; the others stay at their
+        mechanism: mechanism.
+        free: indices of the coordinates that are degrees of freedom; the others keep their
             defaults.
-        apart: whether bodies that never move in one another are links of their own.
+        apart: whether bodies that never move relative to each other are separate links.
 
     Raises:
-        UnsupportedError: a joint that the kernels do not know.
+        UnsupportedError: the kernels do not know the motion of a joint.
     """
     links: list[Link] = []
     placements: list[Placement] = []
@@ -154,6 +176,7 @@ def tree_of(mechanism: Mechanism, free: Collection[int], *, apart: bool = False)
     for body in mechanism.bodies:
         parent, frame = (GROUND, np.eye(4)) if body.parent == GROUND else placements[body.parent]
         operations, rest = _list_operations(mechanism, body.mobilizer, frame, free)
+        # A body without motions of its own is merged into the link that carries it.
         if operations or apart:
             links.append(Link(parent, operations))
             parent = len(links) - 1
@@ -164,6 +187,7 @@ def tree_of(mechanism: Mechanism, free: Collection[int], *, apart: bool = False)
     ends = [0]
     for link in links:
         own = {place for item in link.operations for place in item.arguments}
+        # Within a link, degrees of freedom are in the order of the coordinates.
         order += sorted(own & free)
         ends.append(len(order))
     freedoms = {place: number for number, place in enumerate(order)}
@@ -173,13 +197,24 @@ def tree_of(mechanism: Mechanism, free: Collection[int], *, apart: bool = False)
 def _list_operations(
     mechanism: Mechanism, mobilizer: Mobilizer, frame: Array, free: set[int]
 ) -> tuple[list[Operation], Array]:
-    """The motions of a joint from a frame of the carrying link on, and the carried body after the last of them."""
+    """Return the operations of a joint, and the frame of the carried body after the last one.
+
+    Args:
+        mechanism: mechanism.
+        mobilizer: joint.
+        frame: frame of the carrying body in its link (4, 4).
+        free: indices of the coordinates that are degrees of freedom.
+
+    Returns:
+        Operations, and the frame of the carried body in the new link (4, 4).
+    """
     own = mobilizer.coordinates
     chain: list[Motion] = [
         Fixed(mobilizer.parent_frame),
         *mobilizer.motions,
         Fixed(invert_transform(mobilizer.child_frame)),
     ]
+    # A reversed joint passes its motions backwards, each inverted.
     if mobilizer.reversed:
         chain.reverse()
     result: list[Operation] = []
@@ -192,6 +227,7 @@ def _list_operations(
             frame = frame @ (
                 invert_transform(motion.matrix) if mobilizer.reversed else motion.matrix
             )
+        # An error of accelerations matters only where coordinates move.
         elif isinstance(motion, SimbodyAccelerationError):
             if motion.elementary() and not free.isdisjoint(own):
                 sign = -1 if mobilizer.reversed else 1
@@ -200,6 +236,7 @@ def _list_operations(
                 )
                 drifts.append((result[-1], motion))
                 frame = np.eye(4)
+        # A motion whose coordinates are all locked is a fixed transform.
         elif still:
             q = np.zeros(len(own))
             q[list(motion.coordinates)] = [
@@ -210,6 +247,8 @@ def _list_operations(
         elif isinstance(motion, AxisMotion):
             axis = -motion.axis if mobilizer.reversed else motion.axis
             function = None if motion.function == IDENTITY else motion.function
+            # Kernels rotate about z only; the fixed transforms before and behind bring the axis
+            # there.
             if motion.kind == "rotate":
                 turned = make_transform(_to_axis(axis))
                 result.append(Operation(MOTION.TURN, frame @ turned, places, function))
@@ -234,7 +273,10 @@ def _list_operations(
 
 
 def _to_axis(axis: Array) -> Array:
-    """A rotation (3, 3) that takes z to a unit vector; without rounding if that is a coordinate axis."""
+    """Return a rotation (3, 3) that takes z to a unit vector.
+
+    It has no rounding errors if the vector is along a coordinate axis.
+    """
     x, y, z = axis.tolist()
     if z == 1.0:
         return np.eye(3)
@@ -246,7 +288,13 @@ def _to_axis(axis: Array) -> Array:
 
 
 def _load(link: Link, properties: Any, frame: Array) -> None:
-    """Add the mass of a body to its link."""
+    """Add the mass of a body to its link.
+
+    Args:
+        link: link; changed.
+        properties: mass properties of the body.
+        frame: frame of the body in the link (4, 4).
+    """
     rotation = frame[:3, :3]
     center = rotation @ properties.center + frame[:3, 3]
     link.mass += properties.mass
@@ -259,22 +307,24 @@ def _load(link: Link, properties: Any, frame: Array) -> None:
 
 
 def _square_of_skew(v: Array) -> Array:
-    """[v] [v], the inertia of a unit mass at v but for the sign."""
+    """Return [v] [v], the negative inertia about the origin of a unit mass at v."""
     return skew_matrix(v) @ skew_matrix(v)
 
 
 def _move_inertia(link: Link) -> list[float]:
+    # Inertia about the mass centre, by the parallel axis theorem.
     center = link.first / link.mass if link.mass != 0.0 else link.first
     i = link.second + link.mass * _square_of_skew(center)
     return [link.mass, *center.tolist(), i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2]]
 
 
 class LinkPacker:
-    """Puts all that makes a mechanism at its place in the vectors."""
+    """Packer of a mechanism into the vectors of the kernels."""
 
     def __init__(self, tree: Tree) -> None:
         self.links, self.ends, self.order, self.places = tree
         self.operations = [operation for link in self.links for operation in link.operations]
+        # The head of the model, and the addresses of all laws, which are filled in later.
         self.ints: list[int] = [0] * (MODEL.LAWS + len(LAW_NUMBERS))
         self.numbers: list[float] = [float(x) for x in self.places.mechanism.gravity]
         self.work = WORK.SIZE
@@ -283,11 +333,11 @@ class LinkPacker:
         self.laws: list[str] = ["evaluate"]
 
     def mechanism_records(self, kept: Sequence[Constraint], locks: int = 0) -> None:
-        """Write the mechanism.
+        """Write the records of the mechanism.
 
         Args:
-            kept: the constraints that are kept up.
-            locks: how many coordinates are locked besides.
+            kept: constraints to include.
+            locks: number of coordinates that are locked besides.
         """
         ints, size = self.ints, len(self.order)
         for link in self.links:
@@ -313,17 +363,21 @@ class LinkPacker:
         self.constraint_records(kept, locks)
 
     def reserve_work(self, count: int) -> int:
-        """Place of some more numbers in the work vector."""
+        """Reserve numbers in the work vector, and return their offset."""
         self.work += count
         return self.work - count
 
     def require_law(self, name: str) -> int:
-        """Number of a law, which must then be there."""
+        """Return the number of a law, and note that the program needs it."""
         self.laws.append(name)
         return LAW_NUMBERS[name]
 
     def link_records(self) -> list[int]:
-        """Write the links; returns the degree of freedom above each."""
+        """Write the records of the links.
+
+        Returns:
+            Degree of freedom above each one on the path to ground, or -1.
+        """
         self.ints[MODEL.LINK_AT] = len(self.ints)
         above, carrying, operation = [-1] * self.ends[-1], [-1] * len(self.links), 0
         for number, link in enumerate(self.links):
@@ -344,10 +398,16 @@ class LinkPacker:
         return above
 
     def freedom_records(self, above: Sequence[int]) -> None:
-        """Write the degrees of freedom, and the list of those whose columns are sums."""
+        """Write the records of the degrees of freedom, and the list of those with summed columns.
+
+        Args:
+            above: degree of freedom above each one, or -1.
+        """
         self.ints[MODEL.DOF_AT] = len(self.ints)
         depths: list[int] = []
         for freedom in above:
+            # A sparse row of the mass matrix has one entry per degree of freedom on the path to
+            # ground.
             depths.append(depths[freedom] + 1 if freedom >= 0 else 0)
             self.ints += DOF.record(
                 ABOVE=freedom, ROW=self.reserve_work(depths[-1] + 1), DEPTH=depths[-1]
@@ -360,7 +420,7 @@ class LinkPacker:
 
     @cached_property
     def simple_freedoms(self) -> set[int]:
-        """Degrees of freedom that are the amount of one operation about or along one axis, and nothing else."""
+        """Degrees of freedom that are the amount of a single one-axis operation only."""
         users: dict[int, list[Operation]] = {}
         for item in self.operations:
             for freedom in {self.places.freedom(place) for place in item.arguments}:
@@ -372,7 +432,7 @@ class LinkPacker:
         }
 
     def operation_records(self) -> None:
-        """Write the operations, and what their functions need."""
+        """Write the records of the operations, and what their functions need."""
         start = self.ints[MODEL.OPERATION_AT] = len(self.ints)
         self.ints += [0] * (OPERATION.SIZE * len(self.operations))
         numbers = {id(item): number for number, item in enumerate(self.operations)}
@@ -383,6 +443,8 @@ class LinkPacker:
             looked_at: list[int] = []
             if item.kind == MOTION.ACCELERATION_ERROR:
                 law = self.require_law("place_drift")
+                # The number of the law that moves follows that of the law that places, see
+                # `BALL_MOVES`.
                 self.require_law("move_drift")
                 sign, *watched = item.looked_at
                 looked_at = [
@@ -424,7 +486,12 @@ class LinkPacker:
             )
 
     def constraint_records(self, kept: Sequence[Constraint], locks: int) -> None:
-        """Write what constraints need, if there are any."""
+        """Write the records of constraints, if there are any.
+
+        Args:
+            kept: constraints.
+            locks: number of coordinates that are locked besides.
+        """
         if not kept:
             return
         start, size = len(self.ints), self.ints[MODEL.DOFS]
@@ -436,6 +503,7 @@ class LinkPacker:
         for constraint in constraints:
             records.append(len(self.ints))
             end, end_position = equations + constraint.equations, equations + constraint.positions
+            # Only here the offset of a constraint's workspace is known.
             ints = [
                 x + self.reserve_work(constraint.room) if k == constraint.room_at else x
                 for k, x in enumerate(constraint.ints)

@@ -1,10 +1,10 @@
-"""The mechanism: a flat tree of bodies and mobilizers, and what can be asked of it.
+"""Mechanism: a flat tree of bodies and mobilizers, with its kinematics and dynamics.
 
-Bodies stand in an order in which every body follows the one that carries it; -1 stands for ground.
-Coordinates stand in the order of OpenSim's CoordinateSet, and values q, generalized speeds u, their
-derivatives udot and generalized forces all use that order. The speeds are the rates of the
-coordinates except for ball, free, ellipsoid and scapulothoracic joints, whose rotational speeds are
-the angular velocity of the joint's child frame in its parent frame.
+Every body follows the body that carries it; -1 stands for ground. Coordinates are in the order of
+OpenSim's CoordinateSet, and so are values q, generalized speeds u, their derivatives udot and
+generalized forces. The speeds are the rates of the coordinates except for ball, free, ellipsoid and
+scapulothoracic joints, whose rotational speeds are the angular velocity of the joint's child frame
+in its parent frame.
 """
 
 from __future__ import annotations
@@ -57,23 +57,23 @@ Values = ArrayLike | Mapping[str, float]
 @methods_of_any_numbers
 @dataclass(frozen=True, eq=False)
 class Mechanism:
-    """A tree of bodies under gravity.
+    """Tree of bodies under gravity.
 
-    Wherever a method takes q or u, an array (n,) in the order of `coordinates` or a mapping by
-    coordinate name will do; names left out take their default. A body or frame is named by its
-    absolute path, a body also by its name. Every method raises ModelError for a name that does not
-    exist and for values of the wrong number. A `time` (s) matters only where coordinates are
-    prescribed.
+    Wherever a method takes q or u, it accepts an array (n,) in the order of `coordinates` or a
+    mapping by coordinate name; omitted names have their default. A body or frame is named by its
+    absolute path, a body also by its name. Every method raises ModelError for an unknown name and
+    for a wrong number of values. A `time` (s) matters only where coordinates are prescribed.
 
     Attributes:
-        bodies: carriers before the carried.
-        coordinates: in the order of all arrays.
-        gravity: acceleration (3,) in ground (m/s²).
-        frames: every frame fixed to a body or to ground, by absolute path.
-        constraints: what holds besides the joints; what locked and prescribed coordinates need is
-            put before them.
-        stations: every marker and other station, by absolute path.
-        assembly_accuracy: ten times what position errors of constraints may be in an assembled pose
+        name: name of the model.
+        bodies: bodies, each after the one that carries it.
+        coordinates: coordinates, in the order of all arrays.
+        gravity: acceleration of gravity in ground (3,), m/s².
+        frames: frames that are fixed to a body or to ground, by absolute path.
+        constraints: constraints besides the joints; those of locked and prescribed coordinates are
+            inserted before them.
+        stations: markers and other stations, by absolute path.
+        assembly_accuracy: ten times the accepted position error of constraints in an assembled pose
             (m or rad).
     """
 
@@ -97,6 +97,7 @@ class Mechanism:
             raise ModelError(
                 f"the joints of '{self.name}' do not share out its coordinates one by one"
             )
+        # Locked and prescribed coordinates are constraints like any others.
         holds: list[Constraint] = []
         for index, info in enumerate(self.coordinates):
             if info.locked:
@@ -108,14 +109,21 @@ class Mechanism:
     # ------------------------------------------------------------------------------------ names and states
     @cached_property
     def coordinate_names(self) -> tuple[str, ...]:
-        """Names in the order of all arrays; of coordinates that share a name, the paths."""
+        """Names in the order of all arrays; coordinates that share a name have their paths."""
         counts = Counter(info.name for info in self.coordinates)
         return tuple(
             info.name if counts[info.name] == 1 else info.path for info in self.coordinates
         )
 
     def coordinate_index(self, name: str) -> int:
-        """Place of a coordinate, by its absolute path, or by its name if no other has it."""
+        """Return the index of a coordinate.
+
+        Args:
+            name: absolute path, or a name that no other coordinate has.
+
+        Raises:
+            ModelError: the name is unknown or ambiguous.
+        """
         try:
             return self._coordinate_places[name]
         except KeyError:
@@ -128,7 +136,14 @@ class Mechanism:
             raise ModelError(f"'{self.name}' has no coordinate '{name}'{near}") from None
 
     def placement(self, name: str) -> FramePlacement:
-        """Body index and transform of a frame by absolute path, of a body (or ground) also by name."""
+        """Return the body index and transform of a frame, a body or ground.
+
+        Args:
+            name: absolute path; for a body or ground also the name.
+
+        Raises:
+            ModelError: the name is unknown.
+        """
         try:
             return self._placements[name]
         except KeyError:
@@ -136,7 +151,13 @@ class Mechanism:
             raise ModelError(f"'{self.name}' has no body or frame '{name}'{near}") from None
 
     def default_state(self, time: float = 0.0) -> tuple[Array, Array]:
-        """Default values (n,) and speeds (n,), these changed as little as the constraints demand.
+        """Return the default state, changed as little as the constraints demand.
+
+        Args:
+            time: time of prescribed coordinates (s).
+
+        Returns:
+            Values (n,) and speeds (n,).
 
         Raises:
             SimulationError: no pose near the default one fulfils the constraints.
@@ -145,18 +166,26 @@ class Mechanism:
         return q, self.project_speeds(q, {}, time)
 
     def without_constraints(self) -> Mechanism:
-        """The mechanism without constraints, and with no coordinate locked or prescribed: it can be in any state."""
+        """Return the mechanism without constraints, locked and prescribed coordinates.
+
+        It can be in any state.
+        """
         infos = tuple(replace(info, locked=False, prescribed=None) for info in self.coordinates)
         return replace(self, coordinates=infos, constraints=())
 
     def assemble(self, q: Values, time: float = 0.0, *, kept: Collection[int] = ()) -> Array:
-        """The values (n,) nearest to `q` that fulfil the constraints, by the rules of OpenSim's assembly.
+        """Return the values (n,) nearest to a pose that fulfil the constraints.
 
-        Locked coordinates, and those whose places are in `kept`, keep their values, clamped ones
-        their ranges; those that are `yielding` do not count.
+        The rules are those of OpenSim's assembly. Locked coordinates keep their values, and clamped
+        ones stay in their ranges; changes of coordinates that are `yielding` do not count.
+
+        Args:
+            q: coordinate values to start from.
+            time: time of prescribed coordinates (s).
+            kept: indices of further coordinates that keep their values.
 
         Raises:
-            SimulationError: no pose near the given one fulfils the constraints.
+            SimulationError: no pose near `q` fulfils the constraints.
         """
         values = self.values(q)
         if all(isinstance(item, Lock) for item in self.constraints):
@@ -166,26 +195,38 @@ class Mechanism:
     def project_speeds(
         self, q: Values, u: Values, time: float = 0.0, *, kept: Collection[int] = ()
     ) -> Array:
-        """The speeds (n,) nearest to `u` that fulfil the constraints, by the rules of OpenSim's integrator.
+        """Return the speeds (n,) nearest to `u` that fulfil the constraints.
 
-        The change of a speed above 1 counts relative to it; speeds of the coordinates in `kept` do
-        not change.
+        The rules are those of OpenSim's integrator. A change of a speed above 1 counts relative to
+        it.
+
+        Args:
+            q: coordinate values.
+            u: generalized speeds.
+            time: time of prescribed coordinates (s).
+            kept: indices of coordinates whose speeds do not change.
 
         Raises:
-            SimulationError: the constraints do not allow the speeds that are kept.
+            SimulationError: the constraints do not allow the speeds of `kept`.
         """
         return project_speeds(self.at(q, self.speeds(u), time), kept)
 
     def values(self, q: Values) -> Array:
-        """Coordinate values as an array (n,)."""
+        """Return coordinate values as an array (n,)."""
         return self._array(q, "value", self._default_values)
 
     def speeds(self, u: Values) -> Array:
-        """Generalized speeds as an array (n,)."""
+        """Return generalized speeds as an array (n,)."""
         return self._array(u, "speed", self._default_speeds)
 
     def at(self, q: Values, u: Values | None = None, time: float = 0.0) -> Kinematics:
-        """Poses and velocities of all bodies (u None: at rest), from which everything else follows."""
+        """Return the kinematics at a state, from which everything else follows.
+
+        Args:
+            q: coordinate values.
+            u: generalized speeds; None for a mechanism at rest.
+            time: time of prescribed coordinates (s).
+        """
         values = self.values(q)
         return Kinematics(
             self, values, np.zeros(len(values)) if u is None else self.speeds(u), time
@@ -193,47 +234,106 @@ class Mechanism:
 
     # ------------------------------------------------------------------------------------------ kinematics
     def body_transforms(self, q: Values) -> dict[str, Array]:
-        """Transform (4, 4) in ground of every body, by name."""
+        """Compute the transforms of all bodies in ground.
+
+        Args:
+            q: coordinate values.
+
+        Returns:
+            Transform (4, 4) by name of the body.
+        """
         state = self.at(q)
         return {body.name: state.transform(index) for index, body in enumerate(self.bodies)}
 
     def body_velocities(self, q: Values, u: Values) -> dict[str, Array]:
-        """Velocity (6,) in ground of every body, by name: angular, then that of the origin."""
+        """Compute the velocities of all bodies in ground.
+
+        Args:
+            q: coordinate values.
+            u: generalized speeds.
+
+        Returns:
+            Angular velocity and velocity of the origin (6,), rad/s and m/s, by name of the body.
+        """
         velocities = self.at(q, u).velocities
         return {body.name: velocities[index] for index, body in enumerate(self.bodies)}
 
     def body_accelerations(self, q: Values, u: Values, udot: Values) -> dict[str, Array]:
-        """Acceleration (6,) in ground of every body, by name: angular, then that of the origin."""
+        """Compute the accelerations of all bodies in ground.
+
+        Args:
+            q: coordinate values.
+            u: generalized speeds.
+            udot: derivatives of the speeds.
+
+        Returns:
+            Angular acceleration and acceleration of the origin (6,), rad/s² and m/s², by name of
+            the body.
+        """
         accelerations = self.at(q, u).accelerations(self._array(udot, "acceleration"))
         return {body.name: accelerations[index] for index, body in enumerate(self.bodies)}
 
     def frame_transform(self, frame: str, q: Values) -> Array:
-        """Transform (4, 4) in ground of a frame."""
+        """Return the transform of a frame in ground (4, 4).
+
+        Args:
+            frame: name of a frame or body.
+            q: coordinate values.
+        """
         body, placed = self.placement(frame)
         return self.at(q).transform(body) @ placed
 
     def station_position(self, frame: str, station: ArrayLike, q: Values) -> Array:
-        """Position (3,) in ground of a point given in a frame (m)."""
+        """Return the position in ground of a point of a frame (3,), m.
+
+        Args:
+            frame: name of a frame or body.
+            station: point in the frame (3,), m.
+            q: coordinate values.
+        """
         return self.at(q).point(*self._station(frame, station))
 
     def station_positions(self, q: Values) -> dict[str, Array]:
-        """Position (3,) in ground of every marker and other station, by absolute path (m)."""
+        """Compute the positions of all markers and other stations in ground.
+
+        Args:
+            q: coordinate values.
+
+        Returns:
+            Position (3,) in m, by absolute path.
+        """
         state = self.at(q)
         return {path: state.point(*placed) for path, placed in self.stations.items()}
 
     def station_velocity(self, frame: str, station: ArrayLike, q: Values, u: Values) -> Array:
-        """Velocity (3,) in ground of a point fixed in a frame (m/s)."""
+        """Return the velocity in ground of a point of a frame (3,), m/s.
+
+        Args:
+            frame: name of a frame or body.
+            station: point in the frame (3,), m.
+            q: coordinate values.
+            u: generalized speeds.
+        """
         return self.at(q, u).point_velocity(*self._station(frame, station))
 
     def jacobian(self, frame: str, q: Values, station: ArrayLike = (0.0, 0.0, 0.0)) -> Array:
-        """Matrix (6, n) from u to a frame's angular velocity and a station's velocity, in ground."""
+        """Return the Jacobian (6, n) of a frame and a point of it, in ground.
+
+        It maps the generalized speeds to the angular velocity of the frame and the velocity of the
+        point.
+
+        Args:
+            frame: name of a frame or body.
+            q: coordinate values.
+            station: point in the frame (3,), m.
+        """
         return self.at(q).point_jacobian(*self._station(frame, station))
 
     def rate_matrix(self, q: Values) -> Array:
-        """N (n, n) with qdot = N u.
+        """Return N (n, n) with qdot = N u.
 
         Raises:
-            SimulationError: a ball, free or ellipsoid joint stands where N is singular.
+            SimulationError: a ball, free or ellipsoid joint is in a pose where N is singular.
         """
         if not self.turning:
             return self._unit
@@ -244,7 +344,15 @@ class Mechanism:
         return matrix
 
     def rate_bias(self, q: Values, u: Values) -> Array:
-        """Ndot u (n,), so that qddot = N udot + Ndot u; raises as :meth:`rate_matrix`."""
+        """Return Ndot u (n,), so that qddot = N udot + Ndot u.
+
+        Args:
+            q: coordinate values.
+            u: generalized speeds.
+
+        Raises:
+            SimulationError: a ball, free or ellipsoid joint is in a pose where N is singular.
+        """
         bias = np.zeros(len(self.coordinates))
         if not self.turning:
             return bias
@@ -255,12 +363,30 @@ class Mechanism:
         return bias
 
     def coordinate_rates(self, q: Values, u: Values) -> Array:
-        """Rates of the coordinates (n,) for given generalized speeds; raises as :meth:`rate_matrix`."""
+        """Return the rates of the coordinates (n,) for generalized speeds.
+
+        Args:
+            q: coordinate values.
+            u: generalized speeds.
+
+        Raises:
+            SimulationError: a ball, free or ellipsoid joint is in a pose where the rates are not
+                defined.
+        """
         speeds = self.speeds(u)
         return self.rate_matrix(q) @ speeds if self.turning else speeds.copy()
 
     def speeds_from_rates(self, q: Values, qdot: Values) -> Array:
-        """Generalized speeds (n,) for given rates of the coordinates; raises as :meth:`rate_matrix`."""
+        """Return the generalized speeds (n,) for rates of the coordinates.
+
+        Args:
+            q: coordinate values.
+            qdot: rates of the coordinates.
+
+        Raises:
+            SimulationError: a ball, free or ellipsoid joint is in a pose where the rates are not
+                defined.
+        """
         rates = self._array(qdot, "rate")
         if not self.turning:
             return rates.copy()
@@ -269,12 +395,16 @@ class Mechanism:
     # -------------------------------------------------------------------------------------------- dynamics
     @cached_property
     def constrained(self) -> frozenset[int]:
-        """Indices of the bodies that constraints speak of."""
+        """Indices of the bodies that constraints involve."""
         return frozenset(body for item in self.constraints for body in item.bodies) - {GROUND}
 
     @cached_property
     def inertial(self) -> tuple[Array, Array, Array]:
-        """Masses (b,), mass centres (b, 3) and inertias (b, 3, 3) of all bodies, as in `MassProperties`."""
+        """Masses (b,), mass centres (b, 3) and inertias (b, 3, 3) of all bodies.
+
+        Returns:
+            Arrays in the units and frames of `MassProperties`.
+        """
         properties = [body.mass_properties for body in self.bodies]
         return (
             np.array([item.mass for item in properties], dtype=float),
@@ -283,19 +413,30 @@ class Mechanism:
         )
 
     def mass_matrix(self, q: Values) -> Array:
-        """M (n, n) for the generalized speeds."""
+        """Return the mass matrix M (n, n) for the generalized speeds."""
         return dynamics.mass_matrix(self.at(q))
 
     def bias(self, q: Values, u: Values) -> Array:
-        """C (n,), the velocity-dependent part of M udot + C = gravity + applied forces."""
+        """Return C (n,), the velocity-dependent part of M udot + C = gravity + applied forces.
+
+        Args:
+            q: coordinate values.
+            u: generalized speeds.
+        """
         return dynamics.missing_forces(self.at(q, u), self._still, np.zeros(3))
 
     def gravity_forces(self, q: Values) -> Array:
-        """Generalized forces of gravity (n,)."""
+        """Return the generalized forces of gravity (n,)."""
         return -dynamics.missing_forces(self.at(q), self._still, self.gravity)
 
     def generalized_forces(self, q: Values, body_wrenches: Mapping[str, Wrench]) -> Array:
-        """Generalized forces (n,) of wrenches at the origins of bodies or frames, along ground's axes."""
+        """Return the generalized forces (n,) of wrenches on bodies or frames.
+
+        Args:
+            q: coordinate values.
+            body_wrenches: wrenches at the origins of bodies or frames, along the axes of ground, by
+                name.
+        """
         return self._sum_applied_forces(self.at(q), {}, body_wrenches)
 
     def acceleration(
@@ -306,15 +447,19 @@ class Mechanism:
         body_wrenches: Mapping[str, Wrench] | None = None,
         time: float = 0.0,
     ) -> Array:
-        """Derivatives of the generalized speeds (n,) under gravity, the given forces and the constraints.
+        """Return the derivatives of the generalized speeds (n,) under forces and constraints.
+
+        Gravity is included.
 
         Args:
-            q: coordinate values, which must obey the constraints already.
-            u: generalized speeds, which must obey them too (that of a locked coordinate is zero).
-            generalized_forces: conjugate to the generalized speeds (N, N·m); zero for names left
-                out.
-            body_wrenches: by body or frame, applied at its origin, along ground's axes.
-            time: what prescribed coordinates go by (s).
+            q: coordinate values, which must fulfil the constraints.
+            u: generalized speeds, which must fulfil them, too (that of a locked coordinate is
+                zero).
+            generalized_forces: forces conjugate to the generalized speeds (N, N m); zero for
+                omitted names.
+            body_wrenches: wrenches at the origins of bodies or frames, along the axes of ground, by
+                name.
+            time: time of prescribed coordinates (s).
 
         Raises:
             SimulationError: a coordinate moves no mass, or a number is not finite.
@@ -328,44 +473,66 @@ class Mechanism:
     def inverse_dynamics(
         self, q: Values, u: Values, udot: Values, body_wrenches: Mapping[str, Wrench] | None = None
     ) -> Array:
-        """Generalized forces (n,) that give `udot` against gravity and the wrenches, constraints left aside."""
+        """Return the generalized forces (n,) that give `udot` against gravity and wrenches.
+
+        Constraints are ignored.
+
+        Args:
+            q: coordinate values.
+            u: generalized speeds.
+            udot: derivatives of the speeds.
+            body_wrenches: wrenches at the origins of bodies or frames, along the axes of ground, by
+                name.
+        """
         state = self.at(q, u)
         missing = dynamics.missing_forces(state, self._array(udot, "acceleration"), self.gravity)
         return missing - self._sum_applied_forces(state, {}, body_wrenches or {})
 
     @cached_property
     def total_mass(self) -> float:
-        """Mass of all bodies (kg)."""
+        """Mass of all bodies together (kg)."""
         return float(self.inertial[0].sum())
 
     def center_of_mass(self, q: Values) -> Array:
-        """Mass centre (3,) in ground (m)."""
+        """Return the mass centre in ground (3,), m."""
         return self._mean(MassCentres.of(self.at(q)).positions())
 
     def center_of_mass_velocity(self, q: Values, u: Values) -> Array:
-        """Velocity (3,) of the mass centre in ground (m/s)."""
+        """Return the velocity of the mass centre in ground (3,), m/s."""
         return self._mean(MassCentres.of(self.at(q, u)).velocities())
 
     def kinetic_energy(self, q: Values, u: Values) -> float:
-        """Kinetic energy (J)."""
+        """Return the kinetic energy of all bodies (J)."""
         return MassCentres.of(self.at(q, u)).kinetic_energy()
 
     def potential_energy(self, q: Values) -> float:
-        """Potential energy of gravity (J), zero with the mass centre at ground's origin."""
+        """Return the potential energy of gravity (J).
+
+        It is zero with the mass centre at the origin of ground.
+        """
         return -self.total_mass * float(self.gravity @ self.center_of_mass(q))
 
     def momentum(self, q: Values, u: Values) -> tuple[Array, Array]:
-        """Linear momentum (3,) in kg·m/s, and angular momentum (3,) about ground's origin in kg·m²/s."""
+        """Return the momentum of all bodies.
+
+        Args:
+            q: coordinate values.
+            u: generalized speeds.
+
+        Returns:
+            Linear momentum (3,) in kg m/s, and angular momentum (3,) about the origin of ground in
+            kg m²/s.
+        """
         return MassCentres.of(self.at(q, u)).momentum()
 
     # --------------------------------------------------------------------------------------------- helpers
     @cached_property
     def program(self) -> Program:
-        """The mechanism in the vectors of the kernels."""
+        """Program of the mechanism: its integers and numbers for the kernels."""
         return Program(tree_of(self, range(len(self.coordinates))), self.constraints)
 
     def __getstate__(self) -> dict[str, Any]:
-        # The program has addresses that are good in this process only.
+        # The program contains addresses that are valid in this process only.
         return {name: value for name, value in vars(self).items() if name != "program"}
 
     @cached_property
@@ -396,18 +563,21 @@ class Mechanism:
 
     @cached_property
     def _unit(self) -> Array:
-        """What changes speeds that are rates into rates; nobody may write into it."""
+        """Unit matrix, for speeds that are rates; it cannot be written to."""
         unit = np.eye(len(self.coordinates))
         unit.flags.writeable = False
         return unit
 
     @cached_property
     def turning(self) -> tuple[Mobilizer, ...]:
-        """The mobilizers whose speeds are not the rates of their coordinates."""
+        """Mobilizers whose speeds are not the rates of their coordinates."""
         return tuple(body.mobilizer for body in self.bodies if not body.mobilizer.speeds_are_rates)
 
     def _mean(self, vectors: Array) -> Array:
-        """Mean of one vector per body (b, 3), weighted by mass; zero where nothing has mass."""
+        """Return the mean of one vector per body (b, 3), weighted by mass.
+
+        It is zero if no body has mass.
+        """
         return self.inertial[0] @ vectors / (self.total_mass or 1.0)
 
     def _station(self, frame: str, station: ArrayLike) -> tuple[int, Array]:
@@ -427,6 +597,7 @@ class Mechanism:
 
     def _array(self, values: Values, what: str, defaults: Sequence[float] = ()) -> Array:
         count = len(self.coordinates)
+        # The usual case, in which simulations call, is not converted.
         if type(values) is np.ndarray and values.shape == (count,) and values.dtype == float:
             return values
         if isinstance(values, Mapping):

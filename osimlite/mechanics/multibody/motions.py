@@ -1,8 +1,8 @@
-"""Elementary motions: what the transform of every joint is a product of.
+"""Elementary motions: the factors of the transform of a joint.
 
-A motion moves its outgoing frame in its incoming frame as a few generalized coordinates and speeds
-say. The numbers in `coordinates` are places among the coordinates of the joint; `q` (k,) and `u`
-(k,) always are all those of the joint.
+A motion moves its outgoing frame in its incoming frame by some generalized coordinates and speeds.
+The numbers in `coordinates` are indices among the coordinates of the joint; `q` (k,) and `u` (k,)
+are always all those of the joint.
 """
 
 from __future__ import annotations
@@ -36,100 +36,127 @@ from osimlite.mechanics.multibody.spatial import invert_transform as inverse_tra
 
 
 class Motion(ABC):
-    """One factor of a joint's transform."""
+    """Factor of the transform of a joint."""
 
     coordinates: tuple[int, ...]
 
     @abstractmethod
     def elementary(self) -> tuple[Fixed | AxisMotion, ...]:
-        """The same transform as a product of fixed transforms and motions about or along one axis."""
+        """Return the transform as a product of one-axis motions.
+
+        Returns:
+            Fixed transforms, and motions about or along one axis, in order.
+        """
 
     def placed(self, q: Array) -> Array:
-        """The outgoing frame in the incoming frame (4, 4)."""
+        """Return the outgoing frame in the incoming frame (4, 4)."""
         return reduce(np.matmul, (part.placed(q) for part in self.elementary()), np.eye(4))
 
     def rates(self, q: Array) -> Array | None:
-        """N (k, k) with qdot = N u for these `coordinates`; None if the speeds are the rates."""
+        """Return N (k, k) with qdot = N u for these `coordinates`.
+
+        It is None if the speeds are the rates.
+        """
         return None
 
     def rate_bias(self, q: Array, u: Array) -> Array | None:
-        """Ndot u (k,), so that qddot = N udot + Ndot u; None if it is zero."""
+        """Return Ndot u (k,), so that qddot = N udot + Ndot u; None if it is zero."""
         return None
 
 
 @dataclass(frozen=True, eq=False)
 class Fixed(Motion):
-    """A transform that never changes; `matrix` (4, 4) is the outgoing frame in the incoming frame."""
+    """Transform that never changes."""
 
-    matrix: Array
+    matrix: Array  # outgoing frame in the incoming frame (4, 4)
     coordinates: tuple[int, ...] = ()
 
     def placed(self, q: Array) -> Array:
-        """The frame as it is."""
+        """Return the outgoing frame in the incoming frame (4, 4), whatever the coordinates."""
         return self.matrix
 
     def elementary(self) -> tuple[Fixed | AxisMotion, ...]:
-        """Itself."""
+        """Return the motion itself, which is elementary.
+
+        Returns:
+            Tuple with the motion as its only entry.
+        """
         return (self,)
 
     def inverse(self) -> Fixed:
-        """The motion of the incoming frame in the outgoing frame."""
+        """Return the transform of the incoming frame in the outgoing frame."""
         return Fixed(inverse_transform(self.matrix))
 
 
 @dataclass(frozen=True, eq=False)
 class AxisMotion(Motion):
-    """Rotation about (rad) or translation along (m) a fixed unit axis, by a function of coordinates."""
+    """Rotation about or translation along a fixed unit axis, by a function of coordinates."""
 
     kind: Literal["rotate", "translate"]
-    axis: Array
-    coordinates: tuple[int, ...]
-    function: Function = IDENTITY
+    axis: Array  # unit vector (3,) in the incoming frame
+    coordinates: tuple[int, ...]  # arguments of the function
+    function: Function = IDENTITY  # amount, rad or m
 
     @property
     def coordinate(self) -> int | None:
-        """The coordinate that *is* the amount, or None if the amount is any other function."""
+        """Coordinate that equals the amount, or None if the amount is another function."""
         return self.coordinates[0] if self.function == IDENTITY else None
 
     def amount(self, q: Array) -> float:
-        """How far the motion goes (rad or m)."""
+        """Return the amount of the motion (rad or m)."""
         return self.function.evaluate(q[list(self.coordinates)])[0]
 
     def placed(self, q: Array) -> Array:
-        """The outgoing frame turned about or moved along the axis."""
+        """Return the outgoing frame, rotated about or moved along the axis (4, 4)."""
         amount = self.amount(q)
         if self.kind == "rotate":
             return make_transform(rotation_about(self.axis, amount))
         return make_transform(None, amount * self.axis)
 
     def elementary(self) -> tuple[Fixed | AxisMotion, ...]:
-        """Itself."""
+        """Return the motion itself, which is elementary.
+
+        Returns:
+            Tuple with the motion as its only entry.
+        """
         return (self,)
 
     def inverse(self) -> AxisMotion:
-        """The motion of the incoming frame in the outgoing frame: the same about the opposite axis."""
+        """Return the inverse motion, which is about the opposite axis."""
         return AxisMotion(self.kind, -self.axis, self.coordinates, self.function)
 
 
 @dataclass(frozen=True, eq=False)
 class SimbodyAccelerationError(Motion):
-    """No motion, but the error of Simbody's angular acceleration of a CustomJoint with these three `turns` after it.
+    """Error of Simbody's angular acceleration of a CustomJoint, without any motion.
 
-    The angular velocity is W r with the rates r of the three angles and the axes W, each turned by
-    the angles before it. In the rate of W Simbody takes for the rate of the first angle what the
-    first coordinate does to all three angles, and for that of the first two what the first two
-    coordinates do. That is right only if each coordinate drives the angle of the same number.
+    The angular velocity is W r with the rates r of the three angles and the axes W, each rotated by
+    the angles before it. In the derivative of W, Simbody uses for the rate of the first angle the
+    effect of the first coordinate on all three angles, and for the rates of the first two angles
+    the effect of the first two coordinates. That is correct only if each coordinate drives the
+    angle of the same number.
+
+    Attributes:
+        turns: the three rotations of the joint, which follow this motion.
+        coordinates: none.
     """
 
     turns: tuple[AxisMotion, ...]
     coordinates: tuple[int, ...] = ()
 
     def elementary(self) -> tuple[Fixed | AxisMotion, ...]:
-        """Three turns that stay at zero and accelerate all the same; nothing where there is no error."""
+        """Return three rotations that stay at zero but have an acceleration.
+
+        Returns:
+            The rotations; none where Simbody makes no error.
+        """
         turned = [
             set() if isinstance(turn.function, Constant) else set(turn.coordinates)
             for turn in self.turns
         ]
+        # No error if the second rotation is constant, or only the first coordinate drives the first
+        # rotation and none of the others; the same for the third rotation and the first two
+        # coordinates.
         if (
             not turned[1] or (turned[0] <= {0} and not turned[1] & {0} and not turned[2] & {0})
         ) and (not turned[2] or (turned[0] | turned[1] <= {0, 1} and not turned[2] & {0, 1})):
@@ -143,14 +170,14 @@ class SimbodyAccelerationError(Motion):
 
 @dataclass(frozen=True, eq=False)
 class AccelerationErrorAngle(Function):
-    """An angle of zero with a rate of zero; its acceleration is a component of a `SimbodyAccelerationError`."""
+    """Angle of zero with a rate of zero, whose acceleration is a component of Simbody's error."""
 
     drift: SimbodyAccelerationError
-    places: tuple[int, ...]  # of its arguments among the coordinates of the joint
-    component: int
+    places: tuple[int, ...]  # indices of its arguments among the coordinates of the joint
+    component: int  # component of the error, 0, 1 or 2
 
     def evaluate(self, arguments: Arguments) -> Evaluated:
-        """Zero and zeros: what it accelerates by is no derivative of these."""
+        """Return zero and zero derivatives; the acceleration does not follow from derivatives."""
         return make_zero_derivatives(len(arguments))
 
 
@@ -158,16 +185,20 @@ class AccelerationErrorAngle(Function):
 class SphericalMotion(Motion):
     """Rotation by three body-fixed X-Y-Z angles, whose generalized speeds are the angular velocity.
 
-    The angular velocity is that of the outgoing frame in the incoming frame F, expressed in F, so
-    the speeds are not the rates of the angles. With `radii` (m) the origin moves on an ellipsoid:
-    it lies where the outgoing Z axis, stretched by the radii along F, ends.
+    The angular velocity is that of the outgoing frame in the incoming frame F, along the axes of F,
+    so that the speeds are not the rates of the angles. With `radii` (m) the origin moves on an
+    ellipsoid: it is at the elementwise product of the radii and the outgoing Z axis.
     """
 
     coordinates: tuple[int, ...]
     radii: Array = field(default_factory=lambda: np.zeros(3))
 
     def elementary(self) -> tuple[Fixed | AxisMotion, ...]:
-        """The three translations to the ellipsoid, if it has a size, and the three rotations."""
+        """Return the translations to the ellipsoid, if it has a size, and the three rotations.
+
+        Returns:
+            One-axis motions, in order.
+        """
         turns = tuple(
             AxisMotion("rotate", np.array(axis), (place,))
             for axis, place in zip((X, Y, Z), self.coordinates, strict=True)
@@ -185,12 +216,24 @@ class SphericalMotion(Motion):
         return slides + turns
 
     def rates(self, q: Array) -> Array:
-        """N (3, 3); SimulationError where the second angle makes it singular."""
+        """Return N (3, 3) with the rates of the angles N u.
+
+        Raises:
+            SimulationError: the second angle is a right angle, where N is singular.
+        """
         own: Any = self._angles(q)
         return np.array([angle_rate_row(own, _FIRST, part) for part in range(3)])
 
     def rate_bias(self, q: Array, u: Array) -> Array:
-        """Ndot u (3,); SimulationError where the second angle makes N singular."""
+        """Return Ndot u (3,).
+
+        Args:
+            q: coordinates of the joint.
+            u: speeds of the joint.
+
+        Raises:
+            SimulationError: the second angle is a right angle, where N is singular.
+        """
         own, rows = self._angles(q), self.rates(q)
         rates: Any = (rows @ u[list(self.coordinates)]).tolist()
         return np.array(
@@ -212,13 +255,13 @@ _FIRST: Any = (0, 1, 2)
 
 @dataclass(frozen=True)
 class EllipsoidPoint(Function):
-    """One component of the point that `SphericalMotion` reaches, as a function of its three angles."""
+    """One component of the point on the ellipsoid of a `SphericalMotion`, by its three angles."""
 
-    component: int
-    radius: float
+    component: int  # 0, 1 or 2
+    radius: float  # half axis along this component, m
 
     def evaluate(self, arguments: Arguments) -> Evaluated:
-        """Value, gradient (3,) and Hessian (3, 3) at the three angles."""
+        """Return the value, the gradient (3,) and the Hessian (3, 3) at the three angles."""
         a, b, r = float(arguments[0]), float(arguments[1]), self.radius
         sa, ca, sb, cb = math.sin(a), math.cos(a), r * math.sin(b), r * math.cos(b)
         if self.component == 0:
@@ -234,15 +277,30 @@ class EllipsoidPoint(Function):
 
 
 def rotate_about(axis: Sequence[float], coordinate: int) -> AxisMotion:
-    """Rotation about a unit `axis` by a coordinate."""
+    """Return a rotation about a unit axis by a coordinate.
+
+    Args:
+        axis: unit vector (3,).
+        coordinate: index of the coordinate in the joint.
+    """
     return AxisMotion("rotate", np.array(axis), (coordinate,))
 
 
 def translate(axis: Sequence[float], coordinate: int) -> AxisMotion:
-    """Translation along a unit `axis` by a coordinate."""
+    """Return a translation along a unit axis by a coordinate.
+
+    Args:
+        axis: unit vector (3,).
+        coordinate: index of the coordinate in the joint.
+    """
     return AxisMotion("translate", np.array(axis), (coordinate,))
 
 
 def place(rotation: Array | None = None, translation: Sequence[float] | None = None) -> Fixed:
-    """A fixed rotation and translation."""
+    """Return a fixed transform.
+
+    Args:
+        rotation: rotation (3, 3); None for none.
+        translation: translation (3,), m; None for none.
+    """
     return Fixed(make_transform(rotation, translation))

@@ -1,4 +1,4 @@
-"""What a mechanism is made of: mass, coordinates, bodies, and what is fixed to bodies."""
+"""Parts of a mechanism: mass properties, coordinates, bodies, and frames and stations of bodies."""
 
 from __future__ import annotations
 
@@ -13,30 +13,31 @@ from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.joints import MotionType
 
 GROUND = -1
-"""The index that stands for ground wherever a body is meant."""
+"""Index of ground, wherever a body is referred to."""
 
 
 @dataclass(frozen=True, eq=False)
 class MassProperties:
-    """Mass (kg), mass centre (3,) in the body frame (m), inertia (3, 3) about it along body axes (kg·m²)."""
+    """Mass, mass centre and inertia of a body."""
 
-    mass: float
-    center: Array = field(default_factory=lambda: np.zeros(3))
-    inertia: Array = field(default_factory=lambda: np.zeros((3, 3)))
+    mass: float  # kg
+    center: Array = field(default_factory=lambda: np.zeros(3))  # in the body frame (3,), m
+    inertia: Array = field(default_factory=lambda: np.zeros((3, 3)))  # about the mass centre, kg m²
 
     def about_origin(self) -> Array:
-        """The inertia about the origin of the body (3, 3), kg m^2."""
+        """Return the inertia about the origin of the body (3, 3), kg m²."""
+        # Parallel axis theorem.
         c = self.center
         return self.inertia + self.mass * (c @ c * np.eye(3) - np.outer(c, c))
 
     def share(self, count: int) -> MassProperties:
-        """One of `count` equal parts that lie on each other."""
+        """Return one of `count` equal parts in the same position."""
         return MassProperties(self.mass / count, self.center, self.inertia / count)
 
 
 @dataclass(frozen=True)
 class CoordinateInfo:
-    """What the model says of one coordinate (rad or m, and per second)."""
+    """Properties of one coordinate in the model (rad or m, and per second)."""
 
     name: str
     path: str
@@ -47,37 +48,35 @@ class CoordinateInfo:
     range: tuple[float, float] = (-10.0, 10.0)
     clamped: bool = False
     locked: bool = False
-    # its value as a function of time (s), or None; a locked coordinate keeps its value all the same
-    prescribed: Function | None = None
-    # assembling a pose moves it as the constraints like, instead of as little as it can
-    yielding: bool = False
+    prescribed: Function | None = None  # value as a function of time (s); without effect if locked
+    yielding: bool = False  # whether assembly may move it freely, without counting the change
 
     @property
     def unit(self) -> str:
-        """Of its values: rad or m, or nothing if what it moves is neither an angle nor a distance of that size."""
+        """Unit of its values: rad or m, or empty if it is neither an angle nor a distance."""
         return {"rotational": "rad", "translational": "m"}.get(self.motion_type, "")
 
 
 @dataclass(frozen=True, eq=False)
 class MobileBody:
-    """A body, the index of the body that carries it (-1: ground), and the mobilizer between them."""
+    """Body with the body that carries it, and the mobilizer between them."""
 
     name: str
-    path: str
-    parent: int
+    path: str  # absolute path
+    parent: int  # index of the body that carries it, -1 for ground
     mass_properties: MassProperties
     mobilizer: Mobilizer
 
 
 class FramePlacement(NamedTuple):
-    """A frame fixed to a body (index, -1 for ground); `transform` (4, 4) is the frame in the body."""
+    """Frame that is fixed to a body."""
 
-    body: int
-    transform: Array
+    body: int  # index of the body, -1 for ground
+    transform: Array  # frame in the body (4, 4)
 
 
 class StationPlacement(NamedTuple):
-    """A point fixed to a body (index, -1 for ground); `location` (3,) is the point in the body's frame (m)."""
+    """Point that is fixed to a body."""
 
-    body: int
-    location: Array
+    body: int  # index of the body, -1 for ground
+    location: Array  # point in the body's frame (3,), m

@@ -1,4 +1,4 @@
-"""From the constraints of a model to equations between coordinates and bodies."""
+"""Conversion of the constraints of a model to constraints of a mechanism."""
 
 from __future__ import annotations
 
@@ -23,20 +23,20 @@ from osimlite.schema.sets import Constraint as SchemaConstraint
 
 @dataclass(frozen=True, eq=False)
 class ConstraintReader:
-    """Makes constraints of a mechanism from those of a model."""
+    """Converter of constraints of a model."""
 
-    placements: Placements  # of the model's frames
+    placements: Placements  # frames of the model
     bodies: Mapping[str, int]  # index in the mechanism of every body and ground, by absolute path
     coordinates: Mapping[str, int]  # index in the mechanism of every coordinate, by absolute path
     opensim_derivatives: bool  # see `build_mechanism`
 
     def build_constraint(self, constraint: SchemaConstraint) -> Constraint:
-        """The equations of an enforced constraint.
+        """Return the constraint of the mechanism for an enforced constraint of the model.
 
         Raises:
-            ModelError: it names what does not exist, or its function, a direction or a distance is
+            ModelError: a reference has no target, or a function, a direction or a distance is
                 impossible.
-            UnsupportedError: a constraint of another class.
+            UnsupportedError: the constraint is of an unknown class.
         """
         make = _READERS.get(type(constraint))
         path = self.placements.path(constraint)
@@ -50,8 +50,8 @@ class ConstraintReader:
         ]
 
     def _find_station(self, owner: Component, socket: str, location: str) -> StationPlacement:
-        # OpenSim takes the location in the body itself, even where the socket names a frame that is
-        # off the body's.
+        # OpenSim applies the location to the body itself, even where the socket refers to an offset
+        # frame.
         return StationPlacement(
             self._find_base(owner, socket), np.array(getattr(owner, location), dtype=float)
         )
@@ -63,7 +63,7 @@ class ConstraintReader:
     def _find_coordinate(self, owner: Component, field: str, value: str | Component) -> int:
         path = self.placements.path(self.placements.tree.target(owner, field, value))
         if path not in self.coordinates:
-            # Of a coordinate that stands several times in a joint, only the first moves something.
+            # If a coordinate occurs several times in a joint, only the first one moves the joint.
             raise ModelError(
                 f"the {field} of '{self.placements.path(owner)}' is '{path}', which moves nothing; "
                 "give it a coordinate that a joint moves by"
@@ -71,7 +71,12 @@ class ConstraintReader:
         return self.coordinates[path]
 
     def build_coupler(self, item: schema.CoordinateCouplerConstraint, path: str) -> Constraint:
-        """One coordinate as a function of others."""
+        """Return the constraint of one coordinate by a function of others.
+
+        Args:
+            item: constraint of the model.
+            path: its path.
+        """
         names = item.independent_coordinate_names
         function = convert_function(
             item.coupled_coordinates_function,
@@ -91,7 +96,12 @@ class ConstraintReader:
         )
 
     def build_point_constraint(self, item: schema.PointConstraint, path: str) -> Constraint:
-        """Two stations on each other."""
+        """Return the constraint that holds two stations together.
+
+        Args:
+            item: constraint of the model.
+            path: its path.
+        """
         return b.PointConstraint(
             self._find_station(item, "socket_body_1", "location_body_1"),
             self._find_station(item, "socket_body_2", "location_body_2"),
@@ -101,7 +111,12 @@ class ConstraintReader:
     def build_distance_constraint(
         self, item: schema.ConstantDistanceConstraint, path: str
     ) -> Constraint:
-        """Two stations at a distance."""
+        """Return the constraint that keeps two stations at a distance.
+
+        Args:
+            item: constraint of the model.
+            path: its path.
+        """
         if not 0.0 < item.constant_distance < np.inf:
             raise ModelError(
                 f"'{path}' has a distance of {item.constant_distance:g}; give a positive length in m"
@@ -114,7 +129,12 @@ class ConstraintReader:
         )
 
     def build_point_on_line(self, item: schema.PointOnLineConstraint, path: str) -> Constraint:
-        """A station on a line."""
+        """Return the constraint that keeps a station on a line.
+
+        Args:
+            item: constraint of the model.
+            path: its path.
+        """
         return b.PointOnLineConstraint(
             self._find_station(item, "socket_line_body", "point_on_line"),
             _parse_direction(item.line_direction_vec, f"the line of '{path}'"),
@@ -125,7 +145,12 @@ class ConstraintReader:
     def build_rolling_constraint(
         self, item: schema.RollingOnSurfaceConstraint, path: str
     ) -> Constraint:
-        """A roller on a plane."""
+        """Return the constraint of a roller on a plane.
+
+        Args:
+            item: constraint of the model.
+            path: its path.
+        """
         return b.RollingConstraint(
             self._find_base(item, "socket_surface_body"),
             self._find_base(item, "socket_rolling_body"),
@@ -135,14 +160,24 @@ class ConstraintReader:
         )
 
     def build_weld_constraint(self, item: schema.WeldConstraint, path: str) -> Constraint:
-        """Two frames on each other."""
+        """Return the constraint that holds two frames together.
+
+        Args:
+            item: constraint of the model.
+            path: its path.
+        """
         return b.WeldConstraint(
             self._find_frame(item, "socket_frame1"), self._find_frame(item, "socket_frame2"), path
         )
 
 
 def unknown_constraint(path: str, kind: str) -> UnsupportedError:
-    """The error for a constraint that cannot be computed."""
+    """Return the error for a constraint of an unknown class.
+
+    Args:
+        path: path of the constraint.
+        kind: name of its class.
+    """
     return UnsupportedError(
         f"the constraint '{path}' ({kind}) cannot be computed; set its isEnforced to false or remove it; "
         f"those osimlite computes are {join_words([item.__name__ for item in _READERS], most=len(_READERS))}"

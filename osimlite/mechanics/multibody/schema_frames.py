@@ -1,4 +1,4 @@
-"""Where the frames and stations of a model are: which body they are fixed to, and their transform there."""
+"""Resolution of frames and stations of a model to bodies."""
 
 from __future__ import annotations
 
@@ -20,22 +20,29 @@ from osimlite.schema.tree import Tree
 
 
 class Placements:
-    """Follows frames of frames down to bodies (or ground), each named by its absolute path."""
+    """Resolver of frames and stations to bodies (or ground), which are named by absolute paths."""
 
     def __init__(self, tree: Tree) -> None:
         self.tree = tree
         self.found: dict[str, tuple[str, Array]] = {}
-        """The body (or ground) that each frame is fixed to so far, and where it is there (4, 4)."""
+        """Body (or ground) of each frame so far, and the frame's transform in it (4, 4), by path."""
 
     def resolve_frame(self, frame: PhysicalFrame) -> tuple[str, Array]:
-        """The body (or ground) that a frame is fixed to, and the frame's transform (4, 4) there.
+        """Return the body of a frame, and the frame's transform in it.
+
+        Args:
+            frame: frame of the model.
+
+        Returns:
+            Path of the body (or ground), and the frame in the body (4, 4).
 
         Raises:
             ModelError: frames are fixed to each other in a circle, or stations do not define a
                 frame.
-            UnsupportedError: a frame of another class.
+            UnsupportedError: a frame is of an unknown class.
         """
-        # Each frame that waits is fixed to the next one; a chain of them may be of any length.
+        # Each waiting frame is fixed to the next one. A list instead of recursion, because a chain
+        # of frames may be of any length.
         wanted = self.path(frame)
         waiting = {} if wanted in self.found else {wanted: frame}
         while waiting:
@@ -60,7 +67,7 @@ class Placements:
         return self.found[wanted]
 
     def _list_parent_frames(self, frame: PhysicalFrame) -> list[PhysicalFrame]:
-        """The frames that a frame is laid on."""
+        """Return the frames that a frame is defined by."""
         if isinstance(frame, PhysicalOffsetFrame):
             return [self.follow_socket(frame, "socket_parent")]
         if isinstance(frame, StationDefinedFrame):
@@ -87,7 +94,15 @@ class Placements:
         )
 
     def follow_socket(self, owner: Component, socket: str) -> PhysicalFrame:
-        """The frame that a socket of `owner` leads to."""
+        """Return the frame that a socket refers to.
+
+        Args:
+            owner: component with the socket.
+            socket: name of the socket.
+
+        Raises:
+            UnsupportedError: the target is not a physical frame.
+        """
         target = self.tree.target(owner, socket, getattr(owner, socket))
         if not isinstance(target, PhysicalFrame):
             kind = getattr(target, "class_name", "") or type(target).__name__
@@ -99,18 +114,25 @@ class Placements:
 
     @np.errstate(invalid="ignore")
     def resolve_station(self, station: Station) -> tuple[str, Array]:
-        """The body (or ground) that a station is fixed to, and its place (3,) there."""
+        """Return the body of a station, and its position there.
+
+        Args:
+            station: station of the model.
+
+        Returns:
+            Path of the body (or ground), and the position in the body (3,), m.
+        """
         base, matrix = self.resolve_frame(self.follow_socket(station, "socket_parent_frame"))
         return base, matrix[:3, :3] @ np.array(station.location, dtype=float) + matrix[:3, 3]
 
     def path(self, component: Component) -> str:
-        """The absolute path of a component of the model."""
+        """Return the absolute path of a component of the model."""
         path = self.tree.path_of(component)
         assert path is not None
         return path
 
     def _list_stations(self, frame: StationDefinedFrame) -> list[Station]:
-        """Points a, b, c and the origin of a frame."""
+        """Return the stations of points a, b and c and of the origin of a frame."""
         stations = []
         for socket in ("socket_point_a", "socket_point_b", "socket_point_c", "socket_origin_point"):
             target = self.tree.target(frame, socket, getattr(frame, socket))
@@ -135,6 +157,8 @@ class Placements:
                 f"point_a, point_b and point_c of the frame '{path}' lie on a line; move one off it"
             )
         # The third vector completes the two, in the order of the two axes.
+        # An unknown first axis counts as x, and a second one that is not perpendicular as the next
+        # axis.
         first, second = _parse_axis(frame.ab_axis), _parse_axis(frame.ab_x_ac_axis)
         first = np.eye(3)[0] if first is None else first
         if second is None or first @ second != 0.0:
@@ -148,7 +172,10 @@ class Placements:
 
 
 def _parse_axis(word: str) -> Array | None:
-    """The unit vector that a word like ``-y`` names, by its first letter as in OpenSim; None for another word."""
+    """Return the unit vector of a word like ``-y``, or None for another word.
+
+    As in OpenSim only the sign and the first letter count.
+    """
     sign, letter = (word[:1], word[1:2]) if word[:1] in ("+", "-") else ("+", word[:1])
     if letter.lower() not in ("x", "y", "z"):
         return None

@@ -1,4 +1,4 @@
-"""From the function components of a model to functions that can be evaluated."""
+"""Conversion of the function components of a model to functions with derivatives."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ from osimlite.schema.base import Object, Unknown
 def convert_function(
     function: Object | None, arguments: int, where: str, *, opensim_derivatives: bool = False
 ) -> f.Function:
-    """The function that a component of a model describes.
+    """Return the function that a component of a model describes.
 
     Args:
         function: one of OpenSim's functions.
-        arguments: how many arguments it will get.
-        where: the path and property it stands in, for messages.
-        opensim_derivatives: give a multivariate polynomial the second derivatives that OpenSim
-            takes for them.
+        arguments: number of arguments that it will be called with.
+        where: path and property of the function, for messages.
+        opensim_derivatives: whether a multivariate polynomial has OpenSim's wrong second
+            derivatives.
 
     Raises:
-        ModelError: there is no function, or it is not a function of this many arguments, or has
-            impossible values.
-        UnsupportedError: a function of another class.
+        ModelError: the function is missing, has another number of arguments, or has impossible
+            values.
+        UnsupportedError: the function is of an unknown class.
     """
     if function is None:
         raise ModelError(f"{where} is missing; give one, for instance a LinearFunction")
@@ -73,7 +73,7 @@ def convert_function(
 
 
 class _Impossible(Exception):
-    """What is wrong with a function, and what to do, without its place."""
+    """Error of a function, with the remedy but without its position in the model."""
 
 
 def _converts(function: Object, wanted: int, given: int) -> None:
@@ -87,7 +87,7 @@ def _convert_linear(function: schema.LinearFunction, arguments: int) -> f.Functi
     count = len(function.coefficients)
     if count <= arguments:
         raise _Impossible(f"it has {count} coefficients; give {arguments + 1}, the constant last")
-    # OpenSim takes the coefficient behind the weights for the constant, and ignores the others.
+    # OpenSim uses the coefficient after the weights as the constant, and ignores those after it.
     weights, start = function.coefficients[:arguments], function.coefficients[arguments]
     return f.Linear(weights[0], start) if arguments == 1 else f.WeightedSum(weights, start)
 
@@ -95,13 +95,16 @@ def _convert_linear(function: schema.LinearFunction, arguments: int) -> f.Functi
 def _read_points(
     function: Any, least: int, *, apart: bool = False
 ) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Return the abscissae and ordinates of a function that goes through points, checked.
+    """Return the abscissae and ordinates of a function through points, after checks.
 
     Args:
-        function: with properties `x` and `y`; ordinates beyond the last abscissa are ignored, as in
-            OpenSim.
-        least: the number of points that it needs.
-        apart: whether no two abscissae may be equal.
+        function: function with properties `x` and `y`; ordinates beyond the last abscissa are
+            ignored, as in OpenSim.
+        least: smallest number of points.
+        apart: whether abscissae must differ.
+
+    Returns:
+        Abscissae and ordinates.
     """
     x = tuple(function.x)
     y = tuple(function.y)[: len(x)]
@@ -137,7 +140,7 @@ def _convert_gcv_spline(function: schema.GCVSpline) -> f.Function:
     if half_order < 1:
         raise _Impossible(f"its half_order is {half_order}; give 1 or more, 2 for a cubic spline")
     x, y = _read_points(function, 2 * half_order, apart=True)
-    # The linter values what it can without numpy.
+    # The module is imported here, because the linter evaluates other functions without numpy.
     splines: Any = import_module("osimlite.mechanics.multibody.smoothing_spline")
     made: f.Function = splines.smoothing_spline(x, y, half_order, function.error_variance)
     return made

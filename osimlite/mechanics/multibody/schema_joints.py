@@ -1,4 +1,4 @@
-"""From the joints of a model to motions: which coordinates a joint has, in which order, and what they do."""
+"""Conversion of the joints of a model to motions, with the order of their coordinates."""
 
 from __future__ import annotations
 
@@ -40,12 +40,20 @@ JOINT_TYPES = (
 def joint_motions(
     joint: Joint, path: str, *, opensim_derivatives: bool = False
 ) -> tuple[tuple[Motion, ...], Sequence[Coordinate]]:
-    """The factors of X_FM of a joint, and its coordinates in the order that the factors count them in.
+    """Return the motions of a joint.
+
+    Args:
+        joint: joint of the model.
+        path: its path, for messages.
+        opensim_derivatives: see `build_mechanism`.
+
+    Returns:
+        Factors of X_FM, and the coordinates in the order to which the factors refer.
 
     Raises:
-        ModelError: a wrong number of coordinates, an axis or a function that cannot be, radii that
-            are no numbers.
-        UnsupportedError: a joint or a function of another class.
+        ModelError: the number of coordinates is wrong, or an axis, a function or radii are
+            impossible.
+        UnsupportedError: the joint or a function is of an unknown class.
     """
     kind, coordinates = type(joint).__name__, list(joint.coordinates)
     if isinstance(joint, schema.CustomJoint):
@@ -75,7 +83,12 @@ def joint_motions(
 
 
 def unknown_joint(path: str, kind: str) -> UnsupportedError:
-    """The error for a joint that cannot be computed."""
+    """Return the error for a joint of an unknown class.
+
+    Args:
+        path: path of the joint.
+        kind: name of its class.
+    """
     return UnsupportedError(
         f"'{path}' is a {kind}, whose motion osimlite cannot compute; the joints it can are "
         f"{join_words(JOINT_TYPES, most=len(JOINT_TYPES))}"
@@ -119,7 +132,7 @@ def _build_custom_motions(
 
 
 def _read_radii(radii: Sequence[float], path: str) -> Sequence[float]:
-    # Models mirror an ellipsoid by negative radii: the point is then on the other side.
+    # Negative radii are accepted: models use them to mirror an ellipsoid.
     if not np.isfinite(radii).all():
         words = " ".join(f"{radius:g}" for radius in radii)
         raise ModelError(

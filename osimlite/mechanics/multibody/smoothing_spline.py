@@ -21,20 +21,21 @@ from osimlite.mechanics.multibody.functions import Univariate
 from osimlite.mechanics.multibody.spatial import Array
 
 TOUCHING = 1e-9
-"""Points that are closer than this part of their mean distance are one."""
+"""Distance of points, relative to the mean distance, below which they count as one point."""
 _GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
+"""Golden ratio of the sections of an interval."""
 
 
 @dataclass(frozen=True, eq=False)
 class PiecewisePolynomial(Univariate):
-    """Polynomials in x - knots[k], `pieces` (k, degree + 1) from the constant up; the end pieces go on outside."""
+    """Piecewise polynomial in x - knots[k]; the end pieces continue outside."""
 
-    knots: Array
-    pieces: Array
+    knots: Array  # first argument of each piece (k,)
+    pieces: Array  # coefficients from the constant up (k, degree + 1)
 
     @property
     def table(self) -> Sequence[float]:
-        """The pieces."""
+        """Table of the pieces, see `kernels.functions`."""
         head = PIECES, 1.0, len(self.knots), self.pieces.shape[1]
         numbers: list[float] = np.concatenate([head, self.knots, self.pieces.ravel()]).tolist()
         return numbers
@@ -43,15 +44,15 @@ class PiecewisePolynomial(Univariate):
 def smoothing_spline(
     x: ArrayLike, y: ArrayLike, half_order: int, error_variance: float
 ) -> PiecewisePolynomial:
-    """The natural spline of degree 2 `half_order` - 1 for n points (n,) that increase, n >= 2 `half_order`.
+    """Return the natural spline of degree 2m - 1 through or near points.
 
     Args:
-        x: abscissae (n,).
+        x: abscissae (n,), which increase; n >= 2m.
         y: ordinates (n,).
         half_order: m.
-        error_variance: of the ordinates; the smoothing is chosen to leave it in the residuals. Zero
-            goes through the points, a negative number chooses the smoothing by generalized cross
-            validation.
+        error_variance: variance of the ordinates; the smoothing is chosen so that the residuals
+            have it. Zero gives a spline through the points; a negative number chooses the smoothing
+            by generalized cross validation.
     """
     points, values = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
     if error_variance != 0.0:
@@ -61,19 +62,22 @@ def smoothing_spline(
 
 
 def natural_splines(x: ArrayLike, y: ArrayLike, half_order: int) -> list[PiecewisePolynomial]:
-    """The natural splines of degree 2 `half_order` - 1 through the points of k columns.
+    """Return the natural splines of degree 2m - 1 through the points of several columns.
 
     Args:
-        x: abscissae (n,) that increase, n >= 2 `half_order`.
+        x: abscissae (n,), which increase; n >= 2m.
         y: ordinates (n, k).
         half_order: m.
+
+    Returns:
+        One spline per column.
     """
     points, values = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
     places, scale = _unit_spacing(points)
     pieces = (
         _compute_pieces(places, values, half_order) / scale ** np.arange(2.0 * half_order)[:, None]
     )
-    # The piece before the first point counts from there too.
+    # The piece before the first point is relative to that point, too.
     knots = np.append(points[0], points)
     return [
         PiecewisePolynomial(knots, column)
@@ -84,32 +88,49 @@ def natural_splines(x: ArrayLike, y: ArrayLike, half_order: int) -> list[Piecewi
 def derivatives_of_samples(
     x: ArrayLike, y: ArrayLike, at: ArrayLike, orders: Sequence[int], half_order: int = 3
 ) -> tuple[Array, ...]:
-    """Derivatives of some orders (k, m), at k places, of the natural splines through n points.
+    """Return derivatives of natural splines through sampled points.
 
     Args:
-        x: abscissae (n,), increasing.
-        y: ordinates, in m columns (n, m).
-        at: places (k,).
-        orders: of the derivatives; 0 is the value.
-        half_order: the splines are of degree 2 `half_order` - 1.
+        x: abscissae (n,), which increase.
+        y: ordinates (n, m), in m columns.
+        at: arguments (k,).
+        orders: orders of the derivatives; 0 is the value.
+        half_order: half of the order of the splines, whose degree is 2 `half_order` - 1.
+
+    Returns:
+        One array (k, m) per order.
     """
     return SampledCurves(x, y, half_order).derivatives(at, orders)
 
 
 class SampledCurves:
-    """Natural splines through the points of several columns; as of :func:`derivatives_of_samples`."""
+    """Natural splines through the points of several columns.
+
+    Args:
+        x: abscissae (n,), which increase.
+        y: ordinates (n, m).
+        half_order: half of the order of the splines, whose degree is 2 `half_order` - 1.
+    """
 
     def __init__(self, x: ArrayLike, y: ArrayLike, half_order: int = 3) -> None:
         points, values = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
         places, self._scale = _unit_spacing(points)
-        # What lies closer to the point before than rounding of the values would let a slope be
-        # found, says nothing.
+        # Points that are nearly equal determine no slope between them within rounding: drop the
+        # later ones.
         kept = np.diff(places, prepend=-1.0) > TOUCHING
         self._start, self._places = points[0], places[kept]
         self._pieces = _compute_pieces(self._places, values[kept], half_order)
 
     def derivatives(self, at: ArrayLike, orders: Sequence[int]) -> tuple[Array, ...]:
-        """Derivatives of some orders (k, m) at k places."""
+        """Return derivatives of the splines.
+
+        Args:
+            at: arguments (k,).
+            orders: orders of the derivatives; 0 is the value.
+
+        Returns:
+            One array (k, m) per order.
+        """
         own = (np.asarray(at, dtype=float) - self._start) / self._scale
         found = (
             (order, _evaluate_derivative(self._places, self._pieces, own, order))
@@ -119,32 +140,56 @@ class SampledCurves:
 
 
 def _unit_spacing(points: Array) -> tuple[Array, float]:
-    """The points with a spacing of 1 on average, which keeps the powers of the derivatives in bounds; their scale."""
+    """Scale points to a mean spacing of 1, which keeps powers of the widths in bounds.
+
+    Args:
+        points: abscissae (n,).
+
+    Returns:
+        Scaled points, and the scale.
+    """
     scale = float(points[-1] - points[0]) / (len(points) - 1)
     return (points - points[0]) / scale, scale
 
 
 def _evaluate_derivative(points: Array, pieces: Array, at: Array, order: int) -> Array:
-    """A derivative (j, k) at j places of the splines of `_compute_pieces`."""
+    """Return a derivative (j, k) at j arguments of the splines of `_compute_pieces`.
+
+    Args:
+        points: abscissae (n,).
+        pieces: coefficients (n + 1, 2m, k).
+        at: arguments (j,).
+        order: order of the derivative.
+    """
     place = np.searchsorted(points, at, side="right")
     t, own = (at - points[np.maximum(place - 1, 0)])[:, None], pieces[place]
     result = np.zeros_like(own[:, 0])
+    # Horner's rule with the factors of the derivative.
     for power in range(pieces.shape[1] - 1, order - 1, -1):
         result = result * t + math.perm(power, order) * own[:, power]
     return result
 
 
 def _compute_pieces(points: Array, values: Array, half_order: int) -> Array:
-    """Coefficients (n + 1, 2 m, k) of natural splines through n points with values (n, k), from the constant up.
+    """Return the coefficients of natural splines through points, from the constant up.
 
-    Between two points they go with the distance from the first; before the first point and after
-    the last, where the degree is m - 1, with that from there.
+    Between two points they belong to powers of the distance from the first. Before the first point
+    and after the last, where the degree is m - 1, they belong to powers of the distance from that
+    point.
+
+    Args:
+        points: abscissae (n,).
+        values: ordinates (n, k).
+        half_order: m.
+
+    Returns:
+        Coefficients (n + 1, 2m, k).
     """
     derivatives = _compute_knot_derivatives(points, values, half_order)
     powers = np.arange(2.0 * half_order)[:, None]
     width = np.diff(points)[:, None, None] ** powers
-    # What the polynomials are over a unit interval by their values and derivatives at its ends; the
-    # first value is 0.
+    # Polynomials over a unit interval from values and derivatives at its ends. The first value is
+    # set to 0, which keeps digits of small changes of large values.
     ends = np.concatenate([derivatives[:-1], derivatives[1:]], axis=1)
     ends[:, 0], ends[:, half_order] = 0.0, np.diff(values, axis=0)
     shapes, _ = _unit_interval(half_order)
@@ -158,10 +203,15 @@ def _compute_pieces(points: Array, values: Array, half_order: int) -> Array:
 
 
 def _compute_knot_derivatives(points: Array, values: Array, half_order: int) -> Array:
-    """Derivatives (n, m, k) of orders 0 .. m - 1 at the points of splines through them.
+    """Return derivatives (n, m, k) of orders 0 to m - 1 at the points of splines through them.
 
-    They make the sum of the integrals of the squared m-th derivative a minimum: each interval is a
-    beam with as many freedoms at both ends.
+    They minimize the sum of the integrals of the squared m-th derivative: each interval is a beam
+    element with m degrees of freedom at either end.
+
+    Args:
+        points: abscissae (n,).
+        values: ordinates (n, k).
+        half_order: m.
     """
     result = np.empty((len(points), half_order, values.shape[1]))
     result[:, 0] = values
@@ -175,6 +225,7 @@ def _compute_knot_derivatives(points: Array, values: Array, half_order: int) -> 
         * powers[:, None, :]
         * width[:, None, None] ** (1 - 2 * half_order)
     )
+    # The values at the points are known; only derivatives are unknown.
     one, two = slice(1, half_order), slice(half_order + 1, 2 * half_order)
     diagonal = np.zeros((len(points), half_order - 1, half_order - 1))
     diagonal[:-1] += stiffness[:, one, one]
@@ -191,17 +242,21 @@ def _compute_knot_derivatives(points: Array, values: Array, half_order: int) -> 
 
 @cache
 def _unit_interval(half_order: int) -> tuple[Array, Array]:
-    """Of the polynomial of degree 2 m - 1 by its derivatives up to m - 1 at 0 and, behind these, at 1.
+    """Return matrices of the polynomial of degree 2m - 1 over a unit interval.
+
+    The polynomial is determined by its derivatives up to order m - 1 at 0, and then at 1.
 
     Returns:
-        Its coefficients from the constant up (2 m, 2 m), and half the second derivatives of the
-        integral of its squared m-th derivative (2 m, 2 m); all are fractions of whole numbers.
+        Its coefficients from the constant up (2m, 2m), and half the second derivatives of the
+        integral of its squared m-th derivative (2m, 2m). All entries are fractions of whole
+        numbers.
     """
     size, parts = 2 * half_order, math.factorial(half_order - 1)
     ends = np.zeros((size, size))
     for order in range(half_order):
         ends[order, order] = math.factorial(order)
         ends[half_order + order] = [math.perm(power, order) for power in range(size)]
+    # Rounding to fractions removes the error of the inverse.
     shapes = np.rint(np.linalg.inv(ends) * parts) / parts
     falling = np.array([float(math.perm(power, half_order)) for power in range(size)])
     sums = np.add.outer(np.arange(size), np.arange(size)) - size + 1
@@ -210,14 +265,14 @@ def _unit_interval(half_order: int) -> tuple[Array, Array]:
 
 
 def _solve_block_tridiagonal(diagonal: Array, beside: Array, right: Array) -> Array:
-    """The solution (n, p, k) of symmetric equations in which each of n unknowns (p, k) meets its neighbours only.
+    """Return the solution (n, p, k) of symmetric block-tridiagonal equations.
 
-    Every other unknown is eliminated, all at once, until one is left: cyclic reduction (R. Hockney,
-    J. ACM 12, 1965).
+    Every other unknown is eliminated at once until one is left: cyclic reduction (R. Hockney, J.
+    ACM 12, 1965). It needs log2(n) vectorized steps instead of n.
 
     Args:
-        diagonal: blocks (n, p, p), positive definite all together.
-        beside: blocks (n - 1, p, p) behind them.
+        diagonal: blocks (n, p, p); the matrix is positive definite.
+        beside: blocks (n - 1, p, p) to the right of them.
         right: right sides (n, p, k).
     """
     if len(diagonal) == 1:
@@ -247,10 +302,17 @@ def _solve_block_tridiagonal(diagonal: Array, beside: Array, right: Array) -> Ar
 
 
 def _smooth_values(points: Array, values: Array, half_order: int, error_variance: float) -> Array:
-    """Values at the points (n,) of the spline whose smoothing the criterion prefers."""
+    """Return the values at the points (n,) of the spline with the best smoothing.
+
+    Args:
+        points: abscissae (n,).
+        values: ordinates (n,).
+        half_order: m.
+        error_variance: variance of the ordinates, or a negative number for cross validation.
+    """
     n = len(values)
-    # The penalty of the values s is sᵀ K s, by Gauss's rule, which is exact here; K's eigenvectors
-    # make every choice of p cheap.
+    # The penalty of the values s is sᵀ K s. Gauss quadrature of K is exact here, and its
+    # eigenvectors make the evaluation for each smoothing parameter p cheap.
     nodes, weights = np.polynomial.legendre.leggauss(half_order)
     width, middle = np.diff(points) / 2.0, (points[1:] + points[:-1]) / 2.0
     places = (middle[:, None] + width[:, None] * nodes).ravel()
@@ -261,12 +323,15 @@ def _smooth_values(points: Array, values: Array, half_order: int, error_variance
         bends.T @ ((width[:, None] * weights).ravel()[:, None] * bends)
     )
     roughness = np.maximum(roughness, 0.0)
+    # Polynomials of degree m - 1 have no roughness; rounding must not give them any.
     roughness[:half_order] = 0.0
     loads = vectors.T @ values
 
     def criterion(logarithm: float) -> float:
         left = 1.0 - 1.0 / (1.0 + math.exp(logarithm) * roughness)
         trace, error = float(left.sum()) / n, float(np.sum((left * loads) ** 2)) / n
+        # Generalized cross validation (Woltring 1986), else the mean squared error for a known
+        # variance.
         if error_variance < 0.0:
             return error / trace**2
         return error - error_variance * (2.0 * trace - 1.0)
@@ -276,7 +341,14 @@ def _smooth_values(points: Array, values: Array, half_order: int, error_variance
 
 
 def _find_minimum(function: Callable[[float], float], start: float) -> float:
-    """Where a function of one number has a minimum: steps downhill from `start`, then golden sections."""
+    """Return an argument at which a function has a minimum.
+
+    Steps downhill from `start` bracket it, and golden sections narrow the bracket.
+
+    Args:
+        function: function of one number.
+        start: start of the search.
+    """
     step, limit = math.log(2.0), 60.0
     middle, right = start, start + step
     if function(right) < function(middle):

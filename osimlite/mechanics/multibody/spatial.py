@@ -14,23 +14,27 @@ from osimlite.mechanics.laws.rotations import (
 )
 
 Array = NDArray[np.float64]
+"""Array of floats."""
 
 
 def cross(a: Array, b: Array) -> Array:
-    """Cross product of two 3-vectors (numpy's general one takes ten times as long)."""
+    """Return the cross product of two vectors (3,).
+
+    It is ten times as fast as numpy's general function.
+    """
     ax, ay, az = a.tolist()
     bx, by, bz = b.tolist()
     return np.array((ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx))
 
 
 def skew_matrix(v: Array) -> Array:
-    """The matrix [v] with [v] a = v × a."""
+    """Return the matrix [v] (3, 3) with [v] a = v × a."""
     x, y, z = v.tolist()
     return np.array(((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0)))
 
 
 def skew_matrices(vectors: Array) -> Array:
-    """The matrices [v] with [v] a = v × a of many vectors: (b, 3) to (b, 3, 3)."""
+    """Return the matrices [v] (b, 3, 3) with [v] a = v × a of vectors (b, 3)."""
     result = np.zeros((len(vectors), 3, 3))
     for row, column, place, sign in ((0, 1, 2, -1), (0, 2, 1, 1), (1, 2, 0, -1)):
         result[:, row, column] = sign * vectors[:, place]
@@ -39,7 +43,13 @@ def skew_matrices(vectors: Array) -> Array:
 
 
 def rotation_about(axis: Array, angle: float) -> Array:
-    """Rotation matrix (3, 3) by `angle` (rad) about the unit vector `axis` (Rodrigues' formula)."""
+    """Return the rotation matrix (3, 3) about an axis, by Rodrigues' formula.
+
+    Args:
+        axis: unit vector (3,).
+        angle: angle (rad).
+    """
+    # The laws return the columns of the matrix as three axes.
     return np.array(
         transpose_rotation(
             rotation_about_axis(axis.tolist(), float(np.sin(angle)), float(np.cos(angle)))
@@ -48,7 +58,7 @@ def rotation_about(axis: Array, angle: float) -> Array:
 
 
 def rotation_xyz(angles: Array) -> Array:
-    """Rotation matrix Rx(a) Ry(b) Rz(c) of body-fixed X-Y-Z `angles` (rad)."""
+    """Return the rotation matrix Rx(a) Ry(b) Rz(c) (3, 3) of body-fixed X-Y-Z angles (3,), rad."""
     return np.array(
         transpose_rotation(
             rotation_from_xyz(*np.stack((np.sin(angles), np.cos(angles)), axis=1).ravel().tolist())
@@ -57,16 +67,20 @@ def rotation_xyz(angles: Array) -> Array:
 
 
 def rotation_about_space(angles: ArrayLike) -> Array:
-    """Rotation matrix Rz(c) Ry(b) Rx(a) of `angles` (3,) about X, Y and Z of space, one after the other (rad)."""
+    """Return the rotation matrix Rz(c) Ry(b) Rx(a) (3, 3) of space-fixed X-Y-Z angles (3,), rad."""
+    # Its inverse is Rx(-a) Ry(-b) Rz(-c).
     return rotation_xyz(-np.asarray(angles, dtype=float)).T
 
 
 def angles_xyz(rotation: Array) -> Array:
-    """Body-fixed X-Y-Z angles (..., 3) of rotation matrices (..., 3, 3), the second from -90 to 90 degrees (rad)."""
+    """Return body-fixed X-Y-Z angles (..., 3) of rotation matrices (..., 3, 3), rad.
+
+    The second angle is from -90 to 90 degrees.
+    """
     r13 = rotation[..., 0, 2]
     first = np.arctan2(-rotation[..., 1, 2], rotation[..., 2, 2])
     third = np.arctan2(-rotation[..., 0, 1], rotation[..., 0, 0])
-    # Where only the sum (or difference) of the other two shows, let the third be zero.
+    # At a right angle only the sum (or difference) of the others is determined: set the third to 0.
     is_straight = np.abs(r13) > 1.0 - 1e-14
     alone = np.arctan2(rotation[..., 1, 0], rotation[..., 1, 1]) * np.copysign(1.0, r13)
     second = np.arcsin(np.clip(r13, -1.0, 1.0))
@@ -76,10 +90,13 @@ def angles_xyz(rotation: Array) -> Array:
 
 
 def quaternion_of(rotation: ArrayLike) -> Array:
-    """Unit quaternions (..., 4), scalar first, of rotation matrices (..., 3, 3), each by the largest of its parts."""
+    """Return unit quaternions (..., 4), scalar first, of rotation matrices (..., 3, 3).
+
+    Each is computed from its largest component, which avoids cancellation.
+    """
     m = np.asarray(rotation)
     trace = np.trace(m, axis1=-2, axis2=-1)[..., None, None]
-    # Every row is the quaternion times one of its parts; the longest has the most digits.
+    # Each row is the quaternion times one of its components; the longest row is the most exact.
     products = np.empty((*m.shape[:-2], 4, 4))
     products[..., 1:, 1:] = m + np.swapaxes(m, -1, -2) + (1.0 - trace) * np.eye(3)
     for k in range(3):
@@ -94,10 +111,13 @@ def quaternion_of(rotation: ArrayLike) -> Array:
 
 
 def rotation_of(quaternions: ArrayLike) -> Array:
-    """Rotation matrices (..., 3, 3) of quaternions (..., 4), scalar first, whatever their lengths; NaN for zeros."""
+    """Return rotation matrices (..., 3, 3) of quaternions (..., 4), scalar first.
+
+    Quaternions need not have unit length; zeros give NaN.
+    """
     given = np.asarray(quaternions, dtype=float)
     with np.errstate(invalid="ignore"):
-        # The square of a long or short one is no number.
+        # Scale first, since the squares of very long or short quaternions overflow or vanish.
         near = given / np.abs(given).max(axis=-1, keepdims=True)
         w, x, y, z = np.moveaxis(near / np.linalg.norm(near, axis=-1, keepdims=True), -1, 0)
     return np.stack(
@@ -117,7 +137,12 @@ def rotation_of(quaternions: ArrayLike) -> Array:
 
 
 def make_transform(rotation: Any = None, translation: Any = None) -> Array:
-    """Homogeneous matrix (4, 4) of a rotation matrix and a translation (m); identity for what is left out."""
+    """Return the homogeneous matrix (4, 4) of a rotation and a translation.
+
+    Args:
+        rotation: rotation matrix (3, 3); None for the identity.
+        translation: translation (3,), m; None for none.
+    """
     matrix = np.eye(4)
     if rotation is not None:
         matrix[:3, :3] = rotation
@@ -127,11 +152,16 @@ def make_transform(rotation: Any = None, translation: Any = None) -> Array:
 
 
 def make_offset(translation: Any, orientation: Any) -> Array:
-    """Homogeneous matrix of a frame at `translation` (m), turned by body-fixed X-Y-Z `orientation` (rad)."""
+    """Return the homogeneous matrix (4, 4) of an offset frame.
+
+    Args:
+        translation: origin (3,), m.
+        orientation: body-fixed X-Y-Z angles (3,), rad.
+    """
     return make_transform(rotation_xyz(np.asarray(orientation, dtype=float)), translation)
 
 
 def invert_transform(matrix: Array) -> Array:
-    """Inverse of a homogeneous matrix."""
+    """Return the inverse of a homogeneous matrix (4, 4)."""
     rotation = matrix[:3, :3].T
     return make_transform(rotation, -rotation @ matrix[:3, 3])

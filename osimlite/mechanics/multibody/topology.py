@@ -1,6 +1,6 @@
-"""From joints to a tree: which joint carries which body, and which joints close loops.
+"""Spanning tree of joints: which joint carries which body, and which joints close loops.
 
-The rules are those of Simbody's multibody graph maker, so that the bodies come in OpenSim's order.
+The rules are those of Simbody's multibody graph maker, so that bodies are in OpenSim's order.
 """
 
 from __future__ import annotations
@@ -10,34 +10,42 @@ from typing import Generic, NamedTuple, Protocol, TypeVar
 
 
 class Link(Protocol):
-    """A joint between two bodies (or ground), named by their absolute paths."""
+    """Joint between two bodies (or ground), which are named by absolute paths."""
 
     @property
     def parent(self) -> str:
-        """The body of the joint's parent frame."""
+        """Path of the body of the joint's parent frame."""
 
     @property
     def child(self) -> str:
-        """The body of the joint's child frame."""
+        """Path of the body of the joint's child frame."""
 
     @property
     def coordinates(self) -> tuple[int, ...]:
-        """Its coordinates, empty for a weld."""
+        """Indices of its coordinates, empty for a weld."""
 
 
 L = TypeVar("L", bound=Link)
 
 
 class Branch(NamedTuple, Generic[L]):
-    """A joint in the tree: which body it adds, and whether it does so from its child to its parent."""
+    """Joint in the tree."""
 
-    link: L
-    outer: str
-    reversed: bool
+    link: L  # the joint
+    outer: str  # path of the body that it adds
+    reversed: bool  # whether it leads from its child to its parent
 
 
 def new_base(loose: Sequence[str], links: Sequence[Link]) -> str:
-    """The body of groups without ground that OpenSim connects to it: rather no child, then parent of the most."""
+    """Return the body that OpenSim connects to ground, of bodies without connection to it.
+
+    It is a body that is no child of a joint, if there is such a body, and of these the parent of
+    most joints.
+
+    Args:
+        loose: paths of the bodies.
+        links: joints.
+    """
     children = {link.child for link in links}
     parents = [link.parent for link in links]
     return max(loose, key=lambda path: (path not in children, parents.count(path)))
@@ -46,11 +54,19 @@ def new_base(loose: Sequence[str], links: Sequence[Link]) -> str:
 def spanning_tree(
     links: Sequence[L], ground: str, masses: Mapping[str, float]
 ) -> tuple[list[Branch[L]], list[L]]:
-    """The joints that carry bodies, carriers before the carried, and those that only close loops.
+    """Return the joints that carry bodies, and the joints that only close loops.
 
     The tree grows level by level from ground, within a level in the order of the joints. Where a
-    joint would move a body without mass, the branch goes on at once, to the heaviest neighbour,
+    joint would move a body without mass, the branch continues at once to the heaviest neighbour,
     until a body with mass ends it.
+
+    Args:
+        links: joints.
+        ground: path of ground.
+        masses: mass of each body, by path (kg).
+
+    Returns:
+        Branches, each after the one that carries its inner body; and joints that close loops.
     """
     levels = {ground: 0}
     branches: list[Branch[L]] = []
@@ -66,7 +82,10 @@ def spanning_tree(
         return outer
 
     def onward(inner: str) -> int | None:
-        """The joint to the heaviest body beyond, forward joints first, joints to bodies without mass last."""
+        """Return the index of the joint to the heaviest body beyond, or None.
+
+        Forward joints come first, and joints to bodies without mass last.
+        """
         result: list[tuple[float, bool, int]] = []
         for place, link in enumerate(links):
             if place not in used and inner in (link.parent, link.child):
@@ -90,6 +109,8 @@ def spanning_tree(
             if levels.get(link.parent, levels.get(link.child)) != level:
                 continue
             outer = add(place)
+            # A massless body needs a body with mass beyond it, or its coordinates could not be
+            # solved for.
             while links[place].coordinates and not masses.get(outer, 0.0) > 0.0:
                 following = onward(outer)
                 if following is None:
