@@ -428,7 +428,7 @@ def restore_pose(a: Assembly, q: Floats, is_assembled: bool) -> bool:
         for k in range(free):
             trial[free_list[k]] += LONGEST_STEP / furthest * step[k]
         new = evaluate_equations(a, trial)
-        # Within the tolerance, go on only while errors at least halve; then rounding is reached.
+        # Within the tolerance, continue only while errors at least halve; then rounding is reached.
         if largest <= tolerance and not new < 0.5 * largest:
             break
         largest = new

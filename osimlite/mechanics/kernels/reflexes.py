@@ -290,7 +290,7 @@ def add_reflexes(
                 value = max(value, 0.0)
         else:
             since = frames - 1.0 - own[0]
-            # The term begins at its delay, NEAR of which is rounding.
+            # The term begins at its delay, up to rounding.
             if since < -NEAR:
                 continue
             for _ in range(term[TERM.KIND]):

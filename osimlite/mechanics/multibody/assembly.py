@@ -39,7 +39,7 @@ _FINEST = 1e-12
 
 
 class UnmetConstraintsError(SimulationError):
-    """Error of a model no pose of which fulfils the constraints.
+    """Error of constraints that no pose of a model fulfils.
 
     Args:
         model: name of the model.
@@ -276,7 +276,7 @@ class _Search:
             trial = q + size * self._spread_over_coordinates(step)
             state = self._compute_state(trial)
             new = _compute_position_errors(state)
-            # Within the tolerance, go on only while errors at least halve; then rounding is
+            # Within the tolerance, continue only while errors at least halve; then rounding is
             # reached.
             near = np.abs(errors).max(initial=0.0) <= self.tolerance
             if near and np.abs(new).max(initial=0.0) >= 0.5 * np.abs(errors).max(initial=0.0):

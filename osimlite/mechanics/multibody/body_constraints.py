@@ -47,7 +47,11 @@ class _Between(Constraint, Generic[P]):
 
     @property
     def bodies(self) -> tuple[int, ...]:
-        """Indices of the two bodies."""
+        """Indices of the two bodies.
+
+        Returns:
+            Indices in the mechanism, -1 for ground.
+        """
         return self.first.body, self.second.body
 
 
@@ -77,7 +81,11 @@ class PointOnLineConstraint(Constraint):
 
     @property
     def bodies(self) -> tuple[int, ...]:
-        """Indices of the body of the line and of the follower."""
+        """Indices of the body of the line and of the follower.
+
+        Returns:
+            Indices in the mechanism, -1 for ground.
+        """
         return self.line.body, self.follower.body
 
     def find_normal_directions(self) -> list[Array]:
@@ -121,7 +129,11 @@ class RollingConstraint(Constraint):
 
     @property
     def bodies(self) -> tuple[int, ...]:
-        """Indices of the surface and of the roller."""
+        """Indices of the surface and of the roller.
+
+        Returns:
+            Indices in the mechanism, -1 for ground.
+        """
         return self.surface, self.roller
 
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class Equations(NamedTuple):
-    """m equations at one state, the first p of which constrain positions.
+    """System of m equations at one state; the first p constrain positions.
 
     Speeds fulfil G u = b, and their derivatives G udot = c.
     """
@@ -34,11 +34,19 @@ class Constraint(Protocol):
 
     @property
     def bodies(self) -> tuple[int, ...]:
-        """Indices of the bodies in the equations."""
+        """Indices of the bodies in the equations.
+
+        Returns:
+            Indices in the mechanism, -1 for ground.
+        """
 
     @property
     def coordinates(self) -> tuple[int, ...]:
-        """Indices of the coordinates in the equations."""
+        """Indices of the coordinates in the equations.
+
+        Returns:
+            Indices in the mechanism.
+        """
         return ()
 
     @property
@@ -83,7 +91,11 @@ class Lock(Constraint):
 
     @property
     def coordinates(self) -> tuple[int, ...]:
-        """Index of the locked coordinate."""
+        """Index of the locked coordinate.
+
+        Returns:
+            Indices in the mechanism.
+        """
         return (self.coordinate,)
 
 
@@ -101,7 +113,11 @@ class Prescribed(Constraint):
 
     @property
     def coordinates(self) -> tuple[int, ...]:
-        """Index of the prescribed coordinate."""
+        """Index of the prescribed coordinate.
+
+        Returns:
+            Indices in the mechanism.
+        """
         return (self.coordinate,)
 
 
@@ -120,5 +136,9 @@ class Coupler(Constraint):
 
     @property
     def coordinates(self) -> tuple[int, ...]:
-        """Indices of the independent coordinates, then of the dependent one."""
+        """Indices of the independent coordinates, then of the dependent one.
+
+        Returns:
+            Indices in the mechanism.
+        """
         return (*self.independent, self.dependent)

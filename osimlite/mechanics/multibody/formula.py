@@ -234,6 +234,9 @@ class _Reader:
         Args:
             result: register of the result.
 
+        Returns:
+            Steps, in the order in which they fill registers.
+
         Raises:
             _Wrong: a step stands for an unknown name, or is NaN for all values of the variables.
         """

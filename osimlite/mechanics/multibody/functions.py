@@ -111,7 +111,11 @@ class Multivariate(Function):
         )
 
         def at_rates(*moving: int) -> tuple[float, float]:
-            """Return the value, and its second derivative while some arguments change by 1."""
+            """Return the value, and its second derivative while some arguments change by 1.
+
+            Returns:
+                Value and second derivative.
+            """
             rates = make_floats([float(k in moving) for k in places])
             value, _, curvature = evaluate_monomials(size, places, table, given, rates, gradient)
             return value, curvature
@@ -389,6 +393,9 @@ class SimmSpline(Univariate):
 
         The last piece is the line beyond the last point, with two nonzero coefficients. The line
         before the first point has the first two coefficients of the first piece.
+
+        Returns:
+            Four coefficients of each piece, one piece per point.
         """
         return tuple(self._pieces)
 

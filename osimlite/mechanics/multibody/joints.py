@@ -299,6 +299,9 @@ class Mobilizer:
         """Groups of coordinates whose rates follow together from as many speeds.
 
         Each group has indices in the mechanism; a ball joint has one group of three.
+
+        Returns:
+            Indices in the mechanism, group by group.
         """
         return tuple(
             tuple(self.coordinates[place] for place in motion.coordinates)

@@ -109,7 +109,11 @@ class Mechanism:
     # ------------------------------------------------------------------------------------ names and states
     @cached_property
     def coordinate_names(self) -> tuple[str, ...]:
-        """Names in the order of all arrays; coordinates that share a name have their paths."""
+        """Names in the order of all arrays; coordinates that share a name have their paths.
+
+        Returns:
+            Names or paths, one per coordinate.
+        """
         counts = Counter(info.name for info in self.coordinates)
         return tuple(
             info.name if counts[info.name] == 1 else info.path for info in self.coordinates
@@ -570,7 +574,11 @@ class Mechanism:
 
     @cached_property
     def turning(self) -> tuple[Mobilizer, ...]:
-        """Mobilizers whose speeds are not the rates of their coordinates."""
+        """Mobilizers whose speeds are not the rates of their coordinates.
+
+        Returns:
+            Mobilizers of ball, free, ellipsoid and scapulothoracic joints.
+        """
         return tuple(body.mobilizer for body in self.bodies if not body.mobilizer.speeds_are_rates)
 
     def _mean(self, vectors: Array) -> Array:

@@ -1,7 +1,7 @@
-"""A mechanism in the vectors of the kernels, which run on it as Python.
+"""Mechanism in the vectors of the kernels, which run on it as Python.
 
-:mod:`osimlite.mechanics.kernels.layout` says what is where. Every state has a work vector of its
-own, so that nothing that is known of one changes with another.
+:mod:`osimlite.mechanics.kernels.layout` describes the vectors. Every state has a work vector of its
+own, so that results of different states are independent.
 """
 
 from __future__ import annotations
@@ -27,25 +27,25 @@ _ENDS = CONSTRAINT.FIRST_EQUATION, CONSTRAINT.END_EQUATION, CONSTRAINT.END_POSIT
 
 
 class Program:
-    """A mechanism all of whose coordinates are free, packed.
-
-    Args:
-        tree: the links, with all coordinates as degrees of freedom.
-        constraints: that are kept up.
+    """Packed mechanism, all of whose coordinates are degrees of freedom.
 
     Attributes:
-        s: the integers, with addresses that are good in this process.
-        x: the numbers, without gravity.
-        heavy: the numbers, with gravity.
+        model: integers, with addresses that are valid in this process.
+        reals: numbers, without gravity.
+        heavy: numbers, with gravity.
         laws: names of the laws that are called.
-        tree: the links, as given.
-        order: place in the mechanism of the coordinate of each degree of freedom.
+        tree: links of the mechanism.
+        order: index in the mechanism of the coordinate of each degree of freedom.
         freedoms: degree of freedom of each coordinate.
         links: link of each body, and of ground as the last (b + 1,); -1 for ground.
-        frames: each body in its link (b + 1, 4, 4).
+        frames: frame of each body in its link (b + 1, 4, 4).
         constraints: number of each constraint, by its identity.
-        bound: the coordinates that constraints speak of.
-        on_bodies: whether a constraint speaks of bodies.
+        bound: indices of the coordinates in constraints.
+        on_bodies: whether a constraint involves bodies.
+
+    Args:
+        tree: links of the mechanism.
+        constraints: constraints to include.
     """
 
     def __init__(self, tree: Tree, constraints: Sequence[Constraint]) -> None:
@@ -58,6 +58,7 @@ class Program:
             ints[MODEL.LAWS + LAW_NUMBERS[name]] = register_law(load_kernel(name))
         integers: Any = memoryview(array("q", ints))
         self.model: Ints = integers
+        # Kinematics must not contain gravity, which the kernels treat as an acceleration of ground.
         self.reals, self.heavy = make_floats(packer.numbers), make_floats(packer.numbers)
         for k in range(GRAVITY_AT, GRAVITY_AT + 3):
             self.reals[k] = 0.0
@@ -69,12 +70,12 @@ class Program:
         placements = [*tree.places.placements, tree.places.placement(GROUND)]
         self.links = np.array([item.link for item in placements])
         self.frames = np.array([item.frame for item in placements])
-        # What has an identity is kept, lest another gets it.
+        # Keep a reference to each constraint, so that its identity is not given to another object.
         self._kept = [*constraints]
         self._others: dict[int, Program] = {}
 
     def with_constraint(self, constraint: Constraint) -> Program:
-        """This, if the constraint is one of its own, or the program that has it alone."""
+        """Return the program if it contains a constraint, else one with this constraint only."""
         if id(constraint) in self.constraints:
             return self
         if id(constraint) not in self._others:
@@ -82,7 +83,14 @@ class Program:
         return self._others[id(constraint)]
 
     def equations_of(self, constraint: Constraint) -> tuple[int, int, int]:
-        """First and end of the equations of a constraint of its own, and the end of those that bind positions."""
+        """Return the range of the equations of a constraint of this program.
+
+        Args:
+            constraint: the constraint.
+
+        Returns:
+            First equation, end of its equations, and end of those that constrain positions.
+        """
         s = self.model
         at = s[
             s[s[MODEL.CONSTRAINED] + CONSTRAINED.CONSTRAINT_AT] + self.constraints[id(constraint)]
@@ -90,12 +98,14 @@ class Program:
         return tuple(s[at + k] for k in _ENDS)
 
     def equations(self, data: Floats) -> Equations:
-        """All equations as they stand in a work vector."""
+        """Return all equations from a work vector after `evaluate_constraints`."""
         size = len(self.order)
         if not self.constraints:
             return Equations(np.zeros(0), np.zeros((0, size)), np.zeros(0), np.zeros(0))
         h, vector = self.model[self.model[MODEL.CONSTRAINED] :], np.frombuffer(data)
         count = h[CONSTRAINED.EQUATIONS]
+        # Columns are in the order of degrees of freedom; the mechanism's order is that of
+        # coordinates.
         rows = vector[h[CONSTRAINED.WORK_ROWS] :][: count * size].reshape(count, size)[
             :, self.freedoms
         ]
@@ -105,7 +115,7 @@ class Program:
 
     @cached_property
     def still(self) -> NDArray[np.bool_]:
-        """Whether each body (and ground as the last) stays when a coordinate moves (b + 1, n)."""
+        """Table (b + 1, n) of whether a body, the last being ground, ignores a coordinate."""
         links, ends, order, _ = self.tree
         still = np.ones((len(links) + 1, len(order)), dtype=bool)
         for number, link in enumerate(links):
@@ -115,7 +125,7 @@ class Program:
 
     @cached_property
     def _entries(self) -> NDArray[np.int_]:
-        """Row, column, and place in the work vector of each entry of the mass matrix that is not zero (3, k)."""
+        """Row, column and offset in the work vector of the stored entries of M (3, k)."""
         s, entries = self.model, []
         for freedom in range(len(self.order)):
             record = s[s[MODEL.DOF_AT] + DOF.SIZE * freedom :]
@@ -126,14 +136,22 @@ class Program:
         return np.array(entries, dtype=int).reshape(-1, 3).T
 
     def mass_matrix(self, data: Floats) -> Array:
-        """The mass matrix (n, n) as it stands in a work vector."""
+        """Return the mass matrix (n, n) from a work vector."""
         (rows, columns, places), size = self._entries, len(self.order)
         matrix = np.zeros((size, size))
         matrix[rows, columns] = matrix[columns, rows] = np.frombuffer(data)[places]
         return matrix
 
     def state(self, q: Array, u: Array) -> tuple[Floats, Floats, Floats]:
-        """A work vector for a state, the state, and its rates, as they are but for balls."""
+        """Return new vectors for a state.
+
+        Args:
+            q: coordinate values (n,).
+            u: generalized speeds (n,).
+
+        Returns:
+            Work vector, state, and rates, which equal the speeds but for balls.
+        """
         values, speeds = q[self.order].tolist(), u[self.order].tolist()
         return (
             make_floats(bytes(8 * self.model[MODEL.WORK_SIZE])),

@@ -22,7 +22,11 @@ class Link(Protocol):
 
     @property
     def coordinates(self) -> tuple[int, ...]:
-        """Indices of its coordinates, empty for a weld."""
+        """Indices of its coordinates, empty for a weld.
+
+        Returns:
+            Indices in the mechanism.
+        """
 
 
 L = TypeVar("L", bound=Link)
