@@ -60,7 +60,7 @@ def place_links(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats) 
         model: integers of the model.
         reals: its numbers.
         data: filled with the poses.
-        y: state, of which the coordinates are used.
+        y: state; only the coordinates are used.
         f: scratch that laws may use.
     """
     # Parents come before children, so that one pass is enough.

@@ -149,7 +149,7 @@ def helix_point(one: Vector, two: Vector, turn: float, part: float) -> Vector:
 
     Args:
         one: first point of the helix (m).
-        two: last point, of which the height is used (m).
+        two: last point; only its height is used (m).
         turn: angle of the helix (rad).
         part: fraction of its length.
     """

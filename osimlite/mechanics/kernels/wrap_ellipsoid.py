@@ -258,7 +258,7 @@ def tangent_point(
 
     Four equations determine the point r and a number d: r is in the plane and on the surface, and the
     end and r are in the tangent plane n . x + d = 0 of r, n = (2 x / a a, 2 y / b b, 2 z / c c).
-    OpenSim solves them by the Levenberg-Marquardt method in small steps, each of which is repeated at
+    OpenSim solves them by the Levenberg-Marquardt method in small steps, and repeats each one at
     double length as long as that helps; the result depends on the start.
 
     Args:

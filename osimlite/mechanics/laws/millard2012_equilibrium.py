@@ -352,7 +352,7 @@ def muscle_with(
     """Return the results of `millard2012_equilibrium` for known values of the curves.
 
     Args:
-        fibers: fibers, of which activation, length, cosine and rate are used.
+        fibers: fibers; activation, length, cosine and rate of activation are used.
         m: muscle.
         is_found: whether a fiber velocity exists.
         velocity: normalized fiber velocity.

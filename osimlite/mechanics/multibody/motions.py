@@ -55,7 +55,7 @@ class Motion(ABC):
     def rates(self, q: Array) -> Array | None:
         """Return N (k, k) with qdot = N u for these `coordinates`.
 
-        It is None if the speeds are the rates.
+        None stands for the identity: the speeds are the rates.
         """
         return None
 
