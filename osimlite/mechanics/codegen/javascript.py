@@ -1,9 +1,9 @@
-"""Kernels as JavaScript: a page computes poses and paths by the very functions that simulations run.
+"""Kernels as JavaScript: a page computes poses and paths by the functions of simulations.
 
-Vectors are typed arrays, of which `at` gives the rest from a place on; a law has its number in a
-list `laws` for its address. JavaScript has one type of numbers, so that results differ from
-Python's in the sign of an integer zero and in the last digits of mathematical functions only.
-Integers beyond 53 bits have no counterpart.
+Vectors are typed arrays, of which `at` returns the rest from an offset on. The address of a law is
+its index in a list `laws`. JavaScript has one type of numbers, so that results differ from Python's
+only in the sign of an integer zero and in the last digits of mathematical functions. Integers
+beyond 53 bits have no counterpart.
 """
 
 from __future__ import annotations
@@ -20,12 +20,13 @@ from osimlite.mechanics.kernels import pointers
 from osimlite.mechanics.kernels.layout import Record
 
 OPERATORS = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}
+"""Signs of operators that JavaScript has with the same meaning."""
 FUNCTIONS: dict[type[ast.operator], str] = {
     ast.FloorDiv: "floorDivide",
     ast.Mod: "modulo",
     ast.Pow: "power",
 }
-"""Operators that mean something else in JavaScript, by the function of the runtime."""
+"""Functions of the runtime for operators that have another meaning in JavaScript."""
 COMPARISONS = {
     ast.Lt: "<",
     ast.LtE: "<=",
@@ -34,7 +35,9 @@ COMPARISONS = {
     ast.Eq: "==",
     ast.NotEq: "!=",
 }
+"""Signs of comparisons."""
 SIGNS = {ast.USub: "-", ast.UAdd: "+"}
+"""Signs before an operand."""
 CALLED: dict[Any, str] = {
     abs: "Math.abs",
     min: "minimum",
@@ -59,11 +62,11 @@ CALLED: dict[Any, str] = {
         )
     },
 }  # fmt: skip
-"""Functions of Python by their names in JavaScript or in the runtime."""
+"""Name in JavaScript or in the runtime of each function of Python."""
 TRUTHS = frozenset((bool, math.isnan, math.isfinite, math.isinf))
 """Functions whose results are truth values."""
 LARGEST_MASK = 2**31 - 1
-"""Bits of larger numbers become negative in JavaScript."""
+"""Largest mask of bits; JavaScript makes larger numbers negative."""
 
 RUNTIME = """\
 const modulo = (a, b) => { const r = a % b; return r !== 0 && (r < 0) !== (b < 0) ? r + b : r; };
@@ -108,7 +111,7 @@ const errorTail = (x) => {
   }
   return Math.exp(-x * x) / (fraction * 1.7724538509055159);
 };"""
-"""Python's arithmetic, and the functions that JavaScript has not."""
+"""Python's arithmetic, and the functions that JavaScript lacks."""
 RESERVED = frozenset((
     "await", "case", "catch", "class", "const", "debugger", "default", "delete", "do", "enum", "export", "extends",
     "false", "finally", "function", "implements", "import", "in", "instanceof", "interface", "let", "new", "null",
@@ -116,15 +119,17 @@ RESERVED = frozenset((
     "typeof", "undefined", "var", "void", "with", "yield", "eval", "arguments", "laws", "Math", "Number", "Boolean",
     "Infinity", "NaN", "Object", *(line.split()[1] for line in RUNTIME.splitlines() if line.startswith("const ")),
 ))  # fmt: skip
-"""Names that a kernel may have and JavaScript or the runtime not."""
+"""Names that a kernel may use, but that mean something else in JavaScript or the runtime."""
 
 
 def write_javascript(laws: Sequence[Function], others: Sequence[Function] = ()) -> str:
-    """Return kernels, and all that they call, as the text of one expression: an object that has them.
+    """Return kernels, with all functions that they call, as the text of one expression.
+
+    The value of the expression is an object with the kernels.
 
     Args:
-        laws: those that are called by their numbers, from 1 on; the object has them as `laws`.
-        others: those that the object has by their names.
+        laws: kernels that are called by their numbers, from 1 on; the object has them as `laws`.
+        others: kernels that the object has by their names.
 
     Raises:
         TranslationError: a kernel uses something that has no counterpart in JavaScript.
@@ -133,6 +138,7 @@ def write_javascript(laws: Sequence[Function], others: Sequence[Function] = ()) 
     while pending:
         writers.append(_write_function(next(iter(pending))))
         pending.update(dict.fromkeys(writers[-1].functions))
+        # A function that was written while others were pending must not be written again.
         for writer in writers:
             pending.pop(writer.function, None)
     records = dict.fromkeys(record for writer in writers for record in writer.records)
@@ -157,7 +163,7 @@ def _write_function(function: Function) -> _Writer:
 
 
 def _write_record(record: Any) -> str:
-    """Return a class of named tuples as an array whose items have names too."""
+    """Return a class of named tuples as an array whose items also have names."""
     getters = " ".join(
         f"get ${name}() {{ return this[{k}]; }}" for k, name in enumerate(record._fields)
     )
@@ -169,11 +175,11 @@ def _record_name(record: Any) -> str:
 
 
 class _Writer(Kernel):
-    """Writes one function.
+    """Writer of one function.
 
     Attributes:
-        functions: the functions that it calls or passes on.
-        records: the classes of named tuples that it makes.
+        functions: functions that it calls or passes on.
+        records: classes of named tuples that it makes.
         written: its text.
     """
 
@@ -225,7 +231,7 @@ class _Writer(Kernel):
             case ast.While(test=test, body=body, orelse=[]):
                 return [f"while ({self.condition(test)}) {{", *self.block(body), "}"]
             case ast.For(target=ast.Name(id=name), iter=iterated, body=body, orelse=[]):
-                # As in Python, what the body stores in the variable makes no difference to the next
+                # As in Python, assignments to the loop variable in the body do not affect the next
                 # round.
                 counter = self.temporary()
                 store = f"{_local(name)} = {counter};"
@@ -237,7 +243,12 @@ class _Writer(Kernel):
         raise self.refuse(node)
 
     def assign(self, targets: Sequence[ast.expr], value: ast.expr) -> list[str]:
-        """Return the lines of an assignment to one target or several."""
+        """Return the lines of an assignment to one target or several.
+
+        Args:
+            targets: targets.
+            value: assigned expression.
+        """
         if len(targets) == 1 and isinstance(targets[0], ast.Name):
             return [f"{self.expression(targets[0])} = {self.expression(value)};"]
         if isinstance(value, ast.Tuple) and all(map(_has_separate_items, (value, *targets))):
@@ -248,7 +259,7 @@ class _Writer(Kernel):
                 for name, part in zip(held, value.elts, strict=True)
             ]
             return lines + [line for target in targets for line in self.store(target, held)]
-        # JavaScript would evaluate the place before the value.
+        # JavaScript evaluates the target before the value, so the value gets a variable first.
         whole = self.temporary()
         lines = [f"{whole} = {self.expression(value)};"]
         for target in targets:
@@ -259,7 +270,12 @@ class _Writer(Kernel):
         return lines
 
     def store(self, target: ast.expr, values: Sequence[str]) -> list[str]:
-        """Return the lines that store values in a target, or in its items."""
+        """Return the lines that store values in a target, or in its items.
+
+        Args:
+            target: target, or tuple of targets.
+            values: texts of the values.
+        """
         targets = target.elts if isinstance(target, ast.Tuple) else [target]
         return [
             f"{self.expression(part)} = {value};"
@@ -272,7 +288,12 @@ class _Writer(Kernel):
         return f"${self._temporaries - 1}"
 
     def loop(self, name: str, iterated: ast.expr) -> str:
-        """Return the head of a loop."""
+        """Return the head of a loop.
+
+        Args:
+            name: name of the counter.
+            iterated: what the loop is over.
+        """
         if not (isinstance(iterated, ast.Call) and self.value(iterated.func) is range):
             if not isinstance(iterated, ast.Tuple):
                 raise self.refuse(
@@ -281,6 +302,7 @@ class _Writer(Kernel):
             return f"{name} of {self.expression(iterated)}"
         bounds = [self.expression(part) for part in iterated.args]
         first, stop, step = ["0", *bounds, "1"] if len(bounds) == 1 else [*bounds, "1"][:3]
+        # Python evaluates the end once, before the loop.
         end = self.temporary()
         if step.removeprefix("(-").rstrip(")").isdigit():
             sign = ">" if step.startswith("(-") else "<"
@@ -348,6 +370,7 @@ class _Writer(Kernel):
             return f"({left} {OPERATORS[type(op)]} {right})"
         if type(op) in FUNCTIONS:
             return f"{FUNCTIONS[type(op)]}({left}, {right})"
+        # Bits of numbers up to 31 bits are the same in both languages.
         if isinstance(op, ast.BitAnd) and any(
             text.isdigit() and int(text) <= LARGEST_MASK for text in (left, right)
         ):
@@ -355,7 +378,10 @@ class _Writer(Kernel):
         raise self.refuse(node, "JavaScript has no integers of 64 bits")
 
     def condition(self, node: ast.expr) -> str:
-        """Return the text of an expression as a truth value; NaN is true, as in Python."""
+        """Return the text of an expression as a truth value.
+
+        NaN is true, as in Python.
+        """
         if isinstance(node, ast.BoolOp):
             sign = " && " if isinstance(node.op, ast.And) else " || "
             return f"({sign.join(map(self.condition, node.values))})"
@@ -375,7 +401,12 @@ class _Writer(Kernel):
         return False
 
     def either(self, op: ast.boolop, values: Sequence[ast.expr]) -> str:
-        """Return the text of `and` or `or`, whose value is the operand that decides."""
+        """Return the text of `and` or `or`, whose value is the operand that decides.
+
+        Args:
+            op: `and` or `or`.
+            values: operands.
+        """
         if all(map(self.is_truth, values)):
             sign = " && " if isinstance(op, ast.And) else " || "
             return f"({sign.join(map(self.expression, values))})"
@@ -402,6 +433,7 @@ class _Writer(Kernel):
             if type(op) not in COMPARISONS:
                 raise self.refuse(node)
             after = text = self.expression(operand)
+            # A middle operand is part of two comparisons but evaluated once.
             if k < len(node.ops) - 1 and not isinstance(operand, ast.Name | ast.Constant):
                 after = self.temporary()
                 text = f"({after} = {text})"
@@ -412,7 +444,14 @@ class _Writer(Kernel):
     def call(
         self, called: Any, function: ast.expr, arguments: Sequence[str], node: ast.expr
     ) -> str:
-        """Return the text of a call."""
+        """Return the text of a call.
+
+        Args:
+            called: the function, None for a local one.
+            function: expression of the function.
+            arguments: texts of the arguments.
+            node: the call, for messages.
+        """
         if self._is_local(function):
             return f"{self.expression(function)}({', '.join(arguments)})"
         if isinstance(called, FunctionType):
@@ -427,8 +466,14 @@ class _Writer(Kernel):
         raise self.refuse(node)
 
     def new_record(self, record: Any, arguments: Sequence[str]) -> str:
-        """Return the text of a new named tuple."""
+        """Return the text of a new named tuple.
+
+        Args:
+            record: class of named tuples.
+            arguments: texts of the arguments.
+        """
         self.records.append(record)
+        # Unpacked tuples fill all fields.
         is_complete = any(text.startswith("...") for text in arguments)
         missing = () if is_complete else record._fields[len(arguments) :]
         defaults = [
@@ -460,7 +505,7 @@ def _has_separate_items(node: ast.expr) -> bool:
 
 
 def _local(name: str) -> str:
-    """Return a name that means nothing else in JavaScript."""
+    """Return a name with a trailing underscore if it means something else in JavaScript."""
     return f"{name}_" if name in RESERVED else name
 
 

@@ -1,4 +1,4 @@
-"""The instruction sets of this processor, which decide what machine code it can run."""
+"""Instruction sets of this processor, which determine what machine code it can run."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import sys
 from functools import cache
 
 X86_64_V3 = frozenset({"avx", "avx2", "bmi1", "bmi2", "f16c", "fma", "movbe"})
-"""Names in Linux of what the level x86-64-v3 adds to the first one (its `lzcnt` is `abm` there)."""
+"""Names in Linux of the features that x86-64-v3 adds to x86-64 (its `lzcnt` is `abm` there)."""
 
 WINDOWS_AVX2 = 40
 """PF_AVX2_INSTRUCTIONS_AVAILABLE of the Windows API."""
@@ -17,14 +17,20 @@ WINDOWS_AVX2 = 40
 
 @cache
 def machine_name() -> str:
-    """Return the kind of processor: "x86_64", "aarch64" or whatever the system calls it."""
+    """Return the kind of processor, such as "x86_64" or "aarch64".
+
+    Windows and macOS call these "AMD64" and "arm64". Other names are those of the system.
+    """
     name = platform.machine().lower()
     return {"amd64": "x86_64", "x64": "x86_64", "arm64": "aarch64"}.get(name, name)
 
 
 @cache
 def processor_features() -> frozenset[str]:
-    """Return the names of the instruction sets of this processor; none where the system has no list of them."""
+    """Return the names of the instruction sets of this processor.
+
+    The set is empty if the system does not list them.
+    """
     system: str = sys.platform
     if system == "linux":
         return _read_cpuinfo("/proc/cpuinfo")
@@ -54,7 +60,7 @@ def _read_cpuinfo(path: str) -> frozenset[str]:
 
 
 def _sysctl(name: bytes) -> bool:
-    """Return whether macOS says yes to a question about the processor."""
+    """Return whether macOS reports a feature of the processor."""
     value, size = ctypes.c_int(0), ctypes.c_size_t(ctypes.sizeof(ctypes.c_int))
     system = ctypes.CDLL(None)
     status = system.sysctlbyname(name, ctypes.byref(value), ctypes.byref(size), None, 0)

@@ -1,8 +1,8 @@
-"""The Python that kernels and laws are written in: functions of floats, integers, vectors and tuples of these.
+"""Restricted Python in which kernels and laws are written.
 
-A writer of another language starts from a `Kernel`, which has the text of one function and knows
-what the names in it stand for. It meets a few kinds of statements and expressions only; what else
-there is, is an error that names it.
+They are functions of floats, integers, vectors and tuples of these. A writer of another language
+starts from a `Kernel`, which has the syntax tree of one function and resolves the names in it. It
+supports a few kinds of statements and expressions; any other is an error that quotes it.
 """
 
 from __future__ import annotations
@@ -19,24 +19,25 @@ from osimlite.errors import UnsupportedError
 from osimlite.mechanics.kernels.layout import Record
 
 Function = Callable[..., Any]
+"""Function of the package."""
 
 
 class TranslationError(UnsupportedError, NotImplementedError):
-    """A kernel uses something of Python that a writer has no counterpart for."""
+    """Error of a kernel that uses something without a counterpart in the language of a writer."""
 
 
 class Kernel:
-    """One function as a writer sees it.
-
-    Args:
-        function: of ours.
-        language: that it is to become, for messages.
+    """One function as writers see it.
 
     Attributes:
-        function: as given.
-        tree: of its text.
+        function: the function.
+        tree: its syntax tree.
         body: its statements without the docstring.
         given: names of its arguments.
+
+    Args:
+        function: function of the package.
+        language: language that it is translated to, for messages.
     """
 
     def __init__(self, function: Function, language: str) -> None:
@@ -46,12 +47,12 @@ class Kernel:
         self.given = [argument.arg for argument in tree.args.args]
 
     def parse(self, function: Function) -> ast.FunctionDef:
-        """Return the tree of a function, which all kernels share that read it."""
+        """Return the syntax tree of a function, which all kernels of the function share."""
         return find_tree(function)
 
     @cached_property
     def own(self) -> list[str]:
-        """Names of its other variables, in the order of their first appearance."""
+        """Names of its local variables besides arguments, by their first appearance."""
         return [name for name in list_assigned_names(self.tree) if name not in self.given]
 
     @property
@@ -60,7 +61,10 @@ class Kernel:
         return name_of(self.function)
 
     def value(self, node: ast.expr) -> Any:
-        """Return what a global name, or an attribute of a record or module, stands for; None if nothing."""
+        """Return the value of a global name, or of an attribute of a record or module.
+
+        It is None if the name has no value there.
+        """
         if isinstance(node, ast.Attribute):
             owner = (
                 self.value(node.value) if isinstance(node.value, ast.Name | ast.Attribute) else None
@@ -74,7 +78,7 @@ class Kernel:
 
     @property
     def file(self) -> str:
-        """The file of its source."""
+        """Path of the file of its source."""
         return self.function.__code__.co_filename
 
     def line_of(self, node: ast.AST) -> int:
@@ -82,7 +86,7 @@ class Kernel:
         return getattr(node, "lineno", self.tree.lineno)
 
     def refuse(self, node: ast.AST, reason: str = "") -> TranslationError:
-        """Return the error for a part that the language has no counterpart for.
+        """Return the error for a part of the function without a counterpart in the language.
 
         Args:
             node: the part of the function.
@@ -96,18 +100,20 @@ class Kernel:
 
 
 _parsed: dict[str, tuple[list[str], dict[tuple[int, str], ast.FunctionDef]]] = {}
-"""By file, its lines and the functions in it, by the line that they begin in and their name."""
+"""Lines of each file, and its functions by their first line and name."""
 
 
 def find_tree(function: Function) -> ast.FunctionDef:
-    """Return the tree of a function from the file that it is in.
+    """Return the syntax tree of a function from its file.
 
     Raises:
-        OSError: there is no such file, or the function is not there any more.
+        OSError: the file does not exist, or does not contain the function any more.
     """
     file = function.__code__.co_filename
+    # A file that has changed since the import must not be translated by old line numbers.
     linecache.checkcache(file)
     lines = linecache.getlines(file, function.__globals__)
+    # linecache returns the same list until the file changes.
     if file not in _parsed or _parsed[file][0] is not lines:
         trees = list_functions(ast.parse("".join(lines)))
         starts = [
@@ -124,7 +130,7 @@ def find_tree(function: Function) -> ast.FunctionDef:
 
 
 def list_functions(tree: ast.AST) -> list[ast.FunctionDef]:
-    """Return the functions in a module, without looking into expressions as `ast.walk` does."""
+    """Return the functions in a module, without descending into expressions as `ast.walk` does."""
     result, pending = list[ast.FunctionDef](), [tree]
     while pending:
         node = pending.pop()
@@ -140,10 +146,9 @@ Node = TypeVar("Node", bound=ast.AST)
 
 
 def copy_tree(node: Node) -> Node:
-    """Return a copy of a tree that shares what has no parts, such as operators.
+    """Return a copy of a tree that shares nodes without parts, such as operators.
 
-    It is made ten times as fast as by `copy.deepcopy`, which a small study would spend a tenth of
-    its time in.
+    It is ten times as fast as `copy.deepcopy`, which takes a tenth of the time of a small study.
     """
     result = type(node).__new__(type(node))
     state = vars(result)
@@ -158,11 +163,14 @@ def copy_tree(node: Node) -> Node:
 
 
 LONGEST_QUOTE = 100
-"""Characters of the code that an error message quotes."""
+"""Largest number of characters of code that an error message quotes."""
 
 
 def name_of(function: Function) -> str:
-    """Return a name of a function that is unique among all modules."""
+    """Return a name of a function that is unique among all modules.
+
+    Modules of kernels have different names, whatever their packages.
+    """
     return f"{function.__module__.rpartition('.')[2]}_{function.__name__}"
 
 

@@ -1,4 +1,4 @@
-"""Which functions a kernel consists of, and a digest of their code.
+"""Functions of which a kernel consists, and a digest of their code.
 
 A kernel consists of its own function and of all functions of this package that it calls. Two states
 of the sources that compile to the same code have the same digest: comments, docstrings and line
@@ -23,18 +23,25 @@ from osimlite.mechanics.kernels.layout import Record
 
 @cache
 def compute_digest(function: Any, settings: str = "") -> str:
-    """Return a digest that changes with the code of a function, of anything that it calls, and with the settings.
+    """Return a digest of a kernel.
+
+    It changes with the code of the function, of anything that it calls, and with the settings.
 
     Args:
         function: the kernel.
-        settings: whatever else decides what the function is compiled to.
+        settings: everything else that determines what the function is compiled to.
+
+    Returns:
+        The first 16 hexadecimal digits of a SHA-256.
     """
     parts = [settings, *(_describe_function(part) for part in collect_functions(function))]
     return hashlib.sha256(repr(parts).encode()).hexdigest()[:16]
 
 
 def collect_functions(function: Any) -> Iterator[FunctionType]:
-    """Yield a function and all functions of this package that it calls, directly or indirectly, each once.
+    """Yield a function and all functions of this package that it calls, each once.
+
+    Calls may be direct or indirect.
 
     Functions that are called by their address are not included: they are kernels of their own.
     """
@@ -49,7 +56,12 @@ def collect_functions(function: Any) -> Iterator[FunctionType]:
 
 
 def _describe_function(function: FunctionType) -> tuple[Any, ...]:
-    """Return everything of one function that decides what it is compiled to."""
+    """Return everything of one function that determines what it is compiled to.
+
+    Returns:
+        Its name, its text, and the values of its global names.
+    """
+    # Sorted, because the order of names differs between versions of Python.
     values = [
         (name, value.__qualname__ if _is_local(value) else _describe_value(value))
         for name, value in sorted(_global_values(function), key=itemgetter(0))
@@ -81,7 +93,10 @@ def _is_local(value: object) -> bool:
 
 
 def _describe_value(value: Any) -> Any:
-    """Return the part of a global value that compiled code depends on, equal in every process."""
+    """Return the part of a global value on which compiled code depends.
+
+    It is equal in every process.
+    """
     if isinstance(value, Record):
         return value.__qualname__, {
             name: number for name, number in vars(value).items() if name.isupper()

@@ -1,4 +1,4 @@
-"""C++ compilers: find the one that is installed, and make shared libraries of the text of kernels."""
+"""C++ compilers: search for an installed one, and build shared libraries of kernels."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from typing import NamedTuple
 from osimlite.errors import OsimliteError
 from osimlite.mechanics.codegen.processor import machine_name
 
-# `shutil` and `subprocess` are imported where a compiler runs: simulations need only the names of
-# targets.
+# `shutil` and `subprocess` are imported where a compiler runs, because simulations only need the
+# names of targets.
 
 PROGRAMS = ("clang++", "g++", "c++", "clang-cl")
 """Compilers in the order of preference: clang compiles kernels faster than g++."""
@@ -34,6 +34,7 @@ COMMON = (
     # loops.
     "-fno-math-errno", "-fno-trapping-math",
 )  # fmt: skip
+"""Options of all compilers."""
 
 GCC = (
     # With g++'s own limits on inlining an evaluation takes 1.4 to 1.6 times as long.
@@ -43,39 +44,45 @@ GCC = (
     # -ffp-contract=off.
     "-fno-tree-slp-vectorize",
 )  # fmt: skip
+"""Options of g++."""
 
 CLANG = (
     # Clang inlines functions with several callers less. With its default limit an evaluation of
     # gait2392 takes 16.1 instead of 13.9 us; compiling takes a tenth longer with this one.
     "-mllvm", "-inline-threshold=500",
 )  # fmt: skip
+"""Options of clang."""
 
 
 class CompilationError(OsimliteError):
-    """A compiler failed, or a kernel cannot be translated for it."""
+    """Error of a compiler, or of a kernel that cannot be translated for it."""
 
 
 class Compiler(NamedTuple):
     """A C++ compiler with the options of the GNU compilers."""
 
-    command: tuple[str, ...]
-    version: str  # first line of what it says about itself
+    command: tuple[str, ...]  # program and options that start it
+    version: str  # first line of its version message
     is_gcc: bool
-    system: str = sys.platform  # that it compiles for
-    machine: str = machine_name()
+    system: str = sys.platform  # system that it compiles for
+    machine: str = machine_name()  # kind of processor that it compiles for
 
     @property
     def name(self) -> str:
-        """Program and version for people."""
+        """Program and version, for messages."""
         return f"{Path(self.command[0]).stem}: {self.version}"
 
     @property
     def targets(self) -> tuple[str, ...]:
-        """Targets of a wheel for this kind of processor, best first."""
+        """Targets of a wheel for this kind of processor, best first.
+
+        Returns:
+            Names of targets, such as X86_64_V3.
+        """
         return (X86_64_V3, BASELINE) if self.machine == "x86_64" else (BASELINE,)
 
     def flags(self, target: str = NATIVE) -> list[str]:
-        """Return the options that decide the machine code."""
+        """Return the options that determine the machine code."""
         # On x86-64 the baseline is for processors of before 2013: it is compiled in a third of the
         # time.
         is_quick = target == BASELINE and self.machine == "x86_64"
@@ -91,7 +98,7 @@ class Compiler(NamedTuple):
         return [*flags, *self._architectures()]
 
     def _architectures(self) -> list[str]:
-        """Return what Python's build tools ask for on macOS."""
+        """Return the options that Python's build tools request on macOS, for universal binaries."""
         return shlex.split(os.environ.get("ARCHFLAGS", "")) if self.system == "darwin" else []
 
     def compile(self, text: Path, result: Path, target: str = NATIVE) -> None:
@@ -111,6 +118,10 @@ class Compiler(NamedTuple):
 
     def link(self, objects: Sequence[Path], result: Path) -> None:
         """Link object files to a shared library.
+
+        Args:
+            objects: paths of the object files.
+            result: path of the library.
 
         Raises:
             CompilationError: the linker failed.
@@ -147,7 +158,10 @@ class Compiler(NamedTuple):
 
 @cache
 def find_compiler() -> Compiler | None:
-    """Return the C++ compiler of this machine: that of the variable CXX, else one of the path; None without one."""
+    """Return the C++ compiler of this machine, None if it has no compiler.
+
+    The variable CXX has priority over compilers of the path.
+    """
     import shutil
 
     chosen = os.environ.get("CXX")
@@ -157,7 +171,7 @@ def find_compiler() -> Compiler | None:
         return None
     for program in PROGRAMS:
         path = shutil.which(program)
-        # What lies in the current folder was not installed.
+        # A program in the current folder has not been installed, and is not run.
         if path is not None and os.path.isabs(path):
             more = ("--driver-mode=g++",) if program == "clang-cl" else ()
             found = _examine((path, *more))
@@ -202,7 +216,10 @@ def _examine(command: tuple[str, ...]) -> Compiler | None:
 
 
 def _has_developer_tools() -> bool:
-    """Return whether macOS has its compiler; without it, `clang++` is a program that asks to install it."""
+    """Return whether macOS has its developer tools.
+
+    Without them, `clang++` is a program that asks to install them.
+    """
     import subprocess
 
     try:

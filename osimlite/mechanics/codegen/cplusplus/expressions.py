@@ -26,10 +26,32 @@ from osimlite.mechanics.codegen.cplusplus.types import (
     type_of_constant,
 )
 
-PRIMARY, UNARY, PRODUCT, SUM, SHIFT, ORDER, EQUALITY, BIT_AND, BIT_XOR, BIT_OR, AND, OR, CHOICE = (
-    range(13, 0, -1)
-)
-"""Precedences of C++ operators: a higher number binds more closely."""
+PRIMARY = 13
+"""Precedence of C++ expressions without an operator; a higher number binds more closely."""
+UNARY = 12
+"""Precedence of signs and of `!`."""
+PRODUCT = 11
+"""Precedence of `*` and `/`."""
+SUM = 10
+"""Precedence of `+` and `-`."""
+SHIFT = 9
+"""Precedence of `<<` and `>>`."""
+ORDER = 8
+"""Precedence of `<`, `<=`, `>` and `>=`."""
+EQUALITY = 7
+"""Precedence of `==` and `!=`."""
+BIT_AND = 6
+"""Precedence of `&`, which in Python binds more closely than comparisons."""
+BIT_XOR = 5
+"""Precedence of `^`."""
+BIT_OR = 4
+"""Precedence of `|`."""
+AND = 3
+"""Precedence of `&&`."""
+OR = 2
+"""Precedence of `||`."""
+CHOICE = 1
+"""Precedence of `?:`."""
 
 OPERATORS: dict[type[ast.operator], tuple[str, int]] = {
     ast.Mult: ("*", PRODUCT),
@@ -41,6 +63,7 @@ OPERATORS: dict[type[ast.operator], tuple[str, int]] = {
     ast.BitXor: ("^", BIT_XOR),
     ast.BitOr: ("|", BIT_OR),
 }
+"""Signs of operators that C++ has with the same meaning, with their precedences."""
 FUNCTIONS: dict[type[ast.operator], str] = {
     ast.FloorDiv: "floor_divide",
     ast.Mod: "modulo",
@@ -56,6 +79,7 @@ COMPARISONS: dict[type[ast.cmpop], tuple[str, int]] = {
     ast.Eq: ("==", EQUALITY),
     ast.NotEq: ("!=", EQUALITY),
 }
+"""Signs of comparisons with their precedences."""
 
 RESERVED = frozenset((
     "alignas", "alignof", "and_eq", "asm", "assert", "auto", "bitand", "bitor", "bool", "case", "catch", "char",
@@ -67,7 +91,7 @@ RESERVED = frozenset((
     "throw", "true", "typedef", "typeid", "typename", "uint64_t", "union", "unix", "unsigned", "using", "virtual",
     "void", "volatile", "wchar_t", "xor", "xor_eq", "Array", "Dual", "INFINITY", "NAN",
 ))  # fmt: skip
-"""Names that a kernel may have and C++ or the header not."""
+"""Names that a kernel may use, but that mean something else in C++ or in the header."""
 
 
 class Code(NamedTuple):
@@ -78,20 +102,25 @@ class Code(NamedTuple):
 
 
 class Names(Protocol):
-    """What a writer of functions asks of the library that they belong to."""
+    """Interface of the library that names types, functions and constants."""
 
     def name_type(self, kind: Type) -> str:
-        """Return the name of a type, and define it if it has to be."""
+        """Return the name of a type, after defining it if necessary."""
 
     def name_function(self, function: Specialisation) -> str:
-        """Return the name of a function, and write it if it is not written yet."""
+        """Return the name of a function, after writing it if necessary."""
 
     def name_constant(self, name: str, value: tuple[Any, ...]) -> str:
-        """Return the name of a constant tuple, and define it if it is not defined yet."""
+        """Return the name of a constant tuple, after defining it if necessary.
+
+        Args:
+            name: name in Python.
+            value: the tuple.
+        """
 
 
 def escape_name(name: str) -> str:
-    """Return a name that means nothing else in C++."""
+    """Return a name with a trailing underscore if it means something else in C++."""
     return f"{name}_" if name in RESERVED else name
 
 
@@ -105,6 +134,7 @@ def write_number(value: bool | int | float) -> str:
         return "NAN"
     if math.isinf(value):
         return "INFINITY" if value > 0.0 else "-INFINITY"
+    # repr() gives the shortest text that is read as the same number.
     return repr(value)
 
 
@@ -137,9 +167,18 @@ class ExpressionWriter:
                 return name
 
     def hold(self, kind: Type, text: str) -> str:
-        """Define a variable before the statement that is being written, and return its name."""
+        """Define a variable before the statement that is being written.
+
+        Args:
+            kind: type of the variable.
+            text: its value.
+
+        Returns:
+            Its name.
+        """
         name = self.new_name("temporary")
         self.pending.append(f"const {self.names.name_type(kind)} {name} = {text};")
+        # Kernels write through pointers, so that these must not be constant.
         if isinstance(kind, Pointer):
             self.pending[-1] = self.pending[-1].removeprefix("const ")
         return name
@@ -155,7 +194,9 @@ class ExpressionWriter:
         return code.text if code.precedence >= least else f"({code.text})"
 
     def guard_expression(self, write: Callable[..., str], *arguments: Any) -> str:
-        """Return the text of an expression that is not always evaluated; its variables are defined within it.
+        """Return the text of an expression that is not always evaluated.
+
+        Variables that it needs are defined within it, in a lambda expression.
 
         Args:
             write: returns the text.
@@ -172,8 +213,18 @@ class ExpressionWriter:
     def order_operands(
         self, nodes: Sequence[ast.expr], write: Callable[[ast.expr], str]
     ) -> list[str]:
-        """Return the texts of operands that C++ may evaluate in any order."""
+        """Return the texts of operands that C++ may evaluate in any order.
+
+        Args:
+            nodes: the operands.
+            write: returns the text of an operand.
+
+        Returns:
+            Texts in the order of the operands; earlier ones are names of variables where the order
+            matters.
+        """
         if len(nodes) < 2 or not self.function.effects & WRITES:
+            # Operands that only read memory may be evaluated in any order.
             return [write(node) for node in nodes]
         effects = [self.function.effects_of(node) for node in nodes]
         active = [index for index, effect in enumerate(effects) if effect]
@@ -190,16 +241,29 @@ class ExpressionWriter:
         return texts
 
     def convert(self, text: str, have: Type, want: Type) -> str:
-        """Return the text of a value as one of another type."""
+        """Return the text of a value as one of another type.
+
+        Args:
+            text: the value.
+            have: its type.
+            want: type that is needed; numbers convert implicitly.
+        """
         if have is want or (is_number(have) and is_number(want)) or isinstance(have, Callee):
             return text
         assert isinstance(have, Tuple) and isinstance(want, Tuple)
+        # A name costs nothing to repeat; any other text becomes a variable first.
         name = text if text.replace(".", "").replace("_", "").isalnum() else self.hold(have, text)
         parts = [self.item(name, have, index) for index in range(len(have.parts))]
         return self.build(want, parts, have.parts)
 
     def cast(self, text: str, have: Type, want: Type) -> str:
-        """Return the text of a value whose type is exactly the one that is needed."""
+        """Return the text of a value whose type is exactly the one that is needed.
+
+        Args:
+            text: the value.
+            have: its type.
+            want: type that is needed.
+        """
         if have is want:
             return text
         if is_number(have) and is_number(want):
@@ -208,7 +272,13 @@ class ExpressionWriter:
         return self.convert(text, have, want)
 
     def item(self, text: str, kind: Tuple, index: int) -> str:
-        """Return the text of an item of a tuple."""
+        """Return the text of an item of a tuple.
+
+        Args:
+            text: the tuple.
+            kind: its type.
+            index: index of the item; negative ones count from the end.
+        """
         index %= len(kind.parts)
         if kind.is_array:
             return f"{text}.items[{index}]"
@@ -244,6 +314,7 @@ class ExpressionWriter:
             if isinstance(node, ast.Tuple) and not any(
                 isinstance(part, ast.Starred) for part in node.elts
             ):
+                # Convert the items instead of the tuple, so that no temporary tuple is made.
                 wanted = dict(zip(node.elts, want.parts, strict=True))
                 texts = self.order_operands(
                     node.elts, lambda part: self.text_as(part, wanted[part])
@@ -338,7 +409,12 @@ class ExpressionWriter:
         return Code(text, UNARY if text.startswith("-") else PRIMARY)
 
     def constant(self, name: str, value: Any) -> Code:
-        """Return the text of a value of a module."""
+        """Return the text of a value of a module.
+
+        Args:
+            name: name in Python.
+            value: the value.
+        """
         if isinstance(value, tuple):
             return Code(self.names.name_constant(name, value))
         # A function that is passed on is a part of the specialisation that is called, and no
@@ -353,7 +429,12 @@ class ExpressionWriter:
         return Code(self.build(kind, texts, kinds))
 
     def subscript(self, owner: ast.expr, index: ast.expr) -> Code:
-        """Return the text of an item of a vector or a tuple."""
+        """Return the text of an item of a vector or a tuple.
+
+        Args:
+            owner: the vector or tuple.
+            index: the index.
+        """
         kind = self.function.require_type(owner)
         if isinstance(kind, Pointer):
             texts = self.order_operands(
@@ -375,6 +456,7 @@ class ExpressionWriter:
         if type(op) in FUNCTIONS:
             return self.text(node)
         _, precedence = OPERATORS[type(op)]
+        # Bit operators get parentheses in any case, because compilers warn without them.
         if precedence < SUM:
             return self.text(node, PRIMARY)
         return self.text(node, precedence + is_right)
@@ -403,17 +485,23 @@ class ExpressionWriter:
                 # A power by an integer is a product of factors, whatever the base is.
                 two = f"static_cast<{'int64_t' if is_whole or isinstance(op, ast.Pow) else 'double'}>({two})"
             return Code(f"py::{FUNCTIONS[type(op)]}({one}, {two})")
+        # C++ leaves the behaviour of signed overflow undefined: generators of random numbers
+        # multiply by a function of the header.
         if type(op) not in OPERATORS:
             raise self.function.refuse(node)
         sign, precedence = OPERATORS[type(op)]
         if isinstance(op, ast.Mult) and are_integers and self._may_overflow(node):
             return Code(f"py::multiply({one}, {two})")
+        # Division of integers gives a float in Python.
         if isinstance(op, ast.Div) and are_integers:
             one = f"static_cast<double>({one})"
         return Code(f"{one} {sign} {two}", precedence)
 
     def _may_overflow(self, node: ast.AST) -> bool:
-        """Return whether a product has a factor that only generators of random numbers have."""
+        """Return whether a product may overflow, judged by the size of a constant factor.
+
+        Only generators of random numbers have such factors.
+        """
         factors = [node.left, node.right] if isinstance(node, ast.BinOp) else [right_of(node)]
         return any(
             abs(self.function.constant_index(part) or 0) >= 2**31
@@ -433,6 +521,7 @@ class ExpressionWriter:
         have = self.function.require_type(first)
         if not others:
             return self.cast(self.text(first), have, kind)
+        # The first operand is both tested and returned, so that it must be evaluated once.
         name = (
             self.text(first) if isinstance(first, ast.Name) else self.hold(have, self.text(first))
         )
@@ -450,6 +539,7 @@ class ExpressionWriter:
         if any(isinstance(op, ast.In | ast.NotIn) for op in node.ops):
             return self._contains(node)
         operands = [node.left, *node.comparators]
+        # A middle operand is part of two comparisons.
         if any(self.function.effects_of(operand) & WRITES for operand in operands[2:-1]):
             raise self.function.refuse(node, "an operand that writes memory is compared twice")
         texts = self.order_operands(operands[:2], self._comparand)
@@ -535,7 +625,13 @@ class ExpressionWriter:
         return texts, kinds
 
     def call(self, node: ast.Call, function: Any, nodes: Sequence[ast.expr]) -> Code:
-        """Return the text of a call."""
+        """Return the text of a call.
+
+        Args:
+            node: the call.
+            function: the function that is called.
+            nodes: its arguments.
+        """
         texts, kinds = self.arguments(nodes)
         if (intrinsic := self.function.intrinsic(function)) is not None:
             result = self.function.require_type(node)
@@ -551,6 +647,7 @@ class ExpressionWriter:
             return Code(self.build(kind, texts, kinds))
         if isinstance(function, FunctionType):
             complete = self.function.complete_arguments(function, tuple(kinds))
+            # Defaults are values of the Python function; C++ functions have none.
             defaults = (
                 (function.__defaults__ or ())[len(kinds) - len(complete) :]
                 if len(complete) > len(kinds)
@@ -560,6 +657,7 @@ class ExpressionWriter:
                 self.constant(f"{function.__name__}_default", value).text for value in defaults
             ]
             called = self.function.specialise(function, complete)
+            # Functions as arguments are part of the specialisation.
             given = [
                 text
                 for text, kind in zip(texts, complete, strict=True)

@@ -1,7 +1,7 @@
-"""Types of the variables and expressions of one function, for given types of its arguments.
+"""Types of the variables and expressions of one function, for known types of its arguments.
 
-A function is read again and again until no type changes: within a loop, a variable may be used
-before the statement that decides its type. Annotations are ignored, because one force law serves
+A function is inferred again and again until no type changes, since in a loop a variable may be used
+before the statement that determines its type. Annotations are ignored, because one force law serves
 floats and numbers with derivatives.
 """
 
@@ -34,28 +34,29 @@ from osimlite.mechanics.codegen.reader import Function, Kernel
 from osimlite.mechanics.kernels.layout import Record
 
 MAX_ROUNDS = 20
-"""Rounds of inference in one function; each round that changes nothing is the last."""
+"""Largest number of rounds of inference in one function; a round without change is the last."""
 INTEGER_OPERATORS = ast.BitAnd, ast.BitOr, ast.BitXor, ast.LShift, ast.RShift
+"""Operators that only integers have."""
 
 
 READS = 1
 """Bit of an expression that may read memory: it must stay behind earlier writes."""
 WRITES = 2
-"""Bit of an expression that may write memory: it must keep its order beside other expressions."""
+"""Bit of an expression that may write memory: it must keep its order among other expressions."""
 
 
 class Specialisation(Kernel):
-    """A function for given types of its arguments.
+    """Function for known types of its arguments.
+
+    Attributes:
+        variables: types of arguments and local variables by name.
+        result: type of its result.
+        effects: effects of a call on memory, as bits of READS and WRITES.
 
     Args:
         function: the function.
         arguments: types of its arguments.
         specialise: returns the specialisation of a function that this one calls.
-
-    Attributes:
-        variables: types of arguments and local variables by name.
-        result: type of what it returns.
-        effects: what a call does with memory, as bits of READS and WRITES.
     """
 
     def __init__(
@@ -88,6 +89,7 @@ class Specialisation(Kernel):
     # --------------------------------------------------------------------------------------------- fixed point
     def _infer(self) -> None:
         for _ in range(MAX_ROUNDS):
+            # Types only become wider from round to round, so that the iteration ends.
             before = dict(self.variables), self.result
             # A variable may have become wider: infer all types again.
             self._types.clear()
@@ -99,6 +101,7 @@ class Specialisation(Kernel):
             raise self.refuse(self.tree.args, f"its types do not converge in {MAX_ROUNDS} rounds")
         if self.result is None:
             self.result = VOID
+        # C++ does not define what such a function returns.
         elif not leaves(self.body):
             raise self.refuse(self.body[-1], "the function may end without returning a value")
 
@@ -153,6 +156,7 @@ class Specialisation(Kernel):
             )
 
     def _assign(self, target: ast.expr, kind: Type | None) -> None:
+        # Python's convention for a value that is not used.
         match target:
             case ast.Name(id="_"):
                 pass
@@ -167,6 +171,7 @@ class Specialisation(Kernel):
                 pass
             case ast.Subscript(value=vector):
                 element = self.type_of(to_load(target))
+                # Tuples are values in C++, and cannot be changed in place.
                 if element is not None and not isinstance(self.type_of(vector), Pointer):
                     raise self.refuse(target, "an item of a tuple is assigned")
                 self.effects |= WRITES
@@ -365,7 +370,13 @@ class Specialisation(Kernel):
 
     # ------------------------------------------------------------------------------------------ what names mean
     def value(self, node: ast.expr) -> Any:
-        """Return what a global name, or an attribute of a record or module, stands for; None if nothing."""
+        """Return the value of a global name, or of an attribute of a record or module.
+
+        It is None if the name has no value there.
+
+        Args:
+            node: name or attribute.
+        """
         if isinstance(node, ast.Attribute):
             owner = (
                 self.value(node.value) if isinstance(node.value, ast.Name | ast.Attribute) else None
@@ -379,15 +390,16 @@ class Specialisation(Kernel):
         return scope[node.id] if node.id in scope else getattr(builtins, node.id, None)
 
     def resolve_call(self, node: ast.expr) -> Any:
-        """Return the function that a call names, which may be one that was passed as an argument."""
+        """Return the function that is called, which may be one that was passed as an argument."""
         if isinstance(node, ast.Name) and isinstance(kind := self.variables.get(node.id), Callee):
             return kind.function
         return self.value(node)
 
     def intrinsic(self, function: Any) -> Intrinsic | None:
-        """Return how a function that is no kernel is written; None if it has no counterpart."""
+        """Return the rules of a function that is not a kernel, None if it has no counterpart."""
         try:
             return INTRINSICS.get(function)
+        # Values that cannot be hashed are no functions.
         except TypeError:
             return None
 
@@ -431,14 +443,32 @@ class Specialisation(Kernel):
 
     @staticmethod
     def complete_arguments(function: FunctionType, kinds: tuple[Type, ...]) -> tuple[Type, ...]:
-        """Return the types of all arguments of a call, including those left at their defaults."""
+        """Return the types of all arguments of a call, including those left at their defaults.
+
+        Defaults count with the types of their values.
+
+        Args:
+            function: the called function.
+            kinds: types of the arguments that are written.
+
+        Returns:
+            One type per parameter.
+        """
         rest = function.__code__.co_argcount - len(kinds)
         defaults = (function.__defaults__ or ())[-rest:] if rest > 0 else ()
         return kinds + tuple(kind for kind in map(type_of_constant, defaults) if kind is not None)
 
     @staticmethod
     def complete_fields(record: Any, kinds: tuple[Type, ...]) -> tuple[Type, ...]:
-        """Return the types of all fields of a new named tuple, including those left at their defaults."""
+        """Return the types of all fields of a new named tuple, including those with defaults.
+
+        Args:
+            record: class of named tuples.
+            kinds: types of the fields that are written.
+
+        Returns:
+            One type per field.
+        """
         rest = record._fields[len(kinds) :]
         defaults = [
             type_of_constant(record._field_defaults[name])
@@ -449,7 +479,7 @@ class Specialisation(Kernel):
 
     # ------------------------------------------------------------------------------------------------- effects
     def effects_of(self, node: ast.AST) -> int:
-        """Return what the evaluation of an expression does with memory, as bits of READS and WRITES."""
+        """Return the effects of an expression on memory, as bits of READS and WRITES."""
         if node not in self._effects:
             effect = self._direct_effect(node)
             for child in ast.iter_child_nodes(node):
@@ -463,6 +493,7 @@ class Specialisation(Kernel):
         if isinstance(node, ast.Call):
             function = self.resolve_call(node.func)
             if (intrinsic := self.intrinsic(function)) is not None:
+                # A law that is called by address may do anything.
                 return READS | WRITES if intrinsic.has_effects else 0
             kinds = self.infer_types(node.args)
             if isinstance(function, FunctionType) and kinds is not None:

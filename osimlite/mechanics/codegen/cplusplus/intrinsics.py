@@ -1,6 +1,7 @@
-"""Functions that kernels call and that are no kernels: Python's own, those of `math`, and the operations on vectors.
+"""Functions that kernels call and that are not kernels themselves.
 
-Each has a rule for its type and one for its text. Their C++ is in the header `kernel_runtime.h`.
+These are Python's own, those of `math`, and the operations on vectors and dual numbers. Each has a
+rule for its type and one for its text. Their C++ is in the header `kernel_runtime.h`.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ from osimlite.mechanics.laws import dual_numbers
 
 
 class Reader(Protocol):
-    """What the rules need of the inference."""
+    """Interface of the inference for the rules."""
 
     def constant_index(self, node: ast.expr) -> int | None:
         """Return the value of an integer constant."""
@@ -40,14 +41,14 @@ Types = Sequence[Type]
 
 
 class Intrinsic(NamedTuple):
-    """How a function that is no kernel is written.
+    """Rules of a function that is not a kernel.
 
     Attributes:
-        infer: returns the type of the result from the arguments and their types.
+        infer: returns the type of the result from the arguments and their types; raises a TypeError
+            for wrong arguments.
         write: returns the text from those of the arguments, their types, and the type of the
             result.
-        early: type of the result while the types of the arguments are not known yet, if it depends
-            on none.
+        early: type of the result while types of arguments are not known yet, if it depends on none.
         has_effects: whether it may read and write memory.
     """
 
@@ -66,7 +67,13 @@ def _check_numbers(kinds: Types, least: int, most: int) -> None:
 
 
 def cast_to(code: str, have: Type, want: Type) -> str:
-    """Return the text of a number as one of another type."""
+    """Return the text of a number as one of another type.
+
+    Args:
+        code: text of the number.
+        have: its type.
+        want: type that is needed.
+    """
     if have is want:
         return code
     return f"static_cast<{want!r}>({code})" if isinstance(want, Scalar) else f"{want!r}({code})"
@@ -77,7 +84,15 @@ def _dual_or_float(kinds: Types) -> Type:
 
 
 def _convert_to_floats(codes: Sequence[str], kinds: Types) -> list[str]:
-    """Return the texts of numbers with integers as floats."""
+    """Return the texts of numbers with integers as floats.
+
+    Args:
+        codes: texts of the numbers.
+        kinds: their types.
+
+    Returns:
+        Texts of floats and dual numbers.
+    """
     return [
         cast_to(code, kind, FLOAT) if is_integral(kind) else code
         for code, kind in zip(codes, kinds, strict=True)
@@ -86,7 +101,12 @@ def _convert_to_floats(codes: Sequence[str], kinds: Types) -> list[str]:
 
 # ------------------------------------------------------------------------------------------------- families
 def _mathematics(name: str, count: int) -> Intrinsic:
-    """A function of `math` that takes numbers and returns a float or a number with derivatives."""
+    """Return the rules of a function of `math`, whose result is a float or dual number.
+
+    Args:
+        name: name of the function in the header.
+        count: number of arguments.
+    """
 
     def infer(reader: Reader, nodes: Nodes, kinds: Types) -> Type:
         _check_numbers(kinds, count, count)
@@ -99,7 +119,12 @@ def _mathematics(name: str, count: int) -> Intrinsic:
 
 
 def _declare_fixed_result(name: str, result: Type) -> Intrinsic:
-    """A function of one number whose result has the same type for every argument."""
+    """Return the rules of a function of one number whose result always has the same type.
+
+    Args:
+        name: name of the function in the header.
+        result: type of the result.
+    """
 
     def infer(reader: Reader, nodes: Nodes, kinds: Types) -> Type:
         _check_numbers(kinds, 1, 1)
@@ -112,9 +137,13 @@ def _declare_fixed_result(name: str, result: Type) -> Intrinsic:
 
 
 def _extreme(name: str) -> Intrinsic:
-    """`min` or `max` of two numbers or more, in the order of Python's comparisons."""
+    """Return the rules of `min` or `max` of two numbers or more.
+
+    Python's order of comparisons decides what NaN gives, and is kept.
+    """
 
     def infer(reader: Reader, nodes: Nodes, kinds: Types) -> Type:
+        # No upper limit on the number of arguments.
         _check_numbers(kinds, 2, len(kinds) + 2)
         result: Type | None = None
         for kind in kinds:
@@ -125,6 +154,7 @@ def _extreme(name: str) -> Intrinsic:
     def write(codes: Sequence[str], kinds: Types, result: Type) -> str:
         text = codes[0]
         for code in codes[1:]:
+            # The template argument is explicit, as the arguments may have different types.
             text = f"py::{name}<{result!r}>({text}, {code})"
         return text
 
@@ -200,6 +230,7 @@ def _infer_call(reader: Reader, nodes: Nodes, kinds: Types) -> Type:
 
 
 def _write_call(codes: Sequence[str], kinds: Types, result: Type) -> str:
+    # A law is called by its address, with vectors and an integer; see `pointers.Law`.
     vectors = ", ".join(repr(kind) for kind in kinds[1:6])
     law = f"reinterpret_cast<int64_t (*)({vectors}, int64_t)>({codes[0]})"
     return f"{law}({', '.join(codes[1:])})"
@@ -286,4 +317,4 @@ INTRINSICS: dict[Any, Intrinsic] = {
     dual_numbers.carrying: Intrinsic(_infer_carrying, _write_carrying),
     dual_numbers.carrying_room: Intrinsic(_infer_carrying_room, _write_carrying_room),
 }
-"""How each is written."""
+"""Rules of each function that is not a kernel."""

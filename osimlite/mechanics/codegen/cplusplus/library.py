@@ -1,4 +1,7 @@
-"""A library of kernels as one C++ text: functions for the types that they are called with, structs and constants."""
+"""Library of kernels as C++ text: functions for the types that they are called with.
+
+It contains the structs and constants that these need, too.
+"""
 
 from __future__ import annotations
 
@@ -36,14 +39,22 @@ PARAMETERS: dict[str, Callable[[Type], Type]] = {
     "float": lambda number: number,
     "int": lambda number: INTEGER,
 }
-"""Types of the parameters of an exported function by their annotations, and by the type of its numbers."""
+"""Type of a parameter of an exported function, by its annotation and the type of its numbers."""
 
 Kernels = Mapping[str, tuple[Callable[..., Any], int]]
-"""What a library exports: by the name of the symbol a function, and how many derivatives its numbers have."""
+"""Exports of a library: function and number of derivatives of its numbers, by symbol."""
 
 
 class Library:
-    """Functions, structs and constants of one library."""
+    """Functions, structs and constants of one library.
+
+    Attributes:
+        structs: definitions of structs.
+        constants: definitions of constants.
+        functions: text of each function, by name.
+        exports: text of each exported function, by symbol.
+        called: names of the functions that each function or exported symbol calls.
+    """
 
     def __init__(self) -> None:
         self._specialisations: dict[tuple[FunctionType, tuple[Type, ...]], Specialisation] = {}
@@ -55,7 +66,7 @@ class Library:
         self.structs: list[str] = []
         self.constants: list[str] = []
         self.functions: dict[str, str] = {}
-        """Texts of the functions by name; what a function calls stands before it."""
+        """Texts of the functions by name; called functions come before those that call them."""
         self.exports: dict[str, str] = {}
         self.called: dict[str, set[str]] = {}
         """Names of the functions that each function or exported symbol calls."""
@@ -119,12 +130,18 @@ class Library:
     def specialise(self, function: FunctionType, kinds: Sequence[Type]) -> Specialisation:
         """Return a function for given types of its arguments.
 
+        Args:
+            function: the function.
+            kinds: types of its arguments.
+
         Raises:
             TranslationError: the function calls itself, or uses something that has no counterpart
                 in C++.
         """
         key = function, tuple(kinds)
         if key not in self._specialisations:
+            # An open key is a function whose inference has led back to itself; its type would have
+            # no end.
             if key in self._open:
                 kernel = Kernel(function, "C++")
                 raise kernel.refuse(kernel.tree.args, "the function calls itself")
@@ -145,8 +162,13 @@ class Library:
 
     # ---------------------------------------------------------------------------------------------------- names
     def name_function(self, function: Specialisation) -> str:
-        """Return the name of a function, and write it if it is not written yet."""
+        """Return the name of a function, after writing it if necessary.
+
+        The call graph is noted, so that a text contains what its symbols need only.
+        """
         if function not in self._function_names:
+            # The name is registered before the text is written, so that it is free for no other
+            # function.
             name = self._function_names[function] = self._free(function.name)
             self.called[name] = set()
             self._writing.append(name)
@@ -163,7 +185,7 @@ class Library:
         return f"// {code.__module__}.{code.__qualname__}"
 
     def name_type(self, kind: Type) -> str:
-        """Return the name of a type, and define it if it has to be."""
+        """Return the name of a type, after defining it if necessary."""
         if isinstance(kind, Scalar | Dual):
             return repr(kind)
         if isinstance(kind, Pointer):
@@ -190,9 +212,15 @@ class Library:
         return name
 
     def name_constant(self, name: str, value: tuple[Any, ...]) -> str:
-        """Return the name of a constant tuple, and define it if it is not defined yet."""
+        """Return the name of a constant tuple, and define it if it is not defined yet.
+
+        Args:
+            name: name in Python.
+            value: the tuple.
+        """
         kind = type_of_constant(value)
         assert isinstance(kind, Tuple)
+        # One name may stand for different tuples in different modules.
         key = name, repr(value)
         if key not in self._constant_names:
             free = self._constant_names[key] = self._free(name)
@@ -247,7 +275,7 @@ def write_library(kernels: Kernels) -> str:
             numbers carry; 0 for plain numbers.
 
     Returns:
-        The whole text but the header, which it includes as `kernel_runtime.h`.
+        The complete text but the header, which it includes as `kernel_runtime.h`.
 
     Raises:
         TranslationError: a kernel uses something that has no counterpart in C++.
@@ -256,7 +284,9 @@ def write_library(kernels: Kernels) -> str:
 
 
 def write_units(kernels: Kernels, count: int) -> list[str]:
-    """Return kernels as the texts of several translation units of about equal size, to be compiled in parallel.
+    """Return kernels as the texts of several translation units of about equal size.
+
+    They can be compiled in parallel.
 
     Functions that kernels of two units call are repeated. Fewer units are returned where there are
     fewer kernels.
@@ -266,6 +296,9 @@ def write_units(kernels: Kernels, count: int) -> list[str]:
             numbers carry.
         count: the largest number of units.
 
+    Returns:
+        Texts, at most one per kernel.
+
     Raises:
         TranslationError: a kernel uses something that has no counterpart in C++.
     """
@@ -273,6 +306,7 @@ def write_units(kernels: Kernels, count: int) -> list[str]:
     sizes = {name: len(text) for name, text in library.functions.items()}
     reached = {symbol: library.reach([symbol]) for symbol in kernels}
     groups: list[tuple[set[str], list[str]]] = [(set(), []) for _ in range(count)]
+    # Largest kernels first, each to the unit that stays smallest with it.
     for symbol in sorted(kernels, key=lambda symbol: -sum(sizes[name] for name in reached[symbol])):
         functions, symbols = min(
             groups, key=lambda group: sum(sizes[name] for name in group[0] | reached[symbol])

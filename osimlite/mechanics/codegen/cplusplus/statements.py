@@ -1,4 +1,4 @@
-"""Functions of kernels as C++: statements, and where variables are defined."""
+"""Functions of kernels as C++: statements, and definitions of variables."""
 
 from __future__ import annotations
 
@@ -25,10 +25,11 @@ from osimlite.mechanics.codegen.cplusplus.types import (
 from osimlite.mechanics.codegen.reader import Function, Kernel
 
 INDENT = "    "
+"""Indentation of one level."""
 
 
 class FunctionWriter(ExpressionWriter):
-    """Writes one function.
+    """Writer of one function.
 
     Args:
         function: the function with its types.
@@ -55,7 +56,7 @@ class FunctionWriter(ExpressionWriter):
             given = local if own is kind else f"{local}_given"
             parameters.append(f"{self.names.name_type(kind)} {given}")
             if own is not kind:
-                # The function stores wider numbers in it.
+                # The function assigns a wider type to this parameter, so it needs a copy.
                 copies.append(
                     f"{self.names.name_type(own)} {local} = {self.convert(given, kind, own)};"
                 )
@@ -89,7 +90,10 @@ class FunctionWriter(ExpressionWriter):
         return lines
 
     def inner_block(self, body: Sequence[ast.stmt]) -> list[str]:
-        """Return the lines of the body of a compound statement, indented."""
+        """Return the lines of the body of a compound statement, indented.
+
+        Variables of the statement before the body must not be defined within it.
+        """
         before, self.pending = self.pending, []
         lines = [f"{INDENT}{line}" for line in self.block(body)]
         self.pending = before
@@ -147,10 +151,19 @@ class FunctionWriter(ExpressionWriter):
     ) -> list[str]:
         """Return the lines of a for statement.
 
+        As in Python, assignments to the loop variable in the body do not affect the next round.
+
         As in Python, what the body stores in the variable of the loop makes no difference to the
         next round.
+
+        Args:
+            node: the statement.
+            name: name of the loop variable.
+            iterated: what the loop is over.
+            body: statements of the loop.
         """
         is_own = name == "_" or name in self._places.loop_variables.get(node, ())
+        # A variable that is used after the loop, or assigned in it, needs a counter besides.
         counter = self.new_name("index") if name == "_" or not is_own else self.local(name)
         store = [] if is_own else [f"{INDENT}{self.local(name)} = {counter};"]
         if self.function.is_range(iterated):
@@ -182,6 +195,7 @@ class FunctionWriter(ExpressionWriter):
         first, stop, step = ["0", *texts, "1"] if len(texts) == 1 else [*texts, "1"][:3]
         ends = ""
         stop_node = bounds[0] if len(bounds) == 1 else bounds[1]
+        # Python evaluates the end once, before the loop.
         if self.function.constant_index(stop_node) is None:
             end = self.new_name(f"{counter}_end")
             ends, stop = f", {end} = {stop}", end
@@ -189,6 +203,7 @@ class FunctionWriter(ExpressionWriter):
         if len(texts) < 3:
             return f"for ({start}; {counter} < {stop}; ++{counter})"
         constant = self.function.constant_index(bounds[2])
+        # Without a constant step its sign is known at run time only.
         if constant is None:
             held = self.new_name(f"{counter}_step")
             return (
@@ -202,7 +217,13 @@ class FunctionWriter(ExpressionWriter):
 
     # ------------------------------------------------------------------------------------------- assignments
     def assign(self, node: ast.stmt, targets: Sequence[ast.expr], value: ast.expr) -> list[str]:
-        """Return the lines of an assignment to one target or several."""
+        """Return the lines of an assignment to one target or several.
+
+        Args:
+            node: the assignment.
+            targets: targets.
+            value: assigned expression.
+        """
         kind = self.function.require_type(value)
         if isinstance(kind, Callee):
             return []
@@ -210,6 +231,7 @@ class FunctionWriter(ExpressionWriter):
             return self._assign_one(node, targets[0], value, kind)
         if isinstance(value, ast.Tuple) and self._are_separate(targets, value):
             return self._assign_items(node, targets, value)
+        # Several targets, or a tuple that is unpacked: evaluate the value once.
         text = self.text(value)
         held = (
             text if is_number(kind) and isinstance(value, ast.Constant) else self.hold(kind, text)
@@ -219,7 +241,12 @@ class FunctionWriter(ExpressionWriter):
 
     @staticmethod
     def _are_separate(targets: Sequence[ast.expr], value: ast.Tuple) -> bool:
-        """Return whether items are assigned to items, so that no tuple has to be made."""
+        """Return whether single items are assigned, so that no tuple has to be made.
+
+        Args:
+            targets: targets.
+            value: tuple of the values.
+        """
         return all(isinstance(target, ast.Tuple) for target in targets) and not any(
             isinstance(part, ast.Starred) for part in value.elts
         )
@@ -234,14 +261,22 @@ class FunctionWriter(ExpressionWriter):
             return [
                 f"{self._definition(node, target.id)}{self.local(target.id)} = {self.text_as(value, own)};"
             ]
-        # C++17 evaluates what is assigned before the place that it is assigned to, as Python does.
+        # C++17 evaluates the value before the target of an assignment, as Python does.
         text = self.text(value)
         return [f"{self.text(target)} = {text};"]
 
     def _assign_items(
         self, node: ast.stmt, targets: Sequence[ast.expr], value: ast.Tuple
     ) -> list[str]:
-        """Return the lines of a tuple assignment: all values are computed before the first is stored."""
+        """Return the lines of a tuple assignment.
+
+        All values are computed before the first one is stored.
+
+        Args:
+            node: the assignment.
+            targets: tuples of targets.
+            value: tuple of the values.
+        """
         first = targets[0]
         assert isinstance(first, ast.Tuple)
         stored = {part.id for part in first.elts if isinstance(part, ast.Name)}
@@ -267,7 +302,10 @@ class FunctionWriter(ExpressionWriter):
         return lines
 
     def _is_independent(self, target: ast.Tuple, value: ast.Tuple, stored: set[str]) -> bool:
-        """Return whether each value may be stored as soon as it is computed."""
+        """Return whether each value may be stored as soon as it is computed.
+
+        It may if no target occurs in the values.
+        """
         if not all(isinstance(part, ast.Name) and part.id != "_" for part in target.elts):
             return False
         used = {node.id for node in ast.walk(value) if isinstance(node, ast.Name)}
@@ -303,7 +341,12 @@ class FunctionWriter(ExpressionWriter):
         return [*self._take_pending(), line]
 
     def _definition(self, node: ast.stmt, name: str) -> str:
-        """Return what stands before a variable where it is defined, which is nothing elsewhere."""
+        """Return the type before a variable where it is defined, and an empty text elsewhere.
+
+        Args:
+            node: the assignment.
+            name: name of the variable.
+        """
         if self._places.definitions.get(name) is not node:
             return ""
         kind = self.function.variables[name]
@@ -316,13 +359,21 @@ class FunctionWriter(ExpressionWriter):
     def augment(
         self, node: ast.AugAssign, target: ast.expr, op: ast.operator, value: ast.expr
     ) -> list[str]:
-        """Return the lines of an augmented assignment."""
+        """Return the lines of an augmented assignment.
+
+        Args:
+            node: the statement.
+            target: its target.
+            op: its operator.
+            value: its right side.
+        """
         kinds = [self.function.require_type(to_load(target)), self.function.require_type(value)]
         is_written = bool(self.function.effects_of(value) & WRITES)
         if isinstance(target, ast.Subscript):
             place = f"{self.text(target.value)}[{self._store_index(target.slice, is_written)}]"
         else:
             place = self.text(target)
+        # Python reads the target before it evaluates the right side, which may change it.
         before = (
             self.hold(kinds[0], place)
             if is_written and isinstance(target, ast.Subscript)
@@ -344,7 +395,9 @@ class FunctionWriter(ExpressionWriter):
 
 
 class VariablePlaces:
-    """Where each variable of a function is defined: by the assignment to it, by its loop, or before everything.
+    """Position of the definition of each variable of a function.
+
+    A variable is defined by the assignment to it, by its loop, or before all statements.
 
     Attributes:
         definitions: the statement that defines a variable by its first assignment.
@@ -363,6 +416,7 @@ class VariablePlaces:
             for node in ast.walk(statement):
                 if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
                     stores[node.id] = stores.get(node.id, 0) + 1
+        # A variable with a single assignment may be constant in C++.
         self.constants = {name for name, count in stores.items() if count == 1}
         self._place(function.body, [name for name in function.own if name != "_"])
 
@@ -374,7 +428,12 @@ class VariablePlaces:
         return self._names[node]
 
     def _place(self, body: Sequence[ast.stmt], names: Sequence[str]) -> None:
-        """Find the place of variables that are used in one block only."""
+        """Find the position of variables that are used in one block only.
+
+        Args:
+            body: statements of the block.
+            names: names of the variables.
+        """
         for name in names:
             users = [statement for statement in body if name in self._find_used_names(statement)]
             first = users[0]
@@ -388,7 +447,15 @@ class VariablePlaces:
                 self.outer.append(name)
 
     def _place_within(self, node: ast.stmt, name: str) -> bool:
-        """Find the place of a variable that is used in one compound statement only."""
+        """Find the position of a variable that is used in one compound statement only.
+
+        Args:
+            node: the statement.
+            name: name of the variable.
+
+        Returns:
+            Whether it can be defined within the statement.
+        """
         blocks = [
             block
             for field in ("body", "orelse")
@@ -407,6 +474,7 @@ class VariablePlaces:
                 for part in ast.walk(statement)
                 if isinstance(part, ast.Name) and isinstance(part.ctx, ast.Store)
             }
+            # The variable of a range loop is defined by the loop, if the body does not assign it.
             if name in stored or name in self._find_used_names(node.iter):
                 return False
             self.loop_variables.setdefault(node, set()).add(name)
@@ -424,7 +492,7 @@ class VariablePlaces:
         return True
 
     def _defines(self, node: ast.stmt, name: str) -> bool:
-        """Return whether an assignment gives a variable its first value without asking for it."""
+        """Return whether an assignment gives a variable its first value without using it."""
         match node:
             case ast.Assign(targets=targets, value=value):
                 pass
@@ -439,13 +507,13 @@ class VariablePlaces:
 
 @cache
 def place_variables(function: Function) -> VariablePlaces:
-    """Return where each variable of a function is defined."""
+    """Return the positions of the definitions of all variables of a function."""
     return VariablePlaces(Kernel(function, "C++"))
 
 
 @cache
 def describe_statement(node: ast.stmt, keyword: str = "") -> str:
-    """Return the Python of a statement in one line, of a compound one the head only.
+    """Return the Python text of a statement in one line; of a compound one the head only.
 
     Args:
         node: the statement.

@@ -1,8 +1,8 @@
-"""Types of values in the C++ that kernels become.
+"""Types of values in the C++ of kernels.
 
-A kernel has no type declarations that can be relied on. Its types follow from those of its
-arguments, so every type is a value here that the inference compares, joins and passes on. Equal
-types are the same object.
+Kernels have no reliable type declarations: their types follow from those of the arguments. Every
+type is therefore an object that the inference compares, joins and passes on. Equal types are the
+same object.
 """
 
 from __future__ import annotations
@@ -38,9 +38,13 @@ class Scalar(Type):
 
 
 BOOLEAN = Scalar("bool", 0)
+"""Type of truth values."""
 INTEGER = Scalar("int64_t", 1)
+"""Type of integers."""
 FLOAT = Scalar("double", 2)
+"""Type of floats."""
 VOID = Scalar("void", -1)
+"""Type of functions without a result."""
 
 
 class Dual(Type):
@@ -56,7 +60,7 @@ class Dual(Type):
 
 
 class Pointer(Type):
-    """Vector of numbers, known by the address of the first."""
+    """Vector of numbers, represented by the address of its first one."""
 
     __slots__ = ("element",)
 
@@ -87,7 +91,7 @@ class Tuple(Type):
 
     @property
     def is_array(self) -> bool:
-        """Return whether the type is a plain tuple whose items have one type."""
+        """Tell whether the type is a plain tuple whose items have one type."""
         return self.record is None and len({*self.parts}) == 1
 
 
@@ -104,11 +108,15 @@ class Callee(Type):
 
 
 dual = cache(Dual)
+"""Return the type of numbers with some derivatives."""
 pointer_to = cache(Pointer)
+"""Return the type of vectors of some numbers."""
 callee = cache(Callee)
+"""Return the type of a function as an argument."""
 
 
 @cache
+# The cache makes equal types the same object.
 def _make_tuple(parts: tuple[Type, ...], record: Any) -> Tuple:
     return Tuple(parts, record)
 
@@ -139,7 +147,13 @@ def is_number(kind: Type | None) -> bool:
 
 
 def join_types(one: Type | None, two: Type | None) -> Type | None:
-    """Return the type that holds the values of two types; None stands for a type that is not known yet.
+    """Return the type that holds the values of two types.
+
+    None stands for a type that is not known yet.
+
+    Args:
+        one: first type.
+        two: second type.
 
     Raises:
         TypeError: no type holds both.
@@ -156,6 +170,7 @@ def join_types(one: Type | None, two: Type | None) -> Type | None:
         return two
     if isinstance(one, Tuple) and isinstance(two, Tuple) and len(one.parts) == len(two.parts):
         parts = [join_types(a, b) for a, b in zip(one.parts, two.parts, strict=True)]
+        # A plain tuple may be stored where a named one is expected, but not one of another class.
         if one.record is None or two.record is None or one.record is two.record:
             return tuple_of([part for part in parts if part is not None], one.record or two.record)
     raise TypeError(f"a value that is sometimes {one!r} and sometimes {two!r}")
@@ -166,6 +181,7 @@ def type_of_constant(value: Any) -> Type | None:
     if isinstance(value, bool):
         return BOOLEAN
     if isinstance(value, int):
+        # Integers of more than 64 bits do not exist in C++.
         return INTEGER if -(2**63) < value < 2**63 else None
     if isinstance(value, float):
         return FLOAT
