@@ -23,7 +23,7 @@ import osimlite
 from _opensim_walks import Order, opensim_walks
 from osimlite.models.source import make_model, parameters_of
 from osimlite.simulation import Simulation
-from osimlite.studies.gait.basin import sample_perturbed_starts, walks_from
+from osimlite.studies.gait.basin import sample_perturbed_starts, simulate_walks
 from osimlite.studies.gait.cycle import find_cycle
 from osimlite.studies.gait.stepmap import StepMap
 from osimlite.studies.gait.steps import Walk, walk_many
@@ -105,7 +105,7 @@ def near(names: list[str]) -> Table:
             step_map = StepMap(engine, start, accuracy=1e-12)
             cycle = find_cycle(step_map)
             walks = [
-                walks_from(
+                simulate_walks(
                     step_map, cycle, sample_perturbed_starts(step_map, start, part, 60, 0), 20
                 )
                 for part in (0.05, 0.1)

@@ -54,7 +54,10 @@ def main(file: Path, seconds: float) -> None:
     scenario = Scenario(file)
     best = scenario.best()
     walked = scenario.walk(best, duration=seconds)
-    rows, evaluations = len(walked.states.times) - 1, int(scenario.walkers(1).progress[0, FORCES])
+    rows, evaluations = (
+        len(walked.states.times) - 1,
+        int(scenario.get_walkers(1).progress[0, FORCES]),
+    )
     scenario.walk(best, CANDIDATES, duration=0.1)
     alone, many, theirs = [], [], []
     with tempfile.TemporaryDirectory() as folder:

@@ -40,8 +40,8 @@ def measured(
 ) -> list[tuple[str, float, float, float, float]]:
     """Method, accuracy, errors of values and of speeds, seconds of walking a second."""
     walked = scenario.walk(scenario.best(), duration=seconds)
-    walkers = scenario.walkers(1)
-    order = np.argsort([*walkers.places.values()])
+    walkers = scenario.get_walkers(1)
+    order = np.argsort([*walkers.offsets.values()])
     first = np.arange(0, len(walked.states.times) - 1 - steps, EVERY)
     start, rows = walked.states.rows[first][:, order], walked.excitations.rows
     size = len(walkers.coordinates)

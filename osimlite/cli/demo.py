@@ -268,7 +268,7 @@ def _walk(tour: _Tour) -> tuple[Scenario, Path, str]:
         write_sto(file, "states", table.times, table.columns, table.rows)
         speed, steps = walked.report["speed"][0], int(walked.report["steps"][0])
         peak = float(walked.loads.rows[len(table.times) // 2 :].max())
-        mass, t = scenario.walkers(1).mass, walked.times[0]
+        mass, t = scenario.get_walkers(1).mass, walked.times[0]
         said = (
             f"A human model of {mass:.0f} kg walks for {t:.0f} s at {speed:.2f} m/s, in {steps} steps, by reflexes alone: "
             "muscles react to their lengths and forces, and those of the hips to the lean of the torso. The gains come "

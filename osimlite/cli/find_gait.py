@@ -114,7 +114,7 @@ def find_gait(
 
 def _describe_result(gait: Gait) -> Facts:
     from osimlite.base.text import format_count, join_words
-    from osimlite.studies.gait.cycle_search import STARTS, STEPS
+    from osimlite.studies.gait.cycle_search import BASIN_STARTS, BASIN_STEPS
 
     cycle, walk = gait.found.cycle, gait.walk
     stable = "stable" if cycle.largest < 1.0 else "not stable"
@@ -127,7 +127,8 @@ def _describe_result(gait: Gait) -> Facts:
     done = f"{format_count(len(walk.steps), 'step')}, {format_count(len(walk.scuffs), 'scuff')}; {end} after {walk.end:.4g} s"
     facts.add("walk", done)
     facts.add(
-        "near it", f"{round(STARTS * gait.found.walking)} of {STARTS} starts make {STEPS} steps"
+        "near it",
+        f"{round(BASIN_STARTS * gait.found.walking)} of {BASIN_STARTS} starts make {BASIN_STEPS} steps",
     )
     facts.add(
         "search",

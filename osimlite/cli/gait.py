@@ -97,10 +97,10 @@ def gait(
     from osimlite.base.require import require
     from osimlite.simulation.run import Simulation
     from osimlite.studies.gait.basin import (
-        basin_places,
         find_basin,
+        find_basin_offsets,
         sample_perturbed_starts,
-        walks_from,
+        simulate_walks,
     )
     from osimlite.studies.gait.stepmap import refuse_constraints
 
@@ -119,7 +119,7 @@ def gait(
             options.quantities(start_speed, simulation.mechanism, "--set-speed"),
         )
         engine: Any = simulation.engine
-        basin_places(engine, basin_x, basin_y)
+        find_basin_offsets(engine, basin_x, basin_y)
         result, step_map = simulate_walk(engine, state, foot, to, settle, accuracy)
         result.skipped = simulation.forces.skipped
         cycle = result.cycle
@@ -127,7 +127,7 @@ def gait(
             for part in perturb or ():
                 with progress_bar(f"starting within {part:.0%}", starts) as progress:
                     states = sample_perturbed_starts(step_map, state, part, starts, seed)
-                    walks = walks_from(step_map, cycle, states, steps, progress=progress)
+                    walks = simulate_walks(step_map, cycle, states, steps, progress=progress)
                 result.nearby.append(
                     Nearby(part, sum(len(walk.steps) >= steps for walk in walks), starts, steps)
                 )
@@ -140,7 +140,7 @@ def gait(
                         basin_y,
                         reach=reach,
                         grid=grid,
-                        wanted=steps,
+                        target_steps=steps,
                         progress=progress,
                     )
         files = _write(where, result, pictures) if where else []
@@ -216,7 +216,7 @@ def simulate_walk(
     step_map = None
     try:
         step_map = StepMap(engine, state, footing=footing, accuracy=accuracy)
-        result.cycle = find_cycle(step_map, settle=settle)
+        result.cycle = find_cycle(step_map, warm_up_steps=settle)
     except OsimliteError as error:
         result.why_not = error.message
     return result, step_map
@@ -266,7 +266,8 @@ def _describe_cycle(found: GaitReport, files: Sequence[Path]) -> Facts:
     if found.basin is not None:
         basin = found.basin
         facts.add(
-            "basin", f"{basin.part:.0%} of {basin.steps.size} starts make {basin.wanted} steps"
+            "basin",
+            f"{basin.part:.0%} of {basin.steps.size} starts make {basin.target_steps} steps",
         )
     for skipped in summarize_skipped(found.skipped):
         facts.add("left out", skipped)

@@ -88,10 +88,10 @@ def scone(
     from osimlite.errors import SettingError
     from osimlite.io.tables.storage import write_sto
     from osimlite.models.walking import SCENARIO, write_scenario
-    from osimlite.studies.reflexes.gait import gait_of
+    from osimlite.studies.reflexes.gait import measure_gait
     from osimlite.studies.reflexes.parameters import read_par
     from osimlite.studies.reflexes.scenario import Scenario
-    from osimlite.studies.reflexes.search import BEST, search_parameters
+    from osimlite.studies.reflexes.search import BEST_FILE, search_parameters
 
     if not optimize and (
         resume or any(given is not None for given in (generations, population, seed))
@@ -112,9 +112,9 @@ def scone(
             population=population,
             seed=seed,
             resume=resume,
-            tell=lambda each: show(f"{each}\n", err=True),
+            report=lambda each: show(f"{each}\n", err=True),
         )
-        files.append(output / BEST)
+        files.append(output / BEST_FILE)
     walked = given.walk(values, duration=duration)
     make_folder(output)
     for name, table in (
@@ -130,7 +130,7 @@ def scone(
         facts.add(name, f"{term[0]:.6g}")
     for name, report in walked.report.items():
         facts.add(LABELS.get(name, name), f"{report[0]:.6g} {UNITS.get(name, '')}".rstrip())
-    gait = gait_of(given, walked)
+    gait = measure_gait(given, walked)
     for name, words in () if gait is None else gait.describe().items():
         facts.add(name, words)
     facts.add("files", ", ".join(map(str, files)))

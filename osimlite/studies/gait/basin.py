@@ -1,4 +1,4 @@
-"""How far from its cycle a walker may start and still walk."""
+"""Basin of attraction of a gait cycle: from which perturbed states a walker still walks."""
 
 from __future__ import annotations
 
@@ -16,56 +16,73 @@ from osimlite.studies.gait.stepmap import StepMap
 from osimlite.studies.gait.steps import Walk, measure_along_slope, walk_many
 
 SWEEP_ACCURACY = 1e-5
-"""Of the integrator, where many walkers walk many steps."""
+"""Accuracy of the integrator where many walkers make many steps; cycles need a tighter one."""
 
-AT_ONCE = 64
-"""So many walkers between two reports of progress."""
+WALKERS_PER_REPORT = 64
+"""Walkers that are simulated between two reports of progress."""
 
 Progress = Callable[[int, int], object]
-"""Called with the number of walkers that have walked, and of all."""
+"""Callback with the number of walkers that have been simulated, and of all."""
 
 
 @dataclass(frozen=True, eq=False)
 class Axis:
-    """One entry of the state that is changed."""
+    """Entry of the state that varies along one side of the grid.
 
-    label: str  # what it is called, with its unit
-    place: int  # in the state
-    values: Floats  # (k,)
+    Attributes:
+        label: name with its unit.
+        place: index in the state.
+        values: values on the grid (k,) (rad, m, rad/s or m/s).
+    """
+
+    label: str
+    place: int
+    values: Floats
 
 
 @dataclass(frozen=True, eq=False)
 class Basin:
-    """How many steps walkers make from a grid of starts."""
+    """Number of steps that walkers make from a grid of initial states.
 
-    x: Axis  # what changes along the columns
-    y: Axis  # what changes along the rows
-    steps: Ints  # made before the fall, at most `wanted` (rows, columns)
-    wanted: int  # as many steps count as walking
-    center: tuple[float, float]  # values of x and y on the cycle
+    Attributes:
+        x: entry of the state that varies along the columns.
+        y: entry of the state that varies along the rows.
+        steps: steps before the fall, at most `target_steps` (rows, columns).
+        target_steps: number of steps after which a walker counts as walking.
+        center: values of x and y on the cycle.
+    """
+
+    x: Axis
+    y: Axis
+    steps: Ints
+    target_steps: int
+    center: tuple[float, float]
 
     @property
     def part(self) -> float:
-        """Which part of the starts walks."""
-        return float((self.steps >= self.wanted).mean())
+        """Part of the initial states, 0 to 1, from which the walker walks."""
+        return float((self.steps >= self.target_steps).mean())
 
 
 def sample_perturbed_starts(
     step_map: StepMap, state: ArrayLike, part: float, count: int, seed: int
 ) -> Floats:
-    """Random starts (count, y) near a state.
+    """Draw random initial states (count, y) near a state.
 
-    Every value and every speed, as far as it is not neutral, is multiplied by a number that lies
-    within `part` of 1; then the walker is lifted or lowered until the foot that stands is as deep
-    in the ground as it was.
+    Each value and speed is multiplied by a uniform random number between 1 - `part` and 1 + `part`,
+    except
+    along neutral directions. Then the walker is lifted or lowered until the penetration of the
+    stance foot
+    is as before.
 
     Args:
-        step_map: of the walker.
-        state: best one at which a single foot stands (y,).
-        part: 0.05 for five per cent.
-        count: how many starts.
-        seed: of the random numbers.
+        step_map: step map of the walker.
+        state: state (y,), preferably in single support.
+        part: largest relative change, for example 0.05.
+        count: number of initial states.
+        seed: seed of the random numbers.
     """
+    # Only the part of the change along `basis` is applied: the rest changes nothing of the motion.
     here = np.array(state, dtype=float)
     change = np.random.default_rng(seed).uniform(-part, part, (count, len(here))) * here
     engine, footing = step_map.engine, step_map.footing
@@ -79,31 +96,34 @@ def sample_perturbed_starts(
     )
 
 
-def walks_from(
+def simulate_walks(
     step_map: StepMap,
     cycle: Cycle,
     states: Floats,
-    wanted: int,
+    target_steps: int,
     *,
     accuracy: float = SWEEP_ACCURACY,
     progress: Progress | None = None,
 ) -> list[Walk]:
-    """Let walkers walk as long as a walker on the cycle takes for a number of steps, and half as long again.
+    """Simulate walkers for one and a half times the duration of a number of steps on the cycle.
 
     Args:
-        step_map: of the walker.
-        cycle: its cycle.
-        states: starts (W, y).
-        wanted: number of steps.
-        accuracy: of the integrator.
-        progress: called now and then.
+        step_map: step map of the walker.
+        cycle: gait cycle, which gives the duration of a step.
+        states: initial states (W, y).
+        target_steps: number of steps.
+        accuracy: accuracy of the integrator.
+        progress: callback after each part of the walkers.
+
+    Returns:
+        The walk of each walker.
     """
     result: list[Walk] = []
-    for first in range(0, len(states), AT_ONCE):
+    for first in range(0, len(states), WALKERS_PER_REPORT):
         result += walk_many(
             step_map.engine,
-            states[first : first + AT_ONCE],
-            1.5 * wanted * cycle.period,
+            states[first : first + WALKERS_PER_REPORT],
+            1.5 * target_steps * cycle.period,
             footing=step_map.footing,
             accuracy=accuracy,
             threads=step_map.threads,
@@ -121,52 +141,62 @@ def find_basin(
     *,
     reach: float = 0.5,
     grid: int = 21,
-    wanted: int = 20,
+    target_steps: int = 20,
     accuracy: float = SWEEP_ACCURACY,
     progress: Progress | None = None,
 ) -> Basin:
-    """Let walkers start on a grid around a cycle.
+    """Simulate walkers from a grid of initial states around a cycle.
 
     Args:
-        step_map: of the walker.
-        cycle: its cycle.
-        x: what changes along the columns: a coordinate, or with ``/speed`` behind its name its
-            speed. By default the speed of the first joint of the leg that strikes.
-        y: likewise along the rows; by default of the other leg.
-        reach: how far from the cycle, rad, m or per second.
-        grid: values of each.
-        wanted: steps after which a walker walks.
-        accuracy: of the integrator.
-        progress: called now and then.
+        step_map: step map of the walker.
+        cycle: gait cycle.
+        x: coordinate that varies along the columns, or its speed as `NAME/speed`. The default is
+            the
+            speed of the first joint of the leg that touches down.
+        y: coordinate that varies along the rows; the default is the same speed of the other leg.
+        reach: half the width of the grid (rad, m, rad/s or m/s).
+        grid: number of values along each side.
+        target_steps: number of steps after which a walker counts as walking.
+        accuracy: accuracy of the integrator.
+        progress: callback after each part of the walkers.
 
     Raises:
-        OsimliteError: there is no such coordinate, or nothing to take by default.
+        OsimliteError: a coordinate is unknown or locked, or the legs are not alike, so that there
+            are no
+            defaults.
     """
-    named = basin_places(step_map.engine, x, y)
-    defaults = (0, 0) if None not in named else _leg_speeds(step_map)
-    # A default that is named for the other axis gives way to the other default.
-    free = [other[0] if other[0] not in named else other[1] for other in (defaults, defaults[::-1])]
-    places = [other if place is None else place for place, other in zip(named, free, strict=True)]
+    selected = find_basin_offsets(step_map.engine, x, y)
+    defaults = (0, 0) if None not in selected else _find_leg_speeds(step_map)
+    # If the user selects the default of one axis for the other one, the axes exchange defaults.
+    free = [
+        other[0] if other[0] not in selected else other[1] for other in (defaults, defaults[::-1])
+    ]
+    places = [
+        other if place is None else place for place, other in zip(selected, free, strict=True)
+    ]
     axes = [
-        _axis(step_map.engine, place, float(cycle.state[place]), reach, grid) for place in places
+        _make_axis(step_map.engine, place, float(cycle.state[place]), reach, grid)
+        for place in places
     ]
     columns, rows = np.meshgrid(axes[0].values, axes[1].values)
     states = np.tile(cycle.state, (grid * grid, 1))
     states[:, places[0]], states[:, places[1]] = columns.ravel(), rows.ravel()
     starts = lift_to_depth(step_map.engine, step_map.footing, states)
-    walks = walks_from(step_map, cycle, starts, wanted, accuracy=accuracy, progress=progress)
-    made = np.array([min(len(walk.steps), wanted) for walk in walks], dtype=np.int64)
+    walks = simulate_walks(
+        step_map, cycle, starts, target_steps, accuracy=accuracy, progress=progress
+    )
+    made = np.array([min(len(walk.steps), target_steps) for walk in walks], dtype=np.int64)
     return Basin(
         axes[0],
         axes[1],
         made.reshape(grid, grid),
-        wanted,
+        target_steps,
         (float(cycle.state[places[0]]), float(cycle.state[places[1]])),
     )
 
 
-def _leg_speeds(step_map: StepMap) -> tuple[int, int]:
-    """Places of the speeds of the first joints of the two legs."""
+def _find_leg_speeds(step_map: StepMap) -> tuple[int, int]:
+    """Return the offsets in the state of the speeds of the first joints of the two legs."""
     n = len(step_map.engine.order)
     if step_map.exchange is None:
         raise OsimliteError(
@@ -176,8 +206,18 @@ def _leg_speeds(step_map: StepMap) -> tuple[int, int]:
     return n + first, n + int(step_map.exchange[first])
 
 
-def basin_places(engine: BatchEngine, x: str = "", y: str = "") -> tuple[int | None, int | None]:
-    """Where in a state the numbers are that a basin changes by name; None where the default is to be taken.
+def find_basin_offsets(
+    engine: BatchEngine, x: str = "", y: str = ""
+) -> tuple[int | None, int | None]:
+    """Find the entries of the state that a basin varies by name.
+
+    Args:
+        engine: engine of the model.
+        x: coordinate, or its speed as `NAME/speed`; "" for the default.
+        y: second coordinate or speed; "" for the default.
+
+    Returns:
+        Offsets in the state; None for a default.
 
     Raises:
         OsimliteError: there is no such coordinate, it is locked, or both are the same.
@@ -197,7 +237,7 @@ def _find_index(engine: BatchEngine, name: str) -> int:
     return engine.order.index(place) + (len(engine.order) if is_speed else 0)
 
 
-def _axis(engine: BatchEngine, place: int, value: float, reach: float, grid: int) -> Axis:
+def _make_axis(engine: BatchEngine, place: int, value: float, reach: float, grid: int) -> Axis:
     n = len(engine.order)
     info = engine.mechanism.coordinates[engine.order[place % n]]
     unit = "rad" if info.motion_type == "rotational" else "m"

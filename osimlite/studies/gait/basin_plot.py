@@ -1,4 +1,4 @@
-"""A picture of a basin of attraction."""
+"""Picture of a basin of attraction."""
 
 from __future__ import annotations
 
@@ -12,12 +12,15 @@ from osimlite.view.plots import figure_of, save_figure
 
 
 def draw_basin(basin: Basin, path: str | Path, *, title: str = "Steps before the fall") -> Path:
-    """Draw from which starts a walker walks.
+    """Draw the number of steps over the grid of initial states, and mark the cycle.
 
     Args:
-        basin: how many steps it makes from a grid of starts.
-        path: of the PNG file.
-        title: of the picture.
+        basin: basin to draw.
+        path: PNG file to write.
+        title: title of the picture.
+
+    Returns:
+        Path of the file.
 
     Raises:
         MissingDependency: matplotlib is not installed.
@@ -32,6 +35,7 @@ def _draw_panels(basin: Basin, path: Path, title: str) -> Path:
     axes = figure.subplots()
     half = [float(axis.values[1] - axis.values[0]) / 2.0 for axis in (basin.x, basin.y)]
     x, y = basin.x.values, basin.y.values
+    # Each initial state is the centre of a pixel.
     extent = (x[0] - half[0], x[-1] + half[0], y[0] - half[1], y[-1] + half[1])
     image = axes.imshow(
         basin.steps,
@@ -40,7 +44,7 @@ def _draw_panels(basin: Basin, path: Path, title: str) -> Path:
         aspect="auto",
         cmap="viridis",
         vmin=0,
-        vmax=basin.wanted,
+        vmax=basin.target_steps,
     )
     axes.plot(*basin.center, marker="o", mfc="#d55e00", mec="white", ms=8)
     axes.annotate(
@@ -60,6 +64,6 @@ def _draw_panels(basin: Basin, path: Path, title: str) -> Path:
         fontsize=11,
     )
     bar = figure.colorbar(image, ax=axes)
-    bar.set_label(f"steps, {basin.wanted} or more count as walking")
-    bar.set_ticks(np.linspace(0, basin.wanted, 5).round().astype(int))
+    bar.set_label(f"steps, {basin.target_steps} or more count as walking")
+    bar.set_ticks(np.linspace(0, basin.target_steps, 5).round().astype(int))
     return save_figure(figure, path, dpi=110)

@@ -1,4 +1,4 @@
-"""Cycles: fixed points of the step map, and whether they attract."""
+"""Gait cycles: fixed points of the step map, and their Floquet multipliers."""
 
 from __future__ import annotations
 
@@ -11,42 +11,58 @@ from osimlite.simulation.batches import Floats
 from osimlite.studies.gait.stepmap import StepMap
 from osimlite.studies.gait.steps import measure_along_slope
 
-CONVERGED = 1e-9
-"""A fixed point is found when the map moves it by less than this (rad, m and per second, as a norm)."""
+CYCLE_TOLERANCE = 1e-9
+"""Norm of the residual of the step map (rad, m, rad/s, m/s) below which a state is a fixed point."""
 
-MOST_STEPS = 30
-DIFFERENCE = 3e-5
-"""By how much the reduced state is moved to differentiate the map.
+MAX_NEWTON_STEPS = 30
+"""Most steps of Newton's method before the search for a cycle is given up."""
+DIFFERENCE_STEP = 3e-5
+"""Change of the reduced state (rad, m, rad/s, m/s) in central differences of the step map.
 
-With less, steps of the integrator that come and go show in the multipliers (half a percent at 1e-5
-for the steady walker); with more, the map's curvature does (two parts in a thousand at 1e-4).
+Steps of the integrator that appear and vanish show in the multipliers of a smaller change (half a
+percent at 1e-5 for the steady walker), the curvature of the map in those of a larger one (two parts
+in a thousand at 1e-4).
 """
 
 
 @dataclass(frozen=True, eq=False)
 class Cycle:
-    """A walk that repeats itself with every step, or every stride if the legs differ."""
+    """Gait that repeats after each step, or after each stride if the legs differ.
 
-    state: Floats  # at the heel strike of the first foot, in the engine's order (y,)
-    length: float  # of a step along the slope, from foot to foot, m
-    # of the walker in a step, along the slope; feet that roll while they stand take it further than
-    # `length`, m
-    way: float
-    period: float  # of a step, s
-    # Floquet multipliers (of a step, or of a stride if the legs differ) without those of the
-    # neutral directions, the largest first; that of the direction of the motion itself, zero, is
-    # among them
+    Attributes:
+        state: state at the touch-down of the first foot, in the order of the engine (y,).
+        length: length of a step along the slope, from foot to foot (m).
+        travel: distance that the walker moves along the slope in a step (m); rolling feet take it
+            further
+            than `length`.
+        period: duration of a step (s).
+        multipliers: Floquet multipliers of a step, or of a stride if the legs differ, largest
+            magnitude
+            first. Those of neutral directions are left out; that of the direction of motion, zero,
+            is
+            among them.
+        neutral: number of neutral directions.
+        residual: norm of the residual of the step map.
+        scuffs: number of scuffs in one step.
+        per_stride: whether the legs differ, so that the map is one of strides.
+        iterations: number of steps of Newton's method.
+    """
+
+    state: Floats
+    length: float
+    travel: float
+    period: float
     multipliers: NDArray[np.complex128]
-    neutral: int  # how many directions are neutral
-    residual: float  # how far the map moves the state
-    scuffs: int  # in one step
-    per_stride: bool  # whether the legs differ
-    iterations: int  # of Newton's method
+    neutral: int
+    residual: float
+    scuffs: int
+    per_stride: bool
+    iterations: int
 
     @property
     def speed(self) -> float:
-        """Along the slope, m/s."""
-        return self.way / self.period
+        """Mean speed along the slope (m/s)."""
+        return self.travel / self.period
 
     @property
     def largest(self) -> float:
@@ -54,8 +70,19 @@ class Cycle:
         return float(np.abs(self.multipliers).max())
 
 
-def step_matrix(step_map: StepMap, state: ArrayLike, difference: float = DIFFERENCE) -> Floats:
-    """Derivative of the step map in reduced states, by central differences; not a number where no step is made."""
+def differentiate_step_map(
+    step_map: StepMap, state: ArrayLike, difference: float = DIFFERENCE_STEP
+) -> Floats:
+    """Return the Jacobian of the step map in reduced states (r, r), by central differences.
+
+    Args:
+        step_map: step map.
+        state: state at a touch-down of the first foot (y,).
+        difference: change of each reduced entry.
+
+    Returns:
+        Matrix, with NaN in the column of a direction in which the walker makes no step.
+    """
     reduced = step_map.reduce(state)
     moves = difference * np.eye(len(reduced))
     images = step_map(step_map.expand(np.concatenate((reduced + moves, reduced - moves)))).states
@@ -67,26 +94,28 @@ def find_cycle(
     step_map: StepMap,
     state: ArrayLike | None = None,
     *,
-    converged: float = CONVERGED,
-    most_steps: int = MOST_STEPS,
-    settle: int = 0,
+    tolerance: float = CYCLE_TOLERANCE,
+    max_steps: int = MAX_NEWTON_STEPS,
+    warm_up_steps: int = 0,
 ) -> Cycle:
-    """Find a fixed point of the step map by Newton's method, with steps halved until they help.
+    """Find a fixed point of the step map by Newton's method with a line search.
 
     Args:
-        step_map: of the walker.
-        state: where to begin (y,), at a heel strike of the first foot; by default where the map was
-            made.
-        converged: largest residual.
-        most_steps: Newton steps.
-        settle: walk so many steps first.
+        step_map: step map of the walker.
+        state: initial guess (y,), at a touch-down of the first foot; by default the state in which
+            the
+            step map was made.
+        tolerance: largest norm of the residual.
+        max_steps: most steps of Newton's method.
+        warm_up_steps: number of steps that the walker makes before the first step of Newton's
+            method.
 
     Raises:
-        OsimliteError: no fixed point is found from there.
+        OsimliteError: the method does not converge from there, or the walker makes no step.
     """
     here = np.array(step_map.start if state is None else state, dtype=float)
     name = step_map.engine.mechanism.name
-    for _ in range(settle):
+    for _ in range(warm_up_steps):
         there = step_map(here[None]).states[0]
         if np.isnan(there).any():
             break
@@ -94,17 +123,18 @@ def find_cycle(
     reduced = step_map.reduce(here)
     miss, size = _compute_residual(step_map, reduced)
     taken, slope = 0, None
-    while size > converged:
-        if taken == most_steps:
+    while size > tolerance:
+        if taken == max_steps:
             raise OsimliteError(
                 f"no cycle of '{name}' is found after {taken} steps of Newton; still {size:.2g} off"
             )
-        slope = step_matrix(step_map, step_map.expand(reduced))
+        slope = differentiate_step_map(step_map, step_map.expand(reduced))
         if not np.isfinite(slope).all():
             raise OsimliteError(
                 f"'{name}' makes no step from near the start; give a start that walks"
             )
         move = np.linalg.solve(slope - np.eye(len(reduced)), -miss)
+        # Halve the step until the residual decreases; a change of 1e-4 of it is hopeless.
         part, last = 1.0, size
         while True:
             there, off = _compute_residual(step_map, reduced + part * move)
@@ -121,12 +151,13 @@ def find_cycle(
     images = step_map(state_found[None])
     engine, per_stride = step_map.engine, step_map.exchange is None
     feet = [engine.contacts.index(name) for foot in step_map.footing.feet for name in foot]
+    # All contacts of the feet together move by as much as the walker does in a complete cycle.
     before, after = (
         measure_along_slope(engine, np.array([state_found, images.states[0]]))[0][:, feet]
         .mean(axis=1)
         .tolist()
     )
-    values = np.linalg.eigvals(step_matrix(step_map, state_found)).astype(np.complex128)
+    values = np.linalg.eigvals(differentiate_step_map(step_map, state_found)).astype(np.complex128)
     return Cycle(
         state_found,
         float(images.lengths[0]),
@@ -142,7 +173,7 @@ def find_cycle(
 
 
 def _compute_residual(step_map: StepMap, reduced: Floats) -> tuple[Floats, float]:
-    """How far the map moves a state, and the norm of that; infinite where it makes no step."""
+    """Return the residual of the step map, and its norm; infinity where the walker makes no step."""
     miss = step_map.reduce(step_map(step_map.expand(reduced)[None]).states[0]) - reduced
     size = float(np.linalg.norm(miss))
     return miss, size if np.isfinite(size) else np.inf

@@ -1,12 +1,17 @@
-"""The search for walkers that keep on walking: which start, with which numbers of the model, repeats itself.
+"""Search for gait cycles: which initial state, with which numbers of the model, repeats itself.
 
-1. Random starts of random models: each walker stands with a foot at rest on the ground. Kept are
-   those that make two steps, the ones first whose second step ended most like the first.
-2. From the best of them, the start and the numbers are moved together until the step ends where it
-   began (least squares by a trust region, then Newton's method), which is a cycle.
-3. The numbers of the best cycle are led on, from cycle to cycle, to where its largest multiplier is
-   small, and then to where most of the walkers that start near it walk
-   (`osimlite.studies.gait.stability`).
+1. Random initial states of random models, each with one foot at rest on the ground. Walkers that
+make
+   two steps are candidates, ordered by how much the states at the end of the two steps differ.
+2. The initial state and the numbers of the best candidates are changed together until the state at
+the
+   end of a step equals that at its start (least squares in a trust region, then Newton's method),
+   which
+   is a cycle.
+3. The numbers of the best cycle are changed from cycle to cycle until its largest multiplier is
+small,
+   and then until most of the walkers that start near it walk
+   (:mod:`osimlite.studies.gait.stability`).
 """
 
 from __future__ import annotations
@@ -23,103 +28,144 @@ from osimlite.errors import OsimliteError, SettingError
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.model import Model
 from osimlite.simulation.batches import BatchEngine, run_many
-from osimlite.studies.gait.basin import sample_perturbed_starts, walks_from
-from osimlite.studies.gait.cycle import CONVERGED, MOST_STEPS, Cycle, find_cycle, step_matrix
+from osimlite.studies.gait.basin import sample_perturbed_starts, simulate_walks
+from osimlite.studies.gait.cycle import (
+    CYCLE_TOLERANCE,
+    MAX_NEWTON_STEPS,
+    Cycle,
+    differentiate_step_map,
+    find_cycle,
+)
 from osimlite.studies.gait.foot_contacts import FootContacts, find_footing
 from osimlite.studies.gait.starts import move_along_neutral_directions, plant_feet
-from osimlite.studies.gait.stepmap import TIGHT, StepMap
+from osimlite.studies.gait.stepmap import TIGHT_ACCURACY, StepMap
 from osimlite.studies.gait.steps import Walk, walk_many
 from osimlite.studies.sweep.plan import Plan
 from osimlite.studies.sweep.variables import Floats, Start, refuse_counts
 from osimlite.studies.sweep.variants import Variant, Variants
 
-ROUGH, FINE = 1e-7, 1e-9
-"""Accuracy of the integrator where a walker is far from its cycle, and where it is near."""
+ROUGH_ACCURACY = 1e-7
+"""Accuracy of the integrator while a walker is far from its cycle."""
 
-NEAR = 1e-6
-"""While numbers are searched, a cycle is found when the map moves it by less than this."""
+FINE_ACCURACY = 1e-9
+"""Accuracy of the integrator near a cycle; finite differences of the step map need it."""
 
-DIFFERENCE, SHIFT = 1e-4, 1e-4
-"""By how much reduced states, and numbers as parts of their ranges, are moved to differentiate the step map."""
+SEARCH_TOLERANCE = 1e-6
+"""Norm of the residual of cycles during the search; the final cycle has `CYCLE_TOLERANCE`."""
 
-SLOWER = 0.25
-"""Weight of speeds beside values (s) where states are compared."""
+STATE_DIFFERENCE = 1e-4
+"""Change of reduced states (rad, m, rad/s, m/s) in differences; large, because `ROUGH_ACCURACY` is."""
 
-KEPT = 4
-"""So many step maps are kept at a time."""
+FRACTION_DIFFERENCE = 1e-4
+"""Change of a number, as a part of its range, in differences."""
 
-LOST = 10.0
-"""What is missed, in each direction, by a walker that makes no step."""
+SPEED_WEIGHT_S = 0.25
+"""Weight of speeds relative to values (s) in the distance of two states."""
 
-MOST_MOVES, CLOSE = 30, 3e-3
-"""So many moves bring a candidate so near to a cycle, or it is given up."""
+CACHED_STEP_MAPS = 4
+"""Number of step maps in the cache; the least-squares solver evaluates a few models at a time."""
+
+FALL_RESIDUAL = 10.0
+"""Residual in each direction of a walker that makes no step; far larger than that of any step."""
+
+MAX_EVALUATIONS = 30
+"""Most evaluations of the least-squares solver for a candidate."""
+
+NEWTON_RANGE = 3e-3
+"""Norm of the residual below which Newton's method takes over; candidates above it are dropped."""
 
 PATIENCE = 8
-"""After so many moves that did not halve what is missed, a candidate is given up."""
+"""A candidate is dropped if this many iterations have not halved the residual."""
 
-NUMBERS_REACH = 0.1
-"""So much of their ranges the numbers are moved as readily as reduced states by 1."""
+FRACTION_SCALE = 0.1
+"""Part of its range by which a number changes as readily as a reduced state by 1 (scale of variables)."""
 
-MIDWAY = 0.4
-"""Part of a step after the heel strike at which walkers start near a cycle."""
+BASIN_PHASE = 0.4
+"""Part of a step after touch-down at which walkers start near a cycle; a foot is then in single
+support.
+"""
 
-STARTS, STEPS = 60, 20
-"""So many walkers start near a cycle, and after so many steps they walk."""
+BASIN_STARTS = 60
+"""Walkers that start near a cycle to measure how attractive it is."""
 
-SCUFFED = 1.0
-"""What a scuff in a cycle costs."""
+BASIN_STEPS = 20
+"""Number of steps after which such a walker counts as walking."""
 
-FIRST_SECONDS = 3.0
-"""So long random walkers walk."""
+SCUFF_COST = 1.0
+"""Cost of a scuff in a cycle, as much as a multiplier at the limit of stability."""
 
-AT_ONCE, ALIKE = 1024, 64
-"""So many random walkers are tried together, and so many of them are the same model."""
+RANDOM_WALK_S = 3.0
+"""Duration of the walks of random walkers (s), enough for two steps."""
 
-MOST_TRIES = 3000
-"""Steps that the integrator may try for one of them; what takes more rattles."""
+WALKERS_PER_CALL = 1024
+"""Random walkers that are simulated in one call."""
+
+STARTS_PER_MODEL = 64
+"""Random initial states of the same random model; making a model takes longer than a walk."""
+
+MAX_INTEGRATOR_STEPS = 3000
+"""Most steps of the integrator for a random walker; one that needs more rattles on the ground."""
 
 Progress = Callable[[float, float], object]
+"""Callback with the amount of work done, and of all work."""
 
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """A walker whose second step ended nearly as the first."""
+    """Walker whose two steps end in similar states.
 
-    fractions: Floats  # where the numbers of its model lie in their ranges (k,)
-    state: Floats  # at the end of the first step, written for the first foot (y,)
-    miss: float  # by how much the second ended otherwise
+    Attributes:
+        fractions: numbers of its model, as parts of their ranges (k,).
+        state: state at the end of the first step, exchanged to the first foot (y,).
+        miss: distance between the states at the ends of the two steps.
+    """
+
+    fractions: Floats
+    state: Floats
+    miss: float
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
-    """A model with its cycle."""
+class ModelCycle:
+    """Numbers of a model with a gait cycle of the model.
 
-    fractions: Floats  # where its numbers lie in their ranges (k,)
-    numbers: dict[str, float]  # by the names of the variables
-    cycle: Cycle  # that it walks in
-    walking: float  # which part of the walkers that start near it walk; 0 where nobody asked
-    # the less, the better: the largest multiplier, and below what is stable enough, less by
-    # `walking`
+    Attributes:
+        fractions: numbers as parts of their ranges (k,).
+        numbers: numbers by the names of the variables.
+        cycle: gait cycle of the model with these numbers.
+        walking: part of the walkers started near the cycle that walk; 0 if it was not measured.
+        cost: objective of the search, smaller is better: largest multiplier plus `SCUFF_COST` per
+            scuff,
+            or `stable` minus `walking` once that is below `stable`.
+    """
+
+    fractions: Floats
+    numbers: dict[str, float]
+    cycle: Cycle
+    walking: float
     cost: float
 
 
 class CycleSearch:
-    """Looks for cycles of the models of a plan.
+    """Search for gait cycles of the models of a plan.
 
     Args:
-        plan: what is varied: starts, from which the walkers are drawn, and numbers of the model,
-            which are searched.
-        feet: contacts of each foot; found by the structure of the model if left out.
-        stable: largest multiplier that is small enough; below it, what counts is how many walk from
-            near the cycle.
-        perturb: how near: every value and speed is changed by this part at most.
-        threads: how many work.
+        plan: variables: initial values and speeds, from which random walkers are drawn, and numbers
+            of the
+            model, which are searched.
+        feet: contacts of each foot; found from the structure of the model by default.
+        stable: largest multiplier that is small enough; below it, the part of perturbed walkers
+            that walk
+            counts.
+        perturb: largest relative change of values and speeds of the perturbed walkers.
+        threads: number of threads; by default one per core.
 
     Attributes:
-        footing: the feet.
+        footing: contacts of the feet, and contacts that are falls.
 
     Raises:
-        OsimliteError: the model cannot be simulated, or has no two feet that are alike.
+        OsimliteError: the model cannot be simulated, or does not have two feet.
+        SettingError: the plan varies no initial state.
     """
 
     def __init__(
@@ -131,7 +177,10 @@ class CycleSearch:
         perturb: float = 0.1,
         threads: int | None = None,
     ) -> None:
-        self.plan, self.stable, self.perturb, self.threads = plan, stable, perturb, threads
+        self.plan = plan
+        self.stable = stable
+        self.perturb = perturb
+        self.threads = threads
         refuse_counts(plan.variables)
         self.variants = Variants(plan)
         free = [(place, item) for place, item in enumerate(plan.variables) if not item.is_fixed]
@@ -153,50 +202,66 @@ class CycleSearch:
     # ---------------------------------------------------------------------------------------- models
     @property
     def names(self) -> list[str]:
-        """Of the numbers that are searched."""
+        """Names of the numbers that are searched."""
         return [self.plan.variables[place].name for place in self._numbers]
 
-    def values(self, fractions: Floats) -> list[float]:
-        """A sample of the plan with the model's numbers at fractions (k,) of their ranges."""
+    def make_sample(self, fractions: Floats) -> list[float]:
+        """Return a sample of the plan in which the numbers lie at fractions (k,) of their ranges."""
         row = list(self._least)
         for place, fraction in zip(self._numbers, fractions, strict=True):
-            # Without the noise of the last bits, a number that was rounded stays so.
+            # Fourteen digits drop the rounding errors of the fraction, so that rounded numbers stay
+            # rounded.
             row[place] = float(f"{self.plan.variables[place].at(np.array(fraction)):.14g}")
         return row
 
-    def numbers(self, fractions: Floats) -> dict[str, float]:
-        """The model's numbers by name."""
-        row = self.values(fractions)
+    def get_numbers(self, fractions: Floats) -> dict[str, float]:
+        """Return the numbers at fractions (k,) of their ranges.
+
+        Returns:
+            Numbers by name.
+        """
+        row = self.make_sample(fractions)
         return {self.plan.variables[place].name: row[place] for place in self._numbers}
 
-    def fractions(self, numbers: Mapping[str, float]) -> Floats:
-        """Where numbers, by name, lie in their ranges (k,)."""
+    def compute_fractions(self, numbers: Mapping[str, float]) -> Floats:
+        """Return the fractions of their ranges (k,) at which numbers, by name, lie."""
         items = {item.name: item for item in self.plan.variables}
         return np.array([items[name].fraction(numbers[name]) for name in self.names])
 
     def round_fractions(self, fractions: Floats, digits: int) -> Floats:
-        """Where the numbers lie when they have so many digits (k,)."""
-        numbers = {
-            name: float(f"{number:.{digits}g}") for name, number in self.numbers(fractions).items()
-        }
-        return self.fractions(numbers)
+        """Return the fractions (k,) of numbers that are rounded to significant digits.
 
-    def model(self, fractions: Floats, start: Mapping[str, tuple[float, float]]) -> Model:
-        """The model with these numbers, and with values and speeds of coordinates as their defaults."""
-        self.variants.apply_sample(self.values(fractions))
+        Args:
+            fractions: fractions of the numbers (k,).
+            digits: number of significant digits.
+        """
+        numbers = {
+            name: float(f"{number:.{digits}g}")
+            for name, number in self.get_numbers(fractions).items()
+        }
+        return self.compute_fractions(numbers)
+
+    def make_model(self, fractions: Floats, start: Mapping[str, tuple[float, float]]) -> Model:
+        """Return the model with some numbers, and an initial state as its default values and speeds.
+
+        Args:
+            fractions: fractions of the numbers (k,).
+            start: value and speed by the names of coordinates.
+        """
+        self.variants.apply_sample(self.make_sample(fractions))
         model = self.variants.model
         for coordinate in model.components(Coordinate):
             if coordinate.name in start:
                 coordinate.default_value, coordinate.default_speed_value = start[coordinate.name]
         return model
 
-    def engine(self, fractions: Floats) -> BatchEngine:
-        """Of the model with these numbers.
+    def make_engine(self, fractions: Floats) -> BatchEngine:
+        """Return the engine of the model with numbers at fractions (k,) of their ranges.
 
         Raises:
-            OsimliteError: there is no such model, or it is of another structure.
+            OsimliteError: the model is invalid, or has another structure.
         """
-        variant = self.variants.variant(self.values(fractions))
+        variant = self.variants.variant(self.make_sample(fractions))
         if variant.structure != self.variants.given.structure:
             raise OsimliteError("the numbers change the structure of the model; vary others")
         return variant.engine
@@ -205,26 +270,28 @@ class CycleSearch:
     def find_candidates(
         self, count: int, seed: int, progress: Progress | None = None
     ) -> list[Candidate]:
-        """Draw walkers, and keep those that make two steps without a scuff between, the most alike first.
+        """Simulate random walkers, and return those that make two steps without a scuff between, the
+        best first.
 
         Args:
-            count: how many are drawn.
-            seed: of the random numbers.
-            progress: called with how many have walked, and of how many.
+            count: number of random walkers.
+            seed: seed of the random numbers.
+            progress: callback after each part of the walkers.
         """
         rng, result = np.random.default_rng(seed), []
-        for first in range(0, count, AT_ONCE):
-            size = min(AT_ONCE, count - first)
+        for first in range(0, count, WALKERS_PER_CALL):
+            size = min(WALKERS_PER_CALL, count - first)
             result += self._draw_samples(rng, size)
             if progress is not None:
                 progress(first + size, count)
         return sorted(result, key=lambda candidate: candidate.miss)
 
     def _draw_samples(self, rng: np.random.Generator, count: int) -> list[Candidate]:
+        """Simulate random walkers in one call, and return those that make two steps."""
         engine: Any = self.variants.given.engine
-        models = rng.random((-(-count // ALIKE), len(self._numbers)))
+        models = rng.random((-(-count // STARTS_PER_MODEL), len(self._numbers)))
         starts = rng.random((count, len(self._starts)))
-        fractions = np.repeat(models, ALIKE, axis=0)[:count]
+        fractions = np.repeat(models, STARTS_PER_MODEL, axis=0)[:count]
         states, vectors = (
             np.zeros((count, engine.state.size)),
             np.zeros((count, len(engine.numbers))),
@@ -232,7 +299,7 @@ class CycleSearch:
         variants: list[Variant] = []
         made = np.ones(count, dtype=bool)
         for row in range(count):
-            sample = self.values(fractions[row])
+            sample = self.make_sample(fractions[row])
             for place, fraction in zip(self._starts, starts[row], strict=True):
                 sample[place] = float(self.plan.variables[place].at(np.array(fraction)))
             try:
@@ -253,11 +320,11 @@ class CycleSearch:
         walks = walk_many(
             engine,
             states,
-            FIRST_SECONDS,
+            RANDOM_WALK_S,
             footing=self.footing,
             numbers=vectors,
             accuracy=1e-3,
-            most_tries=MOST_TRIES,
+            most_tries=MAX_INTEGRATOR_STEPS,
             threads=self.threads,
         )
         pairs = (
@@ -267,16 +334,18 @@ class CycleSearch:
         return [pair for pair in pairs if pair is not None]
 
     def _find_similar_strikes(self, walk: Walk, fractions: Floats) -> Candidate | None:
-        """The heel strikes of a walk that are most alike, one step apart, or one stride if the legs differ."""
+        """Find the most similar touch-downs of a walk, one step apart, or one stride if the legs
+        differ.
+        """
         if len(walk.steps) < 2:
             return None
         if self._first is None:
-            engine = self.engine(fractions)
+            engine = self.make_engine(fractions)
             self._first = StepMap(
                 engine,
                 walk.steps[0].state,
                 footing=self.footing,
-                accuracy=ROUGH,
+                accuracy=ROUGH_ACCURACY,
                 threads=self.threads,
             )
         swap, best = self._first.exchange, None
@@ -295,19 +364,29 @@ class CycleSearch:
 
     @staticmethod
     def _compute_distance(step_map: StepMap, one: Floats, two: Floats) -> float:
+        """Return the distance of two states without neutral directions; speeds have the weight
+        `SPEED_WEIGHT_S`.
+        """
         difference = step_map.basis @ step_map.reduce(two - one)
         n = len(step_map.engine.order)
         others = *difference[:n], *difference[2 * n :]
         return float(
-            np.hypot(np.linalg.norm(others), SLOWER * np.linalg.norm(difference[n : 2 * n]))
+            np.hypot(np.linalg.norm(others), SPEED_WEIGHT_S * np.linalg.norm(difference[n : 2 * n]))
         )
 
     # ---------------------------------------------------------------------------------------- cycles
-    def close_cycle(self, candidate: Candidate) -> Found | None:
-        """Move a candidate's start and numbers together until it walks in a cycle; None if it does not come to one."""
+    def close_cycle(self, candidate: Candidate) -> ModelCycle | None:
+        """Change initial state and numbers of a candidate together until it walks in a cycle.
+
+        Args:
+            candidate: walker to start from.
+
+        Returns:
+            The cycle with its model, or None if the solver does not come near one.
+        """
         optimize = require("scipy.optimize", extra="sweep", purpose="the search for cycles")
         try:
-            problem = _Closing(self, candidate)
+            problem = _ClosingProblem(self, candidate)
             solved = optimize.least_squares(
                 problem.compute_residual,
                 problem.start,
@@ -315,67 +394,79 @@ class CycleSearch:
                 method="dogbox",
                 bounds=problem.bounds,
                 x_scale=problem.scale,
-                max_nfev=MOST_MOVES,
+                max_nfev=MAX_EVALUATIONS,
                 xtol=1e-8,
                 ftol=1e-8,
                 gtol=1e-14,
-                callback=problem.watch,
+                callback=problem.check_progress,
             )
-            if np.linalg.norm(solved.fun) > CLOSE:
+            if np.linalg.norm(solved.fun) > NEWTON_RANGE:
                 return None
-            fractions, _, state = problem.at(solved.x)
+            fractions, _, state = problem.unpack(solved.x)
             return self.find_cycle(fractions, state)
         except (OsimliteError, np.linalg.LinAlgError):
             return None
 
-    def find_cycle(self, fractions: Floats, state: Floats, *, fine: bool = False) -> Found:
-        """The cycle of the model with these numbers that is near a state, which is a heel strike of the first foot.
+    def find_cycle(self, fractions: Floats, state: Floats, *, fine: bool = False) -> ModelCycle:
+        """Find the cycle of the model with given numbers that is near a state.
 
         Args:
-            fractions: of the numbers (k,).
-            state: where to begin (y,).
-            fine: whether it is wanted to the last digits.
+            fractions: fractions of the numbers (k,).
+            state: initial guess (y,), at a touch-down of the first foot.
+            fine: whether to compute the cycle with full accuracy.
 
         Raises:
-            OsimliteError: there is none near, or no such model.
+            OsimliteError: there is no cycle near, or the model is invalid.
         """
-        step_map = self.step_map(fractions, state, TIGHT if fine else FINE)
+        step_map = self.make_step_map(fractions, state, TIGHT_ACCURACY if fine else FINE_ACCURACY)
         result = find_cycle(
             step_map,
             state,
-            converged=CONVERGED if fine else NEAR,
-            most_steps=MOST_STEPS if fine else 8,
+            tolerance=CYCLE_TOLERANCE if fine else SEARCH_TOLERANCE,
+            max_steps=MAX_NEWTON_STEPS if fine else 8,
         )
-        cost, walking = result.largest + SCUFFED * result.scuffs, 0.0
+        cost, walking = result.largest + SCUFF_COST * result.scuffs, 0.0
+        # The basin takes as long as many cycles; it is measured only where it counts.
         if cost < self.stable or fine:
             walking = self._measure_basin(step_map, result)
         if cost < self.stable:
             cost = self.stable - walking
-        return Found(np.array(fractions), self.numbers(fractions), result, walking, cost)
+        return ModelCycle(np.array(fractions), self.get_numbers(fractions), result, walking, cost)
 
     def _measure_basin(self, step_map: StepMap, cycle: Cycle) -> float:
-        """Which part of the walkers that start near a cycle walk."""
-        (state,) = sample_states_of_step(step_map, cycle, (MIDWAY,))
-        starts = sample_perturbed_starts(step_map, state, self.perturb, STARTS, 0)
-        walks = walks_from(step_map, cycle, starts, STEPS)
-        return sum(len(walk.steps) >= STEPS for walk in walks) / STARTS
+        """Return the part of the walkers started near a cycle that walk."""
+        (state,) = sample_states_of_step(step_map, cycle, (BASIN_PHASE,))
+        starts = sample_perturbed_starts(step_map, state, self.perturb, BASIN_STARTS, 0)
+        walks = simulate_walks(step_map, cycle, starts, BASIN_STEPS)
+        return sum(len(walk.steps) >= BASIN_STEPS for walk in walks) / BASIN_STARTS
 
-    def step_map(self, fractions: Floats, state: Floats, accuracy: float) -> StepMap:
-        """The step map of the model with these numbers, whose reduced states are alike for all numbers.
+    def make_step_map(self, fractions: Floats, state: Floats, accuracy: float) -> StepMap:
+        """Return the step map of the model with given numbers; reduced states of all models are
+        comparable.
+
+        Args:
+            fractions: fractions of the numbers (k,).
+            state: state at a touch-down of the first foot (y,).
+            accuracy: accuracy of the integrator.
 
         Raises:
-            OsimliteError: there is no such model.
+            OsimliteError: the model is invalid.
         """
-        engine = self.engine(fractions)
+        engine = self.make_engine(fractions)
         if self._first is None:
             self._first = StepMap(engine, state, footing=self.footing, threads=self.threads)
-        return self._first.with_model(engine, state, accuracy)
+        return self._first.rebuild_for_model(engine, state, accuracy)
 
 
 def sample_states_of_step(step_map: StepMap, cycle: Cycle, parts: Sequence[float]) -> Floats:
-    """States (k, y) at parts of a step after the heel strike of a cycle; the parts increase.
+    """Return states (k, y) of a cycle at parts of a step.
 
-    The walker is at the origin, its trunk as it was built, as far as neither matters.
+    The walker is at the origin with its trunk as built, as far as neither changes the motion.
+
+    Args:
+        step_map: step map of the walker.
+        cycle: gait cycle.
+        parts: parts of a step after touch-down (k,), increasing.
     """
     times = [part * cycle.period for part in parts]
     runs = run_many(
@@ -383,22 +474,28 @@ def sample_states_of_step(step_map: StepMap, cycle: Cycle, parts: Sequence[float
         cycle.state[None],
         cycle.period,
         report_times=times,
-        accuracy=TIGHT,
+        accuracy=TIGHT_ACCURACY,
         threads=step_map.threads,
     )
     return move_along_neutral_directions(runs.reports[0], step_map.neutral)
 
 
-class _Closing:
-    """The unknowns that close a cycle: reduced state, then fractions of the numbers."""
+class _ClosingProblem:
+    """Least-squares problem whose unknowns are a reduced state and fractions of the numbers.
+
+    Args:
+        search: search with the plan.
+        candidate: walker to start from.
+    """
 
     def __init__(self, search: CycleSearch, candidate: Candidate) -> None:
         self._search = search
         self._maps: dict[bytes, StepMap] = {}
         self._sizes: list[float] = []
-        self._given = self._map(candidate.fractions, candidate.state)
+        self._given = self._get_step_map(candidate.fractions, candidate.state)
         reduced = self._given.reduce(candidate.state)
         self._size = len(reduced)
+        # The solver needs a start in the interior of the bounds.
         inside = np.clip(candidate.fractions, 1e-3, 1.0 - 1e-3)
         self.start = np.concatenate((reduced, inside))
         many = np.full(self._size, np.inf)
@@ -406,51 +503,63 @@ class _Closing:
             np.concatenate((-many, 0.0 * inside)),
             np.concatenate((many, 1.0 + 0.0 * inside)),
         )
-        self.scale = np.concatenate((np.ones(self._size), np.full(len(inside), NUMBERS_REACH)))
+        self.scale = np.concatenate((np.ones(self._size), np.full(len(inside), FRACTION_SCALE)))
 
-    def _map(self, fractions: Floats, state: Floats) -> StepMap:
+    def _get_step_map(self, fractions: Floats, state: Floats) -> StepMap:
         key = fractions.tobytes()
         if key not in self._maps:
-            # Only the last are asked for again.
-            self._maps = dict(list(self._maps.items())[-KEPT:])
-            self._maps[key] = self._search.step_map(fractions, state, ROUGH)
+            # The solver evaluates residual and Jacobian of the latest models only.
+            self._maps = dict(list(self._maps.items())[-CACHED_STEP_MAPS:])
+            self._maps[key] = self._search.make_step_map(fractions, state, ROUGH_ACCURACY)
         return self._maps[key]
 
-    def at(self, unknowns: Floats) -> tuple[Floats, StepMap, Floats]:
-        """Fractions of the numbers, the step map of the model with them, and the state."""
+    def unpack(self, unknowns: Floats) -> tuple[Floats, StepMap, Floats]:
+        """Split the unknowns.
+
+        Args:
+            unknowns: reduced state and fractions.
+
+        Returns:
+            Fractions of the numbers, the step map of the model with these numbers, and the state.
+        """
         reduced, fractions = np.split(unknowns, [self._size])
-        step_map = self._map(fractions, self._given.expand(reduced))
+        step_map = self._get_step_map(fractions, self._given.expand(reduced))
         return fractions, step_map, step_map.expand(reduced)
 
     def compute_residual(self, unknowns: Floats) -> Floats:
-        """How far the map moves the reduced state."""
+        """Return the change of the reduced state by the step map, `FALL_RESIDUAL` where there is no
+        step.
+        """
         try:
-            _, step_map, state = self.at(unknowns)
+            _, step_map, state = self.unpack(unknowns)
         except OsimliteError:
-            return np.full(self._size, LOST)
+            return np.full(self._size, FALL_RESIDUAL)
         moved = step_map.reduce(step_map(state[None]).states[0]) - unknowns[: self._size]
-        return moved if np.isfinite(moved).all() else np.full(self._size, LOST)
+        return moved if np.isfinite(moved).all() else np.full(self._size, FALL_RESIDUAL)
 
-    def watch(self, intermediate_result: Any) -> None:
-        """End where Newton's method can go on, and where nothing has been gained for a while."""
+    def check_progress(self, intermediate_result: Any) -> None:
+        """Stop the solver where Newton's method can take over, or where the residual no longer
+        decreases.
+        """
         self._sizes.append(float(np.linalg.norm(intermediate_result.fun)))
         here, before = self._sizes[-1], self._sizes[-1 - PATIENCE :][0]
-        if here < CLOSE or (len(self._sizes) > PATIENCE and here > 0.5 * before):
+        if here < NEWTON_RANGE or (len(self._sizes) > PATIENCE and here > 0.5 * before):
             raise StopIteration
 
     def differentiate_residual(self, unknowns: Floats) -> Floats:
-        """Of the miss; of what makes no step, zero."""
-        _, step_map, state = self.at(unknowns)
-        columns = [step_matrix(step_map, state, DIFFERENCE) - np.eye(self._size)]
+        """Return the Jacobian of the residual; zeros in directions in which the walker makes no step."""
+        _, step_map, state = self.unpack(unknowns)
+        columns = [differentiate_step_map(step_map, state, STATE_DIFFERENCE) - np.eye(self._size)]
         here = self.compute_residual(unknowns)
         for index in range(self._size, len(unknowns)):
             column = np.full(self._size, np.nan)
-            for shift in (SHIFT, -SHIFT):
+            # One-sided differences: the other side may be out of bounds, or may have no step.
+            for shift in (FRACTION_DIFFERENCE, -FRACTION_DIFFERENCE):
                 moved = unknowns.copy()
                 moved[index] += shift
                 if (
                     0.0 <= moved[index] <= 1.0
-                    and (there := self.compute_residual(moved))[0] != LOST
+                    and (there := self.compute_residual(moved))[0] != FALL_RESIDUAL
                 ):
                     column = (there - here) / shift
                     break

@@ -1,4 +1,4 @@
-"""What of a walker stands on the ground, and what must not touch it."""
+"""Contacts of a walker that are feet, and contacts that are falls."""
 
 from __future__ import annotations
 
@@ -12,49 +12,66 @@ from osimlite.mechanics.multibody.mechanism import GROUND, Mechanism
 from osimlite.simulation.batches import BatchEngine
 from osimlite.simulation.elements.contact import HuntCrossley
 
-_OF_A_FOOT = re.compile(r"foot|feet|toe|heel|calc|sole|ball|hallux|met(a|\d)", re.IGNORECASE)
+_FOOT_WORDS = re.compile(r"foot|feet|toe|heel|calc|sole|ball|hallux|met(a|\d)", re.IGNORECASE)
+"""Words in names of contacts and spheres that mean a part of the foot."""
 
 
 @dataclass(frozen=True)
 class FootContacts:
-    """The contacts of a walker with the ground."""
+    """Contacts of a walker with the ground.
 
-    # the contacts of each foot, by the names that the engine has for them
+    Attributes:
+        feet: contacts of each foot, by the names of the engine.
+        falls: contacts that end the walk.
+    """
+
     feet: tuple[tuple[str, ...], ...]
-    falls: tuple[str, ...]  # contacts that end the walk
+    falls: tuple[str, ...]
 
     @property
     def foot_of(self) -> dict[str, int]:
-        """Number of the foot that each contact of a foot belongs to."""
+        """Index of its foot for each contact of a foot.
+
+        Returns:
+            Per name of a contact the index of the foot.
+        """
         return {contact: number for number, foot in enumerate(self.feet) for contact in foot}
 
 
 @dataclass(frozen=True)
-class _Sole:
-    """A contact of a moving body with a half space."""
+class _SoleContact:
+    """Contact of a sphere on a moving body with a half space.
+
+    Attributes:
+        contact: name of the contact pair in the engine.
+        words: text in which names of parts of the foot are searched.
+        body: index of the body.
+        reach: distance of the sphere from the joint of its body (m).
+    """
 
     contact: str
     words: str
     body: int
-    reach: float  # from where the joint holds the body, m
+    reach: float
 
 
 def find_footing(engine: BatchEngine, feet: Sequence[str] | None = None) -> FootContacts:
-    """Tell the feet from what must not touch the ground.
+    """Decide which contacts with the ground are feet, and which are falls.
 
-    The bodies that touch the ground and carry no other body that does are the ends of the legs. On
-    each, the contact farthest from the joint is the foot, and so is any other that is at least half
-    as far; only if these leave a doubt (an end without one that is clearly farthest, or a contact
-    farther up whose name is that of a part of the foot) do names decide. Every other contact with
-    the ground ends the walk.
+    Bodies that touch the ground and carry no other such body are the ends of the legs. On each, the
+    contact farthest from the joint belongs to the foot, and so do others that are at least half as
+    far.
+    If this is ambiguous (no contact is clearly farthest, or a contact farther up is named after a
+    part of
+    the foot), names decide. Every other contact with the ground ends the walk.
 
     Args:
-        engine: of the model.
-        feet: the contacts of each foot, with + between those of one foot, instead of looking for
-            them.
+        engine: engine of the model.
+        feet: contacts of each foot, joined by `+` within one foot; found automatically by default.
 
     Raises:
-        OsimliteError: a contact does not exist or is named twice, or the model has no two legs.
+        OsimliteError: a contact does not exist or is named twice, or the model does not have two
+            legs.
     """
     if not engine.contacts:
         raise OsimliteError(
@@ -63,8 +80,8 @@ def find_footing(engine: BatchEngine, feet: Sequence[str] | None = None) -> Foot
     soles = _find_soles(engine)
     known = [sole.contact for sole in soles]
     if feet:
-        given = tuple(tuple(part.strip() for part in foot.split("+")) for foot in feet)
-        named = [contact for foot in given for contact in foot]
+        named_feet = tuple(tuple(part.strip() for part in foot.split("+")) for foot in feet)
+        named = [contact for foot in named_feet for contact in foot]
         for contact in named:
             if contact not in known:
                 raise OsimliteError(
@@ -75,18 +92,18 @@ def find_footing(engine: BatchEngine, feet: Sequence[str] | None = None) -> Foot
                 raise OsimliteError(
                     f"'{contact}' is given to the feet twice; name it once, for one of them"
                 )
-        if len(given) < 2:
+        if len(named_feet) < 2:
             raise OsimliteError(
                 f"a walk needs two feet, not only '{feet[0]}'; name the contacts of each"
             )
     else:
-        given = _find_feet(engine.mechanism, soles)
-    return FootContacts(
-        given, tuple(name for name in known if not any(name in foot for foot in given))
-    )
+        named_feet = _find_feet(engine.mechanism, soles)
+    falls = tuple(name for name in known if not any(name in foot for foot in named_feet))
+    return FootContacts(named_feet, falls)
 
 
-def _find_feet(mechanism: Mechanism, soles: Sequence[_Sole]) -> tuple[tuple[str, ...], ...]:
+def _find_feet(mechanism: Mechanism, soles: Sequence[_SoleContact]) -> tuple[tuple[str, ...], ...]:
+    """Return the contacts of the feet from the structure of the model and the names of the contacts."""
     bodies = {sole.body for sole in soles}
     above = {body: set(_list_ancestors(mechanism, body)) for body in bodies}
     ends = sorted(body for body in bodies if not any(body in above[other] for other in bodies))
@@ -105,16 +122,17 @@ def _find_feet(mechanism: Mechanism, soles: Sequence[_Sole]) -> tuple[tuple[str,
         own = [sole for sole in soles if sole.body == end]
         farthest = max(sole.reach for sole in own)
         likely = [sole for sole in own if sole.reach >= 0.5 * farthest]
-        named = [sole for sole in likely if _OF_A_FOOT.search(sole.words)]
-        # Behind the toes there may be a heel, on a body of its own.
+        named = [sole for sole in likely if _FOOT_WORDS.search(sole.words)]
+        # A heel may be on another body than the toes, farther up the same leg.
         shared = set.intersection(*(above[body] for body in ends))
         leg = above[end] - shared
-        behind = [sole for sole in soles if sole.body in leg and _OF_A_FOOT.search(sole.words)]
+        behind = [sole for sole in soles if sole.body in leg and _FOOT_WORDS.search(sole.words)]
         result.append(tuple(sole.contact for sole in (*behind, *(named or likely))))
     return tuple(result)
 
 
-def _find_soles(engine: BatchEngine) -> list[_Sole]:
+def _find_soles(engine: BatchEngine) -> list[_SoleContact]:
+    """Return all contacts of spheres of moving bodies with half spaces."""
     result = []
     for element in engine.forces.elements:
         if not isinstance(element, HuntCrossley):
@@ -122,18 +140,18 @@ def _find_soles(engine: BatchEngine) -> list[_Sole]:
         for index, pair in enumerate(element.pairs):
             plane, sphere = element.surfaces[pair.first], element.surfaces[pair.second]
             if plane.is_half_space and not sphere.radii and sphere.body != GROUND:
-                held = engine.mechanism.bodies[sphere.body].mobilizer.child_frame[:3, 3]
+                joint = engine.mechanism.bodies[sphere.body].mobilizer.child_frame[:3, 3]
                 reach = (
-                    sum((a - b) ** 2 for a, b in zip(sphere.center, held.tolist(), strict=True))
+                    sum((a - b) ** 2 for a, b in zip(sphere.center, joint.tolist(), strict=True))
                     ** 0.5
                 )
                 name = element.pair_name(index)
-                result.append(_Sole(name, f"{name} {sphere.name}", sphere.body, reach))
+                result.append(_SoleContact(name, f"{name} {sphere.name}", sphere.body, reach))
     return result
 
 
 def _list_ancestors(mechanism: Mechanism, body: int) -> list[int]:
-    """The bodies that carry a body."""
+    """Return the indices of the bodies between a body and ground."""
     result: list[int] = []
     while (body := mechanism.bodies[body].parent) != GROUND:
         result.append(body)

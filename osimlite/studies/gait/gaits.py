@@ -1,4 +1,6 @@
-"""A walker that keeps on walking: found, rounded, put on its way, written."""
+"""Search for a stable gait of a model: find cycles, make the best one stable, round it, and write the
+walker.
+"""
 
 from __future__ import annotations
 
@@ -17,41 +19,61 @@ from osimlite.io.document.printer import write
 from osimlite.studies.gait.cycle_search import (
     Candidate,
     CycleSearch,
-    Found,
+    ModelCycle,
     Progress,
     sample_states_of_step,
 )
-from osimlite.studies.gait.stability import Improvement, cost
-from osimlite.studies.gait.stepmap import TIGHT, refuse_constraints
+from osimlite.studies.gait.stability import StabilityOptimization, get_cost
+from osimlite.studies.gait.stepmap import TIGHT_ACCURACY, refuse_constraints
 from osimlite.studies.gait.steps import Walk, walk_many
 from osimlite.studies.sweep.plan import Plan
 from osimlite.studies.sweep.results import refuse_others, refuse_overwrite
 from osimlite.studies.sweep.variables import Floats
 
-BEST, CYCLES, SUMMARY = "best.osim", "cycles.csv", "summary.json"
-"""What a search writes into its folder."""
+BEST_FILE = "best.osim"
+"""File in the output folder: the model with the most stable cycle, at its initial state."""
 
-PHASES = (0.4, 0.5, 0.3, 0.6, 0.2, 0.7, 0.1, 0.8, 0.9)
-"""Parts of a step after the heel strike at which a walk may begin, the most wanted first."""
+CYCLES_FILE = "cycles.csv"
+"""File in the output folder: all cycles that were found, the most stable first."""
 
-WALK_SECONDS, WALK_ACCURACY = 60.0, 1e-6
-"""How long the walker that is written walks before it is believed."""
+SUMMARY_FILE = "summary.json"
+"""File in the output folder: settings and results of the search."""
+
+START_PHASES = (0.4, 0.5, 0.3, 0.6, 0.2, 0.7, 0.1, 0.8, 0.9)
+"""Parts of a step after touch-down at which the written walker may start, in the order of preference.
+
+The middle of a step is preferred: there only one foot is in contact.
+"""
+
+PROOF_WALK_S = 60.0
+"""Duration of the walk (s) that checks the written walker."""
+
+PROOF_ACCURACY = 1e-6
+"""Accuracy of the integrator in this walk."""
 
 Stage = Callable[[str, float, float], object]
-"""Called with what is being done, how much of it, and of how much."""
+"""Callback with the name of the stage, the amount of work done, and all work of the stage."""
 
 
 @dataclass(frozen=True, eq=False)
 class Gait:
-    """A walker that was found."""
+    """Walker with a stable gait.
 
-    found: Found  # its numbers and its cycle
-    # value and speed of each coordinate at the start, by name
+    Attributes:
+        found: numbers of the model with the cycle.
+        start: initial value and speed by the names of coordinates.
+        walk: walk from this initial state.
+        candidates: number of random walkers that made two steps.
+        cycles: number of cycles that were found among them and during the optimization.
+        files: files that were written.
+    """
+
+    found: ModelCycle
     start: dict[str, tuple[float, float]]
-    walk: Walk  # from there
-    candidates: int  # how many of the random walkers made two steps
-    cycles: int  # how many cycles were found among them, and on the way to the most stable
-    files: tuple[Path, ...]  # that were written
+    walk: Walk
+    candidates: int
+    cycles: int
+    files: tuple[Path, ...]
 
 
 def find_gait(
@@ -72,33 +94,40 @@ def find_gait(
     threads: int | None = None,
     stage: Stage | None = None,
 ) -> Gait:
-    """Look for numbers of a model, and a start, with which it walks in the most stable cycle that is found.
+    """Search numbers of a model, and an initial state, for the most stable gait cycle.
 
     Args:
-        plan: what is varied: values and speeds of coordinates, from which random starts are drawn,
-            and numbers of the model.
-        folder: where `best.osim`, `cycles.csv` and `summary.json` are written.
-        feet: contacts of each foot; found by the structure of the model if left out.
-        samples: random walkers.
-        tries: how many of the best are led to a cycle.
-        enough: cycles after which no more of them are.
-        budget: sets of numbers that are tried on the way to the most stable cycle.
-        stable: largest multiplier that is small enough; below it, what counts is how many walk from
-            near the cycle.
-        perturb: how near: every value and speed is changed by this part at most.
-        digits: that the numbers of the model are rounded to.
-        start_digits: that the start is rounded to; None for all of them.
-        seed: what makes the search the same again.
-        force: replace what another search has left in the folder.
-        threads: how many work.
-        stage: called as work is done.
+        plan: variables: values and speeds of coordinates, from which random initial states are
+            drawn, and
+            numbers of the model.
+        folder: output folder for `best.osim`, `cycles.csv` and `summary.json`.
+        feet: contacts of each foot; found from the structure of the model by default.
+        samples: number of random walkers.
+        tries: number of the best random walkers from which a cycle is searched.
+        enough: number of cycles after which no more are searched.
+        budget: number of sets of numbers that the optimization of stability tries.
+        stable: largest multiplier that is small enough; below it, the part of perturbed walkers
+            that walk
+            counts.
+        perturb: largest relative change of values and speeds of the perturbed walkers.
+        digits: significant digits to which the numbers of the model are rounded.
+        start_digits: significant digits to which the initial state is rounded; None for no
+            rounding.
+        seed: seed of all random numbers.
+        force: whether to overwrite the results of another search in the folder.
+        threads: number of threads; by default one per core.
+        stage: callback during the work.
+
+    Returns:
+        The walker that was written.
 
     Raises:
-        SettingError: a number has no meaning, or the folder has files of another search.
-        SimulationError: no cycle was found, or the best is lost when the numbers are rounded.
-        UnsupportedError: constraints act on the model.
-        OsimliteError: the plan cannot be run, the model has no two feet, or the folder cannot be
-            written to.
+        SettingError: an argument is out of bounds, or the folder has results of another search.
+        SimulationError: there is no cycle, or rounding the numbers destroys the best one.
+        UnsupportedError: the model has constraints.
+        OsimliteError: the plan cannot be run, the model does not have two feet, or the folder
+            cannot be
+            written.
     """
     settings = {
         **plan.settings(),
@@ -114,36 +143,41 @@ def find_gait(
         "seed": seed,
     }
     _check_numbers(settings)
-    tell = stage or (lambda *_: None)
+    report = stage or (lambda *_: None)
     with prepare_folder(folder) as where:
         if not force:
             _protect_results(where, settings)
+        # Settings are checked and the folder is protected before anything is computed.
         search = CycleSearch(plan, feet, stable=stable, perturb=perturb, threads=threads)
         refuse_constraints(search.variants.given.engine.mechanism)
         candidates = search.find_candidates(
-            samples, seed, lambda done, of: tell("random walkers", done, of)
+            samples, seed, lambda done, of: report("random walkers", done, of)
         )
         if not candidates:
             raise SimulationError(
                 f"none of {samples} random walkers made two steps; widen the ranges, or draw more (--samples)"
             )
         cycles = close_candidates(
-            search, candidates[:tries], enough, lambda done, of: tell("closing cycles", done, of)
+            search, candidates[:tries], enough, lambda done, of: report("closing cycles", done, of)
         )
-        improvement = Improvement(search, min(cycles, key=cost), digits)
+        improvement = StabilityOptimization(search, min(cycles, key=get_cost), digits)
         if search.names:
-            improvement.run(budget, seed, lambda done, of: tell("making it stable", done, of))
+            improvement.run(budget, seed, lambda done, of: report("making it stable", done, of))
         best = round_cycle(search, improvement.best, digits)
         cycles += improvement.cycles
         start, walk = choose_start(search, best, start_digits)
-        files = tuple(where / name for name in (BEST, CYCLES, SUMMARY))
+        files = tuple(where / name for name in (BEST_FILE, CYCLES_FILE, SUMMARY_FILE))
         gait = Gait(best, start, walk, len(candidates), len(cycles), files)
         _write_walker(where, search, gait, cycles, settings)
     return gait
 
 
 def _check_numbers(given: Mapping[str, Any]) -> None:
-    """Stop at settings that mean nothing before the search, which takes minutes."""
+    """Check the settings before the search, which takes minutes.
+
+    Raises:
+        SettingError: a setting is out of bounds.
+    """
     for name, least in (("samples", 1), ("tries", 1), ("enough", 1), ("budget", 0)):
         if given[name] < least:
             raise SettingError(f"'{name}' is a whole number from {least} on, not {given[name]}")
@@ -160,16 +194,16 @@ def _check_numbers(given: Mapping[str, Any]) -> None:
 
 
 def _protect_results(folder: Path, wanted: dict[str, Any]) -> None:
-    """Stop before the walker of another search is lost.
+    """Refuse to overwrite the results of another search.
 
     Raises:
-        SettingError: there is one.
+        SettingError: the folder has such results.
     """
-    summary = folder / SUMMARY
+    summary = folder / SUMMARY_FILE
     try:
         before = dict(json.loads(read_file(summary))["settings"])
     except (OsimliteError, ValueError, LookupError, TypeError, RecursionError):
-        refuse_overwrite(folder / name for name in (BEST, CYCLES, SUMMARY))
+        refuse_overwrite(folder / name for name in (BEST_FILE, CYCLES_FILE, SUMMARY_FILE))
     else:
         refuse_others(summary, before, wanted)
 
@@ -179,19 +213,19 @@ def close_candidates(
     candidates: Sequence[Candidate],
     enough: int,
     progress: Progress | None = None,
-) -> list[Found]:
-    """The cycles that candidates are led to.
+) -> list[ModelCycle]:
+    """Search cycles from candidates, in their order.
 
     Args:
-        search: that found them.
-        candidates: the best first.
-        enough: cycles after which no more are looked for.
-        progress: called with how many have been led, and of how many.
+        search: search with the plan.
+        candidates: candidates, the best first.
+        enough: number of cycles after which no more are searched.
+        progress: callback with the number of candidates that were tried, and of all.
 
     Raises:
-        SimulationError: none comes to a cycle.
+        SimulationError: no candidate leads to a cycle.
     """
-    cycles: list[Found] = []
+    cycles: list[ModelCycle] = []
     for number, candidate in enumerate(candidates):
         if progress is not None:
             progress(number, len(candidates))
@@ -208,11 +242,16 @@ def close_candidates(
     return cycles
 
 
-def round_cycle(search: CycleSearch, found: Found, digits: int) -> Found:
-    """The cycle, to its last digits, of the model whose numbers are rounded.
+def round_cycle(search: CycleSearch, found: ModelCycle, digits: int) -> ModelCycle:
+    """Round the numbers of a model, and compute its cycle with full accuracy.
+
+    Args:
+        search: search with the plan.
+        found: numbers with their cycle.
+        digits: number of significant digits.
 
     Raises:
-        SimulationError: there is none.
+        SimulationError: the model with rounded numbers has no cycle near.
     """
     try:
         return search.find_cycle(
@@ -225,36 +264,41 @@ def round_cycle(search: CycleSearch, found: Found, digits: int) -> Found:
 
 
 def choose_start(
-    search: CycleSearch, found: Found, digits: int | None
+    search: CycleSearch, found: ModelCycle, digits: int | None
 ) -> tuple[dict[str, tuple[float, float]], Walk]:
-    """A start between two steps of a cycle, by the names of the coordinates, and the walk from there.
+    """Choose an initial state within a step of a cycle, and simulate the walk from it.
 
-    Of some moments of the step, the first is taken from which, after rounding, it walks on without
-    a scuff.
+    It is at the first of several phases of the step from which, after rounding, the walker walks
+    without a
+    scuff. If none of them does, it is at the first phase.
 
     Args:
-        search: that found it.
-        found: a model with its cycle.
-        digits: that values and speeds are rounded to; None for all of them.
+        search: search with the plan.
+        found: numbers with their cycle.
+        digits: significant digits of values and speeds; None for no rounding.
+
+    Returns:
+        Value (rad or m) and speed by the names of coordinates, and the walk.
     """
-    step_map = search.step_map(found.fractions, found.cycle.state, TIGHT)
-    engine, ordered = step_map.engine, sorted(PHASES)
+    step_map = search.make_step_map(found.fractions, found.cycle.state, TIGHT_ACCURACY)
+    engine, ordered = step_map.engine, sorted(START_PHASES)
     states = sample_states_of_step(step_map, found.cycle, ordered)[
-        [ordered.index(part) for part in PHASES]
+        [ordered.index(part) for part in START_PHASES]
     ]
+    # Rounding errors would be written as digits.
     states[np.abs(states) < 1e-12] = 0.0
     if digits is not None:
         states = np.array(
             [[float(f"{number:.{digits}g}") for number in row] for row in states.tolist()]
         )
-    # A file says where coordinates start, and the auxiliary states follow.
+    # The file has values and speeds of coordinates only; auxiliary states start from their defaults.
     states = engine.state.restart_auxiliary(states)
     walks = walk_many(
         engine,
         states,
-        WALK_SECONDS,
+        PROOF_WALK_S,
         footing=search.footing,
-        accuracy=WALK_ACCURACY,
+        accuracy=PROOF_ACCURACY,
         threads=search.threads,
     )
     best = max(range(len(walks)), key=lambda k: (walks[k].walks and not walks[k].scuffs, -k))
@@ -262,19 +306,25 @@ def choose_start(
 
 
 def _name_values(engine: Any, state: Floats) -> dict[str, tuple[float, float]]:
+    """Return value and speed of each coordinate of a state by name."""
     names = [engine.mechanism.coordinates[place].name for place in engine.order]
     values, speeds = state[: len(names)], state[len(names) : 2 * len(names)]
     return dict(zip(names, zip(values.tolist(), speeds.tolist(), strict=True), strict=True))
 
 
 def _write_walker(
-    folder: Path, search: CycleSearch, gait: Gait, cycles: Sequence[Found], settings: dict[str, Any]
+    folder: Path,
+    search: CycleSearch,
+    gait: Gait,
+    cycles: Sequence[ModelCycle],
+    settings: dict[str, Any],
 ) -> None:
-    model = search.model(gait.found.fractions, gait.start)
-    write(model, folder / BEST)
+    """Write model, table of cycles and summary of a search."""
+    model = search.make_model(gait.found.fractions, gait.start)
+    write(model, folder / BEST_FILE)
     heads = [*search.names, "largest_multiplier", "walking", "step_length_m", "period_s", "scuffs"]
     rows = [",".join(heads)]
-    for each in sorted(cycles, key=cost):
+    for each in sorted(cycles, key=get_cost):
         cycle = each.cycle
         numbers = [
             *each.numbers.values(),
@@ -285,7 +335,7 @@ def _write_walker(
             cycle.scuffs,
         ]
         rows.append(",".join(repr(number) for number in numbers))
-    write_atomically(folder / CYCLES, "\n".join(rows) + "\n")
+    write_atomically(folder / CYCLES_FILE, "\n".join(rows) + "\n")
     result, walk = gait.found, gait.walk
     summary = {
         "numbers": result.numbers,
@@ -306,4 +356,4 @@ def _write_walker(
         "candidates": gait.candidates,
         "settings": settings,
     }
-    write_atomically(folder / SUMMARY, json.dumps(summary, indent=2) + "\n")
+    write_atomically(folder / SUMMARY_FILE, json.dumps(summary, indent=2) + "\n")

@@ -1,4 +1,8 @@
-"""What sweeps can ask of walkers: steps, scuffs, the time until the fall, which ends the run; a start on their feet."""
+"""Measures of sweeps for walkers (steps, scuffs, time of the fall), and a start with the feet on the
+ground.
+
+The names of the public functions are the names that users write in a sweep. A fall ends the run.
+"""
 
 from __future__ import annotations
 
@@ -12,63 +16,93 @@ from osimlite.studies.gait.foot_contacts import FootContacts, find_footing
 from osimlite.studies.gait.starts import lift_to_depth
 from osimlite.studies.gait.starts import plant_feet as at_rest
 from osimlite.studies.gait.steps import (
-    SHORTEST,
+    MIN_STEP_LENGTH_M,
     Walk,
+    estimate_event_count,
+    extract_walks,
     make_fall_watches,
     measure_along_slope,
-    room_for,
-    walks_of,
 )
 from osimlite.studies.sweep import registry
 from osimlite.studies.sweep.measures import Batch, Measure
 from osimlite.studies.sweep.variables import Floats
 
-PRESSED = 8e-4
-"""So deep (m) in the ground is the foot of a walker that is planted: it touches beyond doubt, and little presses it."""
+PLANTED_DEPTH_M = 8e-4
+"""Penetration (m) of the foot of a planted walker: enough for a contact, too little for a large force."""
 
 
 @registry.measure(is_maximized=True)
 def steps(engine: Any, feet: Sequence[str] | None = None) -> Measure:
-    """How many steps were made."""
-    return _measure("steps", engine, feet, lambda walk: len(walk.steps))
+    """Return the measure of the number of steps.
+
+    Args:
+        engine: engine of the model.
+        feet: contacts of each foot; found from the structure of the model by default.
+    """
+    return _make_walk_measure("steps", engine, feet, lambda walk: len(walk.steps))
 
 
 @registry.measure()
 def scuffs(engine: Any, feet: Sequence[str] | None = None) -> Measure:
-    """How many touch-downs were no steps."""
-    return _measure("scuffs", engine, feet, lambda walk: len(walk.scuffs))
+    """Return the measure of the number of touch-downs that are not steps.
+
+    Args:
+        engine: engine of the model.
+        feet: contacts of each foot; found from the structure of the model by default.
+    """
+    return _make_walk_measure("scuffs", engine, feet, lambda walk: len(walk.scuffs))
 
 
 @registry.measure(is_maximized=True)
 def time_to_fall(engine: Any, feet: Sequence[str] | None = None) -> Measure:
-    """When the walk ended, s; the end of the run for those that did not fall."""
-    return _measure("time_to_fall", engine, feet, lambda walk: walk.end)
+    """Return the measure of the time of the fall (s); the end of the run for walkers that do not fall.
+
+    Args:
+        engine: engine of the model.
+        feet: contacts of each foot; found from the structure of the model by default.
+    """
+    return _make_walk_measure("time_to_fall", engine, feet, lambda walk: walk.end)
 
 
 @registry.measure(is_maximized=True)
 def progress(engine: Any, feet: Sequence[str] | None = None) -> Measure:
-    """How many steps were made before the first scuff, and how near the next one was: what a search can climb.
+    """Return a measure that a search can climb: steps before the first scuff, plus how near the next
+    one was.
 
-    The part after the point is the mean of two numbers below one. One is how near the foot came to
-    where its step would have counted, when it scuffed or the run ended: 1/2 if it lacked as much
-    again as the shortest step. The other is how long it had gone on by then: 1/2 for a second.
+    The fraction after the decimal point is the mean of two numbers below 1. The first is m / (m +
+    d), where
+    m is the shortest length of a step and d is what the foot lacked to it when it scuffed or the
+    run ended.
+    The second is t / (t + 1 s) for the time t until then.
+
+    Args:
+        engine: engine of the model.
+        feet: contacts of each foot; found from the structure of the model by default.
     """
-    footing = _footing("progress", engine, feet)
+    footing = _find_footing("progress", engine, feet)
     contacts = [[engine.contacts.index(name) for name in foot] for foot in footing.feet]
 
     def numbers(batch: Batch) -> Floats:
         rows = None if batch.numbers is None else np.arange(len(batch.starts))
         along = measure_along_slope(batch.engine, batch.runs.states, batch.numbers, rows)[0]
         places = np.stack([along[:, foot].max(axis=1) for foot in contacts], axis=1)
-        result = zip(_walks(footing, batch), places.tolist(), strict=True)
-        return np.array([_progress(walk, ends) for walk, ends in result])
+        result = zip(_list_walks(footing, batch), places.tolist(), strict=True)
+        return np.array([_compute_progress(walk, ends) for walk, ends in result])
 
-    return _made("progress", footing, numbers)
+    return _make_measure("progress", footing, numbers)
 
 
 @registry.start
 def planted(engine: Any, feet: Sequence[str] | None) -> registry.Place:
-    """On the ground with the deeper foot, at rest there."""
+    """Return the start in which the deeper foot is on the ground, and at rest there.
+
+    Args:
+        engine: engine of the model.
+        feet: contacts of each foot; found from the structure of the model by default.
+
+    Raises:
+        SettingError: the engine is not the compiled one.
+    """
     if engine.name != "compiled":
         raise SettingError("a walker is planted with --engine compiled only")
     footing = find_footing(engine, feet)
@@ -77,45 +111,56 @@ def planted(engine: Any, feet: Sequence[str] | None) -> registry.Place:
         states: Floats, numbers: Floats | None, started: Callable[[Floats], Floats]
     ) -> Floats:
         resting = at_rest(engine, footing, states, numbers=numbers)
-        return started(lift_to_depth(engine, footing, resting, PRESSED, -1, numbers=numbers))
+        return started(
+            lift_to_depth(engine, footing, resting, PLANTED_DEPTH_M, -1, numbers=numbers)
+        )
 
     return place
 
 
-def _progress(walk: Walk, places: Sequence[float]) -> float:
+def _compute_progress(walk: Walk, places: Sequence[float]) -> float:
+    """Return the progress of a walk; `places` are the positions of the feet along the slope at its end
+    (m).
+    """
     if walk.scuffs:
         until, lead = walk.scuffs[0].time, walk.scuffs[0].length
     else:
         until, last = walk.end, walk.steps[-1].foot if walk.steps else int(np.argmax(places))
         lead = max(place for foot, place in enumerate(places) if foot != last) - places[last]
-    near = SHORTEST / (SHORTEST + max(SHORTEST - lead, 0.0))
+    near = MIN_STEP_LENGTH_M / (MIN_STEP_LENGTH_M + max(MIN_STEP_LENGTH_M - lead, 0.0))
     return walk.clean_steps + 0.5 * (near + until / (until + 1.0))
 
 
-def _measure(
+def _make_walk_measure(
     name: str, engine: Any, feet: Sequence[str] | None, number: Callable[[Walk], float]
 ) -> Measure:
-    footing = _footing(name, engine, feet)
-    return _made(
+    """Return a measure that is a number of a walk."""
+    footing = _find_footing(name, engine, feet)
+    return _make_measure(
         name,
         footing,
-        lambda batch: np.array([number(walk) for walk in _walks(footing, batch)], float),
+        lambda batch: np.array([number(walk) for walk in _list_walks(footing, batch)], float),
     )
 
 
-def _footing(name: str, engine: Any, feet: Sequence[str] | None) -> FootContacts:
+def _find_footing(name: str, engine: Any, feet: Sequence[str] | None) -> FootContacts:
+    """Return the feet for a measure, which needs the compiled engine."""
     if engine.name != "compiled":
         raise SettingError(f"the measure '{name}' needs --engine compiled")
     return find_footing(engine, feet)
 
 
-def _made(name: str, footing: FootContacts, numbers: Callable[[Batch], Floats]) -> Measure:
-    return Measure(name, numbers, tuple(make_fall_watches(footing)), room_for, True)
+def _make_measure(name: str, footing: FootContacts, numbers: Callable[[Batch], Floats]) -> Measure:
+    """Return a measure whose runs end with a fall."""
+    return Measure(name, numbers, tuple(make_fall_watches(footing)), estimate_event_count, True)
 
 
-def _walks(footing: FootContacts, batch: Batch) -> list[Walk]:
+def _list_walks(footing: FootContacts, batch: Batch) -> list[Walk]:
+    """Return the walks of a batch; they are shared by all measures of the batch."""
     walks: list[Walk] | None = batch.memory.get("walks")
     if walks is None:
-        walks = walks_of(batch.engine, batch.starts, batch.runs, footing, numbers=batch.numbers)
+        walks = extract_walks(
+            batch.engine, batch.starts, batch.runs, footing, numbers=batch.numbers
+        )
         batch.memory["walks"] = walks
     return walks

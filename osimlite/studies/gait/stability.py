@@ -1,4 +1,4 @@
-"""From a cycle that closes to one that lasts: the numbers of a model are led to where a small push dies away."""
+"""Optimization of the stability of a gait cycle over numbers of the model."""
 
 from __future__ import annotations
 
@@ -8,58 +8,66 @@ from operator import attrgetter
 import numpy as np
 
 from osimlite.errors import OsimliteError
-from osimlite.studies.gait.cycle_search import CycleSearch, Found, Progress
+from osimlite.studies.gait.cycle_search import CycleSearch, ModelCycle, Progress
 from osimlite.studies.sweep.search import BudgetExhausted, Search, cma, nelder_mead
 from osimlite.studies.sweep.variables import Floats
 
-FIRST_REACH, WORST = 0.05, 100.0
-"""How far a turn looks at first, as a part of the ranges, and what numbers without a cycle cost."""
+INITIAL_STEP = 0.05
+"""Initial step size of a round of the search, as a part of the ranges."""
 
-TOLERANCE = 1e-4
-"""Of cost and fractions, at which a turn ends."""
+FAILURE_COST = 100.0
+"""Cost of numbers without a cycle; the distance to the nearest cycle is added to guide the search."""
 
-cost = attrgetter("cost")
+TURN_TOLERANCE = 1e-4
+"""Change of cost and of fractions at which a round of the search ends."""
+
+get_cost = attrgetter("cost")
+"""Function that returns the cost of a cycle, as a key of `min` and `sorted`."""
 
 
-class Improvement:
-    """Leads a cycle to the numbers at which it costs least.
+class StabilityOptimization:
+    """Minimization of the cost of a cycle with CMA-ES in rounds, each from the best cycle so far.
 
-    The search (cma) goes in turns, each from the best so far. As long as no cycle is stable enough,
-    the numbers are not
-    rounded: the valley of small multipliers is narrow, and between rounded numbers it has steps on
-    which a search stays. From then on they are, so that the region that counts is that of the
-    numbers which will be written.
+    As long as no cycle is stable enough, numbers are not rounded: the valley of small multipliers
+    is
+    narrow, and between rounded numbers it has steps on which a search stalls. From then on numbers
+    are
+    rounded, so that the cost is that of the numbers which will be written.
 
     Args:
-        search: that knows the cycle of a model.
-        found: where to begin.
-        digits: that the numbers will have.
+        search: search that computes the cycle of a model.
+        found: cycle to start from.
+        digits: significant digits of the numbers that will be written.
 
     Attributes:
-        cycles: found on the way.
+        cycles: cycles that were found.
     """
 
-    def __init__(self, search: CycleSearch, found: Found, digits: int) -> None:
-        self.cycles: list[Found] = []
+    def __init__(self, search: CycleSearch, found: ModelCycle, digits: int) -> None:
+        self.cycles: list[ModelCycle] = []
         self._search, self._first, self._digits = search, found, digits
         self._costs: dict[bytes, float] = {}
-        self._written: list[Found] = []
+        self._written: list[ModelCycle] = []
 
     @property
-    def best(self) -> Found:
-        """The cycle that costs least, of rounded numbers as soon as one of those is stable enough."""
-        written = min(self._written, key=cost, default=self._first)
-        return written if self._is_enough(written) else min((self._first, *self.cycles), key=cost)
+    def best(self) -> ModelCycle:
+        """Cycle with the lowest cost; of rounded numbers as soon as one of those is stable enough."""
+        written = min(self._written, key=get_cost, default=self._first)
+        return (
+            written if self._is_enough(written) else min((self._first, *self.cycles), key=get_cost)
+        )
 
     def run(self, budget: int, seed: int, progress: Progress | None = None) -> None:
-        """Search.
+        """Search until the budget is spent.
+
+        With a single number, Nelder-Mead replaces CMA-ES, which needs two.
 
         Args:
-            budget: how many sets of numbers may be tried.
-            seed: of the first turn; each has its own.
-            progress: called with how many have been.
+            budget: number of sets of numbers that are tried.
+            seed: seed of the first round; each further round adds 1.
+            progress: callback with the number of sets that were tried, and of all.
         """
-        look = cma if len(self._first.fractions) > 1 else nelder_mead
+        minimize = cma if len(self._first.fractions) > 1 else nelder_mead
         tried = 0
 
         def ask(points: Floats) -> Floats:
@@ -69,31 +77,36 @@ class Improvement:
             tried += len(points)
             if progress is not None:
                 progress(min(tried, budget), budget)
-            return np.array([self._cost(point, rounds) for point in points])
+            return np.array([self._evaluate_cost(point, rounds) for point in points])
 
         while tried < budget:
+            # A round ends by an exception when its first stable cycle switches to rounded numbers.
             rounds = self._is_enough(self.best)
             with suppress(BudgetExhausted):
-                look(
+                minimize(
                     ask,
-                    Search(self.best.fractions, FIRST_REACH, None, seed, True, budget, TOLERANCE),
+                    Search(
+                        self.best.fractions, INITIAL_STEP, None, seed, True, budget, TURN_TOLERANCE
+                    ),
                 )
             seed += 1
 
-    def _is_enough(self, found: Found) -> bool:
+    def _is_enough(self, found: ModelCycle) -> bool:
         return found.cost < self._search.stable
 
-    def _cost(self, fractions: Floats, rounds: bool) -> float:
-        """Of the cycle there, which is found from the nearest that is known; much if there is none."""
+    def _evaluate_cost(self, fractions: Floats, rounds: bool) -> float:
+        """Return the cost of the cycle at some fractions, searched from the nearest known cycle."""
         if rounds:
             fractions = self._search.round_fractions(fractions, self._digits)
         key = fractions.tobytes()
         if key not in self._costs:
-            near = min((self._first, *self.cycles), key=lambda each: _is_far(each, fractions))
+            near = min(
+                (self._first, *self.cycles), key=lambda each: _compute_distance(each, fractions)
+            )
             try:
                 result = self._search.find_cycle(fractions, near.cycle.state)
             except (OsimliteError, np.linalg.LinAlgError):
-                self._costs[key] = WORST + _is_far(near, fractions)
+                self._costs[key] = FAILURE_COST + _compute_distance(near, fractions)
             else:
                 self._costs[key] = result.cost
                 self.cycles.append(result)
@@ -102,5 +115,6 @@ class Improvement:
         return self._costs[key]
 
 
-def _is_far(found: Found, fractions: Floats) -> float:
+def _compute_distance(found: ModelCycle, fractions: Floats) -> float:
+    """Return the distance between the numbers of a cycle and some fractions."""
     return float(np.linalg.norm(found.fractions - fractions))

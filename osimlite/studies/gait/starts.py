@@ -1,4 +1,4 @@
-"""Where walkers start: how to put one on its feet."""
+"""Initial states of walkers on the ground."""
 
 from __future__ import annotations
 
@@ -9,23 +9,34 @@ from osimlite.simulation.batches import BatchEngine, Floats, Ints
 from osimlite.studies.gait.foot_contacts import FootContacts
 from osimlite.studies.gait.steps import measure_along_slope
 
-APART = 0.1
-"""How far a coordinate is moved to see what it carries, rad or m."""
+PROBE_STEP = 0.1
+"""Change of a coordinate (rad or m) that tests what it moves."""
 
-NUDGE = 1e-6
-"""Over so short a time (s) states are moved on to find out how fast their feet are."""
+PROBE_TIME_S = 1e-6
+"""Time step (s) of the central difference that gives the velocities of the feet."""
 
 
 @dataclass(frozen=True, eq=False)
 class Carriers:
-    """The coordinates that carry a walker as a whole."""
+    """Coordinates that translate the complete walker.
 
-    places: tuple[int, ...]  # of those that move every contact by the same way, in the state (m,)
-    lift: int | None  # place of the one among them that lifts it off the ground, or None
+    Attributes:
+        places: offsets in the state of the coordinates that move all contacts by the same vector
+            (m,).
+        lift: offset of the one among them that lifts the walker off the ground, or None.
+    """
+
+    places: tuple[int, ...]
+    lift: int | None
 
 
 def find_carriers(engine: BatchEngine, footing: FootContacts) -> Carriers:
-    """Find the coordinates that carry a walker as a whole, by moving each at some poses."""
+    """Find the coordinates that translate the complete walker, by moving each one in random poses.
+
+    Args:
+        engine: engine of the model.
+        footing: contacts of the walker.
+    """
     n = len(engine.order)
     contacts = _list_contacts(engine, footing)
     rng = np.random.default_rng(0)
@@ -37,14 +48,19 @@ def find_carriers(engine: BatchEngine, footing: FootContacts) -> Carriers:
     places, lift = [], None
     for index in range(n):
         moved = poses.copy()
-        moved[:, index] += APART
-        way = ((_compute_contact_centres(engine, moved)[:, contacts] - here) / APART).reshape(-1, 3)
+        moved[:, index] += PROBE_STEP
+        way = ((_compute_contact_centres(engine, moved)[:, contacts] - here) / PROBE_STEP).reshape(
+            -1, 3
+        )
+        # A carrier moves all contacts equally, in all poses, and by a noticeable amount.
         if np.ptp(way, axis=0).max() > 1e-9 or np.linalg.norm(way[0]) < 1e-3:
             continue
         places.append(index)
         if (
             lift is None
-            and (measure_along_slope(engine, moved)[1][:, contacts] - depths < -0.1 * APART).all()
+            and (
+                measure_along_slope(engine, moved)[1][:, contacts] - depths < -0.1 * PROBE_STEP
+            ).all()
         ):
             lift = index
     return Carriers(tuple(places), lift)
@@ -59,16 +75,19 @@ def lift_to_depth(
     *,
     numbers: Floats | None = None,
 ) -> Floats:
-    """States (W, y) lifted or lowered until one foot is so deep (m) in the ground.
+    """Lift or lower walkers until one foot has a given penetration.
 
     Args:
-        engine: of the model.
-        footing: its feet.
-        states: what to lift; as they are if no coordinate lifts the walker.
-        depth: of the deepest contact of the foot.
-        foot: which one; -1 for the deeper.
-        numbers: of models of the same structure, one row for each state; by default the engine's
-            own.
+        engine: engine of the model.
+        footing: contacts of the feet.
+        states: states (W, y); they are returned as they are if no coordinate lifts the walker.
+        depth: penetration of the deepest contact of the foot (m).
+        foot: index of the foot; -1 for the deeper one.
+        numbers: numbers of models of the same structure, one row per state; by default those of the
+            engine.
+
+    Returns:
+        States (W, y).
     """
     lift = find_carriers(engine, footing).lift
     if lift is None:
@@ -77,35 +96,40 @@ def lift_to_depth(
     feet = footing.feet if foot < 0 else footing.feet[foot : foot + 1]
     contacts = [engine.contacts.index(name) for names in feet for name in names]
     one = states.copy()
-    one[:, lift] += APART
+    one[:, lift] += PROBE_STEP
+    # The depth is linear in the lifting coordinate, so that two poses determine it.
     now, then = (
         measure_along_slope(engine, moved, numbers, rows)[1][:, contacts] for moved in (states, one)
     )
-    chosen = np.arange(len(states)), now.argmax(axis=1)
+    deepest = np.arange(len(states)), now.argmax(axis=1)
     placed = states.copy()
-    placed[:, lift] += (depth - now[chosen]) * APART / (then[chosen] - now[chosen])
+    placed[:, lift] += (depth - now[deepest]) * PROBE_STEP / (then[deepest] - now[deepest])
     return placed
 
 
 def plant_feet(
     engine: BatchEngine, footing: FootContacts, states: Floats, *, numbers: Floats | None = None
 ) -> Floats:
-    """States (W, y) put on the ground with the deeper foot, which is at rest there.
+    """Put walkers on the ground with the deeper foot, which is at rest there.
 
-    The walker is lifted or lowered until that foot only just touches; then the speeds of the
-    coordinates that carry it as a whole are those with which the centre of this foot's deepest
-    contact does not move.
+    The walker is lifted or lowered until this foot just touches. The speeds of the coordinates that
+    translate the walker are then set so that the centre of the deepest contact of this foot does
+    not move.
 
     Args:
-        engine: of the model.
-        footing: its feet.
-        states: values and speeds of all other coordinates.
-        numbers: as in `lift_to_depth`.
+        engine: engine of the model.
+        footing: contacts of the feet.
+        states: states (W, y) with values and speeds of all other coordinates.
+        numbers: numbers of models of the same structure, one row per state; by default those of the
+            engine.
+
+    Returns:
+        States (W, y).
     """
     n, count = len(engine.order), np.arange(len(states))
     result = find_carriers(engine, footing)
     free = states.copy()
-    # What comes out must not depend, by a rounding, on what was there.
+    # The result must not depend on the carriers' previous values, not even by rounding.
     free[:, [n + place for place in result.places]] = 0.0
     if result.lift is not None:
         free[:, result.lift] = 0.0
@@ -116,19 +140,20 @@ def plant_feet(
     feet = np.array([engine.contacts.index(name) for names in footing.feet for name in names])
     deepest = feet[measure_along_slope(engine, placed, numbers, rows)[1][:, feet].argmax(axis=1)]
     ahead, back = placed.copy(), placed.copy()
-    ahead[:, :n] += NUDGE * placed[:, n:]
-    back[:, :n] -= NUDGE * placed[:, n:]
-    ways = _compute_contact_centres(engine, ahead, numbers, rows) - _compute_contact_centres(
+    ahead[:, :n] += PROBE_TIME_S * placed[:, n:]
+    back[:, :n] -= PROBE_TIME_S * placed[:, n:]
+    motions = _compute_contact_centres(engine, ahead, numbers, rows) - _compute_contact_centres(
         engine, back, numbers, rows
     )
-    speeds = ways[count, deepest] / (2.0 * NUDGE)
+    speeds = motions[count, deepest] / (2.0 * PROBE_TIME_S)
     carried = []
     here = _compute_contact_centres(engine, placed, numbers, rows)
     for place in result.places:
         moved = placed.copy()
-        moved[:, place] += APART
+        moved[:, place] += PROBE_STEP
         carried.append(
-            (_compute_contact_centres(engine, moved, numbers, rows) - here)[count, deepest] / APART
+            (_compute_contact_centres(engine, moved, numbers, rows) - here)[count, deepest]
+            / PROBE_STEP
         )
     needed = np.einsum("wi,wij->wj", speeds, np.linalg.pinv(np.stack(carried, axis=1)))
     placed[:, [n + place for place in result.places]] -= needed
@@ -136,25 +161,35 @@ def plant_feet(
 
 
 def move_along_neutral_directions(states: Floats, neutral: Floats) -> Floats:
-    """States (..., y) moved along the neutral directions (y, m) until the first entries that can be are zero.
+    """Move states along neutral directions until the first entries that these can change are zero.
 
-    A walker that may be anywhere, and whose trunk may be turned in any way, is then at the origin
-    and not turned.
+    A walker that may be anywhere, and whose trunk may have any orientation, is then at the origin
+    and
+    with the trunk as built.
+
+    Args:
+        states: states (..., y).
+        neutral: neutral directions (y, m).
+
+    Returns:
+        States (..., y).
     """
-    chosen: list[int] = []
+    # Rows of the neutral directions that are linearly independent.
+    selected: list[int] = []
     for index in range(len(neutral)):
-        if np.linalg.matrix_rank(neutral[[*chosen, index]], tol=1e-6) > len(chosen):
-            chosen.append(index)
-    return states - np.linalg.solve(neutral[chosen], states[..., chosen].T).T @ neutral.T
+        if np.linalg.matrix_rank(neutral[[*selected, index]], tol=1e-6) > len(selected):
+            selected.append(index)
+    return states - np.linalg.solve(neutral[selected], states[..., selected].T).T @ neutral.T
 
 
 def _compute_contact_centres(
     engine: BatchEngine, states: Floats, numbers: Floats | None = None, rows: Ints | None = None
 ) -> Floats:
-    """Centres of the contacts' second surfaces (k, P, 3), in ground."""
+    """Return the centres of the spheres of contacts (k, P, 3) in ground (m)."""
     return engine.locate_contacts(states, numbers, rows)[..., 6:]
 
 
 def _list_contacts(engine: BatchEngine, footing: FootContacts) -> Ints:
+    """Return the indices of the contacts of feet and falls in the engine."""
     names = [name for foot in footing.feet for name in foot] + list(footing.falls)
     return np.array([engine.contacts.index(name) for name in names])

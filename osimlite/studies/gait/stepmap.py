@@ -1,9 +1,9 @@
-"""The step map: from one heel strike to the next.
+"""Step map of a walker: the state at a touch-down as a function of the state at the previous one.
 
-The Poincaré section is the moment at which a foot begins to touch the ground. A state in it is
-written for the first foot as the one that has just touched down; where the legs are alike, they
-change parts after every step, so that the map goes from step to step, and otherwise from stride to
-stride.
+The Poincaré section is the moment at which a foot begins to touch the ground. A state on it is
+written
+as if the first foot had just touched down. Where the legs are alike, they are exchanged after each
+step, so that the map goes from step to step; otherwise it goes from stride to stride.
 """
 
 from __future__ import annotations
@@ -22,31 +22,32 @@ from osimlite.simulation.run import list_constraints
 from osimlite.studies.gait.foot_contacts import FootContacts, find_footing
 from osimlite.studies.gait.steps import (
     Step,
+    estimate_event_count,
+    extract_walks,
     make_fall_watches,
     measure_along_slope,
-    room_for,
-    walks_of,
 )
-from osimlite.studies.gait.symmetry import leg_exchange, neutral_directions
+from osimlite.studies.gait.symmetry import find_leg_exchange, find_neutral_directions
 
-TIGHT = 1e-10
-"""Accuracy of the integrator for maps that are differentiated."""
+TIGHT_ACCURACY = 1e-10
+"""Accuracy of the integrator for maps that are differentiated by differences of 1e-5."""
 
-LONGEST = 4.0
-"""A step takes at most so long, s."""
+MAX_STEP_S = 4.0
+"""Longest duration of a step (s); a walker that needs longer makes none."""
 
-AT_ONCE = 1e-6
-"""What happens within so short a time belongs to the heel strike, s."""
+STRIKE_WINDOW_S = 1e-6
+"""Touch-downs within this time (s) after the start belong to the touch-down that starts the step."""
 
-ALONG_A_STEP = 9
-"""At so many moments of a step the neutral directions are looked for."""
+NEUTRAL_SAMPLES = 9
+"""Number of states along a step at which neutral directions must hold."""
 
 
 def refuse_constraints(mechanism: Mechanism) -> None:
-    """Stop where constraints act, which no step map is made for.
+    """Refuse a model with constraints, which restrict the directions of the state that a step map
+    varies.
 
     Raises:
-        UnsupportedError: some do.
+        UnsupportedError: the model has constraints, or prescribed coordinates.
     """
     if kept := list_constraints(mechanism):
         raise UnsupportedError(
@@ -56,34 +57,43 @@ def refuse_constraints(mechanism: Mechanism) -> None:
 
 
 @dataclass
-class Images:
-    """Where the step map takes W states."""
+class StepImages:
+    """Images of W states under the step map.
 
-    states: Floats  # on the section (W, y); not a number where there was no step
-    lengths: Floats  # of the step, m (W,); of a stride of two steps, the mean
-    times: Floats  # that the step takes, s (W,); of a stride of two steps, the mean
-    scuffs: Ints  # how many there were on the way (W,)
+    Attributes:
+        states: states on the section (W, y); NaN where there was no step.
+        lengths: length of the step (W,) (m); of a stride the mean of its two steps.
+        times: duration of the step (W,) (s); of a stride the mean of its two steps.
+        scuffs: number of scuffs (W,).
+    """
+
+    states: Floats
+    lengths: Floats
+    times: Floats
+    scuffs: Ints
 
 
 class StepMap:
-    """The step map of a walker.
+    """Step map of a walker.
 
     Args:
-        engine: of the model.
-        near: a state (y,) from which it makes a step, best one at a heel strike.
-        footing: its feet; looked for if left out.
-        accuracy: of the integrator.
-        longest: a step takes at most so long, s.
-        threads: how many work.
+        engine: engine of the model.
+        near: state (y,) from which the walker makes a step, preferably at a touch-down.
+        footing: contacts of the feet; found automatically by default.
+        accuracy: accuracy of the integrator.
+        longest: longest duration of a step (s).
+        threads: number of threads; by default one per core.
 
     Attributes:
-        start: the first heel strike after `near`, written for the first foot (y,).
-        exchange: see `leg_exchange`.
-        neutral: orthonormal directions in which nothing acts (y, m).
+        start: state at the first touch-down after `near`, exchanged to the first foot (y,).
+        exchange: permutation of the state that exchanges the legs, see `find_leg_exchange`; None if
+            they
+            differ.
+        neutral: orthonormal directions that do not change the motion (y, m).
         basis: orthonormal directions of all others (y, y - m).
 
     Raises:
-        OsimliteError: there are no two feet, or the walker makes no step from there.
+        OsimliteError: there are not two feet, or the walker makes no step from there.
     """
 
     def __init__(
@@ -92,8 +102,8 @@ class StepMap:
         near: ArrayLike,
         *,
         footing: FootContacts | None = None,
-        accuracy: float = TIGHT,
-        longest: float = LONGEST,
+        accuracy: float = TIGHT_ACCURACY,
+        longest: float = MAX_STEP_S,
         threads: int | None = None,
     ) -> None:
         self.engine = engine
@@ -103,34 +113,41 @@ class StepMap:
         self.threads = threads
         self.exchange: Ints | None = None
         here = np.array(near, dtype=float)
-        step, moments = self._first_step(here)
-        self.exchange = leg_exchange(engine, self.footing, moments)
-        self.neutral = neutral_directions(engine, moments)
+        step, moments = self._simulate_first_step(here)
+        self.exchange = find_leg_exchange(engine, self.footing, moments)
+        self.neutral = find_neutral_directions(engine, moments)
         full, _ = np.linalg.qr(np.hstack((self.neutral, np.eye(len(here)))))
         self.basis: Floats = full[:, self.neutral.shape[1] :]
-        self.start = self.land(step.state, step.foot)
+        self.start = self.move_to_strike(step.state, step.foot)
         if step.foot != 0:
-            self.start = self._other_leg(self.start)
+            self.start = self._switch_legs(self.start)
 
-    def with_model(
+    def rebuild_for_model(
         self, engine: BatchEngine, near: ArrayLike, accuracy: float | None = None
     ) -> StepMap:
-        """The step map of a model with other numbers, whose reduced states are as near to these as they can be.
+        """Return the step map of a model with other numbers, with reduced states as comparable as
+        possible.
+
+        The new basis is the old one, projected onto the complement of the new neutral directions
+        and made
+        orthonormal by a polar decomposition, which changes it least.
 
         Args:
-            engine: of that model, of the same structure.
-            near: a state from which it makes a step, and where reduced states are along the neutral
-                directions (y,).
-            accuracy: of the integrator; by default the same.
+            engine: engine of that model, of the same structure.
+            near: state (y,) from which it makes a step, and which defines the position along
+                neutral
+                directions.
+            accuracy: accuracy of the integrator; by default the same.
 
         Raises:
-            OsimliteError: it makes no step from there, or has more or fewer neutral directions.
+            OsimliteError: the walker makes no step from there, or the number of neutral directions
+                differs.
         """
         other = copy(self)
         other.engine = engine
         other.start = np.array(near, dtype=float)
         other.accuracy = self.accuracy if accuracy is None else accuracy
-        other.neutral = neutral_directions(engine, other._first_step(other.start)[1])
+        other.neutral = find_neutral_directions(engine, other._simulate_first_step(other.start)[1])
         if other.neutral.shape != self.neutral.shape:
             raise OsimliteError(
                 f"'{engine.mechanism.name}' has {other.neutral.shape[1]} neutral directions where it had "
@@ -141,30 +158,31 @@ class StepMap:
         other.basis = left @ right
         return other
 
-    def _first_step(self, near: Floats) -> tuple[Step, Floats]:
-        """The first step from a state, and states on the way there (k, y)."""
+    def _simulate_first_step(self, near: Floats) -> tuple[Step, Floats]:
+        """Return the first step from a state, and states during this step (k, y)."""
         runs = run_many(
             self.engine,
             near[None],
             self.longest,
             accuracy=self.accuracy,
             watches=make_fall_watches(self.footing),
-            most_events=room_for(self.longest),
+            most_events=estimate_event_count(self.longest),
             event_states=True,
             threads=1,
         )
-        (walk,) = walks_of(self.engine, near[None], runs, self.footing)
+        (walk,) = extract_walks(self.engine, near[None], runs, self.footing)
         if not walk.steps:
             how = f"it fell on {walk.fell_on}" if walk.fell_on else "none"
             raise OsimliteError(
                 f"'{self.engine.mechanism.name}' makes no step within {walk.end:.3g} s ({how}); give another start"
             )
-        # At its ends a foot only just touches, where the force has no derivative.
-        times = np.linspace(0.0, walk.steps[0].time, ALONG_A_STEP + 2)[1:-1].tolist()
+        # The ends are left out: a foot that just touches has a contact force without a derivative.
+        times = np.linspace(0.0, walk.steps[0].time, NEUTRAL_SAMPLES + 2)[1:-1].tolist()
         runs = run_many(self.engine, near[None], walk.steps[0].time, report_times=times, threads=1)
         return walk.steps[0], runs.reports[0]
 
-    def _other_leg(self, state: Floats) -> Floats:
+    def _switch_legs(self, state: Floats) -> Floats:
+        """Return a state after a touch-down of the second foot as one of the first foot."""
         if self.exchange is not None:
             return state[self.exchange]
         images = self._make_step(state[None], 1)
@@ -174,8 +192,14 @@ class StepMap:
             )
         return images.states[0]
 
-    def land(self, state: Floats, foot: int) -> Floats:
-        """A state (y,) a billionth of a second from a heel strike, moved onto it."""
+    def move_to_strike(self, state: Floats, foot: int) -> Floats:
+        """Move a state (y,) that is a rounding error away from a touch-down onto it, by one Newton
+        step in time.
+
+        Args:
+            state: state at the event of a touch-down (y,).
+            foot: index of the foot that touches down.
+        """
         contacts = [self.engine.contacts.index(name) for name in self.footing.feet[foot]]
         rate = np.array(self.engine.compute_derivative(0.0, state.tolist()))
         dt = 1e-7
@@ -185,23 +209,25 @@ class StepMap:
         return state - depths[0, touching] / speed * rate
 
     # ----------------------------------------------------------------------------------------------- images
-    def __call__(self, states: ArrayLike) -> Images:
+    def __call__(self, states: ArrayLike) -> StepImages:
         """Map states (W, y) in which the first foot has just touched down."""
         first = self._make_step(np.asarray(states, dtype=float), 0)
         if self.exchange is not None:
-            return Images(first.states[:, self.exchange], first.lengths, first.times, first.scuffs)
+            return StepImages(
+                first.states[:, self.exchange], first.lengths, first.times, first.scuffs
+            )
         second = self._make_step(first.states, 1)
-        return Images(
+        return StepImages(
             second.states,
             (first.lengths + second.lengths) / 2.0,
             (first.times + second.times) / 2.0,
             first.scuffs + second.scuffs,
         )
 
-    def _make_step(self, states: Floats, leading: int) -> Images:
-        """One step of the foot behind."""
+    def _make_step(self, states: Floats, leading: int) -> StepImages:
+        """Simulate one step of the trailing foot."""
         count, trailing = len(states), 1 - leading
-        result = Images(
+        result = StepImages(
             np.full(states.shape, np.nan),
             np.full(count, np.nan),
             np.full(count, np.nan),
@@ -210,7 +236,8 @@ class StepMap:
         rows = np.flatnonzero(np.isfinite(states).all(axis=1))
         if not len(rows):
             return result
-        # A foot of several contacts may touch with one of them while it stands on another.
+        # A foot of several contacts may touch with one while it stands on another, so that only a foot
+        # of one contact can end the run early.
         foot = self.footing.feet[trailing]
         stops = [Watch("strike", contact=foot[0], stops=1)] if len(foot) == 1 else []
         runs = run_many(
@@ -219,25 +246,29 @@ class StepMap:
             self.longest,
             accuracy=self.accuracy,
             watches=[*make_fall_watches(self.footing), *stops],
-            most_events=room_for(self.longest),
+            most_events=estimate_event_count(self.longest),
             event_states=True,
             threads=self.threads,
         )
-        walks = walks_of(self.engine, states[rows], runs, self.footing)
+        walks = extract_walks(self.engine, states[rows], runs, self.footing)
         for row, walk in zip(rows.tolist(), walks, strict=True):
             step = next((step for step in walk.steps if step.foot == trailing), None)
             if step is not None:
-                result.states[row] = self.land(step.state, trailing)
+                result.states[row] = self.move_to_strike(step.state, trailing)
                 result.lengths[row], result.times[row] = step.length, step.time
-                # The first foot touches down at the start, or a rounding later.
-                result.scuffs[row] = sum(AT_ONCE < scuff.time < step.time for scuff in walk.scuffs)
+                # The first foot touches down at the start, or a rounding error later: no scuff.
+                result.scuffs[row] = sum(
+                    STRIKE_WINDOW_S < scuff.time < step.time for scuff in walk.scuffs
+                )
         return result
 
     # -------------------------------------------------------------------------------------------- coordinates
     def reduce(self, states: ArrayLike) -> Floats:
-        """States without the neutral directions (..., y - m)."""
+        """Return states without their neutral directions (..., y - m)."""
         return np.asarray(states, dtype=float) @ self.basis
 
     def expand(self, reduced: ArrayLike) -> Floats:
-        """States (..., y) from reduced ones; along the neutral directions they are where `start` is."""
+        """Return states (..., y) from reduced ones; along neutral directions they are where `start`
+        is.
+        """
         return np.asarray(reduced) @ self.basis.T + self.start @ self.neutral @ self.neutral.T

@@ -1,7 +1,10 @@
-"""Steps, scuffs and falls of a walk.
+"""Steps, scuffs and falls of walks, from the contact events of simulations.
 
-A step is the other foot touching down far enough ahead along the slope after long enough in the
-air. Any other touch-down is a scuff. Anything but a foot on the ground ends the walk.
+A step is a touch-down of the other foot, far enough ahead along the slope and after long enough in
+the
+air. Any other touch-down of a foot is a scuff. Ground contact of anything but a foot is a fall and
+ends
+the walk.
 """
 
 from __future__ import annotations
@@ -25,31 +28,46 @@ from osimlite.simulation.batches import (
 from osimlite.simulation.options import DEFAULT_ACCURACY
 from osimlite.studies.gait.foot_contacts import FootContacts, find_footing
 
-SHORTEST = 0.05
-"""How far ahead of the other a foot touches down in a step, at least, m."""
+MIN_STEP_LENGTH_M = 0.05
+"""Shortest distance (m) by which a foot touches down ahead of the other in a step."""
 
-QUICKEST = 0.05
-"""How long it has been in the air before, at least, s."""
+MIN_AIR_TIME_S = 0.05
+"""Shortest time (s) that a foot is in the air before a step; less is a bounce."""
 
-FALL = "fall: "
-"""What the events that end a walk are called, before the name of the contact."""
+FALL_PREFIX = "fall: "
+"""Prefix of the names of the watches that end a walk, before the name of the contact."""
 
 EVENTS_PER_SECOND = 60
-"""Room for events; a walk that has more rattles on the ground."""
+"""Memory for contact events per second; a walk with more rattles on the ground."""
 
 
 class Step(NamedTuple):
-    """One step."""
+    """Touch-down that counts as a step.
 
-    time: float  # of touch-down, s
-    foot: int  # that touches down
-    length: float  # how far ahead of the other foot, along the slope, m
-    air: float  # how long it was in the air, s
-    state: Floats  # at touch-down, in the engine's order (y,)
+    Attributes:
+        time: time of touch-down (s).
+        foot: index of the foot.
+        length: distance ahead of the other foot along the slope (m).
+        air: time that the foot was in the air (s).
+        state: state at touch-down, in the order of the engine (y,).
+    """
+
+    time: float
+    foot: int
+    length: float
+    air: float
+    state: Floats
 
 
 class Scuff(NamedTuple):
-    """A touch-down that is no step; fields as those of `Step`."""
+    """Touch-down that does not count as a step.
+
+    Attributes:
+        time: time of touch-down (s).
+        foot: index of the foot.
+        length: distance ahead of the other foot along the slope (m).
+        air: time that the foot was in the air (s).
+    """
 
     time: float
     foot: int
@@ -59,35 +77,43 @@ class Scuff(NamedTuple):
 
 @dataclass
 class Walk:
-    """What became of a walker."""
+    """Walk of one walker.
 
-    end: float = 0.0  # when the walk or the simulation ended, s
-    # "walking" if it was still on its feet, "fell", or why the simulation ended
+    Attributes:
+        end: time at which the walk or the simulation ended (s).
+        ending: "walking" without a fall, "fell", or why the simulation ended.
+        fell_on: contact that ended the walk, or "".
+        steps: steps in the order of time.
+        scuffs: scuffs in the order of time.
+        distance: distance along the slope from the first touch-down of all to the last step (m).
+    """
+
+    end: float = 0.0
     ending: str = "walking"
-    fell_on: str = ""  # contact that ended the walk
-    steps: list[Step] = field(default_factory=list)  # in the order of time
-    scuffs: list[Scuff] = field(default_factory=list)  # likewise
-    distance: float = 0.0  # from the first touch-down of all to the last step, along the slope, m
+    fell_on: str = ""
+    steps: list[Step] = field(default_factory=list)
+    scuffs: list[Scuff] = field(default_factory=list)
+    distance: float = 0.0
 
     @property
     def walks(self) -> bool:
-        """Whether it never fell."""
+        """True if the walker was still walking at the end of the simulation."""
         return self.ending == "walking"
 
     @property
     def clean_steps(self) -> int:
-        """How many steps were made before the first scuff."""
+        """Number of steps before the first scuff."""
         first = self.scuffs[0].time if self.scuffs else np.inf
         return sum(step.time < first for step in self.steps)
 
 
 def make_fall_watches(footing: FootContacts) -> list[Watch]:
-    """Watches that stop a run where the walk ends."""
-    return [Watch(f"{FALL}{contact}", contact=contact, stops=1) for contact in footing.falls]
+    """Return watches that stop a run at a fall."""
+    return [Watch(f"{FALL_PREFIX}{contact}", contact=contact, stops=1) for contact in footing.falls]
 
 
-def room_for(to: float) -> int:
-    """How many events to leave room for in a walk of so many seconds."""
+def estimate_event_count(to: float) -> int:
+    """Return the number of events to reserve memory for in a walk of a duration (s)."""
     return 40 + round(EVENTS_PER_SECOND * to)
 
 
@@ -102,20 +128,25 @@ def walk_many(
     most_tries: int = UNLIMITED_TRIES,
     threads: int | None = None,
 ) -> list[Walk]:
-    """Let many walkers walk.
+    """Simulate many walkers at once, and find their steps and falls.
 
     Args:
-        engine: of the model.
-        states: where they start (W, y), in the engine's order.
-        to: how long they walk, s, if they do not fall.
-        footing: their feet; looked for if left out.
-        numbers: of models of the same structure, one row for each walker, see `run_many`.
-        accuracy: of the integrator.
-        most_tries: steps of the integrator that a walker may try.
-        threads: how many work; by default one for each core.
+        engine: engine of the model.
+        states: initial states (W, y), in the order of the engine.
+        to: duration of walks without a fall (s).
+        footing: contacts of the feet; found automatically by default.
+        numbers: numbers of models of the same structure, one row per walker, see `run_many`; by
+            default
+            those of the engine.
+        accuracy: accuracy of the integrator.
+        most_tries: most steps of the integrator per walker.
+        threads: number of threads; by default one per core.
+
+    Returns:
+        The walk of each walker.
 
     Raises:
-        OsimliteError: the model has no two feet, or the states do not fit.
+        OsimliteError: the model does not have two feet, or the shape of the states does not fit.
     """
     feet = footing or find_footing(engine)
     runs = run_many(
@@ -125,15 +156,15 @@ def walk_many(
         numbers=numbers,
         accuracy=accuracy,
         watches=make_fall_watches(feet),
-        most_events=room_for(to),
+        most_events=estimate_event_count(to),
         event_states=True,
         most_tries=most_tries,
         threads=threads,
     )
-    return walks_of(engine, states, runs, feet, numbers=numbers, room=room_for(to))
+    return extract_walks(engine, states, runs, feet, numbers=numbers, room=estimate_event_count(to))
 
 
-def walks_of(
+def extract_walks(
     engine: BatchEngine,
     states: ArrayLike,
     runs: Runs,
@@ -142,15 +173,19 @@ def walks_of(
     numbers: ArrayLike | None = None,
     room: int | None = None,
 ) -> list[Walk]:
-    """Find the steps and the falls of runs that kept the states at their events.
+    """Find the steps and the falls of runs that recorded the states at their events.
 
     Args:
-        engine: of the model.
-        states: where the runs started (W, y).
-        runs: made with the watches of `make_fall_watches`, among others.
-        footing: their feet.
-        numbers: as given to `run_many`.
-        room: for events that the runs had; with as many events a walk is given up as too restless.
+        engine: engine of the model.
+        states: initial states of the runs (W, y).
+        runs: runs with the watches of `make_fall_watches`, and possibly others.
+        footing: contacts of the feet.
+        numbers: numbers of the models, as for `run_many`.
+        room: number of events for which the runs had memory; a walk with as many ends as "too many
+            events".
+
+    Returns:
+        The walk of each run.
     """
     starts = np.array(states, dtype=np.float64, order="C")
     vectors = np.array(engine.numbers if numbers is None else numbers, dtype=np.float64, order="C")
@@ -165,6 +200,7 @@ def walks_of(
     result = []
     for k, events in enumerate(runs.events):
         part = slice(ends[k], ends[k + 1])
+        # A contact that begins before the start raises no event.
         if (depths[k, fatal] > 0.0).any():
             contact = footing.falls[int(np.argmax(depths[k, fatal]))]
             result.append(Walk(0.0, "fell", contact))
@@ -190,15 +226,15 @@ def follow_events(
     reached: Floats,
     touching: NDArray[np.bool_],
 ) -> Walk:
-    """Go through the events of one run, which may come from any simulation.
+    """Find the steps and the fall in the events of one run, which may come from any simulator.
 
     Args:
-        footing: the feet.
-        contacts: names of the columns (P).
-        events: in the order of time: time (s), contact, whether it begins.
-        states: at the events (as many, any number of columns).
-        reached: how far down the slope each contact is at the events (as many, P), m.
-        touching: which contacts push at the start (P,).
+        footing: contacts of the feet.
+        contacts: names of the contacts, in the order of the columns (P,).
+        events: events in the order of time: time (s), contact, and whether contact begins.
+        states: states at the events (e, any number of columns).
+        reached: positions of the contacts along the slope at the events (e, P) (m).
+        touching: whether each contact touches at the start (P,).
     """
     places = {name: index for index, name in enumerate(contacts)}
     feet = [np.array([places[contact] for contact in foot]) for foot in footing.feet]
@@ -207,8 +243,8 @@ def follow_events(
     lifted = [0.0] * len(feet)
     last, first_place = -1, None
     for (time, name, begins), state, along in zip(events, states, reached, strict=True):
-        if name.startswith(FALL) or (begins and name in footing.falls):
-            walk.end, walk.ending, walk.fell_on = time, "fell", name.removeprefix(FALL)
+        if name.startswith(FALL_PREFIX) or (begins and name in footing.falls):
+            walk.end, walk.ending, walk.fell_on = time, "fell", name.removeprefix(FALL_PREFIX)
             break
         if name not in foot_of:
             continue
@@ -218,6 +254,7 @@ def follow_events(
             if not down[number]:
                 lifted[number] = time
             continue
+        # Only the first contact of a foot is a touch-down; others roll onto the ground after it.
         was_down = bool(down[number])
         down[number].add(name)
         if was_down:
@@ -228,19 +265,17 @@ def follow_events(
             for other, foot in enumerate(feet)
             if other != number and down[other]
         ]
-        # With no foot on the ground, the one that made the last step is what the step is measured
-        # from.
-        behind = (
-            max(others)
-            if others
-            else float(along[feet[last]].max())
-            if 0 <= last != number
-            else here
-        )
+        # In flight, the step is measured from the foot that made the last one.
+        if others:
+            behind = max(others)
+        elif 0 <= last != number:
+            behind = float(along[feet[last]].max())
+        else:
+            behind = here
         length, air = here - behind, time - lifted[number]
         if first_place is None:
             first_place = here
-        if number != last and length >= SHORTEST and air >= QUICKEST:
+        if number != last and length >= MIN_STEP_LENGTH_M and air >= MIN_AIR_TIME_S:
             walk.steps.append(Step(time, number, length, air, state))
             walk.distance = here - first_place
             last = number
@@ -255,18 +290,21 @@ def measure_along_slope(
     vectors: Floats | None = None,
     rows: ArrayLike | None = None,
 ) -> tuple[Floats, Floats]:
-    """How far down the slope the spheres of the contacts are, and how deep in the ground.
+    """Measure positions of contacts along the slope, and their penetration.
 
-    Down the slope is where gravity pulls along the plane; on level ground it is along +x of ground.
+    The direction is that of gravity's component along the plane, downhill; on level ground it is
+    the x axis
+    of ground.
 
     Args:
-        engine: of the model.
-        states: (k, y).
-        vectors: numbers of models of the same structure (v, m); by default the engine's own.
-        rows: which of them each state goes with (k,).
+        engine: engine of the model.
+        states: states (k, y).
+        vectors: numbers of models of the same structure (v, m); by default those of the engine.
+        rows: index of the numbers of each state (k,); by default 0.
 
     Returns:
-        Positions of the centres (k, P) from ground's origin, m, and depths (k, P), m.
+        Positions of the sphere centres along the slope from the origin of ground (k, P) (m), and
+        penetrations of the spheres (k, P) (m), negative above the ground.
     """
     table = np.array(engine.numbers if vectors is None else vectors, dtype=np.float64, order="C")
     table = table.reshape(-1, table.shape[-1])
@@ -281,6 +319,7 @@ def measure_along_slope(
         - np.sum(gravity[which][:, None, :] * normal, axis=2, keepdims=True) * normal
     )
     slope = np.linalg.norm(pull, axis=2)
+    # On level ground gravity has no component along the plane but rounding errors.
     level = slope < 1e-6 * np.maximum(np.linalg.norm(gravity, axis=1)[which], 1e-12)[:, None]
     forward = np.array((1.0, 0.0, 0.0)) - normal[..., :1] * normal
     along = np.where(level[..., None], forward, pull)

@@ -1,4 +1,4 @@
-"""What leaves the motion of a walker as it is: exchanging the legs, and directions that nothing acts along."""
+"""Symmetries of a walker: the exchange of its legs, and neutral directions of its state."""
 
 from __future__ import annotations
 
@@ -10,27 +10,33 @@ from osimlite.simulation.batches import BatchEngine, Floats, Ints
 from osimlite.simulation.elements.contact import HuntCrossley
 from osimlite.studies.gait.foot_contacts import FootContacts
 
-SAME = 1e-6
-"""Two derivatives are the same if they differ by less than this part."""
+RELATIVE_TOLERANCE = 1e-6
+"""Relative difference up to which two derivatives count as equal."""
 
-NUDGE = 1e-6
-"""By how much a state is moved to differentiate, rad, m and per second."""
+DIFFERENCE_STEP = 1e-6
+"""Change of a state in central differences (rad, m, rad/s, m/s)."""
 
-UNEVEN = 10.0
-"""A state at which the derivative is so many times less even than at most others is left out."""
+MAX_UNEVENNESS = 10.0
+"""States whose derivative is this many times less even than the median are left out: a contact begins
+there.
+"""
 
 
-def leg_exchange(engine: BatchEngine, footing: FootContacts, states: ArrayLike) -> Ints | None:
-    """The places (y,) from which the state is taken when the legs change parts, or None if they are not alike.
+def find_leg_exchange(engine: BatchEngine, footing: FootContacts, states: ArrayLike) -> Ints | None:
+    """Find the permutation of the state that exchanges the legs, and check it by the equations of
+    motion.
 
-    The coordinates of one leg, from where the legs part to the foot, change places with those of
-    the other, and auxiliary states with those that do the same there. Whether that makes no
-    difference to the motion is tried out.
+    The coordinates of one leg, from where the legs part to the foot, are exchanged with those of
+    the other,
+    and auxiliary states with those that have the same effect there.
 
     Args:
-        engine: of the model.
-        footing: with two feet.
-        states: at which to try (k, y).
+        engine: engine of the model.
+        footing: contacts of two feet.
+        states: states at which the derivatives are compared (k, y).
+
+    Returns:
+        Index of the entry that takes each place (y,), or None if the legs are not alike.
     """
     mechanism = engine.mechanism
     body_of = {
@@ -69,29 +75,36 @@ def leg_exchange(engine: BatchEngine, footing: FootContacts, states: ArrayLike) 
         here, there = (
             np.array(engine.compute_derivative(0.0, y.tolist())) for y in (state, state[source])
         )
-        if not np.allclose(here[source], there, rtol=SAME, atol=SAME * np.abs(here).max()):
+        if not np.allclose(
+            here[source],
+            there,
+            rtol=RELATIVE_TOLERANCE,
+            atol=RELATIVE_TOLERANCE * np.abs(here).max(),
+        ):
             return None
     return source
 
 
 def exchange_auxiliary(engine: BatchEngine, source: Ints, states: Floats) -> None:
-    """Complete the places (y,) that the legs exchange, which are known for values and speeds.
+    """Complete the permutation for auxiliary states, such as activations of muscles.
 
     Args:
-        engine: of the model.
-        source: changed where an auxiliary state does what another does when the legs have changed
-            parts.
-        states: at which to try (k, y).
+        engine: engine of the model.
+        source: permutation (y,), known for values and speeds; changed where an auxiliary state has
+            the
+            effect of another one after the exchange.
+        states: states at which the effects are compared (k, y).
     """
     first = 2 * len(engine.order)
     if first == engine.state.size:
         return
-    # Those that belong together have equal values where all have just started.
+    # At their start values, auxiliary states that belong together are equal, so that effects differ
+    # by the legs only.
     states = engine.state.restart_auxiliary(states)
     columns = [*source[:first], first, first + 1]
     before = np.stack([_compute_effects(engine, state)[:, columns] for state in states], axis=1)
     after = np.stack([_compute_effects(engine, state[source]) for state in states], axis=1)
-    tolerances = SAME * np.abs(before).max(axis=(0, 1))
+    tolerances = RELATIVE_TOLERANCE * np.abs(before).max(axis=(0, 1))
     for index, effects in enumerate(after):
         alike = np.flatnonzero((np.abs(before - effects) <= tolerances).all(axis=(1, 2)))
         if len(alike) and index not in alike:
@@ -99,61 +112,82 @@ def exchange_auxiliary(engine: BatchEngine, source: Ints, states: Floats) -> Non
 
 
 def _compute_effects(engine: BatchEngine, state: Floats) -> Floats:
-    """What each auxiliary state (z) does: by how much it changes the other rates (2n) and its own, and that rate."""
+    """Return the effect of each auxiliary state (z, 2n + 2).
+
+    It consists of the derivatives of all rates of coordinates and speeds, and of its own rate, by
+    the
+    auxiliary state, and of its own rate.
+    """
     first, here = 2 * len(engine.order), np.array(engine.compute_derivative(0.0, state.tolist()))
     rows = []
     for index in range(first, len(state)):
         moved = state.copy()
-        moved[index] += NUDGE
-        slope = (np.array(engine.compute_derivative(0.0, moved.tolist())) - here) / NUDGE
+        moved[index] += DIFFERENCE_STEP
+        slope = (np.array(engine.compute_derivative(0.0, moved.tolist())) - here) / DIFFERENCE_STEP
         rows.append([*slope[:first], slope[index], here[index]])
     return np.array(rows)
 
 
-def neutral_directions(engine: BatchEngine, states: ArrayLike) -> Floats:
-    """Directions (y, m) of the state in which the motion goes on unchanged, but for going that way; orthonormal.
+def find_neutral_directions(engine: BatchEngine, states: ArrayLike) -> Floats:
+    """Find the directions of the state that do not change the motion except for the motion along them.
 
-    A walker may be anywhere along an even slope; a body that hangs in its mass centre turns as fast
-    as it pleases. The derivative does not change in these directions or changes along one of them,
-    at all of the states.
+    A walker may be anywhere along an even slope, and a body that hangs in its mass centre may turn
+    at any
+    rate. The derivative of the state does not change in these directions, or changes along them
+    only, at
+    all of the given states.
 
     Args:
-        engine: of the model.
-        states: some that the walk goes through (k, y).
+        engine: engine of the model.
+        states: states of the walk (k, y).
+
+    Returns:
+        Orthonormal directions (y, m).
     """
-    found_slopes = [derivative_matrix(engine, state) for state in np.asarray(states, dtype=float)]
+    found_slopes = [
+        compute_derivative_matrix(engine, state) for state in np.asarray(states, dtype=float)
+    ]
     usual = float(np.median([uneven for _, uneven in found_slopes]))
-    slopes = [slope for slope, uneven in found_slopes if uneven <= UNEVEN * usual]
+    slopes = [slope for slope, uneven in found_slopes if uneven <= MAX_UNEVENNESS * usual]
     size = slopes[0].shape[0]
     result = np.zeros((size, 0))
+    # Start from directions that change no rate, then add those that change rates along known neutral
+    # directions only, until there are no more.
     while True:
         rest = np.eye(size) - result @ result.T
         rows = np.concatenate([rest @ slope for slope in slopes])
         sizes = np.linalg.norm(rows, axis=1)
-        rows = rows[sizes > SAME] / sizes[sizes > SAME, None]
-        # The triangle has the same singular values and right vectors, and is much smaller.
+        rows = rows[sizes > RELATIVE_TOLERANCE] / sizes[sizes > RELATIVE_TOLERANCE, None]
+        # The factor R of a QR decomposition has the same singular values and right singular vectors,
+        # and is much smaller.
         _, values, vectors = np.linalg.svd(np.linalg.qr(rows, mode="r"))
         values = np.concatenate((values, np.zeros(size - len(values))))
-        larger = vectors[values < SAME * values[0]].T
+        larger = vectors[values < RELATIVE_TOLERANCE * values[0]].T
         if larger.shape[1] <= result.shape[1]:
             return result
         result = larger
 
 
-def derivative_matrix(engine: BatchEngine, state: Floats) -> tuple[Floats, float]:
-    """Derivative (y, y) of the rate of change of the state by the state, and how even that is.
+def compute_derivative_matrix(engine: BatchEngine, state: Floats) -> tuple[Floats, float]:
+    """Differentiate the rates of the state by the state, with central differences.
 
-    Evenness: the part by which the differences to either side are unlike; much where a contact only
-        just touches.
+    Args:
+        engine: engine of the model.
+        state: state (y,).
+
+    Returns:
+        Matrix (y, y), and its unevenness: the relative difference between both one-sided
+        differences. It
+        is large where a contact just touches.
     """
     columns, uneven = [], []
     here = np.array(engine.compute_derivative(0.0, state.tolist()))
     for k in range(len(state)):
         ahead, back = state.copy(), state.copy()
-        ahead[k] += NUDGE
-        back[k] -= NUDGE
+        ahead[k] += DIFFERENCE_STEP
+        back[k] -= DIFFERENCE_STEP
         rates = [np.array(engine.compute_derivative(0.0, y.tolist())) for y in (ahead, back)]
-        columns.append((rates[0] - rates[1]) / (2.0 * NUDGE))
-        uneven.append((rates[0] - 2.0 * here + rates[1]) / NUDGE)
+        columns.append((rates[0] - rates[1]) / (2.0 * DIFFERENCE_STEP))
+        uneven.append((rates[0] - 2.0 * here + rates[1]) / DIFFERENCE_STEP)
     slope = np.array(columns).T
     return slope, float(np.linalg.norm(uneven) / np.linalg.norm(slope))

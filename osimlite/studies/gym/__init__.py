@@ -1,7 +1,7 @@
-"""Environments for learning: muscle-driven models as gymnasium's Env and VectorEnv.
+"""Reinforcement learning environments: muscle-driven models as gymnasium's `Env` and `VectorEnv`.
 
-``import osimlite.gym`` registers ``osimlite/Walk2D-v0``, ``osimlite/Jump-v0``, ``osimlite/Arm-v0``
-and ``osimlite/Model-v0``; gymnasium finds them by itself where osimlite is installed.
+`import osimlite.gym` registers `osimlite/Walk2D-v0`, `osimlite/Jump-v0`, `osimlite/Arm-v0` and
+`osimlite/Model-v0`. Where osimlite is installed, gymnasium finds them without this import.
 """
 
 from __future__ import annotations

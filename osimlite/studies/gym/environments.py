@@ -1,4 +1,4 @@
-"""Gymnasium's environments of a task: one copy, or many that are stepped together."""
+"""Environments of gymnasium for a task: one copy of the model, or many that are stepped together."""
 
 from __future__ import annotations
 
@@ -14,14 +14,27 @@ from osimlite.base.records import replace
 from osimlite.base.text import suggest_name, suggest_or_list
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.simulation.copies import Copies
-from osimlite.studies.gym.tasks import TASKS, Seen, Task, of_model
+from osimlite.studies.gym.tasks import TASKS, Observation, Task, make_task
 
-FAR = 1e6
-"""No observation is larger; what is not finite ends an episode."""
+OBSERVATION_LIMIT = 1e6
+"""Largest magnitude of an observation; infinite and undefined values become it, or 0."""
 
 
-class _Observed:
-    """Copies of the model of a task, what is seen of them, and how they begin."""
+class _ObservedCopies:
+    """Copies of the model of a task, with their observations and initial states.
+
+    Args:
+        task: task with its model.
+        count: number of copies w.
+
+    Attributes:
+        names: paths of the state variables, in the order of the state.
+        state_names: short names of the state variables, which observations and tasks use.
+        labels: short names of the observed state variables.
+        actions: space of actions of one copy.
+        observations: space of observations of one copy.
+        max_steps: number of steps of an episode.
+    """
 
     def __init__(self, task: Task, count: int) -> None:
         self.task, self.count = task, count
@@ -34,78 +47,103 @@ class _Observed:
             *(f"{info.path}/speed" for info in order),
             *simulation.state.paths,
         )
-        self.shown = [
+        self.state_names = [
             *(info.name for info in order),
             *(f"{info.name}/speed" for info in order),
             *("/".join(path.split("/")[-2:]) for path in simulation.state.paths),
         ]
         for name in task.hidden:
-            if name not in self.shown:
-                near = suggest_name(name, self.shown)
+            if name not in self.state_names:
+                near = suggest_name(name, self.state_names)
                 raise gymnasium.error.Error(
                     f"nothing is called '{name}' that could be hidden{near}"
                 )
-        self._visible = [k for k, name in enumerate(self.shown) if name not in task.hidden]
-        self.labels = tuple(self.shown[k] for k in self._visible)
+        self._visible = [k for k, name in enumerate(self.state_names) if name not in task.hidden]
+        self.labels = tuple(self.state_names[k] for k in self._visible)
         paths = self.copies.controls
         tree = simulation.model.tree()
         limits = [(tree.at(path).min_control, tree.at(path).max_control) for path in paths]
         low, high = self._limits = np.clip(
             np.array(limits, dtype=np.float32).reshape(-1, 2).T, -1.0, 1.0
         )
-        # What is below the least excitation is the least.
+        # Learners expect 0 to be a valid action; controls below the smallest excitation count as it.
         self.actions = gymnasium.spaces.Box(np.minimum(low, 0.0), high, dtype=np.float32)
-        self.observations = gymnasium.spaces.Box(-FAR, FAR, (len(self._visible),), dtype=np.float32)
-        self.most = round(task.seconds / task.step)
+        self.observations = gymnasium.spaces.Box(
+            -OBSERVATION_LIMIT, OBSERVATION_LIMIT, (len(self._visible),), dtype=np.float32
+        )
+        self.max_steps = round(task.seconds / task.step)
 
-    def begin(self, which: int, rng: np.random.Generator) -> None:
-        """Have a copy begin anew."""
+    def reset_copy(self, which: int, rng: np.random.Generator) -> None:
+        """Set a copy to an initial state of the task.
+
+        Args:
+            which: index of the copy.
+            rng: random generator for the initial state.
+        """
         start = self.copies.start
         if self.task.start is not None:
             start = self.task.start(start, self.names, rng)
         self.copies.set_states(which, start)
 
-    def seen(self, controls: Array) -> Seen:
+    def observe(self, controls: Array) -> Observation:
+        """Return the states of all copies by name, as rewards need them; `controls` are those of the
+        step (w, c).
+        """
         states = self.copies.states.copy()
-        return Seen(dict(zip(self.shown, states.T, strict=True)), controls, self.task.step)
-
-    def observed(self) -> Any:
-        """(w, o)."""
-        states = np.nan_to_num(
-            self.copies.states[:, self._visible], nan=0.0, posinf=FAR, neginf=-FAR
+        return Observation(
+            dict(zip(self.state_names, states.T, strict=True)), controls, self.task.step
         )
-        return np.clip(states, -FAR, FAR).astype(np.float32)
+
+    def flatten_observations(self) -> Any:
+        """Return the observations of all copies as finite numbers (w, o)."""
+        states = np.nan_to_num(
+            self.copies.states[:, self._visible],
+            nan=0.0,
+            posinf=OBSERVATION_LIMIT,
+            neginf=-OBSERVATION_LIMIT,
+        )
+        return np.clip(states, -OBSERVATION_LIMIT, OBSERVATION_LIMIT).astype(np.float32)
 
     def step(self, actions: Any) -> tuple[Array, Any]:
-        """Rewards (w,) and which copies have failed (w,)."""
-        given = np.asarray(actions, dtype=float)
-        if given.shape != (wanted := (self.count, len(self.copies.controls))):
-            raise gymnasium.error.InvalidAction(
-                f"actions have the shape {wanted}, not {given.shape}"
-            )
-        controls = np.clip(given, *self._limits)
-        before = self.seen(controls)
-        going = self.copies.step_all(controls)
-        after = self.seen(controls)
-        with np.errstate(all="ignore"):
-            rewards = np.where(going, self.task.reward(before, after), 0.0)
-        return rewards, ~going | self.task.is_over(after)
+        """Hold controls for a step.
 
-    def picture(self, which: int = 0) -> Any:
-        """A copy as an image (h, w, 3)."""
-        from osimlite.studies.gym.pictures import picture_of
+        Args:
+            actions: controls (w, c), which are clipped to their bounds.
+
+        Returns:
+            Rewards (w,), and whether each copy has failed (w,).
+        """
+        values = np.asarray(actions, dtype=float)
+        expected = self.count, len(self.copies.controls)
+        if values.shape != expected:
+            raise gymnasium.error.InvalidAction(
+                f"actions have the shape {expected}, not {values.shape}"
+            )
+        controls = np.clip(values, *self._limits)
+        before = self.observe(controls)
+        succeeded = self.copies.step_all(controls)
+        after = self.observe(controls)
+        # States of a copy whose integration failed may be undefined; its reward is 0.
+        with np.errstate(all="ignore"):
+            rewards = np.where(succeeded, self.task.reward(before, after), 0.0)
+        return rewards, ~succeeded | self.task.is_over(after)
+
+    def draw_image(self, which: int = 0) -> Any:
+        """Return the image of a copy (height, width, 3)."""
+        from osimlite.studies.gym.pictures import draw_pose
 
         simulation = self.copies.simulation
-        return picture_of(
+        return draw_pose(
             simulation, np.array(simulation.state.values(self.copies.states[which].tolist()))
         )
 
 
 def _resolve_task(
-    task: Task | Callable[[], Task] | None, model: Any, reward: Any, choices: dict[str, Any]
+    task: Task | Callable[[], Task] | None, model: Any, reward: Any, options: dict[str, Any]
 ) -> Task:
+    """Return the task that the arguments of an environment describe."""
     known = [field.name for field in fields(Task) if field.name not in ("model", "reward")]
-    for name in choices:
+    for name in options:
         if name not in known:
             raise gymnasium.error.Error(f"a task has no '{name}'{suggest_or_list(name, known)}")
     if task is not None:
@@ -114,10 +152,10 @@ def _resolve_task(
                 "this environment has its model; take osimlite/Model-v0 for another"
             )
         made = task if isinstance(task, Task) else task()
-        return replace(made, **choices, **({} if reward is None else {"reward": reward}))
+        return replace(made, **options, **({} if reward is None else {"reward": reward}))
     if model is None or reward is None:
         raise gymnasium.error.Error("give a task, or a model and a reward(before, after)")
-    return of_model(model, reward, **choices)
+    return make_task(model, reward, **options)
 
 
 def _check_render_mode(mode: str | None) -> str | None:
@@ -127,19 +165,23 @@ def _check_render_mode(mode: str | None) -> str | None:
 
 
 class MuscleEnv(gymnasium.Env[Any, Any]):
-    """One copy of a model that is to learn something.
+    """Environment with one copy of a model.
+
+    Observations are values of coordinates (rad or m), generalized speeds, and states of muscles,
+    named by
+    `labels`. Actions are the controls of the actuators, named by `controls`.
 
     Args:
-        task: what, or the function that makes it.
-        model: instead, a model or its file, with `reward`, a function of what was seen before and
-            after a step (:class:`osimlite.studies.gym.tasks.Seen`), and attributes of
-            :class:`osimlite.studies.gym.tasks.Task` as `choices`.
-        reward: as said.
+        task: task, or a function that returns it.
+        model: instead of a task, a model or its file.
+        reward: with `model`, function of the observations before and after a step
+            (:class:`osimlite.studies.gym.tasks.Observation`) that returns rewards (w,).
         render_mode: "rgb_array" or None.
-        choices: as said.
+        options: further attributes of :class:`osimlite.studies.gym.tasks.Task`.
 
-    Observations are the values of coordinates (rad, m), generalized speeds, and states of muscles,
-    named by `labels`; actions are the controls of the actuators, named by `controls`.
+    Attributes:
+        labels: names of the observations.
+        controls: paths of the controls.
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 100}  # noqa: RUF012 - as gymnasium has it
@@ -151,9 +193,9 @@ class MuscleEnv(gymnasium.Env[Any, Any]):
         model: Any = None,
         reward: Any = None,
         render_mode: str | None = None,
-        **choices: Any,
+        **options: Any,
     ) -> None:
-        self._all = _Observed(_resolve_task(task, model, reward, choices), 1)
+        self._all = _ObservedCopies(_resolve_task(task, model, reward, options), 1)
         self.render_mode = _check_render_mode(render_mode)
         self.observation_space, self.action_space = self._all.observations, self._all.actions
         self.labels, self.controls = self._all.labels, self._all.copies.controls
@@ -162,37 +204,67 @@ class MuscleEnv(gymnasium.Env[Any, Any]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
-        """Begin an episode."""
+        """Start an episode.
+
+        Args:
+            seed: seed of the random numbers; None to continue the sequence.
+            options: unused; gymnasium requires it.
+
+        Returns:
+            Observation (o,), and an empty dictionary.
+        """
         super().reset(seed=seed)
-        self._all.begin(0, self.np_random)
+        self._all.reset_copy(0, self.np_random)
         self._steps = 0
-        return self._all.observed()[0], {}
+        return self._all.flatten_observations()[0], {}
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
-        """Hold controls (c,) for a step."""
+        """Hold controls for a control step.
+
+        Args:
+            action: controls (c,).
+
+        Returns:
+            Observation (o,), reward, whether the model has failed, whether the time of the episode
+            is over,
+            and an empty dictionary.
+        """
         rewards, over = self._all.step(np.asarray(action)[None])
         self._steps += 1
         return (
-            self._all.observed()[0],
+            self._all.flatten_observations()[0],
             float(rewards[0]),
             bool(over[0]),
-            self._steps >= self._all.most,
+            self._steps >= self._all.max_steps,
             {},
         )
 
     def render(self) -> Any:
-        """The pose as an image (h, w, 3); None without a mode."""
-        return self._all.picture() if self.render_mode == "rgb_array" else None
+        """Return the pose as an image (height, width, 3); None without a render mode."""
+        return self._all.draw_image() if self.render_mode == "rgb_array" else None
 
     def close(self) -> None:
-        """Free what the copy holds."""
+        """Release the compiled engine."""
         self._all.copies.close()
 
 
 class MuscleVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
-    """Many copies of a model, stepped in one call of machine code on all cores; each as a `MuscleEnv` would be.
+    """Environment with many copies of a model, each like a `MuscleEnv`, stepped in one call on all
+    cores.
 
-    Copies whose episode is over begin anew with the next step, whose action is not used.
+    A copy whose episode is over starts a new one in the next step, which ignores its action.
+
+    Args:
+        num_envs: number of copies w.
+        task: task, or a function that returns it.
+        model: instead of a task, a model or its file.
+        reward: with `model`, function of the observations before and after a step.
+        render_mode: "rgb_array" or None.
+        options: further attributes of :class:`osimlite.studies.gym.tasks.Task`.
+
+    Attributes:
+        labels: names of the observations.
+        controls: paths of the controls.
     """
 
     metadata = {  # noqa: RUF012 - as gymnasium has it
@@ -209,10 +281,10 @@ class MuscleVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
         model: Any = None,
         reward: Any = None,
         render_mode: str | None = None,
-        **choices: Any,
+        **options: Any,
     ) -> None:
         self.num_envs, self.render_mode = num_envs, _check_render_mode(render_mode)
-        self._all = _Observed(_resolve_task(task, model, reward, choices), num_envs)
+        self._all = _ObservedCopies(_resolve_task(task, model, reward, options), num_envs)
         self.single_observation_space, self.single_action_space = (
             self._all.observations,
             self._all.actions,
@@ -228,7 +300,17 @@ class MuscleVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
     def reset(
         self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
-        """Begin an episode of each copy; of a seed the k-th has that plus k."""
+        """Start an episode of each copy.
+
+        Args:
+            seed: seed of the first copy, the k-th has this plus k; or a list of seeds; None to
+                continue the
+                sequences.
+            options: unused; gymnasium requires it.
+
+        Returns:
+            Observations (w, o), and an empty dictionary.
+        """
         if seed is not None or not self._random:
             seeds = (
                 seed
@@ -237,51 +319,63 @@ class MuscleVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
             )
             self._random = [gymnasium.utils.seeding.np_random(each)[0] for each in seeds]
         for k, rng in enumerate(self._random):
-            self._all.begin(k, rng)
+            self._all.reset_copy(k, rng)
         self._steps[:], self._ended[:] = 0, False
-        return self._all.observed(), {}
+        return self._all.flatten_observations(), {}
 
     def step(self, actions: Any) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
-        """Hold controls (w, c) for a step."""
+        """Hold controls for a control step.
+
+        Args:
+            actions: controls (w, c).
+
+        Returns:
+            Observations (w, o), rewards (w,), whether each copy has failed (w,), whether the time
+            of its
+            episode is over (w,), and an empty dictionary.
+        """
         again = np.flatnonzero(self._ended)
-        kept = {int(k): self._initial_state(int(k)) for k in again}
+        # All copies are stepped, then those with a new episode are set to their initial state.
+        initial = {int(k): self._reset_state(int(k)) for k in again}
         rewards, over = self._all.step(actions)
-        for k, state in kept.items():
+        for k, state in initial.items():
             self._all.copies.set_states(k, state)
         self._steps += 1
         self._steps[again], rewards[again], over[again] = 0, 0.0, False
-        late = self._steps >= self._all.most
+        late = self._steps >= self._all.max_steps
         self._ended = over | late
-        return self._all.observed(), rewards, over, late, {}
+        return self._all.flatten_observations(), rewards, over, late, {}
 
-    def _initial_state(self, k: int) -> Array:
-        """The state in which a copy begins anew."""
-        self._all.begin(k, self._random[k])
+    def _reset_state(self, k: int) -> Array:
+        """Return a new initial state of a copy, after drawing it from the random generator of this
+        copy.
+        """
+        self._all.reset_copy(k, self._random[k])
         return self._all.copies.states[k].copy()
 
     def render(self) -> Any:
-        """The poses of all copies as images; None without a mode."""
+        """Return the poses of all copies as images (height, width, 3); None without a render mode."""
         return (
-            tuple(self._all.picture(k) for k in range(self.num_envs))
+            tuple(self._all.draw_image(k) for k in range(self.num_envs))
             if self.render_mode == "rgb_array"
             else None
         )
 
     def close_extras(self, **kwargs: Any) -> None:
-        """Free what the copies hold."""
+        """Release the compiled engines."""
         self._all.copies.close()
 
 
 def _make_single(name: str) -> Callable[..., MuscleEnv]:
-    return lambda **choices: MuscleEnv(TASKS[name], **choices)
+    return lambda **options: MuscleEnv(TASKS[name], **options)
 
 
 def _make_vector(name: str) -> Callable[..., MuscleVectorEnv]:
-    return lambda num_envs=1, **choices: MuscleVectorEnv(num_envs, TASKS[name], **choices)
+    return lambda num_envs=1, **options: MuscleVectorEnv(num_envs, TASKS[name], **options)
 
 
 def register_all() -> None:
-    """Have gymnasium know the environments."""
+    """Register the environments with gymnasium."""
     for name in TASKS:
         if f"osimlite/{name}" not in gymnasium.registry:
             gymnasium.register(

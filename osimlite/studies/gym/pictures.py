@@ -1,4 +1,4 @@
-"""A copy as an image: from the side, the camera moves along."""
+"""Images of the pose of a model, seen from the side by a camera that moves along."""
 
 from __future__ import annotations
 
@@ -12,17 +12,27 @@ from osimlite.view.collect import build_scene
 from osimlite.view.picture import Camera, Style, draw_scene
 from osimlite.view.scene import Scene
 
-SIZE = 480, 360
-FRAME = np.array([[-1.1, -1.1, -0.5], [1.1, 1.1, 0.5]])
-"""What is seen around the first body, m."""
+IMAGE_SIZE = 480, 360
+"""Width and height of an image (pixels)."""
+VIEW_BOX_M = np.array([[-1.1, -1.1, -0.5], [1.1, 1.1, 0.5]])
+"""Opposite corners of the box around the first body that the image shows (m)."""
 
 
-def picture_of(simulation: Simulation, q: Array, size: tuple[int, int] = SIZE) -> Any:
-    """A pose (n,) as pixels (h, w, 3)."""
+def draw_pose(simulation: Simulation, q: Array, size: tuple[int, int] = IMAGE_SIZE) -> Any:
+    """Draw a pose.
+
+    Args:
+        simulation: simulation with the model; it caches the geometry for later images.
+        q: coordinates (n,).
+        size: width and height (pixels).
+
+    Returns:
+        Pixels (height, width, 3).
+    """
     scene: Scene = simulation.__dict__.setdefault(
         "_shown", build_scene(simulation.model, simulation.mechanism)
     )
     pose = simulation.mechanism.at(q)
-    points = pose.origins[0] + FRAME
+    points = pose.origins[0] + VIEW_BOX_M
     camera = Camera.around(points, scene.up, np.array([0.15, 0.1, 1.0]), size[0] / size[1])
     return np.asarray(draw_scene(scene, q, camera, size, (), Style(scene.floor(q))).convert("RGB"))

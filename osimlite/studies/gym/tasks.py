@@ -1,4 +1,4 @@
-"""What is to be learnt: a model, what is seen of it, what is rewarded, when it is over. One declaration for each."""
+"""Tasks for reinforcement learning, one declaration each: model, observations, reward and termination."""
 
 from __future__ import annotations
 
@@ -19,14 +19,20 @@ from osimlite.simulation.options import IntegrationOptions
 
 
 @dataclass(frozen=True, eq=False)
-class Seen:
-    """All copies after a step, by names: coordinates ("knee_angle_r"), speeds
-    ("knee_angle_r/speed"), states of muscles ("soleus_r/activation"), each (w,).
+class Observation:
+    """States of all copies after a step, by name.
+
+    Attributes:
+        columns: values of coordinates ("knee_angle_r", rad or m), speeds ("knee_angle_r/speed") and
+            states
+            of muscles ("soleus_r/activation"), each (w,).
+        controls: controls that were held in the step (w, c).
+        step: duration of the step (s).
     """
 
     columns: dict[str, Array]
-    controls: Array  # that were held (w, c)
-    step: float  # s
+    controls: Array
+    step: float
 
     def __getitem__(self, name: str) -> Array:
         return self.columns[name]
@@ -34,33 +40,36 @@ class Seen:
 
 @dataclass(frozen=True, eq=False)
 class Task(IntegrationOptions):
-    """A task for learners.
+    """Task of a learner.
 
     Attributes:
-        model: makes what moves.
-        reward: of a step (w,), given what was seen before and after it.
-        is_over: which copies (w,) have failed.
-        hidden: coordinates whose values are not observed, such as how far a walker has come.
-        start: makes the state of a copy (y,) from the default one, the names of the states and a
-            random generator.
-        seconds: of an episode.
-        step: for which controls are held, s.
+        model: function that returns the model.
+        reward: function of the observations before and after a step that returns rewards (w,).
+        is_over: function of an observation that returns which copies have failed (w,).
+        hidden: coordinates that are not observed, for example the position of a walker.
+        start: function that returns an initial state (y,) from the default one, the paths of the
+            states
+            and a random generator; None for the default state.
+        seconds: duration of an episode (s).
+        step: duration of a control step (s).
 
-    Besides, options of the integration, such as `accuracy` and `integrator`.
+    Options of the integration, such as `accuracy` and `integrator`, are attributes too.
     """
 
     model: Callable[[], Model]
-    reward: Callable[[Seen, Seen], Array]
-    is_over: Callable[[Seen], NDArray[np.bool_]]
+    reward: Callable[[Observation, Observation], Array]
+    is_over: Callable[[Observation], NDArray[np.bool_]]
     hidden: tuple[str, ...] = ()
     start: Callable[[Array, tuple[str, ...], np.random.Generator], Array] | None = None
     seconds: float = 10.0
     step: float = 0.01
 
 
-CONTACT = "euler2"
-"""The integrator where feet touch the ground: contact sets the steps, whose order does not matter then."""
-STAND = {
+CONTACT_INTEGRATOR = "euler2"
+"""Integrator for models with ground contact: contact limits the step size, so that a higher order does
+not pay.
+"""
+STANDING_POSE = {
     "pelvis_tilt": -0.05,
     "hip_flexion_r": 0.25,
     "hip_flexion_l": -0.1,
@@ -69,22 +78,23 @@ STAND = {
     "ankle_angle_r": -0.05,
     "ankle_angle_l": 0.1,
 }
-"""A pose in which one can begin to walk, rad."""
-HEIGHT = 0.93
-"""Of the hips then, m."""
+"""Pose in which a walk can start (rad)."""
+HIP_HEIGHT_M = 0.93
+"""Height of the hips in this pose (m)."""
 
 
 def _build_human() -> Model:
+    """Return the jumper in `STANDING_POSE`, without controllers."""
     model = jumper(driven=False)
     for coordinate in model.components(Coordinate):
-        coordinate.default_value = STAND.get(coordinate.name, coordinate.default_value)
+        coordinate.default_value = STANDING_POSE.get(coordinate.name, coordinate.default_value)
         if coordinate.name == "pelvis_ty":
-            coordinate.default_value = HEIGHT
+            coordinate.default_value = HIP_HEIGHT_M
     return model
 
 
 def _perturb_state(scale: float) -> Callable[[Array, tuple[str, ...], np.random.Generator], Array]:
-    """Values and speeds that are a little off."""
+    """Return a function that adds uniform random numbers up to `scale` to all values and speeds."""
 
     def start(y: Array, names: tuple[str, ...], rng: np.random.Generator) -> Array:
         moving = np.array([name.endswith(("/value", "/speed")) for name in names])
@@ -95,19 +105,20 @@ def _perturb_state(scale: float) -> Callable[[Array, tuple[str, ...], np.random.
     return start
 
 
-def _compute_effort(seen: Seen) -> Array:
-    return np.mean(seen.controls**2, axis=1)
+def _compute_effort(observation: Observation) -> Array:
+    """Return the mean squared control of each copy (w,)."""
+    return np.mean(observation.controls**2, axis=1)
 
 
 def walk2d() -> Task:
-    """A human with sixteen muscles, who is to walk forward at 1.2 m/s and not to fall."""
+    """Return the task of a human with 16 muscles to walk forward at 1.2 m/s without a fall."""
 
-    def reward(before: Seen, after: Seen) -> Array:
+    def reward(before: Observation, after: Observation) -> Array:
         speed = (after["pelvis_tx"] - before["pelvis_tx"]) / after.step
         return np.exp(-4.0 * (speed - 1.2) ** 2) + 0.2 - 0.1 * _compute_effort(after)
 
-    def is_over(seen: Seen) -> NDArray[np.bool_]:
-        return (seen["pelvis_ty"] < 0.7) | (np.abs(seen["pelvis_tilt"]) > 0.8)
+    def is_over(observation: Observation) -> NDArray[np.bool_]:
+        return (observation["pelvis_ty"] < 0.7) | (np.abs(observation["pelvis_tilt"]) > 0.8)
 
     return Task(
         _build_human,
@@ -115,18 +126,18 @@ def walk2d() -> Task:
         is_over,
         hidden=("pelvis_tx",),
         start=_perturb_state(0.01),
-        integrator=CONTACT,
+        integrator=CONTACT_INTEGRATOR,
     )
 
 
 def jump() -> Task:
-    """The same human in a squat, who is to jump as high as can be in a second."""
+    """Return the task of the same human in a squat to jump as high as possible within one second."""
 
-    def reward(before: Seen, after: Seen) -> Array:
+    def reward(before: Observation, after: Observation) -> Array:
         return 10.0 * (after["pelvis_ty"] - before["pelvis_ty"]) - 0.01 * _compute_effort(after)
 
-    def is_over(seen: Seen) -> NDArray[np.bool_]:
-        return (seen["pelvis_ty"] < 0.4) | (np.abs(seen["pelvis_tilt"]) > 1.5)
+    def is_over(observation: Observation) -> NDArray[np.bool_]:
+        return (observation["pelvis_ty"] < 0.4) | (np.abs(observation["pelvis_tilt"]) > 1.5)
 
     return Task(
         lambda: jumper(driven=False),
@@ -135,38 +146,53 @@ def jump() -> Task:
         hidden=("pelvis_tx",),
         start=_perturb_state(0.002),
         seconds=1.0,
-        integrator=CONTACT,
+        integrator=CONTACT_INTEGRATOR,
     )
 
 
-WANTED = 1.2
-"""The angle at which the elbow is to be held, rad."""
+TARGET_ANGLE_RAD = 1.2
+"""Angle at which the elbow is to be held (rad)."""
 
 
 def arm() -> Task:
-    """A forearm with a weight that is to be held up at 1.2 rad."""
+    """Return the task of a forearm with a weight to hold the elbow at 1.2 rad."""
 
-    def reward(before: Seen, after: Seen) -> Array:
-        return np.exp(-10.0 * (after["elbow"] - WANTED) ** 2) - 0.05 * _compute_effort(after)
+    def reward(before: Observation, after: Observation) -> Array:
+        return np.exp(-10.0 * (after["elbow"] - TARGET_ANGLE_RAD) ** 2) - 0.05 * _compute_effort(
+            after
+        )
 
-    def is_over(seen: Seen) -> NDArray[np.bool_]:
-        return np.abs(seen["elbow"]) > 3.0
+    def is_over(observation: Observation) -> NDArray[np.bool_]:
+        return np.abs(observation["elbow"]) > 3.0
 
     return Task(arm_model, reward, is_over, start=_perturb_state(0.1), seconds=2.0)
 
 
 TASKS: dict[str, Callable[[], Task]] = {"Walk2D-v0": walk2d, "Jump-v0": jump, "Arm-v0": arm}
-"""By the names under which gymnasium knows them, behind ``osimlite/``."""
+"""Tasks by the names under which gymnasium knows them, after `osimlite/`."""
 
 
-def of_model(model: Any, reward: Callable[[Seen, Seen], Array], **choices: Any) -> Task:
-    """A task with any model, or its file; the episode is over only at its end unless `is_over` is given."""
+def make_task(
+    model: Any, reward: Callable[[Observation, Observation], Array], **options: Any
+) -> Task:
+    """Return a task with any model, whose episodes end by time only unless `is_over` is set.
+
+    Args:
+        model: model, or its file.
+        reward: function of the observations before and after a step that returns rewards (w,).
+        options: further attributes of the task.
+
+    Raises:
+        ModelError: the model has no actuators.
+    """
     from osimlite.io.document.reader import read
 
-    given = read(model) if not isinstance(model, Model) else model
-    if not any(isinstance(item, Actuator) for item in given.components()):
+    template = read(model) if not isinstance(model, Model) else model
+    if not any(isinstance(item, Actuator) for item in template.components()):
         from osimlite.errors import ModelError
 
-        raise ModelError(f"'{given.name}' has no actuators that could be learnt to use")
-    choices.setdefault("is_over", lambda seen: np.zeros(len(seen.controls), dtype=bool))
-    return Task(lambda: given.copy_deep(), reward, **choices)
+        raise ModelError(f"'{template.name}' has no actuators that could be learnt to use")
+    options.setdefault(
+        "is_over", lambda observation: np.zeros(len(observation.controls), dtype=bool)
+    )
+    return Task(lambda: template.copy_deep(), reward, **options)

@@ -1,8 +1,10 @@
-"""Reflexes of muscles and coordinates, on while a leg is in some state: SCONE's
-GaitStateController; functions of time; noise.
+"""Controllers of SCONE as data of the kernels: reflexes, states of legs, functions of time, noise.
 
-All reflexes are sums of terms ``gain * (sensor - offset)`` with a delay, functions of time sums of
-terms ``gain * (t - start)**power``, which the kernels add.
+Supported are GaitStateController, ReflexController, FeedForwardController, CompositeController and
+NoiseController. The kernels add terms `gain * (sensor - offset)` with a delay, which may depend on
+the
+state of a leg, and terms `gain * (t - start)**power`; see
+:mod:`osimlite.mechanics.kernels.reflexes`.
 """
 
 from __future__ import annotations
@@ -20,25 +22,51 @@ from osimlite.mechanics.kernels.walks import LEGS
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.studies.reflexes.parameters import Parameters
 from osimlite.studies.reflexes.settings import Node, matches_pattern
-from osimlite.studies.reflexes.sources import KINDS, SPEED, VALUE, Kind, Source, load
-from osimlite.studies.reflexes.walkers import SIDES, Felt
+from osimlite.studies.reflexes.sources import (
+    REFLEX_TYPES,
+    SPEED_SOURCE,
+    VALUE_SOURCE,
+    ReflexType,
+    Source,
+    make_load_source,
+)
+from osimlite.studies.reflexes.walkers import SIDES, SensedModel
 
-STATES = "EarlyStance", "LateStance", "Liftoff", "Swing", "Landing"
-COMPOSITE, FEED_FORWARD, NOISE = "CompositeController", "FeedForwardController", "NoiseController"
+LEG_STATES = "EarlyStance", "LateStance", "Liftoff", "Swing", "Landing"
+"""States of a leg by SCONE's names, in the order of the numbers that the kernels give them."""
+ALL_LEG_STATES = (1 << len(LEG_STATES)) - 1
+"""Bit mask of all states of a leg: a term that is always active."""
+COMPOSITE = "CompositeController"
+"""Controller that adds others."""
+FEED_FORWARD = "FeedForwardController"
+"""Controller of functions of time."""
+NOISE = "NoiseController"
+"""Controller of noise, which is supported within a CompositeController only."""
 CONTROLLERS = "GaitStateController", "ReflexController", FEED_FORWARD, COMPOSITE
-"""What is done here, and besides noise within a CompositeController."""
-CONDITIONAL, OTHER = "ConditionalMuscleReflex", "_o"
-"""A kind of reflexes that have a gate; the end of names of what is on the other side."""
-LONGEST = 10.0
-"""Delay, s."""
-NEVER = -1.0
-"""A threshold that has no effect."""
-LARGEST_SEED = 10**15
-"""Seeds below are exact as numbers of a file, and in 64 bits."""
+"""Controllers that a scenario may have; all but the last may be parts of the last."""
+CONDITIONAL = "ConditionalMuscleReflex"
+"""Type of reflexes that a range of a coordinate gates."""
+OTHER_SIDE_SUFFIX = "_o"
+"""Ending of names for the leg opposite to that of the reflex."""
+MAX_DELAY_S = 10.0
+"""Longest delay (s), which bounds the history of the sensors."""
+DISABLED_THRESHOLD = -1.0
+"""Liftoff threshold in leg lengths that has no effect: no foot is a leg length behind the pelvis."""
+MAX_NOISE_SEED = 10**15
+"""Seeds are below this number, so that they are exact as floating-point numbers and in 64 bits."""
 
 
-class Part(NamedTuple):
-    """A term of a reflex, or a gate: a range of a coordinate, beyond which terms rest while it moves further."""
+class TermOrGate(NamedTuple):
+    """Term of a controller, or a gate: a range of a coordinate beyond which terms rest while it moves
+    away.
+
+    Attributes:
+        ints: integers for the kernels: `TERM`, or for a gate the sensors of the coordinate and its
+            speed.
+        delay: delay (w,) (s); of a term without a sensor the time at which it starts.
+        first: gain of a term, or smallest value of a gate (w,).
+        second: offset of a term, or largest value of a gate (w,).
+    """
 
     ints: tuple[int, ...]  # as the kernels have them
     delay: Array  # s, as the next of each candidate (w,)
@@ -46,41 +74,47 @@ class Part(NamedTuple):
     second: Array  # offset, or largest value
 
 
-Powers = Iterable[tuple[int, Array, Array]]
-"""Terms that a function of time is the sum of: power, and of each candidate start (s) and gain (w,)."""
+PowerTerms = Iterable[tuple[int, Array, Array]]
+"""Terms whose sum is a function of time: power, and per candidate start (w,) (s) and gain (w,)."""
 
 
 def _read_integer(node: Node, key: str, least: int) -> int:
     number = node.number(key)
-    if number not in range(least, MOST_POINTS + 1):
+    if number not in range(least, MAX_CONTROL_POINTS + 1):
         raise node.error(
-            f"'{key}' must be a whole number from {least} to {MOST_POINTS}, not {number:g}"
+            f"'{key}' must be a whole number from {least} to {MAX_CONTROL_POINTS}, not {number:g}"
         )
     return int(number)
 
 
 def _read_control_points(node: Node, parameters: Parameters, before: str) -> tuple[Array, Array]:
-    """Times (n, w) and values of the control points of a function."""
+    """Return times (n, w) (s) and values (n, w) of the control points of a function."""
     count = _read_integer(node, "control_points", 1)
     node.text("control_point_y")
     if node.get("control_point_dt") is None and count > 1:
         raise node.error("several control points need 'control_point_dt'")
-    values = [parameters.of(node, "control_point_y", 0.0, f"{before}Y{k}") for k in range(count)]
+    values = [
+        parameters.get_number(node, "control_point_y", 0.0, f"{before}Y{k}") for k in range(count)
+    ]
     spans = [
-        parameters.of(node, "control_point_dt", 0.0, f"{before}DT{k}") for k in range(count - 1)
+        parameters.get_number(node, "control_point_dt", 0.0, f"{before}DT{k}")
+        for k in range(count - 1)
     ]
     if np.any(np.array(spans) <= 0.0):
         raise node.error("'control_point_dt' must be positive")
     return np.cumsum([np.zeros_like(values[0]), *spans], axis=0), np.array(values)
 
 
-def _make_constants(node: Node, parameters: Parameters, before: str) -> Powers:
+def _read_piecewise_constant(node: Node, parameters: Parameters, before: str) -> PowerTerms:
     times, values = _read_control_points(node, parameters, before)
     return [(0, *each) for each in zip(times, np.diff(values, axis=0, prepend=0.0), strict=True)]
 
 
-def _make_lines(node: Node, parameters: Parameters, before: str) -> Powers:
-    """The last goes on, unless it is flat there."""
+def _read_piecewise_linear(node: Node, parameters: Parameters, before: str) -> PowerTerms:
+    """Return a broken line as a constant and changes of slope.
+
+    After the last point the last slope continues, unless `flat_extrapolation` is set.
+    """
     times, values = _read_control_points(node, parameters, before)
     slopes = np.diff(values, axis=0) / np.diff(times, axis=0)
     ends = [np.zeros_like(values[:1])] if node.flag("flat_extrapolation", False) else []
@@ -88,69 +122,73 @@ def _make_lines(node: Node, parameters: Parameters, before: str) -> Powers:
     return [(0, times[0], values[0]), *((1, *each) for each in zip(times, bends, strict=False))]
 
 
-def _read_polynomial(node: Node, parameters: Parameters, before: str) -> Powers:
+def _read_polynomial(node: Node, parameters: Parameters, before: str) -> PowerTerms:
     degree = _read_integer(node, "degree" if node.get("order") is None else "order", 0)
     for k in range(degree + 1):
         node.text(f"coefficient{k}")
     gains = [
-        parameters.of(node, f"coefficient{k}", 0.0, f"{before}C{k}") for k in range(degree + 1)
+        parameters.get_number(node, f"coefficient{k}", 0.0, f"{before}C{k}")
+        for k in range(degree + 1)
     ]
     return [(k, np.zeros_like(gain), gain) for k, gain in enumerate(gains)]
 
 
-MOST_POINTS = 99
-FUNCTIONS: dict[str, Callable[[Node, Parameters, str], Powers]] = {
-    "PieceWiseConstant": _make_constants,
-    "PieceWiseLinear": _make_lines,
+MAX_CONTROL_POINTS = 99
+"""Most control points of a function, and highest degree of a polynomial."""
+TIME_FUNCTIONS: dict[str, Callable[[Node, Parameters, str], PowerTerms]] = {
+    "PieceWiseConstant": _read_piecewise_constant,
+    "PieceWiseLinear": _read_piecewise_linear,
     "Polynomial": _read_polynomial,
 }
-"""Of time, by the names that scenarios have for them."""
+"""Readers of the supported functions of time, by SCONE's names."""
 
 
 class Reflexes:
-    """Reflexes whose legs are in one of five states (GaitStateController), reflexes alone, functions of time, noise.
+    """Controller of a scenario with its parts, compiled for a number of candidates.
 
     Args:
-        node: of the controller.
-        kind: its class.
-        walkers: that it moves.
-        parameters: of the candidates.
+        node: node of the controller.
+        kind: class of the controller, from `CONTROLLERS`.
+        walkers: model with its actuators, legs and sensors.
+        parameters: values of the parameters of all candidates.
 
     Attributes:
-        terms: of all reflexes.
-        sources: what they feel, and the numbers of the sensors for it.
+        terms: terms of all parts.
+        sources: sensors that the terms use, with their indices.
 
     Raises:
-        DocumentError: it has a part that is not done here; its name and line are told.
+        DocumentError: the controller has a part that is not supported; the error has its name and
+            line.
     """
 
-    def __init__(self, node: Node, kind: str, walkers: Felt, parameters: Parameters) -> None:
+    def __init__(self, node: Node, kind: str, walkers: SensedModel, parameters: Parameters) -> None:
         self.walkers = walkers
-        self.terms: list[Part] = []
+        self.terms: list[TermOrGate] = []
         self.sources: dict[Source, int] = {}
-        self._gates: list[Part] = []
-        self._limits, self._swings_from_stance = np.zeros((walkers.count, LIMITS.HEAD)), False
-        self._has_states = self._is_noisy = False
+        self._gates: list[TermOrGate] = []
+        self._limits = np.zeros((walkers.count, LIMITS.HEAD))
+        self._swings_from_stance = False
+        self._has_states = False
+        self._is_noisy = False
         parts = [(kind, node)]
         if kind == COMPOSITE:
-            parts = [*node.all_of(*CONTROLLERS[:-1]), *node.all_of(NOISE)]
-            node.expect_all_asked(f"a {COMPOSITE}", (*CONTROLLERS[:-1], NOISE))
+            parts = [*node.select_all(*CONTROLLERS[:-1]), *node.select_all(NOISE)]
+            node.refuse_unread_parts(f"a {COMPOSITE}", (*CONTROLLERS[:-1], NOISE))
+        # The kernels expect the loads of the legs as the first two sensors.
         if any(name == "GaitStateController" for name, _ in parts):
             walkers.expect_legs()
             for leg in range(len(SIDES)):
-                self._sensor(load(walkers, leg))
+                self._add_sensor(make_load_source(walkers, leg))
         for name, part in parts:
             if name == NOISE:
                 self._read_noise(part)
             elif name == FEED_FORWARD:
                 self._read_functions(part, parameters)
             elif name == "ReflexController":
-                self.symmetric, self._is_sided = (
-                    part.flag("symmetric", False),
-                    part.flag("dual_sided", True),
-                )
+                self.symmetric = part.flag("symmetric", False)
+                self._is_sided = part.flag("dual_sided", True)
                 for leg in (0, 1) if self._is_sided else (0,):
-                    self._add_reflexes(part, parameters, "", leg, (1 << len(STATES)) - 1)
+                    self._add_reflexes(part, parameters, "", leg, ALL_LEG_STATES)
             elif self._has_states:
                 raise part.error(
                     "legs are in the states of one GaitStateController, and this is another one"
@@ -160,36 +198,40 @@ class Reflexes:
                 self._read_states(part, parameters)
 
     def _read_noise(self, node: Node) -> None:
-        """SCONE's noise of the controls; that of the sensors is ours."""
+        """Read the noise of controls, as in SCONE, and of sensors, which is an addition of ours."""
         if self._is_noisy:
             raise node.error(f"there is a {NOISE} already")
         self._is_noisy, noise = True, self._limits[:, LIMITS.SEED :]
         noise[:, 0] = seed = node.number("random_seed", 123.0)
-        if not (seed.is_integer() and abs(seed) < LARGEST_SEED):
+        if not (seed.is_integer() and abs(seed) < MAX_NOISE_SEED):
             raise node.error(
                 f"'random_seed' must be a whole number of up to 15 digits, not {seed:g}"
             )
-        for place, key in enumerate(
+        for index, key in enumerate(
             ("base_noise", "proportional_noise", "sensor_noise", "proportional_sensor_noise")
         ):
-            noise[:, 1 + place] = width = node.number(key, 0.0)
+            noise[:, 1 + index] = width = node.number(key, 0.0)
             if width < 0.0:
                 raise node.error(f"'{key}' must not be negative, and is {width:g}")
-        node.expect_all_asked(f"a {NOISE}")
+        node.refuse_unread_parts(f"a {NOISE}")
         if node.file.endswith(".scone"):
             warn_caller(
                 "noise is as large as SCONE's, but not the same: its numbers depend on the compiler of SCONE"
             )
 
     def _read_functions(self, node: Node, parameters: Parameters) -> None:
-        """What excites actuators over time, the same on both sides if it is symmetric."""
+        """Read a function of time for some actuators; a symmetric one has the same parameters on both
+        sides.
+        """
         symmetric = node.flag("symmetric", True)
         include, exclude = node.text("include", "*"), node.text("exclude", "")
-        found = [*node.all_of(*FUNCTIONS)]
-        node.expect_all_asked(f"a {FEED_FORWARD}")
-        if len(found) != 1:
-            raise node.error(f"a {FEED_FORWARD} needs one function: {join_words(list(FUNCTIONS))}")
-        kind, function = found[0]
+        functions = [*node.select_all(*TIME_FUNCTIONS)]
+        node.refuse_unread_parts(f"a {FEED_FORWARD}")
+        if len(functions) != 1:
+            raise node.error(
+                f"a {FEED_FORWARD} needs one function: {join_words(list(TIME_FUNCTIONS))}"
+            )
+        kind, function = functions[0]
         names = {
             k: n
             for k, n in enumerate(self.walkers.names)
@@ -199,15 +241,17 @@ class Reflexes:
             raise node.error(f"no actuator is in '{include}' and not in '{exclude}'")
         for target, name in names.items():
             before = name[:-2] if symmetric and name.endswith(SIDES) else name
-            for power, start, gain in FUNCTIONS[kind](function, parameters, f"{before}."):
-                term = target, -1, power, 0, (1 << len(STATES)) - 1, -1
+            for power, start, gain in TIME_FUNCTIONS[kind](function, parameters, f"{before}."):
+                term = target, -1, power, 0, ALL_LEG_STATES, -1
+                # The kernels count time in control steps.
                 self.terms.append(
-                    Part(term, start, gain * self.walkers.step**power, np.zeros_like(gain))
+                    TermOrGate(term, start, gain * self.walkers.step**power, np.zeros_like(gain))
                 )
-        function.expect_all_asked(f"a {kind}")
+        function.refuse_unread_parts(f"a {kind}")
 
     def _read_states(self, node: Node, parameters: Parameters) -> None:
-        parameters.auto = node.number("auto_std_factor", parameters.auto)
+        """Read the thresholds of a GaitStateController and its conditional reflexes."""
+        parameters.auto_std_factor = node.number("auto_std_factor", parameters.auto_std_factor)
         self.symmetric = node.flag("symmetric", True)
         for key in ("use_model_com_reference_pos", "omnidirectional"):
             if node.flag(key, False):
@@ -220,12 +264,12 @@ class Reflexes:
             length = node.number("override_leg_length", self.walkers.legs[leg].length)
             prefix = "" if self.symmetric else f"leg{leg}{side}."
             of = {
-                name: parameters.of(node, name, value, prefix + name)
+                name: parameters.get_number(node, name, value, prefix + name)
                 for name, value in (
                     ("stance_load_threshold", 0.1),
                     ("landing_threshold", 0.0),
                     ("late_stance_threshold", 0.0),
-                    ("liftoff_threshold", NEVER),
+                    ("liftoff_threshold", DISABLED_THRESHOLD),
                 )
             }
             stance, swing = of["stance_load_threshold"], node.get("swing_load_threshold")
@@ -233,7 +277,7 @@ class Reflexes:
                 stance,
                 stance
                 if swing is None
-                else parameters.read(swing, prefix + "swing_load_threshold"),
+                else parameters.parse_number(swing, prefix + "swing_load_threshold"),
             )
             ahead = (
                 length * of[f"{name}_threshold"] for name in ("late_stance", "liftoff", "landing")
@@ -243,10 +287,10 @@ class Reflexes:
         conditional = node.get("ConditionalControllers")
         if conditional is None:
             raise node.error("a GaitStateController needs ConditionalControllers")
-        for _, each in conditional.all_of("ConditionalController"):
+        for _, each in conditional.select_all("ConditionalController"):
             self._add_conditional(each, parameters)
-        conditional.expect_all_asked("ConditionalControllers")
-        node.expect_all_asked("a GaitStateController")
+        conditional.refuse_unread_parts("ConditionalControllers")
+        node.refuse_unread_parts("a GaitStateController")
 
     # ---------------------------------------------------------------------------------------------- reading
     def _add_conditional(self, node: Node, parameters: Parameters) -> None:
@@ -254,61 +298,95 @@ class Reflexes:
         for mask in node.text("states").replace(";", ",").split(","):
             names = mask.split()
             for name in names:
-                if name not in STATES:
-                    raise node.error(f"legs have no state '{name}'{suggest_or_list(name, STATES)}")
-            states = sum(1 << STATES.index(name) for name in set(names))
+                if name not in LEG_STATES:
+                    raise node.error(
+                        f"legs have no state '{name}'{suggest_or_list(name, LEG_STATES)}"
+                    )
+            states = sum(1 << LEG_STATES.index(name) for name in set(names))
             prefix = f"S{states:05b}."
+            # Several states in one mask are one reflex that is active in each of them; masks that a
+            # comma separates are reflexes with parameters of their own.
             for leg in range(len(SIDES)):
                 if side and side.lower() not in (SIDES[leg].strip("_"), ("left", "right")[leg]):
                     continue
-                for _, controller in node.all_of("ReflexController"):
+                for _, controller in node.select_all("ReflexController"):
                     self._add_reflexes(controller, parameters, prefix, leg, states)
-        node.expect_all_asked("a ConditionalController")
+        node.refuse_unread_parts("a ConditionalController")
 
     def _add_reflexes(
         self, node: Node, parameters: Parameters, prefix: str, leg: int, states: int
     ) -> None:
         symmetric = node.flag("symmetric", self.symmetric)
-        blocks = [node, *(block for _, block in node.all_of("Reflexes"))]
+        blocks = [node, *(block for _, block in node.select_all("Reflexes"))]
         for block in blocks:
-            for kind, reflex in block.all_of(*KINDS):
+            for kind, reflex in block.select_all(*REFLEX_TYPES):
                 self._add_reflex(kind, reflex, parameters, prefix, leg, states, symmetric)
-            block.expect_all_asked("a ReflexController", tuple(KINDS))
-        if not any(kind in KINDS for block in blocks for kind, _ in block.parts):
+            block.refuse_unread_parts("a ReflexController", tuple(REFLEX_TYPES))
+        if not any(kind in REFLEX_TYPES for block in blocks for kind, _ in block.parts):
             raise node.error("a ReflexController needs reflexes")
 
     def _find_index(self, node: Node, name: str, names: list[str], leg: int) -> int:
-        """The number of what has a name, with or without the side of a leg; `_o` is the other one."""
-        own = name[:-2] + SIDES[1 - leg] if self._is_sided and name.endswith(OTHER) else name
+        """Return the index of a name with or without the side of a leg; `_o` means the opposite leg.
+
+        Args:
+            node: node for errors.
+            name: name in the scenario.
+            names: names in the model.
+            leg: index of the leg of the reflex.
+        """
+        # A name that fits as it is goes before the same name with a side.
+        own = (
+            name[:-2] + SIDES[1 - leg]
+            if self._is_sided and name.endswith(OTHER_SIDE_SUFFIX)
+            else name
+        )
         for full in (own, own + SIDES[leg]) if self._is_sided else (own,):
             if full in names:
                 return names.index(full)
         beside = f" or '{own}{SIDES[leg]}'" if self._is_sided else ""
         raise node.error(f"the model has no '{own}'{beside}{suggest_or_list(own, names)}")
 
-    def _begin_reflex(
-        self, node: Node, prefix: str, leg: int, symmetric: bool, kind: Kind
+    def _resolve_target_and_source(
+        self, node: Node, prefix: str, leg: int, symmetric: bool, kind: ReflexType
     ) -> tuple[int, int, str]:
-        """Numbers of the target and of the source, and what stands before the names of parameters."""
+        """Find the target and the source of a reflex, and the beginning of the names of its
+        parameters.
+
+        Args:
+            node: node of the reflex.
+            prefix: prefix of the states in which it is active.
+            leg: index of its leg.
+            symmetric: whether both legs share parameters.
+            kind: type of the reflex.
+
+        Returns:
+            Index of the actuator, index of the source, and prefix of the parameters.
+        """
         for key in ("min_control_value", "max_control_value", *kind.refused):
             if node.get(key) is not None:
                 raise node.error(f"'{key}' of reflexes is not done here")
         target = node.text("target")
         source = node.text("source", target if kind.is_own else None)
 
-        def named(name: str) -> str:
-            bare = name[:-2] if name.endswith((*SIDES, OTHER)) else name
+        def format_name(name: str) -> str:
+            # SCONE names parameters by target and source: symmetric ones without the side of the
+            # reflex, with "_o" for the opposite leg; others with the full name.
+            bare = name[:-2] if name.endswith((*SIDES, OTHER_SIDE_SUFFIX)) else name
             if not self._is_sided:
                 return name
             if not symmetric:
                 if name.endswith(SIDES) or bare in self.walkers.coordinates:
                     return name
-                return bare + SIDES[1 - leg if name.endswith(OTHER) else leg]
-            return f"{bare}{OTHER}" if name != bare and not name.endswith(SIDES[leg]) else bare
+                return bare + SIDES[1 - leg if name.endswith(OTHER_SIDE_SUFFIX) else leg]
+            return (
+                f"{bare}{OTHER_SIDE_SUFFIX}"
+                if name != bare and not name.endswith(SIDES[leg])
+                else bare
+            )
 
-        first, second = named(target), named(source)
+        first, second = format_name(target), format_name(source)
         own = node.text("par_name", "")
-        name = named(own) if own else first if first == second else f"{first}-{second}"
+        name = format_name(own) if own else first if first == second else f"{first}-{second}"
         number = self._find_index(node, target, self.walkers.names, leg)
         return (
             number,
@@ -317,18 +395,18 @@ class Reflexes:
         )
 
     @staticmethod
-    def _delay(node: Node, parameters: Parameters, before: str) -> Array:
-        delay = parameters.of(node, "delay", 0.0, before + "delay")
+    def _read_delay(node: Node, parameters: Parameters, before: str) -> Array:
+        delay = parameters.get_number(node, "delay", 0.0, before + "delay")
         if np.any(delay < 0.0):
             raise node.error(f"a delay of {delay.min():g} s knows what is to come")
-        if not np.all(delay <= LONGEST):
+        if not np.all(delay <= MAX_DELAY_S):
             raise node.error(
-                f"a delay of {delay.max():g} s is more than {LONGEST:g} s, the longest that is remembered"
+                f"a delay of {delay.max():g} s is more than {MAX_DELAY_S:g} s, the longest that is remembered"
             )
         return delay
 
-    def _sensor(self, source: Source) -> int:
-        """The number of the sensor that feels something."""
+    def _add_sensor(self, source: Source) -> int:
+        """Return the index of a sensor, which is added if it is new."""
         return self.sources.setdefault(source, len(self.sources))
 
     def _add_reflex(
@@ -341,78 +419,85 @@ class Reflexes:
         states: int,
         symmetric: bool,
     ) -> None:
-        kind = KINDS[name]
-        node.asked.update(kind.settings)
-        target, number, before = self._begin_reflex(node, prefix, leg, symmetric, kind)
-        delay = self._delay(node, parameters, before)
-        gate = self._gate(node, parameters, before, leg) if name == CONDITIONAL else -1
+        kind = REFLEX_TYPES[name]
+        node.read_keys.update(kind.settings)
+        target, number, before = self._resolve_target_and_source(node, prefix, leg, symmetric, kind)
+        delay = self._read_delay(node, parameters, before)
+        gate = self._add_gate(node, parameters, before, leg) if name == CONDITIONAL else -1
         written = {key for key, _ in node.parts}
-        for letter, feel, rest, is_free in kind.channels:
+        for letter, make_source, rest, is_free in kind.channels:
             keys = {
                 f"K{letter}",
                 f"{letter}0",
                 *(() if is_free is None else (f"allow_neg_{letter}",)),
             }
-            node.asked |= keys
+            node.read_keys |= keys
             if written.isdisjoint(keys):
                 continue
+            # SCONE reads offset and gain in this order, which is the order of the parameters.
             settings = (f"{letter}0", rest), (f"K{letter}", 0.0)
-            found = {
-                key: parameters.of(node, key, value, before + key)
+            numbers = {
+                key: parameters.get_number(node, key, value, before + key)
                 for key, value in (settings if kind.corrects else settings[::-1])
             }
-            gain, free = (
-                found[f"K{letter}"],
-                is_free is None or node.flag(f"allow_neg_{letter}", is_free),
-            )
-            if np.any(gain != 0.0) or f"{before}K{letter}" in parameters.found:
-                source = feel(self.walkers, node, number, SIDES[leg] if self._is_sided else "")
-                held = FREE if free else OF_RESULT if kind.corrects else OF_SENSOR
-                term = target, self._sensor(source), held, leg, states, gate
-                self.terms.append(
-                    Part(term, delay, -gain if kind.corrects else gain, found[f"{letter}0"])
+            gain = numbers[f"K{letter}"]
+            free = is_free is None or node.flag(f"allow_neg_{letter}", is_free)
+            # A gain of 0 that is no parameter needs no sensor.
+            if np.any(gain != 0.0) or f"{before}K{letter}" in parameters.requested:
+                source = make_source(
+                    self.walkers, node, number, SIDES[leg] if self._is_sided else ""
                 )
-        constant = parameters.of(node, "C0", 0.0, f"{before}C0")
-        if np.any(constant != 0.0) or f"{before}C0" in parameters.found:
+                sign = FREE if free else OF_RESULT if kind.corrects else OF_SENSOR
+                term = target, self._add_sensor(source), sign, leg, states, gate
+                self.terms.append(
+                    TermOrGate(term, delay, -gain if kind.corrects else gain, numbers[f"{letter}0"])
+                )
+        constant = parameters.get_number(node, "C0", 0.0, f"{before}C0")
+        if np.any(constant != 0.0) or f"{before}C0" in parameters.requested:
             zero = np.zeros_like(constant)
-            self.terms.append(Part((target, -1, FREE, leg, states, -1), zero, constant, zero))
-        node.expect_all_asked(f"a {name}")
+            self.terms.append(TermOrGate((target, -1, FREE, leg, states, -1), zero, constant, zero))
+        node.refuse_unread_parts(f"a {name}")
 
-    def _gate(self, node: Node, parameters: Parameters, before: str, leg: int) -> int:
-        """The number of the range of a ConditionalMuscleReflex."""
+    def _add_gate(self, node: Node, parameters: Parameters, before: str, leg: int) -> int:
+        """Add the range of a ConditionalMuscleReflex; return its index, or -1 without a range."""
         if node.get("dof") is None:
             return -1
         name = node.text("dof")
         number = self._find_index(node, name, self.walkers.coordinates, leg)
         start = f"{before[:-1]}-{name}."
-        delay = self._delay(node, parameters, start)
+        delay = self._read_delay(node, parameters, start)
         low, high = (
-            parameters.of(node, f"pos_{end}", way, f"{start}pos_{end}")
-            for end, way in (("min", -1e12), ("max", 1e12))
+            parameters.get_number(node, f"pos_{end}", limit, f"{start}pos_{end}")
+            for end, limit in (("min", -1e12), ("max", 1e12))
         )
         value, speed = (
-            self._sensor(feel(self.walkers, node, number, "")) for feel in (VALUE, SPEED)
+            self._add_sensor(make_source(self.walkers, node, number, ""))
+            for make_source in (VALUE_SOURCE, SPEED_SOURCE)
         )
-        self._gates.append(Part((value, speed), delay, low, high))
+        self._gates.append(TermOrGate((value, speed), delay, low, high))
         return len(self._gates) - 1
 
     def pack(self) -> tuple[Ints, Array]:
-        """What the kernels go by (see :mod:`osimlite.mechanics.kernels.reflexes`): integers, and of
-        each candidate the numbers (w, r).
+        """Return the controller as the kernels take it (see
+        :mod:`osimlite.mechanics.kernels.reflexes`).
+
+        Returns:
+            Integers, and the numbers of each candidate (w, r).
         """
-        # What goes by sensors is added first.
+        # Terms with sensors come first; sums are rounded in this order.
         parts = [*sorted(self.terms, key=lambda term: term.ints[TERM.SENSOR] < 0), *self._gates]
         delays = [part.delay / self.walkers.step for part in parts]
         each = [(delay, part.first, part.second) for delay, part in zip(delays, parts, strict=True)]
         numbers = np.column_stack(
             [self._limits, *(column for columns in each for column in columns)]
         )
-        felt = (
+        sensor_delays = (
             np.max(delay)
             for part, delay in zip(parts, delays, strict=True)
             if part.ints[TERM.SENSOR] >= 0
         )
-        kept = int(np.ceil(max([*felt, self._limits[0, LIMITS.DELAY]]))) + 2
+        # One step more for the current sensors, and one for the interpolation between two steps.
+        history = int(np.ceil(max([*sensor_delays, self._limits[0, LIMITS.DELAY]]))) + 2
         ints, more = [number for part in parts for number in part.ints], list[float]()
         for source in self.sources:
             ints += (
@@ -427,12 +512,12 @@ class Reflexes:
             *(
                 len(self.terms),
                 len(self._gates),
-                kept,
+                history,
                 sensors,
                 self._has_states,
                 self._swings_from_stance,
             ),
-            *(numbers.shape[1], LEGS + kept * sensors),
+            *(numbers.shape[1], LEGS + history * sensors),
         )
         head[REFLEXES.IS_NOISY] = self._is_noisy
         return np.array([*head, *ints], dtype=np.int64), np.ascontiguousarray(numbers)

@@ -1,4 +1,4 @@
-"""Reflexes that drive the actuators of any simulation."""
+"""Reflex controllers for any simulation, not only for scenarios of SCONE."""
 
 from __future__ import annotations
 
@@ -18,37 +18,47 @@ from osimlite.mechanics.kernels.sensors import SENSED
 from osimlite.schema.model import Model
 from osimlite.simulation.control_steps import Gain, KernelController
 from osimlite.studies.reflexes.controllers import CONTROLLERS, Reflexes
-from osimlite.studies.reflexes.parameters import AUTO, Parameter, Parameters, par_line, read_par
+from osimlite.studies.reflexes.parameters import (
+    AUTO_STD_FACTOR,
+    Parameter,
+    Parameters,
+    format_par_line,
+    read_par,
+)
 from osimlite.studies.reflexes.scenario import (
     OPTIMIZERS,
-    control_step,
-    legs_of,
+    read_control_step,
     read_initial_parameters,
+    read_leg_names,
 )
-from osimlite.studies.reflexes.settings import Node, read_settings, settings_of
-from osimlite.studies.reflexes.walkers import Felt
+from osimlite.studies.reflexes.settings import Node, make_node, read_settings
+from osimlite.studies.reflexes.walkers import SensedModel
 
 
 class Feedback:
-    """A controller for ``osimlite.simulate(model, controller=Feedback("hold.yaml"))``.
+    """Reflex controller for `osimlite.simulate(model, controller=Feedback("hold.yaml"))`.
 
     It computes the controls of the actuators that its reflexes name at every control step, and
-    holds them between; what else drives these adds to it.
+    holds them
+    constant until the next. Controls of other sources add to them.
 
     Args:
-        given: file with a ReflexController, GaitStateController, FeedForwardController or
-            CompositeController, alone or in a scenario: SCONE's or YAML; or the same as data of
-            Python. Beside one that stands alone there may be an `init`, and
-            `fixed_control_step_size` and what legs are called, which a scenario has in its
-            ModelOpenSim4.
-        values: of its parameters, or a file of them (.par); others stand for the best that `init`
-            has, or their means.
+        given: file of SCONE or YAML, or Python data, with a ReflexController, GaitStateController,
+            FeedForwardController or CompositeController, alone or within a scenario. Beside a
+            controller
+            that stands alone there may be `init`, `fixed_control_step_size` and the names of the
+            legs,
+            which a scenario has in its ModelOpenSim4.
+        values: values of parameters by name, or a .par file. Parameters without a value have the
+            best
+            value of `init`, or their mean.
 
     Attributes:
-        step: for which controls are held, s.
+        step: duration of a control step (s).
 
     Raises:
-        DocumentError: it has something that is not done here; its name and line are told.
+        DocumentError: the file has something that is not supported; the error has its name and
+            line.
     """
 
     def __init__(
@@ -57,90 +67,105 @@ class Feedback:
         values: Mapping[str, float] | str | Path = MappingProxyType({}),
     ) -> None:
         if isinstance(given, Mapping):
-            self._told, top, folder = "data of Python", settings_of(given), Path()
+            self._source_text, top, folder = "data of Python", make_node(given), Path()
         else:
-            self._told, top, folder = str(given), read_settings(given), Path(given).parent
-        optimizer = next((node for _, node in top.all_of(*OPTIMIZERS)), top)
+            self._source_text, top, folder = str(given), read_settings(given), Path(given).parent
+        optimizer = next((node for _, node in top.select_all(*OPTIMIZERS)), top)
         objective = optimizer.get("SimulationObjective")
         holder, model = top, top
         if objective is not None:
             holder, model = objective, objective.get("ModelOpenSim4") or Node()
-        found = holder.one_of(*CONTROLLERS)
+        found = holder.select_one(*CONTROLLERS)
         if found is None:
             raise holder.error(f"a controller is needed: {join_words(list(CONTROLLERS))}")
         self._kind, self._node = found
-        self.step, self._legs = control_step(model), legs_of(model)
+        self.step, self._legs = read_control_step(model), read_leg_names(model)
         known = {
             name: best for name, (best, _, _) in read_initial_parameters(optimizer, folder).items()
         }
         if isinstance(values, str | Path):
             values = {name: best for name, (best, _, _) in read_par(values).items()}
-        self._begun, self._values = known, {**known, **values}
+        self._initial, self._values = known, {**known, **values}
         if objective is None:
-            top.expect_all_asked("a file of a controller")
+            top.refuse_unread_parts("a file of a controller")
 
     def __str__(self) -> str:
-        return self._told
+        return self._source_text
 
     @property
     def digest(self) -> str:
-        """Of all that it is."""
-        told = self._kind, self._node, self.step, self._legs, self._values
-        return sha256(repr(told).encode()).hexdigest()
+        """SHA-256 digest of everything that determines the controls, as a key of caches."""
+        content = self._kind, self._node, self.step, self._legs, self._values
+        return sha256(repr(content).encode()).hexdigest()
 
     def gains(self, model: Model, engine: Any) -> list[Gain]:
-        """The parameters, for a model with its engine."""
+        """Return the parameters with their values and bounds.
+
+        Args:
+            model: model that the controller will drive.
+            engine: engine of the model.
+        """
         _, _, parameters = self._read(model, engine)
-        found, values = parameters.found.values(), self._values
+        found, values = parameters.requested.values(), self._values
         return [
             Gain(each.name, values.get(each.name, each.mean), each.low, each.high) for each in found
         ]
 
     def with_values(self, values: Mapping[str, float]) -> Self:
-        """The same with other values of some parameters."""
+        """Return a copy in which some parameters have other values."""
         result = copy(self)
         result._values = {**self._values, **values}
         return result
 
     def par(self) -> str:
-        """The values of parameters that are given, as a file (.par)."""
+        """Return the values that are set, as text of a .par file."""
         return "".join(
-            par_line(Parameter(name, x, AUTO * abs(x), 0.0, 0.0), x)
+            format_par_line(Parameter(name, x, AUTO_STD_FACTOR * abs(x), 0.0, 0.0), x)
             for name, x in self._values.items()
         )
 
-    def _read(self, model: Model, engine: Any) -> tuple[Felt, Reflexes, Parameters]:
-        felt, parameters = Felt(model, engine, 1, self.step, self._legs), Parameters(self._values)
-        reflexes = Reflexes(self._node, self._kind, felt, parameters)
+    def _read(self, model: Model, engine: Any) -> tuple[SensedModel, Reflexes, Parameters]:
+        sensed, parameters = (
+            SensedModel(model, engine, 1, self.step, self._legs),
+            Parameters(self._values),
+        )
+        reflexes = Reflexes(self._node, self._kind, sensed, parameters)
         for name in self._values:
-            if name not in parameters.found and name not in self._begun:
+            # The file of `init` may have more parameters than the controller uses.
+            if name not in parameters.requested and name not in self._initial:
                 raise SettingError(
-                    f"the controller has no parameter '{name}'{suggest_or_list(name, parameters.found)}"
+                    f"the controller has no parameter '{name}'{suggest_or_list(name, parameters.requested)}"
                 )
-        return felt, reflexes, parameters
+        return sensed, reflexes, parameters
 
     def compile_for(self, model: Model, engine: Any) -> KernelController:
-        """What the kernels go by, for a model with its engine.
+        """Return the controller as the kernels take it.
+
+        Args:
+            model: model that the controller will drive.
+            engine: engine of the model.
 
         Raises:
-            OsimliteError: the model has not what a reflex names, or a value belongs to no
+            OsimliteError: the model lacks something that a reflex names, or a value belongs to no
                 parameter.
         """
-        felt, reflexes, parameters = self._read(model, engine)
+        sensed, reflexes, parameters = self._read(model, engine)
         plan, numbers = reflexes.pack()
-        # What no reflex names, and no noise, is left to others.
-        everything, is_noisy = np.arange(len(felt.names)), numbers[0, LIMITS.CONTROL_NOISE] > 0.0
+        # Controls without reflexes are left to other sources, unless there is base noise, which acts
+        # on all controls. Proportional noise of a control that is 0 is 0.
+        everything, is_noisy = np.arange(len(sensed.names)), numbers[0, LIMITS.CONTROL_NOISE] > 0.0
         targets = [term.ints[TERM.TARGET] for term in reflexes.terms]
         others = np.setdiff1d(everything, everything if is_noisy else targets)
-        first, known = SENSED.HEAD + 2 * len(felt.muscles), felt.known.copy()
-        known[first + others] = known[first + len(felt.names) + others] = 0.0
+        # With bounds of 0 the kernels add nothing to a control.
+        first, known = SENSED.HEAD + 2 * len(sensed.muscles), sensed.sensor_numbers.copy()
+        known[first + others] = known[first + len(sensed.names) + others] = 0.0
         return KernelController(
-            tuple(felt.paths),
+            tuple(sensed.paths),
             self.step,
             tuple(source.name for source in reflexes.sources),
-            felt.senses,
+            sensed.sensor_plan,
             known,
             plan,
             numbers,
-            parameters.told,
+            parameters.values_used,
         )

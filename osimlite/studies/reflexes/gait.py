@@ -1,4 +1,4 @@
-"""What a walk looks like, in the numbers by which gaits are compared: heights, strides, stance, loads."""
+"""Gait measures of a simulated walk: heights, strides, stance phases and ground reaction forces."""
 
 from __future__ import annotations
 
@@ -11,28 +11,31 @@ from osimlite.mechanics.multibody.spatial import Array
 from osimlite.simulation.link_motion import locate_mass_centers, locate_station
 
 if TYPE_CHECKING:
-    from osimlite.studies.reflexes.scenario import Scenario, Walked
+    from osimlite.studies.reflexes.scenario import Scenario, WalkResult
 
-TOUCHES = 0.05
-"""Load over the weight with which a foot is on the ground."""
-BRIEF = 0.05
-"""S; a foot that scuffs the ground, or leaves it, for less does not."""
+CONTACT_LOAD = 0.05
+"""Ground reaction force over the body weight above which a foot counts as being in contact."""
+MIN_CONTACT_S = 0.05
+"""Shortest contact and shortest swing (s); briefer ones are scuffs or bounces and are ignored."""
 
 
 class Strides(NamedTuple):
-    """Of whole strides, from one foot's touch to the next of the same, without the first ones of a walk.
+    """Averages over complete strides, each from one touch-down of a foot to its next, without the
+    first strides.
 
     Attributes:
-        number: of strides of both legs.
-        touches: of the ground by both feet, the first ones included; SCONE counts scuffs among its
-            steps, too.
-        time,
-        length: of one, s and m, on average.
-        stance: part of a stride in which a foot is on the ground; left, right.
-        both: part of the time in which both are.
-        humps: largest force in the first half of a stance, least between, and largest in the second
-            half; over the weight, on average.
-        peak: largest force on a foot, over the weight.
+        number: number of strides of both legs.
+        time: mean duration of a stride (s).
+        length: mean length of a stride (m).
+        stance: part of a stride in which the foot is in contact, per leg: left, right.
+        both: part of the time in double support.
+        humps: mean over stance phases of the ground reaction force over the weight: largest in the
+            first
+            half, smallest between the peaks, largest in the second half.
+        peak: largest force on one foot over the weight.
+        touches: touch-downs of both feet, the first ones included; unlike SCONE's count of steps it
+            has
+            no scuffs.
     """
 
     number: int
@@ -45,16 +48,16 @@ class Strides(NamedTuple):
     touches: int
 
 
-class Gait(NamedTuple):
-    """The walk of a first candidate.
+class GaitMeasures(NamedTuple):
+    """Gait measures of the first candidate.
 
     Attributes:
-        distance: that the mass centre went, m.
-        speed: of it, m/s.
-        centre,
-        pelvis: height on average, least, and largest, m; of the mass centre, and of the origin of
-            the body that the legs hang on.
-        strides: None of a walk that has not three of each leg.
+        distance: distance that the mass centre travels along x (m).
+        speed: mean speed of the mass centre along x (m/s).
+        centre: mean, smallest and largest height of the mass centre (m).
+        pelvis: mean, smallest and largest height of the origin of the body that the legs are
+            attached to (m).
+        strides: averages of strides; None for a walk with fewer than three touch-downs of a leg.
     """
 
     distance: float
@@ -64,7 +67,11 @@ class Gait(NamedTuple):
     strides: Strides | None
 
     def describe(self) -> dict[str, str]:
-        """In words."""
+        """Return the measures as lines of text.
+
+        Returns:
+            Per label a text with units, in the order of a report.
+        """
         names = ("mass centre", self.centre), ("pelvis", self.pelvis)
         high = (
             f"{name} {mean:.3f} m ({low:.3f} to {high:.3f})" for name, (mean, low, high) in names
@@ -89,13 +96,19 @@ class Gait(NamedTuple):
         return words
 
 
-def gait_of(scenario: Scenario, walked: Walked) -> Gait | None:
-    """The gait of a walk of the scenario's; None of a model without two legs."""
-    walkers = scenario.walkers(1)
+def measure_gait(scenario: Scenario, walked: WalkResult) -> GaitMeasures | None:
+    """Return the gait of the first candidate of a walk; None for a model without two legs.
+
+    Args:
+        scenario: scenario that has been simulated.
+        walked: its result.
+    """
+    walkers = scenario.get_walkers(1)
     if len(walkers.legs) != 2:
         return None
     states = np.empty_like(walked.states.rows)
-    states[:, [walkers.places[path] for path in walked.states.columns]] = walked.states.rows
+    # The table has the order of the model's file, the kernels have that of the mechanism.
+    states[:, [walkers.offsets[path] for path in walked.states.columns]] = walked.states.rows
     moments = list(zip(walked.states.times.tolist(), states.tolist(), strict=True))
     centre = locate_mass_centers(walkers.engine, moments)[:, :3]
     pelvis = locate_station(walkers.engine, moments, walkers.legs[0].base, np.zeros(3))[:, :3]
@@ -103,30 +116,32 @@ def gait_of(scenario: Scenario, walked: Walked) -> Gait | None:
     upper, lower = (
         (float(y.mean()), float(y.min()), float(y.max())) for y in (centre[:, 1], pelvis[:, 1])
     )
-    return Gait(
+    return GaitMeasures(
         float(far),
         float(far / times[-1]),
         upper,
         lower,
-        strides_of(times, centre[:, 0], walked.loads.rows),
+        measure_strides(times, centre[:, 0], walked.loads.rows),
     )
 
 
-def strides_of(times: Array, way: Array, loads: Array) -> Strides | None:
-    """The strides of a walk; None if there are not three of each leg.
+def measure_strides(times: Array, way: Array, loads: Array) -> Strides | None:
+    """Return averages over the strides of a walk; None with fewer than three touch-downs of a leg.
 
     Args:
-        times: of the moments (n,), s.
-        way: that the walker has gone (n,), m.
-        loads: on both legs over the weight (n, 2).
+        times: times of the samples (n,) (s).
+        way: position of the walker along x (n,) (m).
+        loads: ground reaction force on each leg over the body weight (n, 2).
     """
-    touches: Any = loads > TOUCHES
+    touches: Any = loads > CONTACT_LOAD
     spans = []
     for on in touches.T:
         _remove_brief_contacts(on, times)
         begins = np.flatnonzero(on[1:] & ~on[:-1]) + 1
+        # One stride needs two touch-downs after the first.
         if len(begins) < 3:
             return None
+        # The stride after the first touch-down still depends on the initial state.
         spans.append(begins[1:])
     humps, stance = [], []
     for on, load, begins in zip(touches.T, loads.T, spans, strict=True):
@@ -149,9 +164,11 @@ def strides_of(times: Array, way: Array, loads: Array) -> Strides | None:
 
 
 def _remove_brief_contacts(on: Any, times: Array) -> None:
-    """Take brief times on the ground, and then those off it, for none."""
-    for what in (True, False):
+    """Replace contacts shorter than `MIN_CONTACT_S` by swing, and then such swings by contact, in
+    place.
+    """
+    for contact in (True, False):
         edges = np.flatnonzero(on[1:] != on[:-1]) + 1
         for first, last in pairwise(edges):
-            if on[first] == what and times[last] - times[first] < BRIEF:
-                on[first:last] = not what
+            if on[first] == contact and times[last] - times[first] < MIN_CONTACT_S:
+                on[first:last] = not contact

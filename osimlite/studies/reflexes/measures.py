@@ -1,7 +1,10 @@
-"""What a walk is judged by: SCONE's measures, of all candidates at once.
+"""Measures of SCONE that score walks; all candidates are scored at once.
 
-Each class of measures is one class here, found by its name. While candidates walk, the kernels note
-what measures ask for (:mod:`osimlite.mechanics.kernels.criteria`); the results are made of that.
+Each class of SCONE is one class here, which scenarios find by its name. During a simulation the
+kernels
+update the criteria that measures have requested (:mod:`osimlite.mechanics.kernels.criteria`);
+measures
+compute their results from these afterwards.
 """
 
 from __future__ import annotations
@@ -34,7 +37,8 @@ from osimlite.mechanics.multibody.spatial import Array
 from osimlite.studies.reflexes.settings import Node
 from osimlite.studies.reflexes.walkers import SIDES, Walkers
 
-LIGHT = 299792458.0
+SPEED_OF_LIGHT_M_S = 299792458.0
+"""Upper bound (m/s) of the speed of a gait whose scenario sets none, as in SCONE."""
 EFFORTS = {
     "Wang2012": (WANG, 0),
     "TotalForce": (TENSIONS, 0),
@@ -42,54 +46,73 @@ EFFORTS = {
     "SquaredMuscleActivation": (POWERS, 2),
     "CubedMuscleActivation": (POWERS, 3),
 }
-"""Kinds of efforts, and powers of activations, by the names that scenarios have for them."""
+"""Kind of criterion and power of activations, by the names of effort measures in SCONE."""
 
 
 class Criteria:
-    """What the kernels are to note.
+    """Criteria that the kernels update during a simulation.
 
     Args:
-        most: steps of a gait that there is room for.
+        max_steps: number of steps of a gait for which the workspace has space.
 
     Attributes:
-        room: numbers that are noted.
+        size: length of the workspace of all criteria.
     """
 
-    def __init__(self, most: int) -> None:
-        self.most, self.room = most, 0
+    def __init__(self, max_steps: int) -> None:
+        self.max_steps, self.size = max_steps, 0
         self._ints: list[int] = []
         self._numbers: list[float] = []
 
     def add(self, kind: int, place: int, measure: Measure, *numbers: float) -> int:
-        """Ask for something as long as a measure is on; returns where it will be noted."""
-        first = self.room
+        """Request a criterion for the time in which a measure is active.
+
+        Args:
+            kind: kind of criterion, such as `GAIT` of the kernels.
+            place: index in the sensor row, or a power of activations.
+            measure: measure that needs it.
+            numbers: numbers of the criterion, see `CRITERION_NUMBERS` of the kernels.
+
+        Returns:
+            Offset of the criterion in the workspace.
+        """
+        first = self.size
         self._ints += kind, place, len(self._numbers), first
         self._numbers += measure.start, measure.stop, *numbers
-        self.room += GAIT_NOTED.STEPS + 2 * self.most if kind == GAIT else NOTED.SIZE
+        self.size += GAIT_NOTED.STEPS + 2 * self.max_steps if kind == GAIT else NOTED.SIZE
         return first
 
     def pack(self) -> tuple[Ints, Array]:
-        """Integers and numbers, as the kernels take them."""
+        """Return the criteria as the kernels take them.
+
+        Returns:
+            Integers and numbers of all criteria.
+        """
         return np.array([len(self._ints) // CRITERION.SIZE, *self._ints], dtype=np.int64), np.array(
             self._numbers
         )
 
 
 class Measure(ABC):
-    """One measure.
+    """Measure of a scenario: the base of all classes.
 
     Args:
-        node: of it.
-        walkers: that are judged.
-        criteria: to which it adds.
-        above: that it is a part of.
-        side: ending of the names of what it is about, if it is about one side.
+        node: node of the measure.
+        walkers: candidates to score.
+        criteria: criteria to which it adds its own.
+        above: composite measure that it is part of.
+        side: ending of names of one side, or "" for a measure of both.
 
     Attributes:
-        name: of it. start, stop: between which it is on, s. report: what it says besides; of
-            efforts by power that (W/kg), and what a way takes (J/(kg m)). terms: what it and those
-            that it is made of add, by their names. minimize: whether it is to become small; of a
-            class, what it is without a setting.
+        name: name in the table of results.
+        weight: factor of the result.
+        start: time from which the measure is active (s).
+        stop: time until which it is active (s).
+        report: further quantities by name (w,): of efforts the power per mass ("power", W/kg) and
+            the
+            cost of transport ("transport", J/(kg m)).
+        terms: weighted results of the measure and of its parts by name (w,).
+        minimize: whether the measure is to be minimized; the attribute of the class is the default.
     """
 
     minimize = True
@@ -102,18 +125,17 @@ class Measure(ABC):
         above: Measure | None = None,
         side: str = "",
     ) -> None:
-        self.node, self.walkers, self.criteria, self.side, self.count = (
-            node,
-            walkers,
-            criteria,
-            side,
-            walkers.count,
-        )
+        self.node = node
+        self.walkers = walkers
+        self.criteria = criteria
+        self.side = side
+        self.count = walkers.count
         self.name = node.text("name", "") or self.default_name()
         self.weight = node.number("weight", 1.0)
         threshold, soft = node.get("threshold"), node.get("soft_threshold")
         self.offset = node.number("result_offset", 0.0)
         self.threshold = None if threshold is None else node.number("threshold")
+        # SCONE's soft threshold subtracts the threshold from the value, then cuts at zero.
         if soft is not None:
             self.offset, self.threshold = -node.number("soft_threshold"), 0.0
         self.transition = node.number("threshold_transition", 0.0)
@@ -124,39 +146,60 @@ class Measure(ABC):
         self.report: dict[str, Array] = {}
         self.terms: dict[str, Array] = {}
         self.read(node)
-        node.expect_all_asked(f"a {type(self).__name__}", tuple(MEASURES))
+        node.refuse_unread_parts(f"a {type(self).__name__}", tuple(MEASURES))
 
     def default_name(self) -> str:
-        """Of one that has none."""
+        """Return the name of a measure without a `name`."""
         return type(self).__name__
 
     @abstractmethod
     def read(self, node: Node) -> None:
-        """Read what the class adds, and ask for what it needs."""
+        """Read the settings of the class and request criteria."""
 
     @abstractmethod
-    def result(self, times: Array, duration: float) -> Array:
-        """The measure (w,), of walks that ended at times (w,) before or at a duration, s."""
+    def compute_result(self, times: Array, duration: float) -> Array:
+        """Return the unweighted measure of each candidate (w,).
+
+        Args:
+            times: times at which the walks ended (w,) (s).
+            duration: longest duration (s).
+        """
 
     def add_weighted(self, times: Array, duration: float) -> Array:
-        """What it adds to the sum (w,), noted in `terms`."""
-        value = self.result(times, duration) + self.offset
+        """Return the contribution to the total score (w,), and store it in `terms`.
+
+        With a threshold T and a transition D, a value v counts as 0 below T, as v (v - T) / D
+        between T and
+        T + D, and as v above.
+
+        Args:
+            times: times at which the walks ended (w,) (s).
+            duration: longest duration (s).
+        """
+        value = self.compute_result(times, duration) + self.offset
         if self.minimize and self.threshold is not None:
             least, over = self.threshold, self.transition
             between = value * (value - least) / over if over > 0.0 else value
             value = np.where(value < least, 0.0, np.where(value < least + over, between, value))
         found: Array = self.weight * value
-        # One that is made of others has theirs.
+        # A composite measure has collected the terms of its parts, its own would count them twice.
         self.terms = self.terms or {self.name: found}
         return found
 
     def read_recorded(self, first: int, place: int) -> Array:
-        """A number (w,) of what was asked for."""
-        found: Array = self.walkers.noted[:, first + place]
+        """Return a number of a criterion from the workspaces of the candidates (w,).
+
+        Args:
+            first: offset of the criterion, see `Criteria.add`.
+            place: index within the criterion.
+        """
+        found: Array = self.walkers.criteria_work[:, first + place]
         return found
 
-    def average(self, first: int) -> Array:
-        """Of a number over time (w,)."""
+    def average_over_time(self, first: int) -> Array:
+        """Return the time average of a criterion (w,); the last value of one that was active for no
+        time.
+        """
         total, span, last = (
             self.read_recorded(first, place) for place in (NOTED.TOTAL, NOTED.SPAN, NOTED.VALUE)
         )
@@ -164,11 +207,18 @@ class Measure(ABC):
 
 
 class GaitMeasure(Measure):
-    """How far steps are from a speed; a walker whose mass centre sinks has fallen."""
+    """Deviation of the speed of steps from a range; 0 is a perfect gait, 1 a walker that falls at
+    once.
+
+    A walker whose mass centre sinks below a part of its initial height has fallen.
+    """
 
     def read(self, node: Node) -> None:
-        """As `Measure` says."""
-        self.low, self.high = node.number("min_velocity", 0.0), node.number("max_velocity", LIGHT)
+        """Read the speed range and what counts as a step and a fall."""
+        self.low, self.high = (
+            node.number("min_velocity", 0.0),
+            node.number("max_velocity", SPEED_OF_LIGHT_M_S),
+        )
         self.first_steps = int(node.number("initiation_steps", 2.0))
         self.least_speed = node.number("min_norm_velocity", 0.1)
         self.always = node.flag("always_apply_early_termination_penalty", False)
@@ -184,16 +234,22 @@ class GaitMeasure(Measure):
             GAIT, 0, self, *(node.number(key, value) for key, value in numbers)
         )
 
-    def result(self, times: Array, duration: float) -> Array:
-        """As `Measure` says."""
+    def compute_result(self, times: Array, duration: float) -> Array:
+        """Return 1 minus the time-weighted mean over steps of 1 - |deviation| / speed (w,).
+
+        Args:
+            times: times at which the walks ended (w,) (s).
+            duration: longest duration (s); the time after a fall counts as steps of no value.
+        """
         result, speeds, counts = np.ones(self.count), np.zeros(self.count), np.zeros(self.count)
-        wanted = max(min(abs(self.low), abs(self.high)), self.least_speed)
-        for k, room in enumerate(self.walkers.noted[:, self._first :]):
+        target = max(min(abs(self.low), abs(self.high)), self.least_speed)
+        for k, room in enumerate(self.walkers.criteria_work[:, self._first :]):
             row = room[: GAIT_NOTED.STEPS + 2 * int(room[GAIT_NOTED.COUNT])].tolist()
             numbers = row[GAIT_NOTED.STEPS :]
-            # The last step ends with the walk.
+            # The kernels note completed steps; the unfinished last one ends with the walk.
             last = float(times[k]), row[GAIT_NOTED.HERE] - row[GAIT_NOTED.BEFORE]
             steps = [*zip(numbers[::2], numbers[1::2], strict=True), last]
+            # SCONE ignores the first steps, but fewer of them if there are hardly more.
             first = min(max(len(steps) - self.first_steps, 0), self.first_steps)
             good = time = length = 0.0
             for number, (t, far) in enumerate(steps):
@@ -201,33 +257,30 @@ class GaitMeasure(Measure):
                 if number < first or dt <= 0.0:
                     continue
                 speed = far / dt
-                off = (
-                    speed - self.low
-                    if speed < self.low
-                    else speed - self.high
-                    if speed > self.high
-                    else 0.0
-                )
-                good += dt * min(max(1.0 - abs(off) / wanted, -1.0), 1.0)
+                if speed < self.low:
+                    off = speed - self.low
+                elif speed > self.high:
+                    off = speed - self.high
+                else:
+                    off = 0.0
+                good += dt * min(max(1.0 - abs(off) / target, -1.0), 1.0)
                 time, length = time + dt, length + far
             if times[k] < duration and (row[GAIT_NOTED.FALLEN] or self.always):
                 time += duration - float(times[k])
-            result[k], speeds[k] = (
-                1.0 - good / time if time else 1.0,
-                length / time if time else 0.0,
-            )
+            result[k] = 1.0 - good / time if time else 1.0
+            speeds[k] = length / time if time else 0.0
             counts[k] = len(steps)
         self.report = {"speed": speeds, "steps": counts}
         return result
 
 
 class JumpMeasure(Measure):
-    """How high the mass centre comes, in cm."""
+    """Height of a jump of the mass centre (cm), to be maximized by default."""
 
     minimize = False
 
     def read(self, node: Node) -> None:
-        """As `Measure` says."""
+        """Read when a jump starts and ends."""
         for key in ("jump_type", "jump_angle", "body", "target_body", "offset", "recover_time"):
             if node.get(key) is not None:
                 raise node.error(f"'{key}' of a JumpMeasure is not done here")
@@ -243,8 +296,15 @@ class JumpMeasure(Measure):
         )
         self._first = self.criteria.add(JUMP, 0, self, *numbers)
 
-    def result(self, times: Array, duration: float) -> Array:
-        """As `Measure` says; of one that has not taken off, where it would be after a second."""
+    def compute_result(self, times: Array, duration: float) -> Array:
+        """Return the peak height minus the rise during preparation (w,) (cm).
+
+        Of a jumper that never leaves the preparation, it extrapolates the mean rise to one second.
+
+        Args:
+            times: times at which the jumps ended (w,) (s).
+            duration: longest duration (s).
+        """
         start, here, peak, prepared, does = (
             self.read_recorded(self._first, getattr(JUMP_NOTED, name))
             for name in ("START", "HERE", "PEAK", "PREPARED", "DOES")
@@ -258,10 +318,12 @@ class JumpMeasure(Measure):
 
 
 class EffortMeasure(Measure):
-    """What muscles take."""
+    """Effort of the muscles: metabolic power, total force, or a sum of powers of activations."""
 
     def read(self, node: Node) -> None:
-        """As `Measure` says."""
+        """Read the type of effort; the mass of a muscle is F_max / specific tension * density *
+        optimal length.
+        """
         kind, walkers = node.text("measure_type"), self.walkers
         if kind not in EFFORTS:
             raise node.error(
@@ -276,6 +338,7 @@ class EffortMeasure(Measure):
         )
         slow = node.number("default_muscle_slow_twitch_ratio", 0.5)
         masses = walkers.strengths / tension * density * walkers.optimal
+        # These change no result here: all muscles have the same ratio, and there is only a total.
         for key in ("use_symmetric_fiber_ratios", "store_individual_muscle_efforts"):
             node.get(key)
         if node.get("name") is None:
@@ -283,8 +346,13 @@ class EffortMeasure(Measure):
         self._kind, power = EFFORTS[kind]
         self._first = self.criteria.add(self._kind, power, self, slow, *masses)
 
-    def result(self, times: Array, duration: float) -> Array:
-        """As `Measure` says."""
+    def compute_result(self, times: Array, duration: float) -> Array:
+        """Return the mean effort, or the effort per mass and distance (w,).
+
+        Args:
+            times: times at which the walks ended (w,) (s).
+            duration: longest duration (s).
+        """
         total, start, here = (
             self.read_recorded(self._first, k) for k in (NOTED.TOTAL, NOTED.START, NOTED.HERE)
         )
@@ -292,21 +360,35 @@ class EffortMeasure(Measure):
         if self._kind == WANG:
             mass = self.walkers.mass
             self.report = {
-                "power": self.average(self._first) / mass,
+                "power": self.average_over_time(self._first) / mass,
                 "transport": total / (mass * far),
             }
-        found = total / (self.walkers.mass * far) if self.by_distance else self.average(self._first)
+        found = (
+            total / (self.walkers.mass * far)
+            if self.by_distance
+            else self.average_over_time(self._first)
+        )
         return found / len(self.walkers.names) if self.by_muscle else found
 
 
 class Penalty(Measure):
-    """How far numbers are beyond ranges, over time."""
+    """Penalty of values outside a range, accumulated over time: the base of measures of ranges."""
 
-    _asked: tuple[tuple[str, int], ...] = ()
-    """Of each number the mode, and where it is noted."""
+    _statistics: tuple[tuple[str, int], ...] = ()
+    """Per criterion its mode (average, highest, lowest or sum) and its offset in the workspace."""
 
     def penalize(self, node: Node, kind: int, place: int = 0, factor: float = 1.0) -> None:
-        """Ask for a number; `node` says how it is punished."""
+        """Request a criterion for the excess of a number beyond a range.
+
+        Args:
+            node: node with the range and the penalties.
+            kind: kind of criterion of the kernels.
+            place: index of the number in the sensor row.
+            factor: factor of the number before the comparison, for example 180/pi for degrees.
+
+        Raises:
+            DocumentError: the range is empty, or the mode is unknown.
+        """
         numbers = [factor, node.number("min", -inf), node.number("max", inf)]
         if numbers[1] > numbers[2]:
             raise node.error(f"from {numbers[1]:g} to {numbers[2]:g} there is no value")
@@ -315,27 +397,34 @@ class Penalty(Measure):
         mode = node.text("mode", "average")
         if mode not in ("average", "highest", "lowest", "sum"):
             raise node.error(f"penalties have no mode '{mode}'")
-        self._asked = *self._asked, (mode, self.criteria.add(kind, place, self, *numbers))
+        self._statistics = *self._statistics, (mode, self.criteria.add(kind, place, self, *numbers))
 
-    def result(self, times: Array, duration: float) -> Array:
-        """As `Measure` says."""
+    def compute_result(self, times: Array, duration: float) -> Array:
+        """Return the sum of the statistics of all criteria (w,).
+
+        Args:
+            times: times at which the walks ended (w,) (s).
+            duration: longest duration (s).
+        """
         places, total = (
             {"sum": NOTED.TOTAL, "highest": NOTED.HIGHEST, "lowest": NOTED.LOWEST},
             np.zeros(self.count),
         )
-        for mode, first in self._asked:
+        for mode, first in self._statistics:
             total += (
-                self.read_recorded(first, places[mode]) if mode in places else self.average(first)
+                self.read_recorded(first, places[mode])
+                if mode in places
+                else self.average_over_time(first)
             )
         return total
 
 
 class DofMeasure(Penalty):
-    """A coordinate beyond a range, or the force of its limit."""
+    """Penalty of a coordinate, its speed, or the force of its limit outside a range."""
 
     def read(self, node: Node) -> None:
-        """As `Measure` says."""
-        name, senses = node.text("dof"), self.walkers.senses
+        """Read the coordinate and the ranges; rotations are in degrees unless `in_degrees` is false."""
+        name, senses = node.text("dof"), self.walkers.sensor_plan
         names = self.walkers.coordinates
         if name not in names and name + self.side in names:
             name += self.side
@@ -352,41 +441,46 @@ class DofMeasure(Penalty):
             part = node.get(what)
             if part is not None:
                 self.penalize(part, NUMBER, int(senses[first]) + names.index(name), scale)
-                part.expect_all_asked(f"a {what}")
+                part.refuse_unread_parts(f"a {what}")
 
     def default_name(self) -> str:
-        """As `Measure` says."""
+        """Return the name of the coordinate."""
         return self.node.text("dof") + self.side
 
 
 class ReactionForceMeasure(Penalty):
-    """Forces on the feet beyond a range, over the weight."""
+    """Penalty of ground reaction forces over the body weight outside a range."""
 
     def read(self, node: Node) -> None:
-        """As `Measure` says."""
+        """Read the range, and whether it is for the more loaded leg or for the total."""
         self.walkers.expect_legs()
         self.penalize(node, LARGEST_LOAD if node.flag("use_force_per_leg", False) else WHOLE_LOAD)
 
 
 class CompositeMeasure(Measure):
-    """The sum of others."""
+    """Sum of measures."""
 
     def read(self, node: Node) -> None:
-        """As `Measure` says."""
+        """Read the parts; with `dual_sided` or `symmetric` there is one of each part for either side."""
         if node.flag("use_first_non_zero_result", False):
             raise node.error("use_first_non_zero_result is not done here")
         both = node.flag("dual_sided", node.flag("symmetric", False))
-        blocks = [node, *(block for _, block in node.all_of("Measures"))]
+        blocks = [node, *(block for _, block in node.select_all("Measures"))]
         self.parts: list[Measure] = [
             MEASURES[name](part, self.walkers, self.criteria, self, side)
             for block in blocks
-            for name, part in block.all_of(*MEASURES)
+            for name, part in block.select_all(*MEASURES)
             for side in (SIDES if both else (self.side,))
         ]
         self.minimize = node.flag("minimize", not self.parts or self.parts[0].minimize)
 
-    def result(self, times: Array, duration: float) -> Array:
-        """As `Measure` says."""
+    def compute_result(self, times: Array, duration: float) -> Array:
+        """Return the sum of the weighted parts (w,), and collect their terms and reports.
+
+        Args:
+            times: times at which the walks ended (w,) (s).
+            duration: longest duration (s).
+        """
         total = sum(
             (part.add_weighted(times, duration) for part in self.parts), np.zeros(self.count)
         )
@@ -407,4 +501,4 @@ MEASURES: dict[str, Any] = {
         CompositeMeasure,
     )
 }
-"""By the names that scenarios have for them."""
+"""Supported measures by SCONE's names."""

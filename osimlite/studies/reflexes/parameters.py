@@ -1,4 +1,4 @@
-"""Parameters of a scenario: their names, where they begin, and files of their values (.par)."""
+"""Parameters of a scenario: names, initial distributions, and files of their values (.par)."""
 
 from __future__ import annotations
 
@@ -15,20 +15,24 @@ from osimlite.mechanics.multibody.spatial import Array
 from osimlite.studies.reflexes.settings import Node, parse_finite
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+"""Pattern of a decimal number without names such as inf and nan."""
 _FORM = re.compile(
     rf"(?P<mean>{_NUMBER})?(?:~(?P<std>{_NUMBER})?)?(?:<(?P<low>{_NUMBER}),(?P<high>{_NUMBER})>)?$"
 )
-AUTO = 0.1
-"""A standard deviation that nothing tells, as part of the mean."""
+"""Pattern of `mean~std<low,high>`, where each part may be missing."""
+AUTO_STD_FACTOR = 0.1
+"""Standard deviation over the absolute mean of a parameter that states none."""
 
 
 class Parameter(NamedTuple):
-    """A number that is looked for.
+    """Free number of a scenario, with the distribution from which a search starts.
 
     Attributes:
-        name: with what stands above it, as ``S00011.vasti.KF``.
-        mean, std: where the search begins, and how wide.
-        low, high: bounds.
+        name: name with the prefixes of the parts that it belongs to, for example `S00011.vasti.KF`.
+        mean: mean of the initial distribution.
+        std: standard deviation of the initial distribution.
+        low: lower bound, -inf for none.
+        high: upper bound, inf for none.
     """
 
     name: str
@@ -39,47 +43,66 @@ class Parameter(NamedTuple):
 
 
 class Parameters:
-    """The values of the parameters of some candidates, and which parameters there are.
+    """Values of the parameters of some candidates, and a register of the parameters that were read.
 
     Args:
-        values: by name, of each candidate (w,), or one for all; those without stand for their
-            means.
-        count: of candidates.
+        values: per name one value for all candidates, or an array (w,) with one value each. A
+            parameter
+            that is not named has its mean.
+        count: number of candidates w.
 
     Attributes:
-        found: all that were asked for.
-        told: all numbers that were asked for, of the first candidate.
-        auto: standard deviation that is not told, as part of the mean.
+        requested: per name the parameters that a scenario has asked for.
+        values_used: per name all numbers that a scenario has asked for, fixed ones too, of the
+            first
+            candidate.
+        auto_std_factor: standard deviation over the absolute mean of a parameter that states none.
     """
 
     def __init__(self, values: Mapping[str, Array | float], count: int = 1) -> None:
-        self.values, self.count, self.found, self.auto = values, count, dict[str, Parameter](), AUTO
-        self.told: dict[str, float] = {}
+        self.values = values
+        self.count = count
+        self.requested: dict[str, Parameter] = {}
+        self.auto_std_factor = AUTO_STD_FACTOR
+        self.values_used: dict[str, float] = {}
 
-    def of(self, node: Node, key: str, otherwise: float, name: str = "") -> Array:
-        """A number of each candidate (w,): what is written, or the parameter that is.
+    def get_number(self, node: Node, key: str, default: float, name: str = "") -> Array:
+        """Return a number of each candidate (w,): the literal number in the scenario, or the value of
+        the parameter.
 
         Args:
-            node: that it is part of.
-            key: of it.
-            otherwise: if it is not given.
-            name: of the parameter; the key if empty.
+            node: node that the number is a part of.
+            key: key of the part.
+            default: number if there is no such part.
+            name: name of the parameter; the key if empty.
 
         Raises:
-            DocumentError: it is neither a number nor a parameter.
+            DocumentError: the part is neither a number nor a parameter.
         """
         part = node.get(key)
-        found = np.full(self.count, otherwise) if part is None else self.read(part, name or key)
-        self.told[name or key] = float(found[0])
+        found = (
+            np.full(self.count, default) if part is None else self.parse_number(part, name or key)
+        )
+        self.values_used[name or key] = float(found[0])
         return found
 
-    def read(self, part: Node, name: str) -> Array:
-        """As `of`, from the node itself."""
-        # ``1~0.5<0,2>``, ``~1<0,2>``, or a block of mean, std, min and max.
+    def parse_number(self, part: Node, name: str) -> Array:
+        """Return a number of each candidate (w,) from its own node; values of parameters are clipped
+        to their bounds.
+
+        Args:
+            part: node of the number.
+            name: name of the parameter.
+
+        Raises:
+            DocumentError: the node is neither a number nor a parameter, or the mean is out of
+                bounds.
+        """
+        # A parameter is `1~0.5<0,2>`, `~1<0,2>`, or a block of mean, std, min and max.
         if part.parts:
-            wanted = ("mean", None), ("std", np.nan), ("min", -np.inf), ("max", np.inf)
+            defaults = ("mean", None), ("std", np.nan), ("min", -np.inf), ("max", np.inf)
             return self._request_parameter(
-                part, name, *(part.number(key, value) for key, value in wanted)
+                part, name, *(part.number(key, value) for key, value in defaults)
             )
         text = part.value
         match = _FORM.match(text)
@@ -90,13 +113,14 @@ class Parameters:
         if "~" not in text and match["low"] is None:
             return np.full(self.count, float(text))
         mean, std = match["mean"], match["std"]
+        # In `~1<0,2>` the number is the mean, and the standard deviation follows from it.
         if mean is None:
             mean, std = std, None
         if mean is None:
             raise part.error(f"the parameter '{name}' has no mean")
         low, high = (
-            float(match[end]) if match[end] is not None else way
-            for end, way in (("low", -np.inf), ("high", np.inf))
+            float(match[end]) if match[end] is not None else limit
+            for end, limit in (("low", -np.inf), ("high", np.inf))
         )
         return self._request_parameter(
             part, name, float(mean), np.nan if std is None else float(std), low, high
@@ -109,24 +133,33 @@ class Parameters:
             raise part.error(
                 f"the parameter '{name}' begins at {mean:g}, which is not from {low:g} to {high:g}"
             )
-        std = self.auto * abs(mean) if np.isnan(std) else std
-        self.found.setdefault(name, Parameter(name, mean, std, low, high))
+        std = self.auto_std_factor * abs(mean) if np.isnan(std) else std
+        # Both legs of a symmetric controller read one parameter; its first definition counts.
+        self.requested.setdefault(name, Parameter(name, mean, std, low, high))
         value = self.values.get(name, mean)
         return np.clip(np.broadcast_to(np.asarray(value, dtype=float), (self.count,)), low, high)
 
 
-def par_line(parameter: Parameter, best: float) -> str:
-    """A line of a file of values, as SCONE has it: name, best, mean, standard deviation."""
+def format_par_line(parameter: Parameter, best: float) -> str:
+    """Return a line of a .par file as SCONE writes it: name, best value, mean, standard deviation.
+
+    Args:
+        parameter: parameter with mean and standard deviation.
+        best: best value so far.
+    """
     numbers = "\t".join(f"{number:.17g}" for number in (best, parameter.mean, parameter.std))
     return f"{parameter.name:<32}\t{numbers}\n"
 
 
 def read_par(path: str | Path) -> dict[str, tuple[float, float, float]]:
-    """The best, the mean and the standard deviation of each parameter of a file.
+    """Read a .par file.
+
+    Returns:
+        Per name of a parameter the best value, the mean and the standard deviation.
 
     Raises:
         MissingFileError: there is no such file.
-        DocumentError: a line has no name and three numbers.
+        DocumentError: a line does not consist of a name and three finite numbers.
     """
     try:
         text = read_file(path).decode()

@@ -1,4 +1,6 @@
-"""A scenario of SCONE: a model, its controller, how it is judged, and what is looked for."""
+"""Scenarios of SCONE: a model, its controller, the measures that score a walk, and the parameters to
+optimize.
+"""
 
 from __future__ import annotations
 
@@ -23,56 +25,65 @@ from osimlite.studies.reflexes.parameters import Parameter, Parameters, read_par
 from osimlite.studies.reflexes.settings import (
     Node,
     find_file,
+    make_node,
     matches_pattern,
     read_settings,
-    settings_of,
 )
 from osimlite.studies.reflexes.walkers import Walkers
 
 OPTIMIZERS = "CmaOptimizer", "CmaPoolOptimizer"
+"""Parts of SCONE around a SimulationObjective; both are read as settings of one CMA-ES search."""
 INTEGRATORS = {
     "SemiExplicitEuler2": "euler2",
     "RungeKuttaMerson": "merson",
     "Rosenbrock": "rosenbrock",
 }
-"""By the names of SCONE; the last is ours."""
-POPULATION, GENERATIONS = 16, 1000
-"""Of a search whose scenario says nothing."""
-LEFT_ASIDE = (
+"""Our integrators by SCONE's names; `Rosenbrock` is ours, SCONE has no such name."""
+DEFAULT_POPULATION = 16
+"""Candidates per generation of a scenario that states none."""
+DEFAULT_GENERATIONS = 1000
+"""Generations of a scenario that states none."""
+IGNORED_SEARCH_SETTINGS = (
     "output_root",
     "min_progress",
     "window_size",
     "max_threads",
 )
-"""Settings of a search that change no result, or only when SCONE ends it."""
-HIGH, CLOSE, TRIES = 10.0, 0.1, 100
-"""How far a walker is lifted or lowered at most to carry its weight (m), how well it has to carry it, and tries."""
-LIFT = 0.1
-"""M, by which it is lifted at a time."""
+"""Settings of a search that change no result, or only the moment at which SCONE ends the search."""
+MAX_LIFT_M = 10.0
+"""Farthest distance (m) by which the start height is moved to find the required load."""
+LOAD_TOLERANCE = 0.1
+"""Relative error of the load at the start that is accepted."""
+MAX_BISECTIONS = 100
+"""Most bisections of the start height; more than double precision can resolve."""
+LIFT_STEP_M = 0.1
+"""Step (m) by which the start height is moved until it brackets the required load."""
 MAX_POPULATION = 10_000
-"""Candidates of a generation: each has a state and a record of its own."""
+"""Most candidates of a generation: each one has a state and a record of its own."""
 MAX_SEED = 2**32 - 2
-"""The largest seed that numpy takes, less the one that CMA-ES adds."""
-MAX_STEPS = 2_000_000
-"""Control steps of a walk: each is recorded."""
-SHORTEST = 1e-4
-"""S, of a control step: each is recorded."""
-AT_ONCE = 100
-"""Control steps of a call; between them Ctrl-C is heard."""
+"""Largest seed that numpy takes (2**32 - 1), less 1 because the search adds 1."""
+MAX_CONTROL_STEPS = 2_000_000
+"""Most control steps of a walk, which bounds the memory: each one is recorded."""
+MIN_CONTROL_STEP_S = 1e-4
+"""Shortest control step (s), which bounds the number of records."""
+STEPS_PER_CALL = 100
+"""Control steps per call of the kernels; between calls Python handles Ctrl-C."""
 
 
 @dataclass(frozen=True, eq=False)
-class Walked:
-    """What became of some candidates.
+class WalkResult:
+    """Result of simulating some candidates of a scenario.
 
     Attributes:
-        results: what is to become small (w,); of a measure that is to be large, the negative of it.
-        times: when each ended, s (w,).
-        terms: parts of the results, by the names of measures.
-        report: what measures say besides.
-        states: of the first candidate over time.
-        excitations: of its muscles.
-        loads: forces on its legs, over the weight.
+        results: score of each candidate (w,), smaller is better; a measure to be maximized has its
+            sign
+            changed.
+        times: time at which each walk ended (w,) (s).
+        terms: per name of a measure its weighted contribution to the results (w,).
+        report: per name a further quantity of a measure (w,), for example the speed (m/s).
+        states: states of the first candidate at each control step.
+        excitations: excitations of its muscles.
+        loads: ground reaction force on each of its legs over the body weight.
     """
 
     results: Array
@@ -85,31 +96,38 @@ class Walked:
 
 
 class Scenario:
-    """What walks, by which reflexes, and how it is judged.
+    """Model, controller, measures and search settings of a file of SCONE.
 
     Args:
-        given: file of a scenario, SCONE's or YAML; or the same as data of Python, whose files are
-            in the folder that the program runs in.
-        model: that walks, in the place of a `model_file`.
+        given: file of SCONE or YAML, or Python data of the same content, whose files are relative
+            to the
+            working directory.
+        model: model to use instead of the `model_file` of the scenario.
 
     Attributes:
-        model: that walks. controller: name and part of what excites the muscles. measure: name and
-            part of what judges. begun: parameters that a file of the scenario begins with: best,
-            mean and standard deviation. duration: of a walk, s. population, generations, seed: of a
-            search.
+        model: model that walks.
+        controller: class name and node of the controller.
+        measure: class name and node of the measure.
+        initial: per parameter the best value, mean and standard deviation from the `init` files.
+        duration: longest duration of a walk (s).
+        step: duration of a control step (s).
+        population: candidates per generation of a search.
+        generations: number of generations of a search.
+        seed: seed of the search.
 
     Raises:
-        DocumentError: it has something that is not done here; its name and line are told.
+        DocumentError: the scenario has something that is not supported; the error has its name and
+            line.
     """
 
     def __init__(self, given: str | Path | Mapping[str, Any], model: Model | None = None) -> None:
         if isinstance(given, Mapping):
-            self.folder, top = Path(), settings_of(given)
+            self.folder, top = Path(), make_node(given)
         else:
             self.folder, top = Path(given).parent, read_settings(given)
-        found = next(iter(top.all_of(*OPTIMIZERS)), None)
+        found = next(iter(top.select_all(*OPTIMIZERS)), None)
         self.optimizer = top if found is None else found[1]
-        self.population, self.generations, self.seed = POPULATION, GENERATIONS, 0
+        self.population, self.generations, self.seed = DEFAULT_POPULATION, DEFAULT_GENERATIONS, 0
         objective = self.optimizer.get("SimulationObjective")
         if objective is None:
             raise self.optimizer.error("a scenario needs a SimulationObjective in a CmaOptimizer")
@@ -132,24 +150,28 @@ class Scenario:
             model = read(find_file(settings.text("model_file"), self.folder))
         settings.get("model_file")
         self.model = model
-        self.step = control_step(settings)
+        self.step = read_control_step(settings)
         if self.duration < self.step:
             raise objective.error(
                 f"a walk of {self.duration:g} s is shorter than a control step of {self.step:g} s"
             )
-        self.begun = read_initial_parameters(self.optimizer, self.folder)
+        self.initial = read_initial_parameters(self.optimizer, self.folder)
         if found is not None:
-            self.population = self.optimizer.count("lambda", POPULATION, 1, MAX_POPULATION)
-            self.generations = self.optimizer.count("max_generations", GENERATIONS, 0, 10**9)
+            self.population = self.optimizer.count("lambda", DEFAULT_POPULATION, 1, MAX_POPULATION)
+            self.generations = self.optimizer.count(
+                "max_generations", DEFAULT_GENERATIONS, 0, 10**9
+            )
             self.seed = self.optimizer.count("random_seed", 0, 0, MAX_SEED)
-            for key in LEFT_ASIDE:
+            for key in IGNORED_SEARCH_SETTINGS:
                 self.optimizer.get(key)
-            self.optimizer.expect_all_asked(f"a {found[0]}")
+            self.optimizer.refuse_unread_parts(f"a {found[0]}")
         self._walkers: dict[int, Walkers] = {}
-        self._refuse()
+        self._read_settings()
 
-    def _refuse(self) -> None:
+    def _read_settings(self) -> None:
+        """Read controller, measure and integrator, and refuse settings that are not supported."""
         objective, settings = self._objective, self.settings
+        # These are read later, only if a walk needs them, and must not count as unknown.
         for key in (
             "initial_load_dof",
             "state_init_file",
@@ -167,8 +189,8 @@ class Scenario:
             "max_integration_step_size",
         ):
             settings.get(key)
-        settings.expect_all_asked("a ModelOpenSim4")
-        controller, measure = objective.one_of(*CONTROLLERS), objective.one_of(*MEASURES)
+        settings.refuse_unread_parts("a ModelOpenSim4")
+        controller, measure = objective.select_one(*CONTROLLERS), objective.select_one(*MEASURES)
         if controller is None:
             other = next(
                 (name for name, _ in objective.parts if name.endswith("Controller")), "none"
@@ -179,7 +201,7 @@ class Scenario:
         if measure is None:
             raise objective.error(f"a measure is needed: {join_words(list(MEASURES))}")
         self.controller, self.measure = controller, measure
-        objective.expect_all_asked("a SimulationObjective", tuple(MEASURES))
+        objective.refuse_unread_parts("a SimulationObjective", tuple(MEASURES))
         method = settings.text("integration_method", "SemiExplicitEuler2")
         if method not in INTEGRATORS:
             raise settings.error(
@@ -189,16 +211,24 @@ class Scenario:
 
     # ---------------------------------------------------------------------------------------------- candidates
     def best(self) -> dict[str, float]:
-        """The best values that the scenario begins with."""
-        return {name: best for name, (best, _, _) in self.begun.items()}
+        """Return the best values of the `init` files.
+
+        Returns:
+            Value per name of a parameter.
+        """
+        return {name: best for name, (best, _, _) in self.initial.items()}
 
     def parameters(self) -> list[Parameter]:
-        """All that are looked for, with the means and widths that the scenario begins with."""
-        found = Parameters({})
-        Candidates(self, found, self.step)
+        """Return all parameters to optimize, with the initial means and standard deviations.
+
+        The `init` files of the scenario override the distributions that are written at the
+        parameters.
+        """
+        requested = Parameters({})
+        Candidates(self, requested, self.step)
         result = []
-        for each in found.found.values():
-            _, mean, std = self.begun.get(each.name, (each.mean, each.mean, each.std))
+        for each in requested.requested.values():
+            _, mean, std = self.initial.get(each.name, (each.mean, each.mean, each.std))
             result.append(each._replace(mean=mean, std=std))
         return result
 
@@ -208,26 +238,28 @@ class Scenario:
         count: int = 1,
         *,
         duration: float | None = None,
-    ) -> Walked:
-        """Have candidates walk until they fall, or to the end.
+    ) -> WalkResult:
+        """Simulate candidates until they fall or the duration ends.
 
         Args:
-            values: of the parameters, of each candidate (w,) or one for all.
-            count: of candidates.
-            duration: s; that of the scenario if None.
+            values: per name of a parameter one value for all candidates, or an array (w,) with one
+                each.
+                Others have their means.
+            count: number of candidates w.
+            duration: longest duration (s); by default that of the scenario.
 
         Raises:
-            SettingError: the duration is shorter than a control step.
+            SettingError: the duration is shorter than a control step or has too many, a parameter
+                is
+                unknown, or has another number of values than there are candidates.
         """
         if duration is not None and not duration >= self.step:
             raise SettingError(
                 f"a walk of {duration:g} s is shorter than a control step of {self.step:g} s"
             )
         length = self.duration if duration is None else duration
-        if not length <= MAX_STEPS * self.step:
-            message = (
-                f"a walk of {length:g} s has more than {MAX_STEPS} control steps of {self.step:g} s"
-            )
+        if not length <= MAX_CONTROL_STEPS * self.step:
+            message = f"a walk of {length:g} s has more than {MAX_CONTROL_STEPS} control steps of {self.step:g} s"
             raise SettingError(message)
         parameters = Parameters(values, count)
         for name, value in values.items():
@@ -235,14 +267,16 @@ class Scenario:
                 raise SettingError(f"'{name}' has {np.size(value)} values for {count} candidates")
         candidates = Candidates(self, parameters, length)
         for name in values:
-            if name not in parameters.found and name not in self.begun:
+            if name not in parameters.requested and name not in self.initial:
                 raise SettingError(
-                    f"the scenario has no parameter '{name}'{suggest_or_list(name, parameters.found)}"
+                    f"the scenario has no parameter '{name}'{suggest_or_list(name, parameters.requested)}"
                 )
         return candidates.walk()
 
-    def walkers(self, count: int) -> Walkers:
-        """So many walkers of the model; kept, as making them takes longer than a walk."""
+    def get_walkers(self, count: int) -> Walkers:
+        """Return the copies of the model for a number of candidates; they are cached, because making
+        them takes longer than a walk.
+        """
         if count not in self._walkers:
             node = self.settings
             self._walkers[count] = Walkers(
@@ -254,48 +288,56 @@ class Scenario:
                     integrator=self._integrator,
                     step_bounds=(0.0, node.number("max_integration_step_size", np.inf)),
                 ),
-                legs_of(node),
+                read_leg_names(node),
             )
         return self._walkers[count]
 
     def close(self) -> None:
-        """Free the engines."""
+        """Release the compiled engines of all copies."""
         for each in self._walkers.values():
             each.close()
         self._walkers.clear()
 
 
 class Candidates:
-    """Some candidates of a scenario, at their start, which are to walk for a duration (s)."""
+    """Candidates of a scenario with their reflexes and measures, at the start of a walk.
+
+    Args:
+        scenario: scenario to simulate.
+        parameters: values of the parameters of each candidate.
+        duration: longest duration of the walk (s).
+    """
 
     def __init__(self, scenario: Scenario, parameters: Parameters, duration: float) -> None:
         self.scenario, self.parameters, self.duration = scenario, parameters, duration
-        self.walkers = walkers = scenario.walkers(parameters.count)
-        self._start()
+        self.walkers = walkers = scenario.get_walkers(parameters.count)
+        self._set_initial_states()
         kind, controller = scenario.controller
         reflexes = Reflexes(controller, kind, walkers, parameters)
         self._steps = round(duration / walkers.step)
         name, own = scenario.measure
         criteria = Criteria(self._steps)
         self.measure: Measure = MEASURES[name](own, walkers, criteria)
-        walkers.go_by(*reflexes.pack(), *criteria.pack(), criteria.room)
+        walkers.set_reflexes_and_criteria(*reflexes.pack(), *criteria.pack(), criteria.size)
         node = scenario.settings
         load = node.number("initial_load", 0.2)
-        height = walkers.places.get(
+        height = walkers.offsets.get(
             node.text("initial_load_dof", "/jointset/ground_pelvis/pelvis_ty/value")
         )
         if load > 0.0 and height is not None:
             for k in range(walkers.count):
                 _settle_on_ground(walkers, k, height, load)
 
-    def _start(self) -> None:
-        """States at the start."""
+    def _set_initial_states(self) -> None:
+        """Set the initial states: default of the model, then the file, then offsets that may be
+        parameters.
+        """
         walkers, node, scenario = self.walkers, self.scenario.settings, self.scenario
         states = walkers.copies.states
         walkers.copies.set_states(slice(None), np.tile(walkers.copies.start, (walkers.count, 1)))
         file = node.text("state_init_file", "")
         if file:
-            self._read_state(find_file(file, scenario.folder))
+            self._read_state_file(find_file(file, scenario.folder))
         offset = node.get("initial_state_offset")
         if offset is not None:
             included = node.text("initial_state_offset_include", "*")
@@ -303,105 +345,132 @@ class Candidates:
                 node.text("initial_state_offset_exclude", "") + ";*/activation;*/fiber_length"
             )
             symmetric = node.flag("initial_state_offset_symmetric", False)
-            for path, place in walkers.places.items():
+            for path, index in walkers.offsets.items():
                 if matches_pattern(path, included) and not matches_pattern(path, excluded):
+                    # With the side removed, both legs share one parameter.
                     name = path.replace("_l/", "/").replace("_r/", "/") if symmetric else path
-                    states[:, place] += self.parameters.read(offset, f"{name}.offset")
+                    states[:, index] += self.parameters.parse_number(offset, f"{name}.offset")
 
-    def _read_state(self, path: Path) -> None:
+    def _read_state_file(self, path: Path) -> None:
+        """Set initial states from a storage file (.sto), or from a SCONE file with `values` and
+        `velocities`.
+        """
         walkers = self.walkers
         if path.suffix.lower() == ".sto":
             table = read_sto(path)
             for label in table.columns:
-                if label in walkers.places and len(table.times):
-                    walkers.copies.states[:, walkers.places[label]] = table[label][0]
+                if label in walkers.offsets and len(table.times):
+                    walkers.copies.states[:, walkers.offsets[label]] = table[label][0]
             return
         top = read_settings(path)
         for block, ending in (("values", "value"), ("velocities", "speed")):
             part = top.get(block)
             for name, node in part.parts if part is not None else ():
-                place = next(
+                offset = next(
                     (
-                        at
-                        for full, at in walkers.places.items()
+                        number
+                        for full, number in walkers.offsets.items()
                         if full.endswith(f"/{name}/{ending}")
                     ),
                     None,
                 )
-                if place is None:
+                if offset is None:
                     raise node.error(
                         f"the model has no coordinate '{name}'{suggest_or_list(name, walkers.coordinates)}"
                     )
                 try:
-                    walkers.copies.states[:, place] = float(node.value)
+                    walkers.copies.states[:, offset] = float(node.value)
                 except ValueError:
                     raise node.error(f"'{name}' must be a number, not '{node.value}'") from None
 
-    def walk(self) -> Walked:
-        """As of `Scenario.walk`."""
+    def walk(self) -> WalkResult:
+        """Simulate the candidates; the order of equilibrium and reflexes is that of SCONE."""
         walkers = self.walkers
         small = self.scenario.settings.number("initial_equilibration_activation", 0.05)
+        # SCONE computes the first excitations from muscles in equilibrium at a small activation, and
+        # then brings the muscles into equilibrium with these excitations as activations.
         walkers.equilibrate_muscles(np.full(walkers.excitations.shape, small))
-        walkers.go(BEGIN)
+        walkers.advance(BEGIN)
         walkers.equilibrate_muscles(walkers.excitations)
-        walkers.go(START)
+        walkers.advance(START)
         rows, going = [], list(range(walkers.count))
-        for first in range(0, self._steps, AT_ONCE):
-            rows.append(walkers.go(min(AT_ONCE, self._steps - first), going))
+        for first in range(0, self._steps, STEPS_PER_CALL):
+            rows.append(walkers.advance(min(STEPS_PER_CALL, self._steps - first), going))
             going = np.flatnonzero(walkers.progress[:, GOING]).tolist()
             if not going:
                 break
+        # The kernels record the start of each step; the end of the last one is added here.
         rows.append(
-            np.concatenate([walkers.copies.states[0], walkers.excitations[0], walkers.loads()[0]])[
-                None
-            ]
+            np.concatenate(
+                [walkers.copies.states[0], walkers.excitations[0], walkers.get_leg_loads()[0]]
+            )[None]
         )
         times = walkers.step * walkers.progress[:, STEPS].astype(np.float64)
         results = self.measure.add_weighted(times, self.duration) * (
             1.0 if self.measure.minimize else -1.0
         )
-        return Walked(
+        return WalkResult(
             results,
             times,
             self.measure.terms,
             self.measure.report,
-            *self._tables(np.concatenate(rows)),
+            *self._make_tables(np.concatenate(rows)),
         )
 
-    def _tables(self, rows: Array) -> tuple[StoTable, StoTable, StoTable]:
+    def _make_tables(self, rows: Array) -> tuple[StoTable, StoTable, StoTable]:
+        """Return states, excitations and loads of the first candidate as tables."""
         walkers = self.walkers
         times = walkers.step * np.arange(len(rows), dtype=np.float64)
         legs = tuple(f"leg{leg.side}.load" for leg in walkers.legs)
         size = walkers.copies.states.shape[1]
         states, excitations, loads = np.split(rows, (size, size + len(walkers.names)), axis=1)
         return (
-            StoTable("states", times, tuple(walkers.places), states[:, [*walkers.places.values()]]),
+            StoTable(
+                "states", times, tuple(walkers.offsets), states[:, [*walkers.offsets.values()]]
+            ),
             StoTable("excitations", times, tuple(walkers.names), excitations),
             StoTable("loads", times, legs, loads),
         )
 
 
 def read_initial_parameters(optimizer: Node, folder: Path) -> dict[str, tuple[float, float, float]]:
-    """Parameters of the files that a search begins with: best, mean and standard deviation."""
+    """Read the .par files with which a search starts.
+
+    Args:
+        optimizer: node with any number of `init` parts; later ones override earlier ones.
+        folder: folder of the scenario.
+
+    Returns:
+        Per parameter the best value, the mean (the best value with `use_best_as_mean`) and the
+        standard
+        deviation times `std_factor`.
+    """
     result: dict[str, tuple[float, float, float]] = {}
-    for _, init in optimizer.all_of("init"):
+    for _, init in optimizer.select_all("init"):
         own = read_par(find_file(init.text("file"), folder))
         factor, best = init.number("std_factor", 1.0), init.flag("use_best_as_mean", False)
         result |= {name: (v[0], v[0] if best else v[1], factor * v[2]) for name, v in own.items()}
-        init.expect_all_asked("an init")
+        init.refuse_unread_parts("an init")
     return result
 
 
-def control_step(node: Node) -> float:
-    """For which controls are held, s."""
+def read_control_step(node: Node) -> float:
+    """Return the duration of a control step (s)."""
     step = node.number("fixed_control_step_size", 0.005)
-    if not SHORTEST <= step < np.inf:
-        raise node.error(f"'fixed_control_step_size' is {SHORTEST:g} s or more, not {step:g} s")
+    if not MIN_CONTROL_STEP_S <= step < np.inf:
+        raise node.error(
+            f"'fixed_control_step_size' is {MIN_CONTROL_STEP_S:g} s or more, not {step:g} s"
+        )
     return step
 
 
-def legs_of(node: Node) -> dict[str, str]:
-    """What the legs of a model are called, as :class:`osimlite.studies.reflexes.walkers.Felt` takes it."""
+def read_leg_names(node: Node) -> dict[str, str]:
+    """Return the names of the bodies and contact forces of legs.
+
+    Returns:
+        Names without their side, as the `legs` of
+        :class:`osimlite.studies.reflexes.walkers.SensedModel`.
+    """
     return {
         "upper": node.text("leg_upper_body", "femur"),
         "lower": node.text("leg_lower_body", ""),
@@ -410,25 +479,36 @@ def legs_of(node: Node) -> dict[str, str]:
 
 
 def _settle_on_ground(walkers: Walkers, which: int, height: int, load: float) -> None:
-    """Move a walker to the height in which the ground carries a part of the weight, as SCONE looks for it."""
+    """Move a walker to the height at which the ground carries a part of its weight, as SCONE does.
+
+    Args:
+        walkers: candidates.
+        which: index of the candidate.
+        height: offset of the vertical coordinate in its state.
+        load: required ground reaction force over the weight.
+
+    Raises:
+        SimulationError: no height within `MAX_LIFT_M` carries this load.
+    """
     state = walkers.copies.states[which]
     start = float(state[height])
 
-    def carried(value: float) -> float:
+    def compute_load(value: float) -> float:
         state[height] = value
-        walkers.go(FEEL, (which,))
-        return float(walkers.loads()[which].sum())
+        walkers.advance(FEEL, (which,))
+        return float(walkers.get_leg_loads()[which].sum())
 
+    # The load falls with height; bracket the root, then bisect.
     top = start
-    while carried(top) > load and top - start < HIGH:
-        top += LIFT
-    bottom = top - LIFT
-    while carried(bottom) <= load and bottom - start > -HIGH:
-        bottom -= LIFT
-    for _ in range(TRIES):
+    while compute_load(top) > load and top - start < MAX_LIFT_M:
+        top += LIFT_STEP_M
+    bottom = top - LIFT_STEP_M
+    while compute_load(bottom) <= load and bottom - start > -MAX_LIFT_M:
+        bottom -= LIFT_STEP_M
+    for _ in range(MAX_BISECTIONS):
         middle = 0.5 * (top + bottom)
-        found = carried(middle)
-        if abs(found - load) / load <= CLOSE:
+        found = compute_load(middle)
+        if abs(found - load) / load <= LOAD_TOLERANCE:
             return
         top, bottom = (top, middle) if found > load else (middle, bottom)
     raise SimulationError(f"in no height the ground carries {load:g} of the weight")

@@ -1,4 +1,4 @@
-"""The search for parameters with which a scenario goes best: CMA-ES, all candidates of a generation at once."""
+"""CMA-ES search for the parameters of a scenario; all candidates of a generation walk at once."""
 
 from __future__ import annotations
 
@@ -12,24 +12,25 @@ from osimlite.base.files import make_folder, write_atomically
 from osimlite.base.records import dataclass
 from osimlite.base.require import require
 from osimlite.errors import SettingError
-from osimlite.studies.reflexes.parameters import par_line, read_par
+from osimlite.studies.reflexes.parameters import format_par_line, read_par
 from osimlite.studies.reflexes.scenario import Scenario
 
-BEST = "best.par"
-FEWEST = 4
-"""Candidates that CMA-ES learns anything from."""
+BEST_FILE = "best.par"
+"""File in the output folder with the best parameters, which SCONE reads too."""
+MIN_POPULATION = 4
+"""Fewest candidates per generation: with fewer, CMA-ES has too few to rank and to recombine."""
 
 
 @dataclass(frozen=True, eq=False)
 class Generation:
-    """Where a search is.
+    """State of a search after one generation, for reports of progress.
 
     Attributes:
-        number: of the generation.
-        best: result of the best candidate of all.
-        median: of this generation.
-        longest: how long its longest walk took, s.
-        per_minute: generations.
+        number: number of the generation, from 1.
+        best: smallest result of all candidates so far.
+        median: median result of this generation.
+        longest: duration of the longest walk of this generation (s).
+        per_minute: generations per minute of elapsed time since the start.
     """
 
     number: int
@@ -51,39 +52,46 @@ def search_parameters(
     population: int | None = None,
     seed: int | None = None,
     resume: bool = False,
-    tell: Callable[[Generation], None] | None = None,
+    report: Callable[[Generation], None] | None = None,
 ) -> dict[str, float]:
-    """Look for parameters whose result is least; the best is written whenever it gets better, Ctrl-C ends the search.
+    """Minimize the result of a scenario over its parameters with CMA-ES.
+
+    The file `best.par` is rewritten whenever the best result improves. Ctrl-C ends the search and
+    returns
+    the best parameters so far. The search also ends where CMA-ES stops by its own criteria.
 
     Args:
-        scenario: whose.
-        folder: for ``best.par``, which SCONE reads, too.
-        generations: how many; as the scenario says if None, as the next two.
-        population: candidates of each.
-        seed: the same seed, the same search.
-        resume: whether it begins with the file that is in the folder.
-        tell: is told of each generation.
+        scenario: scenario to optimize.
+        folder: output folder for `best.par`; created if necessary.
+        generations: number of generations; by default that of the scenario.
+        population: candidates per generation; by default that of the scenario.
+        seed: seed of the random numbers, so that a search can be repeated; by default that of the
+            scenario.
+        resume: whether to continue from the `best.par` in the folder.
+        report: called with the state after each generation.
 
     Returns:
-        The best parameters.
+        Per name of a parameter its best value.
 
     Raises:
         MissingDependency: cma is not installed.
-        SettingError: nothing is looked for, there are too few candidates, or the folder has the
-            best of another search.
+        SettingError: the scenario has no parameters, there are too few candidates or generations,
+            the
+            folder has the result of another search, or its parameters are not those of the
+            scenario.
     """
     generations = scenario.generations if generations is None else generations
     population = scenario.population if population is None else population
     seed = scenario.seed if seed is None else seed
-    if population < FEWEST or generations < 1:
+    if population < MIN_POPULATION or generations < 1:
         raise SettingError(
-            f"a search takes {FEWEST} candidates in a generation at least, and one generation"
+            f"a search takes {MIN_POPULATION} candidates in a generation at least, and one generation"
         )
     strategy = require("cma", extra="optimize", purpose="the search for parameters")
     own = scenario.parameters()
     if not own:
         raise SettingError("the scenario has no parameters, which are written as 1~0.1<0,2>")
-    path = Path(folder) / BEST
+    path = Path(folder) / BEST_FILE
     if not resume and path.exists():
         raise SettingError(
             f"'{path}' exists already: continue it with --resume, or name another folder"
@@ -94,7 +102,7 @@ def search_parameters(
         for name in sorted({*known} ^ {*names}):
             whose = "the scenario" if name in known else f"'{path}'"
             raise SettingError(f"{whose} has no parameter '{name}': they are of different searches")
-        # As it was written there, a mean can be beyond the bounds of now.
+        # The scenario may have other bounds than when the file was written.
         own = [
             each._replace(
                 mean=float(np.clip(known[each.name][1], each.low, each.high)),
@@ -109,14 +117,18 @@ def search_parameters(
             ).results[0]
         )
     make_folder(Path(folder))
+    # CMA-ES works on (value - mean) / std, so that its initial step size is 1 for all parameters.
+    # A standard deviation of 0 (a mean of 0 without one) becomes tiny, not a division by zero.
     scale = np.array([each.std if each.std > 0.0 else 1e-6 for each in own])
     middle = np.array([each.mean for each in own])
     lows, highs = (
         (np.array([getattr(each, end) for each in own]) - middle) / scale for end in ("low", "high")
     )
-    options = {"bounds": [lows, highs], "popsize": population, "seed": seed + 1, "verbose": -9}
+    # The package takes seed 0 as "draw one from the clock".
+    cma_seed = seed + 1
+    options = {"bounds": [lows, highs], "popsize": population, "seed": cma_seed, "verbose": -9}
     es = strategy.CMAEvolutionStrategy(np.zeros(len(own)), 1.0, options)
-    begin = time.perf_counter()
+    start_time = time.perf_counter()
     try:
         for number in range(1, generations + 1):
             points = np.array(es.ask())
@@ -125,18 +137,19 @@ def search_parameters(
                 {each.name: values[:, k] for k, each in enumerate(own)}, population
             )
             es.tell(list(points), walked.results.tolist())
-            place = int(np.argmin(walked.results))
-            if walked.results[place] < least:
-                best, least = values[place], float(walked.results[place])
+            index = int(np.argmin(walked.results))
+            if walked.results[index] < least:
+                best, least = values[index], float(walked.results[index])
+                # SCONE continues from mean and standard deviation in the file, not from the best.
                 mean = middle + scale * es.result.xfavorite
                 stds = scale * es.sigma * np.sqrt(np.diag(es.C))
                 found = [
                     each._replace(mean=m, std=s) for each, m, s in zip(own, mean, stds, strict=True)
                 ]
-                write_atomically(path, "".join(map(par_line, found, best)))
-            if tell is not None:
-                rate = 60.0 * number / (time.perf_counter() - begin)
-                tell(
+                write_atomically(path, "".join(map(format_par_line, found, best)))
+            if report is not None:
+                rate = 60.0 * number / (time.perf_counter() - start_time)
+                report(
                     Generation(
                         number,
                         least,

@@ -1,7 +1,10 @@
-"""Trees of keys and values: files of SCONE (.scone, .zml) with includes and constants, YAML, data of Python.
+"""Reader of scenarios as trees of keys and values: SCONE files (.scone, .zml), YAML and Python data.
 
-In YAML and Python a key that stands several times has a list of what stands below it; `include`
-names another file.
+SCONE files may include other files and define constants (`$name = 3`). In YAML and in Python data,
+a
+key that occurs several times in SCONE has a list of mappings; the key `include` of YAML names
+another
+file.
 """
 
 from __future__ import annotations
@@ -25,73 +28,91 @@ from osimlite.io.document.data import SUFFIXES, parse_yaml
 from osimlite.mechanics.multibody.spatial import Array
 
 _TOKEN = re.compile(r'\s+|#[^\n]*|(?P<token>"[^"]*"|<<|>>|[{}=\[\]]|[^\s{}=\[\]#"]+)')
+"""Tokens of SCONE files; white space and comments match too, but have no group `token`."""
 FLAGS = {"1": True, "true": True, "yes": True, "0": False, "false": False, "no": False}
+"""Spellings of true and false that scenarios may use."""
 MAX_INCLUDE_DEPTH = 20
-"""Files that may include one another in a chain."""
+"""Longest chain of files that include one another."""
 MAX_INCLUDED_FILES = 200
-"""Files that one scenario reads: a file that includes the next twice doubles their number each time."""
-MAX_PARTS = 200_000
-"""Parts of all files together, with those that stand there again because a file is included again."""
-MAX_NESTING = 100
-"""Levels of braces; SCONE's own scenarios have about ten."""
-INCLUDED_ENDINGS = (".scone", ".zml", *SUFFIXES)
-"""Endings of files that a scenario may include; errors would show the first words of any other file."""
+"""Most files that one scenario reads.
 
-CALLED = "name", "signature", "signature_prefix", "signature_postfix"
-"""How any part is called, and the folder of its results in SCONE; nothing else depends on these."""
+The depth alone does not bound them: where each file includes the next one twice, their number
+doubles
+with each level.
+"""
+MAX_PARTS = 200_000
+"""Most parts of all files together; a file that is included twice counts twice."""
+MAX_NESTING = 100
+"""Most levels of braces; SCONE's own scenarios have about ten."""
+INCLUDED_ENDINGS = (".scone", ".zml", *SUFFIXES)
+"""Endings of files that a scenario may include; errors about any other file would show its first
+words.
+"""
+
+IGNORED_KEYS = "name", "signature", "signature_prefix", "signature_postfix"
+"""Keys that any part may have and that change no result: names, and SCONE's folder for the output."""
 
 
 @dataclass
 class Node:
-    """A value, and what stands below it.
+    """Value with its parts, and its position in a file.
 
     Attributes:
-        value: as it is written; "" if there is none.
-        parts: below it, in their order.
-        file, line: where it stands.
-        asked: keys that something has asked for.
+        value: text as it is written; "" for none.
+        parts: keys and nodes below this one, in the order of the file.
+        file: path of the file, or "" for Python data.
+        line: line in the file, from 1; 0 for Python data.
+        read_keys: keys that the program has read, or refuses deliberately.
     """
 
     value: str = ""
     parts: list[tuple[str, Node]] = field(default_factory=list)
     file: str = ""
     line: int = 0
-    asked: set[str] = field(default_factory=set)
+    read_keys: set[str] = field(default_factory=set)
 
     def get(self, key: str) -> Node | None:
-        """The part of a name.
+        """Return the only part with a key, or None; the key counts as read.
 
         Raises:
-            DocumentError: there are several.
+            DocumentError: several parts have this key.
         """
-        self.asked.add(key)
+        self.read_keys.add(key)
         found = [node for name, node in self.parts if name == key]
         if len(found) > 1:
             raise found[1].error(f"'{key}' stands here again; it counts once only")
         return found[0] if found else None
 
-    def text(self, key: str, otherwise: str | None = None) -> str:
-        """The value of a part.
+    def text(self, key: str, default: str | None = None) -> str:
+        """Return the text of a part.
+
+        Args:
+            key: key of the part.
+            default: text if there is no such part; None if the part is required.
 
         Raises:
-            DocumentError: there is none, and nothing to take otherwise.
+            DocumentError: the part is missing and has no default, or occurs twice.
         """
         found = self.get(key)
         if found is not None:
             return found.value
-        if otherwise is None:
+        if default is None:
             raise self.error(f"'{key}' is missing")
-        return otherwise
+        return default
 
-    def number(self, key: str, otherwise: float | None = None) -> float:
-        """The number that a part is.
+    def number(self, key: str, default: float | None = None) -> float:
+        """Return the number of a part; infinity is allowed.
+
+        Args:
+            key: key of the part.
+            default: number if there is no such part; None if the part is required.
 
         Raises:
-            DocumentError: it is none.
+            DocumentError: the part is missing and has no default, or is not a number.
         """
         found = self.get(key)
-        if found is None and otherwise is not None:
-            return otherwise
+        if found is None and default is not None:
+            return default
         text = self.text(key)
         try:
             number = float(text)
@@ -105,12 +126,13 @@ class Node:
         """Return the whole number of a part.
 
         Args:
-            key: name of the part.
-            default: if there is no such part.
-            least, most: limits of what makes sense.
+            key: key of the part.
+            default: number if there is no such part.
+            least: smallest number that is allowed.
+            most: largest number that is allowed.
 
         Raises:
-            DocumentError: it is no whole number, or beyond the limits.
+            DocumentError: the part is not a whole number, or is out of bounds.
         """
         number = self.number(key, default)
         if not least <= number <= most or number != int(number):
@@ -119,24 +141,32 @@ class Node:
             )
         return int(number)
 
-    def flag(self, key: str, otherwise: bool) -> bool:
-        """Whether a part is 1 or true.
+    def flag(self, key: str, default: bool) -> bool:
+        """Return whether a part is true; see `FLAGS` for the spellings.
+
+        Args:
+            key: key of the part.
+            default: value if there is no such part.
 
         Raises:
-            DocumentError: it is neither that nor 0 or false.
+            DocumentError: the part is neither true nor false.
         """
-        text = self.text(key, "1" if otherwise else "0")
+        text = self.text(key, "1" if default else "0")
         if text.lower() not in FLAGS:
             raise (self.get(key) or self).error(f"'{key}' must be 0 or 1, not '{text}'")
         return FLAGS[text.lower()]
 
-    def vector(self, key: str, otherwise: str | None = None) -> Array:
-        """The three numbers that a part is.
+    def vector(self, key: str, default: str | None = None) -> Array:
+        """Return the three numbers of a part (3,).
+
+        Args:
+            key: key of the part.
+            default: text with three numbers if there is no such part; None if the part is required.
 
         Raises:
-            DocumentError: it is something else.
+            DocumentError: the part does not consist of three finite numbers.
         """
-        text = self.text(key, otherwise)
+        text = self.text(key, default)
         try:
             x, y, z = map(parse_finite, text.split())
         except ValueError:
@@ -145,18 +175,23 @@ class Node:
             ) from None
         return np.array([x, y, z])
 
-    def all_of(self, *names: str) -> Iterator[tuple[str, Node]]:
-        """The parts of some names, in their order."""
-        self.asked.update(names)
+    def select_all(self, *names: str) -> Iterator[tuple[str, Node]]:
+        """Return an iterator over the parts with any of some keys, in the order of the file, as (key,
+        node).
+        """
+        self.read_keys.update(names)
         return ((name, node) for name, node in self.parts if name in names)
 
-    def one_of(self, *names: str) -> tuple[str, Node] | None:
-        """The part that has one of some names.
+    def select_one(self, *names: str) -> tuple[str, Node] | None:
+        """Return the only part with any of some keys.
+
+        Returns:
+            Key and node, or None if there is no such part.
 
         Raises:
-            DocumentError: there are several.
+            DocumentError: there are several such parts.
         """
-        found = [*self.all_of(*names)]
+        found = [*self.select_all(*names)]
         if len(found) > 1:
             raise found[1][1].error(
                 f"'{found[1][0]}' stands beside '{found[0][0]}'; join them in a composite one"
@@ -164,18 +199,22 @@ class Node:
         return found[0] if found else None
 
     def error(self, message: str) -> DocumentError:
-        """An error about this place."""
+        """Return an error that points at this node."""
         return DocumentError(message, file=self.file, line=self.line or None)
 
-    def expect_all_asked(self, what: str, known: tuple[str, ...] = ()) -> None:
-        """Refuse parts that nothing has asked for.
+    def refuse_unread_parts(self, what: str, known: tuple[str, ...] = ()) -> None:
+        """Refuse parts whose keys the program has not read, so that no setting is ignored silently.
+
+        Args:
+            what: description of this node for the message, for example "a NoiseController".
+            known: further keys to compare with for a suggestion.
 
         Raises:
-            DocumentError: there is one; it names the nearest that is known.
+            DocumentError: there is such a part; the message suggests the nearest known key.
         """
         for name, node in self.parts:
-            if name not in self.asked and name not in CALLED:
-                near = suggest_name(name, {*self.asked, *known})
+            if name not in self.read_keys and name not in IGNORED_KEYS:
+                near = suggest_name(name, {*self.read_keys, *known})
                 raise node.error(f"'{name}' of {what} is not done here{near}")
 
 
@@ -189,7 +228,7 @@ def parse_finite(word: str) -> float:
 
 @dataclass
 class _Budget:
-    """What reading one scenario may still take, with all files that it includes."""
+    """Files and parts that reading one scenario may still use, over all files that it includes."""
 
     files: int = MAX_INCLUDED_FILES
     parts: int = MAX_PARTS
@@ -211,28 +250,32 @@ class _Budget:
 
 
 def read_settings(path: str | Path) -> Node:
-    """Read a file, and those that it includes, which are looked for beside it and in its folders above.
+    """Read a scenario file and the files that it includes.
+
+    Included files are searched in the folder of the file that includes them, in that of the
+    scenario, and
+    in up to three folders above each.
 
     Raises:
-        MissingFileError: a file is not there.
-        MissingDependency: one is YAML and PyYAML is not installed.
-        DocumentError: one is damaged; with its line.
+        MissingFileError: a file does not exist.
+        MissingDependency: a file is YAML and PyYAML is not installed.
+        DocumentError: a file is malformed or too large; the error has its line.
     """
     constants: dict[str, str] = {}
     return _read_source(Path(path), Path(path).parent, constants, 0, _Budget())
 
 
-def settings_of(data: Mapping[str, Any]) -> Node:
-    """The tree that data of Python describe."""
-    return Node(parts=[part for key, value in data.items() for part in _parts_of(key, value)])
+def make_node(data: Mapping[str, Any]) -> Node:
+    """Return the tree of a mapping of Python data, which has the same keys as a file."""
+    return Node(parts=[part for key, value in data.items() for part in _list_parts(key, value)])
 
 
-def _parts_of(key: str, value: Any) -> Iterator[tuple[str, Node]]:
+def _list_parts(key: str, value: Any) -> Iterator[tuple[str, Node]]:
     if isinstance(value, Mapping):
-        yield key, settings_of(value)
+        yield key, make_node(value)
     elif isinstance(value, list | tuple) and any(isinstance(item, Mapping) for item in value):
         for item in value:
-            yield from _parts_of(key, item)
+            yield from _list_parts(key, item)
     else:
         yield (
             key,
@@ -261,31 +304,42 @@ def _read_source(
         return top
     tokens = []
     line = 1
-    place = 0
-    while place < len(text):
-        found = _TOKEN.match(text, place)
+    offset = 0
+    while offset < len(text):
+        found = _TOKEN.match(text, offset)
+        # Only an opening quotation mark without its end matches no token.
         if found is None:
             raise DocumentError(
-                f"a quotation mark is not closed: {text[place : place + 20]!r}",
+                f"a quotation mark is not closed: {text[offset : offset + 20]!r}",
                 file=str(path),
                 line=line,
             )
         if found["token"] is not None:
             tokens.append((found["token"], line))
         line += found.group().count("\n")
-        place = found.end()
-    reader = _Reader(tokens, path, base, constants, depth, budget)
+        offset = found.end()
+    reader = _TokenReader(tokens, path, base, constants, depth, budget)
     top = Node(file=str(path), line=1)
     reader.fill(top, 0)
-    if reader.place < len(tokens):
-        raise top.error(f"line {tokens[reader.place][1]}: a '}}' without its '{{'")
+    if reader.index < len(tokens):
+        raise top.error(f"line {tokens[reader.index][1]}: a '}}' without its '{{'")
     return top
 
 
 def _fill_from_yaml(
     node: Node, found: Any, path: Path, base: Path, depth: int, level: int, budget: _Budget
 ) -> None:
-    """Put below a node what a mapping of YAML has."""
+    """Add the parts of a YAML mapping to a node.
+
+    Args:
+        node: node to fill.
+        found: YAML node with marks of lines.
+        path: file of the mapping.
+        base: folder of the scenario.
+        depth: number of includes that led to this file.
+        level: nesting of mappings.
+        budget: remaining files and parts.
+    """
     if found.id != "mapping":
         raise node.error("keys with values are wanted")
     # An anchor that contains an alias of itself has no end.
@@ -321,7 +375,9 @@ def _fill_from_yaml(
                 _fill_from_yaml(part, item, path, base, depth, level + 1, budget)
 
 
-class _Reader:
+class _TokenReader:
+    """Recursive-descent parser of the tokens of one SCONE file."""
+
     def __init__(
         self,
         tokens: list[tuple[str, int]],
@@ -331,24 +387,29 @@ class _Reader:
         depth: int,
         budget: _Budget,
     ) -> None:
-        self.tokens, self.path, self.base, self.constants = tokens, path, base, constants
-        self.depth, self.budget, self.place = depth, budget, 0
+        self.tokens = tokens
+        self.path = path
+        self.base = base
+        self.constants = constants
+        self.depth = depth
+        self.budget = budget
+        self.index = 0
 
     def next(self) -> str:
-        if self.place >= len(self.tokens):
+        if self.index >= len(self.tokens):
             raise DocumentError(
                 "the file ends in the middle of something", file=str(self.path), line=self.line()
             )
-        self.place += 1
-        return self.tokens[self.place - 1][0]
+        self.index += 1
+        return self.tokens[self.index - 1][0]
 
     def line(self) -> int:
-        return self.tokens[min(self.place, len(self.tokens)) - 1][1] if self.tokens else 1
+        return self.tokens[min(self.index, len(self.tokens)) - 1][1] if self.tokens else 1
 
     def fill(self, node: Node, level: int) -> None:
         if level > MAX_NESTING:
             raise node.error(f"the braces nest more than {MAX_NESTING} levels deep")
-        while self.place < len(self.tokens) and self.tokens[self.place][0] != "}":
+        while self.index < len(self.tokens) and self.tokens[self.index][0] != "}":
             key = self.next()
             if key == "<<":
                 words = []
@@ -358,10 +419,11 @@ class _Reader:
                 continue
             self.budget.take_part(node)
             part = Node(file=str(self.path), line=self.line())
-            what = self.next() if self.place < len(self.tokens) else ""
+            what = self.next() if self.index < len(self.tokens) else ""
+            # A part is `key = value`, `key { ... }`, or `key = value { ... }`.
             if what == "=":
-                part.value = self._value()
-                if self.place < len(self.tokens) and self.tokens[self.place][0] == "{":
+                part.value = self._read_value()
+                if self.index < len(self.tokens) and self.tokens[self.index][0] == "{":
                     what = self.next()
             if what == "{":
                 self.fill(part, level + 1)
@@ -369,12 +431,13 @@ class _Reader:
                     raise part.error(f"'{key}' has no end")
             elif what != "=":
                 raise part.error(f"after '{key}' a '=' or a '{{' is wanted, not '{what}'")
+            # Constants are shared by all files that are read after this line.
             if key.startswith("$"):
                 self.constants[key] = part.value
             else:
                 node.parts.append((key.strip('"'), part))
 
-    def _value(self) -> str:
+    def _read_value(self) -> str:
         value = self.next()
         if value == "[":
             words = []
@@ -400,20 +463,22 @@ class _Reader:
 
 
 def matches_pattern(name: str, patterns: str) -> bool:
-    """Whether a name fits one of some patterns, between which there are semicolons."""
+    """Return whether a name matches one of several patterns with `*` and `?`, separated by semicolons."""
     return any(fnmatchcase(name, pattern) for pattern in patterns.split(";") if pattern)
 
 
 def _resolve_include(name: str, path: Path, base: Path) -> Path:
     """Return the path of an included file.
 
-    Errors in it quote its words, so that it must not be any file of the user: it has an ending of
-    settings, is in the folders of the scenario, and is not hidden; the same holds of what a link
-    leads to.
+    Errors in an included file quote its words. Therefore it must not be an arbitrary file of the
+    user: it
+    ends like a settings file, lies in the folders of the scenario, and is not hidden. The same
+    holds for
+    the target of a link.
 
     Raises:
         MissingFileError: there is no such file.
-        DocumentError: it may not be included.
+        DocumentError: the file must not be included.
     """
     found = find_file(name, path.parent, base)
     real = found.resolve()
@@ -421,6 +486,8 @@ def _resolve_include(name: str, path: Path, base: Path) -> Path:
         endings = join_words(INCLUDED_ENDINGS)
         message = f"'{name}' is not included: the name of the file must end in {endings}"
         raise DocumentError(message, file=str(path))
+    # Scenarios of SCONE include files of folders up to three levels above. The climb ends at folders
+    # that hold more than one project, such as home: their files are not part of the scenario.
     top = base.resolve()
     shared = find_shared_folders()
     for folder in top.parents[:3]:
@@ -434,13 +501,17 @@ def _resolve_include(name: str, path: Path, base: Path) -> Path:
 
 
 def find_file(name: str, *folders: Path) -> Path:
-    """A file that a scenario names: beside it, or in one of the folders above.
+    """Return a file that a scenario names, from the first of some folders that has it.
+
+    Args:
+        name: path relative to one of the folders, or absolute.
+        folders: folders to search; after each one, the three folders above it.
 
     Raises:
-        MissingFileError: it is in none.
+        MissingFileError: no folder has this file.
     """
     for folder in folders:
-        for place in (folder, *folder.resolve().parents[:3]):
-            if os.path.isfile(place / name):
-                return place / name
+        for parent in (folder, *folder.resolve().parents[:3]):
+            if os.path.isfile(parent / name):
+                return parent / name
     raise MissingFileError("no such file", file=str(folders[0] / name))

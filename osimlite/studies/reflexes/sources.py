@@ -1,6 +1,6 @@
-"""What reflexes feel: each kind of reflex, and of what it goes by, is one declaration here.
+"""Types of reflexes and the sensors that they use, one declaration each.
 
-The kernels compute the sources, see :mod:`osimlite.mechanics.kernels.sensors`.
+The kernels compute the sensors, see :mod:`osimlite.mechanics.kernels.sensors`.
 """
 
 from __future__ import annotations
@@ -21,16 +21,20 @@ from osimlite.mechanics.kernels.sensors import (
 )
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.studies.reflexes.settings import Node
-from osimlite.studies.reflexes.walkers import SIDES, Felt
+from osimlite.studies.reflexes.walkers import SIDES, SensedModel
 
 
 class Source(NamedTuple):
-    """What is felt of a model.
+    """Sensor of a reflex.
 
     Attributes:
-        name: in records.
-        kind, place, more: as of `SOURCE` in the kernels.
-        numbers: instead of `more`, where they will be.
+        name: name in records.
+        kind: kind of sensor, such as `IN_ROW` of the kernels.
+        place: index in the sensor row, or number of a link.
+        more: second index in the sensor row, where the kind has one.
+        numbers: numbers of the sensor, such as a point and a direction. If there are any, the
+            kernels
+            find their offset where `more` would be.
     """
 
     name: str
@@ -40,43 +44,47 @@ class Source(NamedTuple):
     numbers: tuple[float, ...] = ()
 
 
-Feel = Callable[[Felt, Node, int, str], Source]
-"""Makes the source of a reflex: for a model, from what is written, the number of what has the name
-that is the `source`, and the side that the reflex is on, if any.
+SourceFactory = Callable[[SensedModel, Node, int, str], Source]
+"""Function that makes the sensor of a reflex.
+
+Its arguments are the model, the node of the reflex, the index of the muscle, coordinate or body
+that
+is its `source`, and the side of the reflex ("" for a reflex without a side).
 """
 
 
 class Channel(NamedTuple):
-    """A part of a reflex: ``K`` and a letter are its gain, the letter and ``0`` its offset.
+    """Term of a reflex: gain `K` + letter, offset letter + `0`.
 
     Attributes:
-        letter: of it.
-        feel: makes the source.
+        letter: letter of the channel, for example `L` for the length of a muscle.
+        make_source: function that makes its sensor.
         rest: offset without a setting.
-        is_free: whether it may be negative without a setting; None where there is no setting for
-            that.
+        is_free: whether the term may be negative without a setting `allow_neg_`; None if SCONE has
+            no such
+            setting for it.
     """
 
     letter: str
-    feel: Feel
+    make_source: SourceFactory
     rest: float = 0.0
     is_free: bool | None = True
 
 
-class Kind(NamedTuple):
-    """A kind of reflexes.
+class ReflexType(NamedTuple):
+    """Class of reflexes in SCONE.
 
     Attributes:
-        names: what a source is called, in the order of its numbers.
-        channels: which are added up.
-        corrects: whether it is a gain times what is missing to the offset, instead of what is
-            beyond it.
-        is_own: whether without a source the target is that.
-        settings: of the sources.
-        refused: settings of SCONE that are not done here.
+        names: function that lists the names which a `source` may have, in the order of their
+            indices.
+        channels: channels whose terms are added.
+        corrects: True for gain * (offset - sensor), False for gain * (sensor - offset).
+        is_own: whether the target is the source of a reflex without one.
+        settings: keys that its sensors read.
+        refused: keys of SCONE that are not supported.
     """
 
-    names: Callable[[Felt], list[str]]
+    names: Callable[[SensedModel], list[str]]
     channels: tuple[Channel, ...]
     corrects: bool = True
     is_own: bool = False
@@ -84,68 +92,100 @@ class Kind(NamedTuple):
     refused: tuple[str, ...] = ()
 
 
-def _list_muscles(felt: Felt) -> list[str]:
-    return felt.names[: len(felt.muscles)]
+def _list_muscles(sensed: SensedModel) -> list[str]:
+    return sensed.names[: len(sensed.muscles)]
 
 
-def _list_coordinates(felt: Felt) -> list[str]:
-    return felt.coordinates
+def _list_coordinates(sensed: SensedModel) -> list[str]:
+    return sensed.coordinates
 
 
-def _list_bodies(felt: Felt) -> list[str]:
-    return [body.name for body in felt.mechanism.bodies]
+def _list_bodies(sensed: SensedModel) -> list[str]:
+    return [body.name for body in sensed.mechanism.bodies]
 
 
-def _read_muscle(what: str, first: int) -> Feel:
-    def feel(felt: Felt, node: Node, number: int, side: str) -> Source:
+def _select_muscle_factory(what: str, first: int) -> SourceFactory:
+    """Return the factory of a sensor of muscles.
+
+    Args:
+        what: quantity for the name of the sensor.
+        first: index in `SENSES` of the offset of this quantity in the sensor row.
+    """
+
+    def feel(sensed: SensedModel, node: Node, number: int, side: str) -> Source:
         return Source(
-            f"{felt.paths[number].removeprefix('/')}.{what}",
+            f"{sensed.paths[number].removeprefix('/')}.{what}",
             IN_ROW,
-            int(felt.senses[first]) + number,
+            int(sensed.sensor_plan[first]) + number,
         )
 
     return feel
 
 
-def _spindle(felt: Felt, node: Node, number: int, side: str) -> Source:
+def _make_spindle_source(sensed: SensedModel, node: Node, number: int, side: str) -> Source:
+    """Return the sensor of the firing rate of a muscle's spindles, from fiber length and velocity."""
     length, speed = (
-        int(felt.senses[first]) + number for first in (SENSES.LENGTHS, SENSES.VELOCITIES)
+        int(sensed.sensor_plan[first]) + number for first in (SENSES.LENGTHS, SENSES.VELOCITIES)
     )
-    return Source(f"{felt.paths[number].removeprefix('/')}.spindle", SPINDLE, length, speed)
+    return Source(f"{sensed.paths[number].removeprefix('/')}.spindle", SPINDLE, length, speed)
 
 
-def coordinate(what: str, first: int) -> Feel:
-    """Of a coordinate a number of the row."""
+def select_coordinate_factory(what: str, first: int) -> SourceFactory:
+    """Return the factory of a sensor of coordinates.
 
-    def feel(felt: Felt, node: Node, number: int, side: str) -> Source:
+    Args:
+        what: quantity for the name of the sensor.
+        first: index in `SENSES` of the offset of this quantity in the sensor row.
+    """
+
+    def feel(sensed: SensedModel, node: Node, number: int, side: str) -> Source:
         return Source(
-            f"{felt.coordinates[number]}.{what}", IN_ROW, int(felt.senses[first]) + number
+            f"{sensed.coordinates[number]}.{what}", IN_ROW, int(sensed.sensor_plan[first]) + number
         )
 
     return feel
 
 
-VALUE, SPEED = coordinate("value", SENSES.VALUES), coordinate("speed", SENSES.SPEEDS)
+VALUE_SOURCE = select_coordinate_factory("value", SENSES.VALUES)
+"""Factory of sensors of the value of a coordinate (rad or m)."""
+SPEED_SOURCE = select_coordinate_factory("speed", SENSES.SPEEDS)
+"""Factory of sensors of the speed of a coordinate (rad/s or m/s)."""
 
 
-def load(felt: Felt, leg: int) -> Source:
-    """Of the ground on a leg."""
-    return Source(f"leg{felt.legs[leg].side}.load", IN_ROW, int(felt.senses[SENSES.LOADS]) + leg)
+def make_load_source(sensed: SensedModel, leg: int) -> Source:
+    """Return the sensor of the ground reaction force on a leg over the body weight.
+
+    Args:
+        sensed: model with its legs.
+        leg: index of the leg.
+    """
+    return Source(
+        f"leg{sensed.legs[leg].side}.load", IN_ROW, int(sensed.sensor_plan[SENSES.LOADS]) + leg
+    )
 
 
-def _describe(*vectors: Array) -> str:
+def _format_vectors(*vectors: Array) -> str:
+    """Return vectors as text for the name of a sensor; adding 0.0 turns -0 into 0."""
     return "".join(f"({','.join(f'{x + 0.0:.10g}' for x in vector)})" for vector in vectors)
 
 
-def _point(what: str, kind: int) -> Feel:
-    def feel(felt: Felt, node: Node, number: int, side: str) -> Source:
+def _select_point_factory(what: str, kind: int) -> SourceFactory:
+    """Return the factory of a sensor of a point of a body.
+
+    Args:
+        what: quantity for the name of the sensor.
+        kind: kind of sensor, `POSITION` or `VELOCITY`.
+    """
+
+    def feel(sensed: SensedModel, node: Node, number: int, side: str) -> Source:
         offset, direction = node.vector("offset", "0 0 0"), node.vector("direction")
         if not direction.any():
-            raise node.error("'direction' is 0 0 0, along which nothing is felt")
-        link, frame = felt.engine.placements[number]
+            raise node.error("'direction' is 0 0 0, along which nothing is sensed")
+        # The offset is in the frame of the body, the kernels know its link only.
+        link, frame = sensed.engine.placements[number]
         numbers = *(frame[:3, :3] @ offset + frame[:3, 3]), *direction
         return Source(
-            f"{_list_bodies(felt)[number]}.{what}{_describe(offset, direction)}",
+            f"{_list_bodies(sensed)[number]}.{what}{_format_vectors(offset, direction)}",
             kind,
             link,
             0,
@@ -155,31 +195,40 @@ def _point(what: str, kind: int) -> Feel:
     return feel
 
 
-def _axis(felt: Felt, node: Node, number: int, side: str) -> Array:
-    """About which a body turns; on the left that of the mirrored motion."""
+def _read_axis(sensed: SensedModel, node: Node, number: int, side: str) -> Array:
+    """Return the unit vector (3,) of a reflex on the rotation of a body.
+
+    On the left side x and y change sign, so that one setting serves both sides: a mirror image in
+    the
+    sagittal plane reverses rotations about x and y and keeps those about z.
+    """
     if node.flag("use_rotation_vector", False):
         raise node.error("'use_rotation_vector' of reflexes is not done here")
     axis = node.vector("axis", "0 0 1")
     if not axis.any():
         raise node.error("'axis' has no direction")
-    own = next((end for end in SIDES if _list_bodies(felt)[number].endswith(end)), side)
+    own = next((end for end in SIDES if _list_bodies(sensed)[number].endswith(end)), side)
     return axis / np.linalg.norm(axis) * ((-1.0, -1.0, 1.0) if own == SIDES[0] else (1.0, 1.0, 1.0))
 
 
-def _angle(felt: Felt, node: Node, number: int, side: str) -> Source:
-    axis, (link, frame) = _axis(felt, node, number, side), felt.engine.placements[number]
+def _make_angle_source(sensed: SensedModel, node: Node, number: int, side: str) -> Source:
+    """Return the sensor of the rotation of a body about one of the axes x, y and z of ground."""
+    axis, (link, frame) = _read_axis(sensed, node, number, side), sensed.engine.placements[number]
     if np.count_nonzero(axis) != 1:
         raise node.error(
             "angles are about [ 1 0 0 ], [ 0 1 0 ] or [ 0 0 1 ]; about another 'axis' there is only KV"
         )
-    name = f"{_list_bodies(felt)[number]}.angle{_describe(axis)}"
+    name = f"{_list_bodies(sensed)[number]}.angle{_format_vectors(axis)}"
     return Source(name, ANGLE, link, 0, (*np.ravel(frame[:3, :3].T), *axis))
 
 
-def _mirror_axis(felt: Felt, node: Node, number: int, side: str) -> Source:
-    axis, (link, frame) = _axis(felt, node, number, side), felt.engine.placements[number]
+def _make_angular_velocity_source(
+    sensed: SensedModel, node: Node, number: int, side: str
+) -> Source:
+    """Return the sensor of the angular velocity of a body about an axis."""
+    axis, (link, frame) = _read_axis(sensed, node, number, side), sensed.engine.placements[number]
     return Source(
-        f"{_list_bodies(felt)[number]}.turn{_describe(axis)}",
+        f"{_list_bodies(sensed)[number]}.turn{_format_vectors(axis)}",
         TURN,
         link,
         0,
@@ -187,19 +236,24 @@ def _mirror_axis(felt: Felt, node: Node, number: int, side: str) -> Source:
     )
 
 
-_OF_MUSCLES = (
-    Channel("L", _read_muscle("length", SENSES.LENGTHS), 1.0),
-    Channel("V", _read_muscle("velocity", SENSES.VELOCITIES), is_free=False),
-    Channel("F", _read_muscle("force", SENSES.FORCES)),
-    Channel("S", _spindle, is_free=False),
-    Channel("A", _read_muscle("activation", SENSES.ACTIVATIONS), is_free=False),
+_MUSCLE_CHANNELS = (
+    Channel("L", _select_muscle_factory("length", SENSES.LENGTHS), 1.0),
+    Channel("V", _select_muscle_factory("velocity", SENSES.VELOCITIES), is_free=False),
+    Channel("F", _select_muscle_factory("force", SENSES.FORCES)),
+    Channel("S", _make_spindle_source, is_free=False),
+    Channel("A", _select_muscle_factory("activation", SENSES.ACTIVATIONS), is_free=False),
 )
-KINDS = {
-    "MuscleReflex": Kind(_list_muscles, _OF_MUSCLES, corrects=False, is_own=True),
-    "ConditionalMuscleReflex": Kind(_list_muscles, _OF_MUSCLES, corrects=False, is_own=True),
-    "DofReflex": Kind(
+"""Channels of reflexes on muscles: length, velocity, force, spindle rate and activation; SCONE's
+defaults.
+"""
+REFLEX_TYPES = {
+    "MuscleReflex": ReflexType(_list_muscles, _MUSCLE_CHANNELS, corrects=False, is_own=True),
+    "ConditionalMuscleReflex": ReflexType(
+        _list_muscles, _MUSCLE_CHANNELS, corrects=False, is_own=True
+    ),
+    "DofReflex": ReflexType(
         _list_coordinates,
-        (Channel("P", VALUE), Channel("V", SPEED)),
+        (Channel("P", VALUE_SOURCE), Channel("V", SPEED_SOURCE)),
         refused=(
             "source_parent",
             "mirror_left",
@@ -209,19 +263,19 @@ KINDS = {
             "P0_source",
         ),
     ),
-    "BodyPointReflex": Kind(
+    "BodyPointReflex": ReflexType(
         _list_bodies,
         (
-            Channel("P", _point("position", POSITION), is_free=None),
-            Channel("V", _point("speed", VELOCITY), is_free=None),
+            Channel("P", _select_point_factory("position", POSITION), is_free=None),
+            Channel("V", _select_point_factory("speed", VELOCITY), is_free=None),
         ),
         settings=("offset", "direction"),
         refused=("KA",),
     ),
-    "BodyOrientationReflex": Kind(
+    "BodyOrientationReflex": ReflexType(
         _list_bodies,
-        (Channel("P", _angle), Channel("V", _mirror_axis)),
+        (Channel("P", _make_angle_source), Channel("V", _make_angular_velocity_source)),
         settings=("axis", "axis_name", "use_rotation_vector"),
     ),
 }
-"""Of reflexes, by SCONE's names."""
+"""Supported types of reflexes by SCONE's names."""

@@ -1,4 +1,4 @@
-"""Several candidates of a walking model, stepped together: what is felt of them, and where their legs are."""
+"""Names, legs and sensors of a walking model, and copies of it that are stepped together."""
 
 from __future__ import annotations
 
@@ -25,17 +25,19 @@ from osimlite.simulation.elements.contact import PairContact
 from osimlite.simulation.options import IntegrationOptions
 
 SIDES = "_l", "_r"
-"""Ends of names, left before right, which is the order of the legs."""
+"""Endings of names of the left and the right side; legs have this order."""
 
 
 class Leg(NamedTuple):
-    """A leg.
+    """Bodies and contacts of a leg.
 
     Attributes:
-        side: ending of the names of what belongs to it.
-        base, foot: numbers of the bodies that it hangs on and ends with.
-        pairs: numbers of the contacts of its foot.
-        length: m.
+        side: ending of the names of its parts, from `SIDES`.
+        base: index of the body that the leg is attached to, such as the pelvis.
+        foot: index of the body at its end.
+        pairs: indices of the contact pairs of its foot.
+        length: sum of the distances between the body origins from the foot to the upper leg, in the
+            default pose (m).
     """
 
     side: str
@@ -45,28 +47,43 @@ class Leg(NamedTuple):
     length: float
 
 
-LAGGING = "euler2", "merson"
-"""Integrators of SCONE, whose control steps begin with the derivative that the one before has ended with."""
+LAGGING_INTEGRATORS = "euler2", "merson"
+"""Integrators with which SCONE starts a control step from the derivative at the end of the previous
+one.
+
+That derivative belongs to the previous excitations.
+"""
 
 
-class Felt:
-    """What is felt of a model, and what is driven: names, legs, and the plan of a row.
+class SensedModel:
+    """Actuators, coordinates and legs of a model, with the plan from which kernels fill its sensor
+    rows.
 
     Args:
-        model: whose.
-        engine: of it.
-        count: of its copies, each of which has numbers of its own.
-        step: for which controls are held, s.
-        lags: whether control steps begin with the derivative that the one before has ended with.
-        legs: without the side the names of the bodies of upper legs (`upper`), of feet (`lower`;
-            empty for those two below), and of the forces of feet (`contact`).
+        model: model with sensors.
+        engine: engine of the model.
+        count: number of its copies; each has its own parameters.
+        step: duration of a control step (s).
+        legs: names without their side: bodies of upper legs (`upper`), of feet (`lower`; empty for
+            those
+            two bodies below the upper leg), and contact forces of feet (`contact`).
+        lags: whether a control step starts from the derivative at the end of the previous one.
 
     Attributes:
-        names: of the actuators, muscles first.
-        order: number of the control of each among those of the model.
-        coordinates: their names, in the order of the state.
-        senses, known: plan of the rows, and its numbers.
-        least, most: bounds of the controls.
+        names: names of the actuators, muscles first.
+        paths: paths of the actuators in the same order.
+        order: per actuator the index of its control among those of the model.
+        muscles: muscles of the model, in the order of `names`.
+        optimal: optimal fiber lengths of the muscles (m).
+        strengths: maximum isometric forces of the muscles (N).
+        control_min: smallest control of each actuator.
+        control_max: largest control of each actuator.
+        mass: mass of the model (kg).
+        weight: weight of the model (N).
+        coordinates: names of the coordinates, in the order of the state.
+        legs: left and right leg; empty where the names fit no bodies and contacts.
+        sensor_plan: integers of the sensor rows, see :mod:`osimlite.mechanics.kernels.sensors`.
+        sensor_numbers: numbers of the sensor rows.
     """
 
     def __init__(
@@ -79,10 +96,12 @@ class Felt:
         *,
         lags: bool = False,
     ) -> None:
-        self.count, self.step, self.engine = count, step, engine
+        self.count = count
+        self.step = step
+        self.engine = engine
         self.mechanism: Mechanism = engine.mechanism
         tree, known = model.tree(), engine.forces.controls.names
-        # Of an actuator with several controls the path has a number behind.
+        # A control of an actuator with several has the path of the actuator, "_" and a number.
         owners: list[Any] = [
             tree.by_path.get(path) or tree.by_path[path.rpartition("_")[0]] for path in known
         ]
@@ -92,18 +111,18 @@ class Felt:
         self.muscles: list[Any] = [owners[k] for k in self.order if isinstance(owners[k], Muscle)]
         self.optimal = np.array([item.optimal_fiber_length for item in self.muscles])
         self.strengths = np.array([item.max_isometric_force for item in self.muscles])
-        self.least, self.most = np.transpose(
+        self.control_min, self.control_max = np.transpose(
             [_read_control_bounds(owners[k]) for k in self.order]
         ).reshape(2, -1)
         self.mass = self.mechanism.total_mass
         self.weight = self.mass * float(np.linalg.norm(self.mechanism.gravity))
         infos = self.mechanism.coordinates
         self.coordinates = [infos[k].name for k in engine.order]
-        self.legs = self._legs(**legs)
-        self.senses, self.known = self._sensing(model, lags=lags)
+        self.legs = self._find_legs(**legs)
+        self.sensor_plan, self.sensor_numbers = self._make_sensor_plan(model, lags=lags)
 
-    def _sensing(self, model: Model, *, lags: bool) -> tuple[Ints, Array]:
-        """Plan of what is felt, and its numbers; see :mod:`osimlite.mechanics.kernels.sensors`."""
+    def _make_sensor_plan(self, model: Model, *, lags: bool) -> tuple[Ints, Array]:
+        """Return plan and numbers of the sensor rows, see :mod:`osimlite.mechanics.kernels.sensors`."""
         engine, bodies = self.engine, self.mechanism.bodies
         limits: list[int] = []
         for item in model.components(CoordinateLimitForce):
@@ -111,6 +130,7 @@ class Felt:
                 places = engine.find_offsets(model.tree().path_of(item), ("force",))
                 limits += self.coordinates.index(str(item.coordinate)), *places
         m, n, b, legs = len(self.muscles), len(self.coordinates), len(bodies), len(self.legs)
+        # The kernels work on links, into which several bodies may be merged.
         centres = []
         for placement, body in zip(engine.placements, bodies, strict=True):
             frame = placement.frame
@@ -120,8 +140,8 @@ class Felt:
             [self.weight, masses.sum(), self.step, float(lags)],
             self.optimal,
             self.strengths,
-            self.least,
-            self.most,
+            self.control_min,
+            self.control_max,
             np.ravel(centres),
             masses,
         )
@@ -140,7 +160,8 @@ class Felt:
         ]
         return np.array(plan, dtype=np.int64), known
 
-    def _legs(self, upper: str, lower: str, contact: str) -> list[Leg]:
+    def _find_legs(self, upper: str, lower: str, contact: str) -> list[Leg]:
+        """Find the legs whose bodies and contact forces have the given names and a side."""
         names = [body.name for body in self.mechanism.bodies]
         parents = {
             body.name: names[body.parent] for body in self.mechanism.bodies if body.parent != GROUND
@@ -178,50 +199,54 @@ class Felt:
             legs.append(
                 Leg(side, names.index(base), names.index(foot), pairs[f"{contact}{side}"], length)
             )
-        self._legs_named = upper, contact
+        self._leg_names = upper, contact
         return legs
 
     def expect_legs(self) -> None:
         """Refuse a model without two legs.
 
         Raises:
-            ModelError: it says what they are called.
+            ModelError: a leg is missing; the message says which names are expected.
         """
         if len(self.legs) != len(SIDES):
-            upper, contact = self._legs_named
+            upper, contact = self._leg_names
             near = suggest_name(f"{upper}_l", [body.name for body in self.mechanism.bodies])
             wanted = f"bodies '{upper}_l' and '{upper}_r', feet, and contact forces '{contact}_l' and '{contact}_r'"
             raise ModelError(f"the model has no legs, which are {wanted}{near}")
 
 
 def _read_control_bounds(actuator: Any) -> tuple[float, float]:
-    """Least and largest control; OpenSim's own tools know of none for actuators with several."""
+    """Return smallest and largest control of an actuator; one with several controls has no bounds in
+    OpenSim's tools.
+    """
     if isinstance(actuator, Muscle):
         return getattr(actuator, "minimum_activation", actuator.min_control), 1.0
     return getattr(actuator, "min_control", -inf), getattr(actuator, "max_control", inf)
 
 
-class Walkers(Felt):
-    """Candidates of a model.
+class Walkers(SensedModel):
+    """Copies of a walking model, one per candidate.
 
     Args:
-        model: that walks.
-        count: of the candidates.
-        step: for which controls are held, s.
+        model: model that walks.
+        count: number of candidates w.
+        step: duration of a control step (s).
         options: accuracy, integrator and other options of the integration.
-        legs: as of :class:`Felt`.
+        legs: names of the legs, see :class:`SensedModel`.
 
     Attributes:
-        rows: what is felt of each (w, r).
-        excitations: that are held (w, c).
-        progress: what is counted of each walk (w, c), see :mod:`osimlite.mechanics.kernels.walks`.
-        noted: by the criteria (w, k).
+        offsets: per path of a state variable its offset in the state.
+        rows: sensor row of each candidate (w, r).
+        excitations: excitations that are held over a control step (w, c).
+        progress: counts of each walk (w, p), see `STEPS` in
+            :mod:`osimlite.mechanics.kernels.walks`.
+        criteria_work: workspaces of the criteria (w, k).
 
     Raises:
-        ModelError: it has actuators that are no muscles.
+        ModelError: the model has actuators other than muscles.
     """
 
-    noted: Array
+    criteria_work: Array
 
     def __init__(
         self,
@@ -233,7 +258,12 @@ class Walkers(Felt):
     ) -> None:
         self.copies = Copies(model, count, step, options)
         super().__init__(
-            model, self.copies.engine, count, step, legs, lags=options.integrator in LAGGING
+            model,
+            self.copies.engine,
+            count,
+            step,
+            legs,
+            lags=options.integrator in LAGGING_INTEGRATORS,
         )
         others = self.names[len(self.muscles) :]
         if others:
@@ -242,65 +272,88 @@ class Walkers(Felt):
             )
         state, size = self.copies.simulation.state, len(self.coordinates)
         infos = self.mechanism.coordinates
-        self.places = {
+        self.offsets = {
             **{f"{infos[k].path}/value": n for n, k in enumerate(state.order)},
             **{f"{infos[k].path}/speed": size + n for n, k in enumerate(state.order)},
             **{path: 2 * size + n for n, path in enumerate(state.paths)},
         }
-        self._activations = np.array([self.places[f"{path}/activation"] for path in self.paths])
-        self.rows, self.excitations = (
-            np.zeros((count, self.senses[SENSES.SIZE])),
-            np.zeros((count, len(self.names))),
-        )
+        self._activations = np.array([self.offsets[f"{path}/activation"] for path in self.paths])
+        self.rows = np.zeros((count, self.sensor_plan[SENSES.SIZE]))
+        self.excitations = np.zeros((count, len(self.names)))
         self.progress: Ints = np.zeros((count, COUNTS), dtype=np.int64)
         self._driven: Ints = self.copies.places[self.order]
 
     # ------------------------------------------------------------------------------------------------- walking
-    def go_by(self, plan: Ints, numbers: Array, criteria: Ints, bounds: Array, room: int) -> None:
-        """Have walks go by reflexes (see :mod:`osimlite.mechanics.kernels.reflexes`), and criteria judge them.
+    def set_reflexes_and_criteria(
+        self, plan: Ints, numbers: Array, criteria: Ints, bounds: Array, room: int
+    ) -> None:
+        """Set the reflexes that drive the walkers and the criteria that score them.
 
         Args:
-            plan: of the reflexes, to whose `ROOM` that of the criteria is added.
-            numbers: of each candidate (w, r).
-            criteria: see :mod:`osimlite.mechanics.kernels.criteria`.
-            bounds: their numbers.
-            room: that they need.
+            plan: integers of the reflexes, see :mod:`osimlite.mechanics.kernels.reflexes`; its
+                `ROOM` is
+                increased by the workspace of the criteria.
+            numbers: numbers of the reflexes of each candidate (w, r).
+            criteria: integers of the criteria, see :mod:`osimlite.mechanics.kernels.criteria`.
+            bounds: numbers of the criteria.
+            room: length of the workspace of the criteria.
         """
+        # The memory of a candidate is that of its reflexes, followed by that of the criteria.
         plan[REFLEXES.ROOM] += room
-        whole = np.zeros((self.count, plan[REFLEXES.ROOM]))
-        self.noted = whole[:, plan[REFLEXES.ROOM] - room :]
-        self._asked = self.senses, self.known, self._driven, plan, numbers, criteria, bounds, whole
+        memory = np.zeros((self.count, plan[REFLEXES.ROOM]))
+        self.criteria_work = memory[:, plan[REFLEXES.ROOM] - room :]
+        self._walk_arguments = (
+            self.sensor_plan,
+            self.sensor_numbers,
+            self._driven,
+            plan,
+            numbers,
+            criteria,
+            bounds,
+            memory,
+        )
 
-    def go(self, order: int, which: Sequence[int] | None = None) -> Array:
-        """Have walkers (all by default) go on by an order of :mod:`osimlite.mechanics.kernels.walks`.
+    def advance(self, order: int, which: Sequence[int] | None = None) -> Array:
+        """Carry out an order for some walkers.
+
+        Args:
+            order: number of control steps, or `FEEL`, `BEGIN` or `START` of
+                :mod:`osimlite.mechanics.kernels.walks`.
+            which: indices of the walkers; all by default.
 
         Returns:
-            Of each control step of the first walker the state at its start, excitations, loads.
+            Per control step of the first walker its state at the start, excitations and leg loads,
+            one row
+            each.
 
         Raises:
-            SimulationError: forces cannot be computed where they begin.
+            SimulationError: forces cannot be computed in a state from which a walker starts.
         """
         states = self.copies.states
         record = np.empty((max(order, 0), states.shape[1] + len(self.names) + len(self.legs)))
-        chosen, before = range(self.count) if which is None else which, int(self.progress[0, STEPS])
-        parts = *self._asked, self.rows, self.excitations, record, self.progress, order
-        if self.copies.walk_some(chosen, *parts) != OUTCOME.OK:
-            # The engine tells what it is.
-            for k in chosen:
+        selected = range(self.count) if which is None else which
+        before = int(self.progress[0, STEPS])
+        parts = *self._walk_arguments, self.rows, self.excitations, record, self.progress, order
+        if self.copies.walk_some(selected, *parts) != OUTCOME.OK:
+            # The kernels return a code only; evaluating again in Python raises the error with its cause.
+            for k in selected:
                 self.engine.compute_applied_forces(0.0, states[k].tolist())
         return record[: int(self.progress[0, STEPS]) - before] if order > 0 else record
 
-    def loads(self) -> Array:
-        """Forces of the ground on the legs over the weight, as they were felt last (w, l)."""
-        return self.rows[:, self.senses[SENSES.LOADS] : self.senses[SENSES.PLACES]]
+    def get_leg_loads(self) -> Array:
+        """Return the ground reaction forces on the legs over the weight, from the last sensor rows (w,
+        l).
+        """
+        return self.rows[:, self.sensor_plan[SENSES.LOADS] : self.sensor_plan[SENSES.PLACES]]
 
     def equilibrate_muscles(self, activations: Array) -> None:
-        """Have muscles be in equilibrium with activations (w, m)."""
+        """Set activations (w, m) and bring the fibers of all muscles into equilibrium with them."""
         for k in range(self.count):
+            # The engine needs the state as a list, and returns the complete state.
             state = self.copies.states[k].copy()
             state[self._activations] = activations[k]
             self.copies.states[k] = self.engine.equilibrate_muscles(0.0, state.tolist())
 
     def close(self) -> None:
-        """Free the engine."""
+        """Release the compiled engine."""
         self.copies.close()

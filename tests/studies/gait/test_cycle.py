@@ -14,8 +14,8 @@ from osimlite.errors import OsimliteError
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.models.walkers import human_walker, steady_walker
 from osimlite.simulation import Simulation
-from osimlite.studies.gait.basin import find_basin, sample_perturbed_starts, walks_from
-from osimlite.studies.gait.cycle import find_cycle, step_matrix
+from osimlite.studies.gait.basin import find_basin, sample_perturbed_starts, simulate_walks
+from osimlite.studies.gait.cycle import differentiate_step_map, find_cycle
 from osimlite.studies.gait.stepmap import StepMap
 from osimlite.studies.gait.steps import measure_along_slope, walk_many
 
@@ -59,7 +59,7 @@ def test_the_steady_walker_walks_in_a_stable_cycle(steady):
 def test_a_walker_comes_back_as_the_derivative_says(steady):
     """Near the cycle the map is its derivative, whose eigenvalues are the multipliers."""
     step_map, cycle = steady.step_map, steady.cycle
-    slope = step_matrix(step_map, cycle.state)
+    slope = differentiate_step_map(step_map, cycle.state)
     assert np.sort(np.abs(np.linalg.eigvals(slope))) == pytest.approx(
         np.sort(np.abs(cycle.multipliers))
     )
@@ -113,7 +113,9 @@ def test_a_varied_map_is_that_of_the_other_model(steady):
     """Its reduced states lie along nearly the same directions, where those of a new map may be turned."""
     with Simulation(steady_walker(foot_ahead=0.073), "compiled") as simulation:
         new = StepMap(simulation.engine, simulation.initial_state({}, {}))
-        varied = steady.step_map.with_model(simulation.engine, simulation.initial_state({}, {}))
+        varied = steady.step_map.rebuild_for_model(
+            simulation.engine, simulation.initial_state({}, {})
+        )
         here = steady.cycle.state[None]
         assert np.array_equal(varied(here).states, new(here).states)
     assert np.abs(varied.basis - steady.step_map.basis).max() < 1e-2
@@ -132,12 +134,18 @@ def test_perturbed_starts_stand_as_deep_as_before(steady):
         for rows in (steady.start, starts)
     )
     assert after == pytest.approx(np.full(8, before[0]), abs=1e-9)
-    assert len(walks_from(steady.step_map, steady.cycle, starts, 3)) == 8
+    assert len(simulate_walks(steady.step_map, steady.cycle, starts, 3)) == 8
 
 
 def test_a_basin_has_the_cycle_in_its_middle(steady):
     basin = find_basin(
-        steady.step_map, steady.cycle, "RHip_rz/speed", "LHip_rz", reach=0.02, grid=3, wanted=5
+        steady.step_map,
+        steady.cycle,
+        "RHip_rz/speed",
+        "LHip_rz",
+        reach=0.02,
+        grid=3,
+        target_steps=5,
     )
     assert basin.steps.shape == (3, 3) and basin.steps[1, 1] == 5
     assert basin.x.label == "speed of RHip_rz (rad/s)" and basin.y.label == "LHip_rz (rad)"
@@ -145,7 +153,7 @@ def test_a_basin_has_the_cycle_in_its_middle(steady):
     with pytest.raises(OsimliteError, match="locked"):
         find_basin(steady.step_map, steady.cycle, "platform_rz", grid=3)
     other = find_basin(
-        steady.step_map, steady.cycle, y="RHip_rz/speed", reach=0.02, grid=2, wanted=2
+        steady.step_map, steady.cycle, y="RHip_rz/speed", reach=0.02, grid=2, target_steps=2
     )
     assert (other.x.label, other.y.label) == (
         "speed of LHip_rz (rad/s)",

@@ -24,9 +24,9 @@ pytest.importorskip("pyarrow", reason="needs pyarrow (extra 'sweep')")
 pytest.importorskip("scipy", reason="needs scipy (extra 'sweep')")
 
 from osimlite.studies.gait.cycle import find_cycle
-from osimlite.studies.gait.cycle_search import CycleSearch, Found
+from osimlite.studies.gait.cycle_search import CycleSearch, ModelCycle
 from osimlite.studies.gait.gaits import find_gait
-from osimlite.studies.gait.stability import Improvement
+from osimlite.studies.gait.stability import StabilityOptimization
 from osimlite.studies.gait.stepmap import StepMap
 
 INERTIA, AHEAD = "/bodyset/*Shank/inertia/2", "/contactgeometryset/*FootContact/location/0"
@@ -221,14 +221,14 @@ class Valley:
         if largest > 3.0:
             raise SimulationError("no cycle")
         cost = largest if largest >= self.stable else self.stable - 0.5 * (1.0 - abs(along))
-        return Found(fractions, {}, SimpleNamespace(state=state), 0.0, cost)
+        return ModelCycle(fractions, {}, SimpleNamespace(state=state), 0.0, cost)
 
 
 def test_a_narrow_valley_is_followed_to_rounded_numbers():
     """It follows the narrow valley without rounding, and rounds where it is wide enough for that."""
     valley = Valley()
     first = valley.find_cycle(np.array([0.3111, 0.3113]), np.zeros(2))
-    improvement = Improvement(valley, first, 2)
+    improvement = StabilityOptimization(valley, first, 2)
     improvement.run(400, 0)
     assert improvement.best.cost < valley.stable
     assert (improvement.best.fractions == np.round(improvement.best.fractions, 2)).all()
@@ -240,7 +240,7 @@ def test_a_narrow_valley_is_followed_to_rounded_numbers():
 def test_a_search_that_gets_nowhere_keeps_the_first_cycle():
     valley = Valley()
     first = valley.find_cycle(np.array([0.3, 0.3]), np.zeros(2))
-    improvement = Improvement(valley, first, 2)
+    improvement = StabilityOptimization(valley, first, 2)
     improvement.run(0, 0)
     assert improvement.best is first and not improvement.cycles
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from osimlite.models.walking import write_scenario
-from osimlite.studies.reflexes.gait import gait_of, strides_of
+from osimlite.studies.reflexes.gait import measure_gait, measure_strides
 from osimlite.studies.reflexes.scenario import Scenario
 
 TIMES: Any = np.linspace(0.0, 9.99, 1000)
@@ -22,21 +22,21 @@ def loads_of(phase) -> Any:
 
 def test_strides_are_counted() -> None:
     loads = np.column_stack([loads_of(10), loads_of(60)])
-    found = strides_of(TIMES, 1.5 * TIMES, loads)
+    found = measure_strides(TIMES, 1.5 * TIMES, loads)
     assert found is not None and (found.number, found.touches) == (16, 20)
     assert (found.time, found.length, found.peak) == pytest.approx((1.0, 1.5, 1.2), abs=1e-12)
     assert found.stance == pytest.approx((0.6, 0.6), abs=1e-12) and found.both == pytest.approx(
         0.2, abs=0.01
     )
     assert found.humps == pytest.approx((1.2, 0.6, 1.0), abs=1e-12)
-    assert strides_of(TIMES[:250], TIMES[:250], loads[:250]) is None
+    assert measure_strides(TIMES[:250], TIMES[:250], loads[:250]) is None
 
 
 def test_scuffs_and_bounces_are_no_steps() -> None:
     loads = np.column_stack([loads_of(10), loads_of(60)])
-    expected = strides_of(TIMES, TIMES, loads)
+    expected = measure_strides(TIMES, TIMES, loads)
     loads[90:93, 0], loads[530:532, 0] = 0.3, 0.0
-    found = strides_of(TIMES, TIMES, loads)
+    found = measure_strides(TIMES, TIMES, loads)
     assert found is not None and expected is not None
     assert found[:5] == expected[:5] and found.touches == expected.touches
 
@@ -45,14 +45,14 @@ def test_a_stance_may_be_one_moment() -> None:
     times = np.arange(0.0, 4.0, 0.1)
     loads = np.zeros((40, 2))
     loads[::5, 0] = loads[2::5, 1] = 0.8
-    found = strides_of(times, times, loads)
+    found = measure_strides(times, times, loads)
     assert found is not None and found.humps == pytest.approx((0.8, 0.8, 0.8), abs=1e-15)
 
 
 def test_our_human_s_gait(tmp_path) -> None:
     scenario = Scenario(write_scenario(tmp_path))
     walked = scenario.walk(scenario.best(), duration=6.0)
-    gait = gait_of(scenario, walked)
+    gait = measure_gait(scenario, walked)
     assert gait is not None and gait.strides is not None
     pelvis = walked.states["/jointset/ground_pelvis/pelvis_ty/value"]
     assert gait.pelvis == pytest.approx((pelvis.mean(), pelvis.min(), pelvis.max()), abs=1e-9)

@@ -69,9 +69,9 @@ def judged(
     walked, given: Scenario, prepare: float, least: float, at_peak: bool
 ) -> tuple[float, int]:
     """SCONE's measure of a jump, and the control step it ends after, from the motion."""
-    walkers, table = given.walkers(1), walked.states
+    walkers, table = given.get_walkers(1), walked.states
     states = np.empty_like(table.rows)
-    states[:, [walkers.places[path] for path in table.columns]] = table.rows
+    states[:, [walkers.offsets[path] for path in table.columns]] = table.rows
     centre = locate_mass_centers(
         walkers.engine, list(zip(table.times.tolist(), states.tolist(), strict=True))
     )

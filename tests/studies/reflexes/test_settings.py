@@ -7,7 +7,7 @@ import pytest
 
 from osimlite.errors import OsimliteError
 from osimlite.studies.reflexes.parameters import Parameters, read_par
-from osimlite.studies.reflexes.settings import read_settings, settings_of
+from osimlite.studies.reflexes.settings import make_node, read_settings
 
 
 def test_trees_includes_and_constants(tmp_path) -> None:
@@ -20,13 +20,13 @@ def test_trees_includes_and_constants(tmp_path) -> None:
     top = read_settings(tmp_path / "it.scone")
     assert [name for name, _ in top.parts] == ["a", "b", "c", "b"]
     assert top.text("a") == "two words" and top.number("c") == 0.5
-    first, second = (node for _, node in top.all_of("b"))
+    first, second = (node for _, node in top.select_all("b"))
     assert first.number("x") == 1.0 and first.text("y") == "1 2" and first.line == 2
     assert second.value == "q" and second.number("z") == 2.0
     with pytest.raises(OsimliteError, match="'y' of a b is not done here"):
-        first.asked.clear()
+        first.read_keys.clear()
         first.get("x")
-        first.expect_all_asked("a b")
+        first.refuse_unread_parts("a b")
 
 
 def test_yaml_and_data_are_the_same_trees(tmp_path) -> None:
@@ -41,11 +41,9 @@ def test_yaml_and_data_are_the_same_trees(tmp_path) -> None:
         ("b", 4),
         ("c", 1),
     ]
-    first, second = (node for _, node in top.all_of("b"))
+    first, second = (node for _, node in top.select_all("b"))
     assert first.text("x") == "~2<0,20>" and first.text("y") == "1 2" and second.flag("z", False)
-    data = settings_of(
-        {"a": "two words", "b": [{"x": "~2<0,20>", "y": [1, 2]}, {"z": True}], "c": 3}
-    )
+    data = make_node({"a": "two words", "b": [{"x": "~2<0,20>", "y": [1, 2]}, {"z": True}], "c": 3})
 
     def plain(node):
         return node.value.lower(), [(name, plain(part)) for name, part in node.parts]
@@ -100,12 +98,14 @@ def test_damage_is_told(text, words, tmp_path) -> None:
 def test_parameters(text, mean, std, low, high, tmp_path) -> None:
     (tmp_path / "it.scone").write_text(f"a = {text} b = 2")
     top, own = read_settings(tmp_path / "it.scone"), Parameters({"S1.a": np.array([0.1, 20.0])}, 2)
-    found = own.of(top, "a", 0.0, "S1.a")
+    found = own.get_number(top, "a", 0.0, "S1.a")
     assert found.tolist() == [min(max(value, low), high) for value in (0.1, 20.0)]
-    assert own.found["S1.a"] == pytest.approx(
+    assert own.requested["S1.a"] == pytest.approx(
         ("S1.a", mean, std, low, high)[1:], abs=1e-12
-    ) or own.found["S1.a"][1:] == (pytest.approx((mean, std, low, high)))
-    assert own.of(top, "b", 0.0).tolist() == [2.0, 2.0] and own.of(top, "c", 7.0).tolist() == [
+    ) or own.requested["S1.a"][1:] == (pytest.approx((mean, std, low, high)))
+    assert own.get_number(top, "b", 0.0).tolist() == [2.0, 2.0] and own.get_number(
+        top, "c", 7.0
+    ).tolist() == [
         7.0,
         7.0,
     ]
@@ -125,6 +125,6 @@ def test_what_parts_are_called_is_nobody_s_business(tmp_path) -> None:
     )
     top = read_settings(tmp_path / "it.scone")
     with pytest.raises(OsimliteError, match="'x' of a model is not done here"):
-        top.expect_all_asked("a model")
+        top.refuse_unread_parts("a model")
     top.get("x")
-    top.expect_all_asked("a model")
+    top.refuse_unread_parts("a model")

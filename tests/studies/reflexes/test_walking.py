@@ -75,7 +75,7 @@ def test_candidates_are_single_walks_bit_for_bit(ours) -> None:
 
 def test_walks_begin_with_the_weight_that_is_asked_for(ours) -> None:
     candidates = Candidates(ours, Parameters(ours.best()), 1.0)
-    assert candidates.walkers.loads().sum() == pytest.approx(0.5, rel=0.1)
+    assert candidates.walkers.get_leg_loads().sum() == pytest.approx(0.5, rel=0.1)
 
 
 def test_a_scenario_that_somebody_changed_is_kept(tmp_path) -> None:
@@ -122,7 +122,7 @@ def test_an_arm_holds_a_weight(arm, tmp_path) -> None:
     before = scenario.walk({}).results[0]
     seen: list[Any] = []
     found = search_parameters(
-        scenario, tmp_path / "out", generations=8, population=8, tell=seen.append
+        scenario, tmp_path / "out", generations=8, population=8, report=seen.append
     )
     assert len(seen) == 8 and seen[-1].best < 0.5 * before
     assert scenario.walk(found).results[0] == pytest.approx(seen[-1].best, rel=1e-6)
@@ -266,7 +266,7 @@ def test_the_scenario_says_how_to_search_and_step(arm) -> None:
     scenario = Scenario(arm)
     assert (scenario.population, scenario.seed) == (6, 3)
     scenario.walk({}, duration=0.005)
-    (counts,) = scenario.walkers(1).copies.batch.counts[:, :1]
+    (counts,) = scenario.get_walkers(1).copies.batch.counts[:, :1]
     assert counts[0] == 50
 
 
@@ -280,7 +280,7 @@ def test_implicit_steps_do_not_shrink_where_feet_touch(ours) -> None:
     steps = []
     for scenario in (walked, wanted):
         result = scenario.walk(scenario.best(), duration=0.5)
-        steps.append(scenario.walkers(1).copies.batch.counts[0, 0])
+        steps.append(scenario.get_walkers(1).copies.batch.counts[0, 0])
         assert result.times[0] == pytest.approx(0.5)
     assert 0 < steps[0] < 4 <= steps[1]
 
@@ -363,6 +363,6 @@ def test_kernels_as_python_walk_likewise(ours, arm, monkeypatch) -> None:
 def test_a_start_that_cannot_be_computed_is_told(ours) -> None:
     candidates = Candidates(ours, Parameters(ours.best(), 2), 1.0)
     walkers = candidates.walkers
-    walkers.copies.states[1, walkers.places["/forceset/vasti_l/fiber_length"]] = np.nan
+    walkers.copies.states[1, walkers.offsets["/forceset/vasti_l/fiber_length"]] = np.nan
     with pytest.raises(OsimliteError, match="state of the motion is not finite"):
         walkers.go(FEEL)

@@ -12,7 +12,7 @@ from osimlite.errors import OsimliteError, SettingError
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.simulation import Simulation
 from osimlite.studies.gait.foot_contacts import find_footing
-from osimlite.studies.gait.measures import PRESSED
+from osimlite.studies.gait.measures import PLANTED_DEPTH_M
 from osimlite.studies.gait.starts import plant_feet
 from osimlite.studies.gait.steps import measure_along_slope, walk_many
 from osimlite.studies.sweep.measures import measure
@@ -39,7 +39,9 @@ def walks_of(made, rows):
         engine = runner.variants.variant(row.tolist()).engine
         start = runner.variants.start(runner.variants.variant(row.tolist()), row.tolist())
         starts.append(plant_feet(engine, find_footing(engine), start[None])[0])
-        starts[-1][engine.order.index(engine.mechanism.coordinate_index("Pelvis_ty"))] -= PRESSED
+        starts[-1][engine.order.index(engine.mechanism.coordinate_index("Pelvis_ty"))] -= (
+            PLANTED_DEPTH_M
+        )
         walks += walk_many(engine, starts[-1][None], made.to, accuracy=made.accuracy)
     return np.array(starts), walks
 
@@ -91,7 +93,7 @@ def test_a_planted_walker_stands_at_rest(walker):
 
     along, depths = of_feet(starts)
     stands = depths.argmax(axis=1)
-    assert depths.max(axis=1) == pytest.approx(np.full(len(rows), PRESSED), abs=1e-12)
+    assert depths.max(axis=1) == pytest.approx(np.full(len(rows), PLANTED_DEPTH_M), abs=1e-12)
     later = starts.copy()
     later[:, :n] += 1e-6 * later[:, n:]
     then, deeper = of_feet(later)
