@@ -166,7 +166,7 @@ def test_more_of_them_walk_where_a_cycle_costs_less():
     search = CycleSearch(plan(dynamic_walker(), NEAR), stable=1.0, perturb=0.02)
     with Simulation(steady_walker(), "compiled") as simulation:
         cycle = find_cycle(StepMap(simulation.engine, simulation.initial_state({}, {})))
-    known = search.find_cycle(search.fractions({INERTIA: 0.0921, AHEAD: 0.0744}), cycle.state)
+    known = search.find_cycle(search.compute_fractions({INERTIA: 0.0921, AHEAD: 0.0744}), cycle.state)
     assert known.cycle.state == pytest.approx(cycle.state, abs=1e-4)
     assert known.walking > 0.5 and known.cost == 1.0 - known.walking
     search.stable = 0.1
@@ -177,8 +177,8 @@ def test_more_of_them_walk_where_a_cycle_costs_less():
 def test_rounded_numbers_have_no_noise_in_the_last_bit():
     search = CycleSearch(plan(dynamic_walker(), NEAR | {INERTIA: (0.02, 1.0, "log")}))
     for inertia in (0.0894, 0.0673, 0.112, 0.33):
-        numbers = search.numbers(
-            search.round_fractions(search.fractions({INERTIA: inertia, AHEAD: 0.0694}), 3)
+        numbers = search.get_numbers(
+            search.round_fractions(search.compute_fractions({INERTIA: inertia, AHEAD: 0.0694}), 3)
         )
         assert numbers == {INERTIA: inertia, AHEAD: 0.0694}
 

@@ -365,4 +365,4 @@ def test_a_start_that_cannot_be_computed_is_told(ours) -> None:
     walkers = candidates.walkers
     walkers.copies.states[1, walkers.offsets["/forceset/vasti_l/fiber_length"]] = np.nan
     with pytest.raises(OsimliteError, match="state of the motion is not finite"):
-        walkers.go(FEEL)
+        walkers.advance(FEEL)
