@@ -166,7 +166,9 @@ def test_more_of_them_walk_where_a_cycle_costs_less():
     search = CycleSearch(plan(dynamic_walker(), NEAR), stable=1.0, perturb=0.02)
     with Simulation(steady_walker(), "compiled") as simulation:
         cycle = find_cycle(StepMap(simulation.engine, simulation.initial_state({}, {})))
-    known = search.find_cycle(search.compute_fractions({INERTIA: 0.0921, AHEAD: 0.0744}), cycle.state)
+    known = search.find_cycle(
+        search.compute_fractions({INERTIA: 0.0921, AHEAD: 0.0744}), cycle.state
+    )
     assert known.cycle.state == pytest.approx(cycle.state, abs=1e-4)
     assert known.walking > 0.5 and known.cost == 1.0 - known.walking
     search.stable = 0.1
