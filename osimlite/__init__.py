@@ -1,8 +1,8 @@
 """osimlite: build, check, translate and simulate OpenSim models without OpenSim.
 
 Everything public is here: ``read``, ``read_document``, ``classes_in``, ``write``, ``to_text``,
-``validate``, ``mechanism``, ``paths``, ``muscle_curves``, ``to_urdf``, ``to_mjcf``, ``simulate``,
-``Feedback``, ``inverse_kinematics``, ``FrameSolver``, ``scale``, ``fit``, ``kinematics``,
+``validate``, ``mechanism``, ``paths``, ``muscle_curves``, ``to_urdf``, ``to_mjcf``, ``from_mjcf``,
+``simulate``, ``Feedback``, ``inverse_kinematics``, ``FrameSolver``, ``scale``, ``fit``, ``kinematics``,
 ``inverse_dynamics``, ``static_optimization``, ``casadi``, ``tangents``, ``linearize``,
 ``sensitivity``, ``modify``, ``run``, ``check_trial``, ``report``, the errors, and every component
 class under OpenSim's own name (``osimlite.PinJoint``). Names are imported when first used, so that
@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from osimlite.tools.report import report as report
     from osimlite.tools.running import run as run
     from osimlite.tools.trials.check import check_trial as check_trial
+    from osimlite.translate import from_mjcf as from_mjcf
     from osimlite.translate import to_mjcf as to_mjcf
     from osimlite.translate import to_urdf as to_urdf
 
@@ -59,6 +60,7 @@ if TYPE_CHECKING:
         "check_trial",
         "classes_in",
         "fit",
+        "from_mjcf",
         "inverse_dynamics",
         "inverse_kinematics",
         "kinematics",
@@ -103,6 +105,7 @@ FUNCTIONS = {
     "sensitivity": "osimlite.derivatives.sensitivity",
     "modify": "osimlite.fitting.modifying.words",
     "mechanism": "osimlite.mechanics.multibody:build_mechanism",
+    "from_mjcf": "osimlite.translate",
     "to_mjcf": "osimlite.translate",
     "to_urdf": "osimlite.translate",
     "muscle_curves": "osimlite.simulation.muscle_curves",

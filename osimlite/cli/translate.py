@@ -11,10 +11,12 @@ from osimlite.cli import _options as options
 from osimlite.cli._command import Option, command_with
 from osimlite.cli._console import add_row, plain_console, plain_table, say
 from osimlite.translate.exporters import list_exporters
+from osimlite.translate.importers import OSIM, find_format, list_importers
 
 if TYPE_CHECKING:
     from osimlite.base.options import OptionSpec
     from osimlite.translate.fidelity import Fidelity
+    from osimlite.translate.importers import Importer
 
 
 WRITTEN = "the file that is written"
@@ -22,14 +24,19 @@ WRITTEN = "the file that is written"
 
 
 def _choices() -> Iterator[OptionSpec]:
-    for exporter in list_exporters("translate").values():
-        yield from exporter.choices
+    for each in (*list_exporters("translate").values(), *_list_model_importers()):
+        yield from each.choices
+
+
+def _list_model_importers() -> list[Importer]:
+    """Return the importers of formats that become a model."""
+    return [importer for importer in list_importers().values() if importer.target == OSIM]
 
 
 def _describe_formats() -> str:
-    return "The format: " + "; ".join(
-        f"'{name}' writes {each.help}" for name, each in list_exporters("translate").items()
-    )
+    words = [f"'{name}' writes {each.help}" for name, each in list_exporters("translate").items()]
+    titles = join_words([importer.title for importer in _list_model_importers()])
+    return "The format: " + "; ".join([*words, f"'{OSIM}' converts a file of {titles} to OpenSim"])
 
 
 @command_with(_choices)
@@ -52,6 +59,7 @@ def translate(
 ) -> None:
     """Translate a model to another format: writes the model, its meshes and fidelity.json.
 
+    FILE is an OpenSim model; with --to osim it is an MJCF file (.xml).
     VTK meshes (.vtp) become .obj, text .stl becomes binary. fidelity.json describes how each
     component was translated, and the table on the screen what was lost or approximated. --check MJCF
     prints the errors of lengths, moment arms and forces of its muscles; with -o it writes them to
@@ -73,39 +81,71 @@ def translate(
         require("mujoco", extra="mujoco", purpose="--check")
         to = "mjcf"
     formats = list_exporters("translate")
-    if to not in formats:
-        raise OsimliteError(f"--to is {' or '.join(map(repr, formats))}, not '{to}'")
-    for name, exporter in formats.items():
+    if to not in (*formats, OSIM):
+        raise OsimliteError(f"--to is {' or '.join(map(repr, (*formats, OSIM)))}, not '{to}'")
+    importer = _find_importer(file) if to == OSIM else None
+    owners: list[tuple[Any, str, bool]] = [
+        (each, f"--to {name}", name == to) for name, each in formats.items()
+    ]
+    owners += [
+        (each, f"--to {OSIM} from {each.title}", each is importer)
+        for each in _list_model_importers()
+    ]
+    for each, words, is_used in owners:
         strange = [
-            each.name for each in exporter.choices if chosen[each.name] is not None and name != to
+            option.name
+            for option in each.choices
+            if chosen[option.name] is not None and not is_used
         ]
         if strange:
-            raise SettingError(f"--{strange[0]} is an option of --to {name}")
-    export = formats[to].write
+            raise SettingError(f"--{strange[0].replace('_', '-')} is an option of {words}")
     given = {name: value for name, value in chosen.items() if value is not None}
-    made = export(
-        read(file),
-        folder=file.parent,
-        name=file.stem,
-        geometry=options.mesh_folders(file, geometry),
-        **given,
-    )
+    made: Any
+    if importer is not None:
+        made = importer.read(file, name=file.stem, **given)
+    else:
+        made = formats[to].write(
+            read(file),
+            folder=file.parent,
+            name=file.stem,
+            geometry=options.mesh_folders(file, geometry),
+            **given,
+        )
     written = made.write(options.results_folder(file, output))
 
     if len(made.fidelity):
         plain_console().print(tabulate(made.fidelity, to.upper()))
-    robot, (same, otherwise, lost) = made.robot, made.fidelity.counts()
+    same, otherwise, lost = made.fidelity.counts()
     say(f"components: {same} exact, {otherwise} approximated or converted, {lost} left out")
-    say(
-        f"{len(robot.links)} links, {len(robot.joints)} joints of which {len(robot.moving)} move; wrote "
-        + join_words([str(path) for path in written], most=4)
+    robot = getattr(made, "robot", None)
+    summary = (
+        ", ".join(f"{count} {what}" for what, count in made.summary.items())
+        if robot is None
+        else f"{len(robot.links)} links, {len(robot.joints)} joints of which {len(robot.moving)} move"
     )
+    say(f"{summary}; wrote " + join_words([str(path) for path in written], most=4))
     if getattr(made, "start_note", ""):
         say(made.start_note)
     if check is not None:
         from osimlite.cli._checking_mjcf import check as check_mjcf
 
         check_mjcf(file, written[0], options.results_folder(file, output))
+
+
+def _find_importer(file: Path) -> Importer:
+    """Return the importer of a file.
+
+    Raises:
+        OsimliteError: the file has no format that becomes a model.
+    """
+    from osimlite.errors import OsimliteError
+
+    known = {importer.name: importer for importer in _list_model_importers()}
+    name = find_format(file)
+    if name not in known:
+        words = join_words([importer.title for importer in known.values()])
+        raise OsimliteError(f"--to {OSIM} converts files of {words}", file=str(file))
+    return known[name]
 
 
 def tabulate(fidelity: Fidelity, target: str) -> Any:

@@ -14,15 +14,19 @@ if TYPE_CHECKING:
     from osimlite.translate.fidelity import Fidelity as Fidelity
     from osimlite.translate.mjcf.export import Mjcf as Mjcf
     from osimlite.translate.mjcf.export import to_mjcf as to_mjcf
+    from osimlite.translate.mjcf_import.convert import Osim as Osim
+    from osimlite.translate.mjcf_import.convert import from_mjcf as from_mjcf
 
 __getattr__ = make_lazy_getattr(
     __name__,
     {
         "Fidelity": "osimlite.translate.fidelity",
         "Mjcf": "osimlite.translate.mjcf.export",
+        "Osim": "osimlite.translate.mjcf_import.convert",
         "Robot": "osimlite.simulation.robot.robot",
         "Urdf": "osimlite.translate.export",
         "build_robot": "osimlite.simulation.robot.build",
+        "from_mjcf": "osimlite.translate.mjcf_import.convert",
         "to_mjcf": "osimlite.translate.mjcf.export",
         "to_urdf": "osimlite.translate.export",
     },

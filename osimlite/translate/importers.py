@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 from osimlite.base.options import OptionSpec
 from osimlite.base.reading import read_at_most
@@ -17,6 +17,7 @@ from osimlite.base.records import dataclass
 
 if TYPE_CHECKING:
     from osimlite.translate.fidelity import Fidelity
+    from osimlite.translate.mjcf_import.convert import Osim
 
 BEGINNING_BYTES = 4096
 """Number of bytes at the beginning of a file that decide between formats with the same suffix."""
@@ -67,7 +68,81 @@ class Importer:
     choices: tuple[OptionSpec, ...] = ()
 
 
-IMPORTERS: list[Importer] = []
+def read_mjcf(path: Path, **choices: Any) -> Osim:
+    """Convert an MJCF file to an OpenSim model; see :func:`osimlite.from_mjcf`."""
+    from osimlite.translate.mjcf_import.convert import from_mjcf
+
+    return from_mjcf(path, **choices)
+
+
+MJCF_CHOICES = (
+    OptionSpec(
+        "written_for",
+        int | None,
+        "The version of MuJoCo that the file was written for, 3 (or older) or 4: it decides what a "
+        "side site of a tendon means, and is required where that makes a difference.",
+        group="From MJCF",
+    ),
+    OptionSpec(
+        "muscle_class",
+        str | None,
+        "'millard' makes muscles with fitted curves, 'exact' RigidTendonMuscles with MuJoCo's "
+        "curves and without activation dynamics.",
+        shown="millard",
+        group="From MJCF",
+    ),
+    OptionSpec(
+        "armature",
+        str | None,
+        "'rotors' adds a rotor and a coupler for each joint with armature, 'none' leaves it out.",
+        shown="rotors",
+        group="From MJCF",
+    ),
+    OptionSpec(
+        "joint_limits",
+        str | None,
+        "'forces' adds a CoordinateLimitForce for each limited joint, 'range' sets ranges only.",
+        shown="forces",
+        group="From MJCF",
+    ),
+    OptionSpec(
+        "contacts",
+        str | None,
+        "'forces' makes contact surfaces and Hunt-Crossley forces, 'geometry' surfaces only, 'none' "
+        "nothing.",
+        shown="forces",
+        group="From MJCF",
+    ),
+    OptionSpec(
+        "up",
+        str | None,
+        "'z' keeps MuJoCo's axes, 'y' turns the model so that y is up.",
+        shown="z",
+        group="From MJCF",
+    ),
+    OptionSpec(
+        "keyframe",
+        str | None,
+        "The keyframe that gives the default pose.",
+        unit="NAME",
+        shown="qpos0",
+        group="From MJCF",
+    ),
+)
+"""Options of the conversion from MJCF."""
+
+IMPORTERS: list[Importer] = [
+    Importer(
+        "mjcf",
+        "MJCF (MuJoCo)",
+        (".xml", ".mjcf"),
+        OSIM,
+        "bodies, joints, constraints, muscles with wrapping, actuators, springs, contacts, meshes",
+        read_mjcf,
+        marks=(b"<mujoco",),
+        choices=MJCF_CHOICES,
+    ),
+]
 """All formats that are read, besides OpenSim's own; the order is that of the list of formats."""
 
 

@@ -142,7 +142,7 @@ def test_paths_are_called_by_the_names_of_their_muscles() -> None:
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (("walker.osim", "--to", "sdf"), "--to is 'urdf' or 'mjcf', not 'sdf'"),
+        (("walker.osim", "--to", "sdf"), "--to is 'urdf' or 'mjcf' or 'osim', not 'sdf'"),
         (("walker.osim", "--to", "mjcf", "--merge"), "--merge is an option of --to urdf"),
         (("walker.osim", "--mujoco", "3"), "--mujoco is an option of --to mjcf"),
         (("walker.osim", "--to", "mjcf", "--mujoco", "2"), "MuJoCo 3 or 4, not 2"),

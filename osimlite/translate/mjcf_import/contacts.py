@@ -1,0 +1,265 @@
+"""Contact: geoms that can collide as contact surfaces, and Hunt-Crossley forces between them.
+
+MuJoCo's contacts are soft constraints with their own friction law; a Hunt-Crossley force is another
+law. Its stiffness is such that it yields as far as MuJoCo's contact does under the weight of the
+bodies that move.
+"""
+
+from __future__ import annotations
+
+import math
+from itertools import product
+
+import numpy as np
+
+from osimlite.mechanics.multibody.spatial import Array
+from osimlite.schema.contact import (
+    ContactEllipsoid,
+    ContactGeometry,
+    ContactHalfSpace,
+    ContactMesh,
+    ContactSphere,
+)
+from osimlite.schema.forces import HuntCrossleyForce
+from osimlite.translate.mjcf_import.draft import Draft, angles_of, quaternion_matrix, vector
+from osimlite.translate.mjcf_import.joints import compute_softness
+from osimlite.translate.mjcf_import.shapes import (
+    BOX,
+    CAPSULE,
+    ELLIPSOID,
+    MESH,
+    PLANE,
+    SPHERE,
+    write_mesh,
+)
+
+PLANE_TO_HALF_SPACE = np.array(((0.0, 0.0, -1.0), (0.0, 1.0, 0.0), (1.0, 0.0, 0.0))).T
+"""Frame of a half space (outward normal -x) in that of a plane (outward normal z), as a rotation."""
+CORNER_RADIUS = 0.1
+"""Radius of the spheres in the corners of a box, as a part of its smallest half length."""
+DISSIPATION_S_M = 1.0
+"""Dissipation of all contact forces."""
+TRANSITION_M_S = 0.1
+"""Transition velocity of all contact forces."""
+
+
+def add_contacts(draft: Draft) -> None:
+    """Add the surfaces that can touch, and forces between planes and what moves above them."""
+    if draft.options.contact == "none":
+        _record_all(draft)
+        return
+    surfaces: dict[int, list[ContactGeometry]] = {}
+    for geom in sorted(_find_colliding_geoms(draft)):
+        made = _make_surfaces(draft, geom)
+        if made:
+            surfaces[geom] = made
+            for surface in made:
+                draft.model.add(surface)
+    if draft.options.contact == "forces":
+        _add_forces(draft, surfaces)
+
+
+def _record_all(draft: Draft) -> None:
+    for geom in sorted(_find_colliding_geoms(draft)):
+        draft.record("geom", geom, "contact", "left out, as requested")
+
+
+def _find_colliding_geoms(draft: Draft) -> set[int]:
+    """Return the geoms that can touch another."""
+    model = draft.mj
+    result = {int(geom) for pair in range(model.npair) for geom in _pair(model, pair)}
+    types, affinities = model.geom_contype, model.geom_conaffinity
+    for geom in range(model.ngeom):
+        if geom in draft.wrapping_geoms:
+            continue
+        others = (types[geom] & affinities) | (affinities[geom] & types)
+        if np.any(others[np.arange(model.ngeom) != geom]):
+            result.add(geom)
+    return result
+
+
+def _pair(model: object, pair: int) -> tuple[int, int]:
+    return int(model.pair_geom1[pair]), int(model.pair_geom2[pair])  # type: ignore[attr-defined]
+
+
+def _make_surfaces(draft: Draft, geom: int) -> list[ContactGeometry]:
+    model = draft.mj
+    name = draft.source.name_of("geom", geom)
+    frame = draft.frames[int(model.geom_bodyid[geom])]
+    position = np.array(model.geom_pos[geom])
+    rotation = quaternion_matrix(model.geom_quat[geom])
+    size = [float(value) for value in model.geom_size[geom]]
+    kind = int(model.geom_type[geom])
+
+    def sphere(center: Array, radius: float) -> ContactSphere:
+        return ContactSphere(
+            name=draft.unique("contact", name),
+            socket_frame=frame,
+            location=vector(position + rotation @ center),
+            radius=radius,
+        )
+
+    if kind == PLANE:
+        return [
+            ContactHalfSpace(
+                name=draft.unique("contact", name),
+                socket_frame=frame,
+                location=vector(position),
+                orientation=angles_of(rotation @ PLANE_TO_HALF_SPACE),
+            )
+        ]
+    if kind == SPHERE:
+        return [sphere(np.zeros(3), size[0])]
+    if kind == CAPSULE:
+        draft.record("geom", geom, "contact of a capsule", "contact of the spheres at its ends")
+        return [sphere(np.array((0.0, 0.0, end)), size[0]) for end in (-size[1], size[1])]
+    if kind == BOX:
+        radius = CORNER_RADIUS * min(size)
+        draft.record(
+            "geom",
+            geom,
+            "contact of a box",
+            "contact of spheres in its corners",
+            f"radius {radius:g} m",
+        )
+        return [
+            sphere(np.array(signs) * (np.array(size) - radius), radius)
+            for signs in product((-1.0, 1.0), repeat=3)
+        ]
+    if kind == ELLIPSOID:
+        return [
+            ContactEllipsoid(
+                name=draft.unique("contact", name),
+                socket_frame=frame,
+                location=vector(position),
+                orientation=angles_of(rotation),
+                radii=vector(size),
+            )
+        ]
+    if kind == MESH and int(model.geom_dataid[geom]) >= 0:
+        file = write_mesh(draft, int(model.geom_dataid[geom]))
+        draft.record(
+            "geom",
+            geom,
+            "contact of the convex hull of a mesh",
+            "a ContactMesh without a force: an ElasticFoundationForce can be added",
+            file,
+        )
+        return [
+            ContactMesh(
+                name=draft.unique("contact", name),
+                socket_frame=frame,
+                location=vector(position),
+                orientation=angles_of(rotation),
+                filename=file,
+            )
+        ]
+    draft.record("geom", geom, "contact of a cylinder or a height field", "left out")
+    return []
+
+
+def _add_forces(draft: Draft, surfaces: dict[int, list[ContactGeometry]]) -> None:
+    """Add a force for each plane and what can touch it; record what else can touch."""
+    model = draft.mj
+    others: dict[int, int] = {}
+    pairs = {tuple(sorted(_pair(model, pair))): pair for pair in range(model.npair)}
+    touching = [
+        (one, two)
+        for position, one in enumerate(surfaces)
+        for two in list(surfaces)[position + 1 :]
+        if (one, two) in pairs or _can_touch(draft, one, two)
+    ]
+    for one, two in touching:
+        planes = [geom for geom in (one, two) if int(model.geom_type[geom]) == PLANE]
+        round_ = [
+            geom
+            for geom in (one, two)
+            if int(model.geom_type[geom]) in (SPHERE, CAPSULE, ELLIPSOID, BOX)
+        ]
+        if len(planes) != 1 or len(round_) != 1:
+            for geom in (one, two):
+                others[geom] = others.get(geom, 0) + 1
+            continue
+        _add_force(draft, surfaces, planes[0], round_[0], pairs.get((one, two)))
+    for geom, count in others.items():
+        draft.record(
+            "geom",
+            geom,
+            "contact with other shapes than planes",
+            "contact surfaces without a force",
+            f"{count} other geoms",
+        )
+
+
+def _can_touch(draft: Draft, one: int, two: int) -> bool:
+    """Whether MuJoCo tests two geoms for contact, pairs in the file not regarded."""
+    model = draft.mj
+    types, affinities = model.geom_contype, model.geom_conaffinity
+    if not (types[one] & affinities[two] or types[two] & affinities[one]):
+        return False
+    bodies = [int(model.body_weldid[model.geom_bodyid[geom]]) for geom in (one, two)]
+    parents = [int(model.body_weldid[model.body_parentid[body]]) for body in bodies]
+    if bodies[0] == bodies[1]:
+        return False
+    # A body does not touch its parent, unless this is the world.
+    if 0 not in bodies and (bodies[0] == parents[1] or bodies[1] == parents[0]):
+        return False
+    signature = {
+        (int(model.geom_bodyid[one]) << 16) + int(model.geom_bodyid[two]),
+        (int(model.geom_bodyid[two]) << 16) + int(model.geom_bodyid[one]),
+    }
+    return not signature & {int(value) for value in model.exclude_signature}
+
+
+def _add_force(
+    draft: Draft,
+    surfaces: dict[int, list[ContactGeometry]],
+    plane: int,
+    geom: int,
+    pair: int | None,
+) -> None:
+    model = draft.mj
+    body = int(model.geom_bodyid[geom])
+    root = int(model.body_rootid[body])
+    mass = float(model.body_subtreemass[root])
+    if pair is None:
+        weights = model.geom_solmix[[plane, geom]]
+        share = weights / weights.sum() if weights.sum() > 0.0 else np.array((0.5, 0.5))
+        reference = share @ model.geom_solref[[plane, geom]]
+        impedance = share @ model.geom_solimp[[plane, geom]]
+        friction = float(model.geom_friction[[plane, geom], 0].max())
+    else:
+        reference, impedance = model.pair_solref[pair], model.pair_solimp[pair]
+        friction = float(model.pair_friction[pair, 0])
+    linear, _ = compute_softness(reference, impedance, 1.0 / max(mass, 1e-6))
+    weight = max(mass * float(np.linalg.norm(model.opt.gravity)), 1e-3)
+    depth = weight / linear
+    radius = float(model.geom_size[geom, 0])
+    if int(model.geom_type[geom]) == BOX:
+        radius = CORNER_RADIUS * float(model.geom_size[geom].min())
+    # Simbody: F = 4/3 K^(3/2) sqrt(R) d^(3/2), where K is k^(2/3) / 2 for two surfaces of the
+    # same stiffness k.
+    stiffness = 2.0**1.5 * 0.75 * weight / (math.sqrt(radius) * depth**1.5)
+    name = draft.unique("force", f"{draft.source.name_of('geom', geom)}_contact")
+    material = HuntCrossleyForce.ContactParameters(
+        geometry=tuple([*surfaces[plane], *surfaces[geom]]),
+        stiffness=stiffness,
+        dissipation=DISSIPATION_S_M,
+        static_friction=friction,
+        dynamic_friction=friction,
+        viscous_friction=0.0,
+    )
+    draft.model.add(
+        HuntCrossleyForce(
+            name=name,
+            contact_parameters=HuntCrossleyForce.ContactParametersSet(objects=[material]),
+            transition_velocity=TRANSITION_M_S,
+        )
+    )
+    draft.record(
+        "geom",
+        geom,
+        "contact by MuJoCo's soft constraint",
+        "a HuntCrossleyForce that yields as far under the weight of the bodies; motions differ",
+        f"force {name}, stiffness {stiffness:.4g} N/m^2, {depth:.3g} m under {weight:.4g} N",
+    )

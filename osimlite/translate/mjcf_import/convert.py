@@ -1,0 +1,204 @@
+"""The conversion of an MJCF file: passes over a draft, and the result."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from osimlite.base.records import dataclass, field
+from osimlite.errors import SettingError
+from osimlite.io.document.printer import to_text
+from osimlite.schema.frames import PhysicalOffsetFrame
+from osimlite.schema.model import Model
+from osimlite.simulation.robot.names import legal
+from osimlite.translate.fidelity import Fidelity
+from osimlite.translate.files import write_files
+from osimlite.translate.mjcf_import.bodies import add_bodies, add_markers
+from osimlite.translate.mjcf_import.contacts import add_contacts
+from osimlite.translate.mjcf_import.coordinate_map import CoordinateMap
+from osimlite.translate.mjcf_import.draft import (
+    Armature,
+    ContactOption,
+    Draft,
+    Limits,
+    MuscleType,
+    Options,
+    Up,
+    vector,
+)
+from osimlite.translate.mjcf_import.equalities import add_equalities
+from osimlite.translate.mjcf_import.joints import add_joint_forces
+from osimlite.translate.mjcf_import.keyframes import add_keyframes
+from osimlite.translate.mjcf_import.shapes import add_shapes, record_unseen
+from osimlite.translate.mjcf_import.source import load_mjcf
+
+
+@dataclass(frozen=True, eq=False)
+class Osim:
+    """An MJCF file as an OpenSim model.
+
+    Attributes:
+        name: name of the files.
+        model: the model.
+        fidelity: what became of every object of MuJoCo, and what OpenSim does not have.
+        coordinates: map from MuJoCo's positions to values of coordinates.
+        files: meshes and the table of keyframes, by name relative to the model.
+    """
+
+    name: str
+    model: Model
+    fidelity: Fidelity
+    coordinates: CoordinateMap
+    files: dict[str, str | bytes] = field(default_factory=dict)
+
+    @property
+    def text(self) -> str:
+        """The model as text."""
+        return to_text(self.model)
+
+    @property
+    def summary(self) -> dict[str, object]:
+        """Numbers of components, as plain data."""
+        model = self.model
+        return {
+            "bodies": len(model.body_set.objects),
+            "joints": len(model.joint_set.objects),
+            "coordinates": sum(len(item.coordinates) for item in model.joint_set.objects),
+            "forces": len(model.force_set.objects),
+            "constraints": len(model.constraint_set.objects),
+        }
+
+    def write(self, folder: str | Path) -> list[Path]:
+        """Write ``<name>.osim``, its meshes and ``fidelity.json`` into a folder.
+
+        The folder is made if it does not exist.
+
+        Returns:
+            The files written, the model first.
+
+        Raises:
+            OsimliteError: a file cannot be written.
+        """
+        return write_files(
+            Path(folder),
+            {
+                f"{self.name}.osim": self.text,
+                **self.files,
+                "fidelity.json": self.fidelity.to_json(),
+            },
+        )
+
+
+PASSES: tuple[Callable[[Draft], None], ...] = (
+    add_bodies,
+    add_joint_forces,
+    add_equalities,
+    add_markers,
+    add_contacts,
+    add_shapes,
+    add_keyframes,
+    record_unseen,
+)
+"""Passes of a conversion in their order."""
+
+
+def from_mjcf(
+    path: str | Path,
+    *,
+    written_for: int | None = None,
+    muscle_class: MuscleType = "millard",
+    armature: Armature = "rotors",
+    joint_limits: Limits = "forces",
+    contacts: ContactOption = "forces",
+    up: Up = "z",
+    keyframe: str | None = None,
+    name: str | None = None,
+) -> Osim:
+    """Convert an MJCF file, the format of MuJoCo, to an OpenSim model.
+
+    MuJoCo itself compiles the file, so that it needs the extra ``mujoco``.
+
+    Args:
+        path: the file (.xml); included files and meshes are found by MuJoCo.
+        written_for: version of MuJoCo that the file was written for, 3 (or older) or 4. It decides
+            what a side site of a tendon means. It is required only where the meanings differ.
+        muscle_class: ``"millard"`` makes rigid-tendon Millard muscles with fitted curves and activation
+            dynamics; ``"exact"`` makes RigidTendonMuscles with MuJoCo's curves as formulas, whose
+            control is the activation and which osimlite does not simulate.
+        armature: ``"rotors"`` adds a rotor and a coupler for each joint with armature, ``"none"``
+            leaves armature out.
+        joint_limits: ``"forces"`` adds a CoordinateLimitForce for each limited joint, ``"range"`` only
+            sets the range of the coordinate.
+        contacts: ``"forces"`` makes contact surfaces and Hunt-Crossley forces, ``"geometry"`` the
+            surfaces alone, ``"none"`` nothing.
+        up: ``"z"`` keeps MuJoCo's axes, ``"y"`` turns the model so that y is up.
+        keyframe: name of the keyframe that gives the default pose.
+        name: name of the files to write, without suffix; that of the input if None.
+
+    Returns:
+        The model, the account of the conversion, and the files beside the model.
+
+    Raises:
+        MissingDependency: MuJoCo is not installed.
+        MissingFileError: there is no such file.
+        DocumentError: MuJoCo rejects the file.
+        SettingError: an option has an unknown value, or `written_for` is required.
+        UnsupportedError: the file has no body.
+    """
+    for word, value, known in (
+        ("written-for", written_for, (None, 2, 3, 4)),
+        ("muscle-class", muscle_class, ("millard", "exact")),
+        ("armature", armature, ("rotors", "none")),
+        ("joint-limits", joint_limits, ("forces", "range")),
+        ("contacts", contacts, ("forces", "geometry", "none")),
+        ("up", up, ("y", "z")),
+    ):
+        if value not in known:
+            words = " or ".join(f"'{item}'" for item in known if item is not None)
+            raise SettingError(f"--{word} is {words}, not '{value}'")
+    options = Options(
+        written_for=None if written_for is None else max(written_for, 3),
+        muscle=muscle_class,
+        armature=armature,
+        limits=joint_limits,
+        contact=contacts,
+        up=up,
+        keyframe=keyframe,
+    )
+    draft = start_draft(Path(path), options)
+    for make in PASSES:
+        make(draft)
+    return Osim(
+        draft.source.path.stem if name is None else name,
+        draft.model,
+        draft.fidelity,
+        CoordinateMap.of(draft.mj, draft.coordinates, draft.rotors),
+        draft.files,
+    )
+
+
+def start_draft(path: Path, options: Options) -> Draft:
+    """Compile a file, and return a draft without components."""
+    source = load_mjcf(path)
+    compiled: Any = source.model
+    gravity = [float(value) for value in compiled.opt.gravity]
+    disabled = int(compiled.opt.disableflags)
+    if disabled & int(source.mujoco.mjtDisableBit.mjDSBL_GRAVITY):
+        gravity = [0.0, 0.0, 0.0]
+    if options.up == "y":
+        gravity = [gravity[0], gravity[2], -gravity[1]]
+    model = Model(
+        name=legal(source.name),
+        gravity=vector(gravity),
+        credits=f"converted from {path.name} by osimlite",
+        publications="",
+    )
+    world: Any = model.ground
+    if options.up == "y":
+        world = PhysicalOffsetFrame(
+            name="world", socket_parent=model.ground, orientation=(-math.pi / 2.0, 0.0, 0.0)
+        )
+        model.add(world)
+    return Draft(source, options, model, Fidelity(source.name, "osim"), world)

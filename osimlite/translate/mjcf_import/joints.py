@@ -1,0 +1,506 @@
+"""Joints: each body of MuJoCo with its hinges, slides, ball or free joint as OpenSim joints.
+
+MuJoCo applies the joints of a body in order: a slide shifts the body along an axis that earlier
+hinges have turned, a hinge turns it about an anchor. Slides followed by up to three hinges with one
+anchor are one CustomJoint; its translations come before its rotations, as here. Everything else is
+divided into several joints with bodies of zero mass between them.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from osimlite.mechanics.multibody.spatial import Array
+from osimlite.schema.coordinates import Coordinate
+from osimlite.schema.custom_joint import CustomJoint, SpatialTransform, TransformAxis
+from osimlite.schema.forces import CoordinateLimitForce
+from osimlite.schema.frames import Body, PhysicalFrame
+from osimlite.schema.functions import LinearFunction
+from osimlite.schema.joints import WeldJoint
+from osimlite.schema.springs import ExpressionBasedCoordinateForce, SpringGeneralizedForce
+from osimlite.translate.fidelity import LEFT_OUT
+from osimlite.translate.mjcf_import.draft import Draft, angles_of, quaternion_matrix, vector
+
+FREE, BALL, SLIDE, HINGE = 0, 1, 2, 3
+"""MuJoCo's joint types (``mjtJoint``)."""
+SAME_ANCHOR_M = 1e-12
+"""Distance up to which two hinges have the same anchor."""
+PARALLEL = 1e-4
+"""Sine of the angle below which two axes of a CustomJoint are too near to parallel for OpenSim."""
+FREE_RANGE_M = 10.0
+"""Range of coordinates that MuJoCo does not limit, in metres; it limits nothing."""
+ROTOR_MASS_KG = 1e-9
+"""Mass of the rotors that stand for armature; OpenSim ignores the inertia of a body without mass."""
+LIMIT_TRANSITION = {"rotational": 0.1, "translational": 1e-4}
+"""Distance (deg, m) over which a CoordinateLimitForce reaches its full stiffness."""
+
+
+class Group(NamedTuple):
+    """Joints of MuJoCo that become one joint of OpenSim."""
+
+    slides: tuple[int, ...]
+    hinges: tuple[int, ...]
+    special: int = -1  # a ball or free joint
+
+
+def group_joints(draft: Draft, body: int) -> list[Group]:
+    """Divide the joints of a body into groups of one OpenSim joint each."""
+    model = draft.mj
+    groups: list[Group] = []
+    slides: list[int] = []
+    hinges: list[int] = []
+    first = int(model.body_jntadr[body])
+    for joint in range(first, first + int(model.body_jntnum[body])):
+        kind = int(model.jnt_type[joint])
+        if kind in (FREE, BALL):
+            if slides or hinges:
+                groups.append(Group(tuple(slides), tuple(hinges)))
+                slides, hinges = [], []
+            groups.append(Group((), (), joint))
+            continue
+        fits = (
+            not hinges and len(slides) < 3 and _is_independent(model, joint, slides)
+            if kind == SLIDE
+            else len(hinges) < 3
+            and _is_independent(model, joint, hinges)
+            and (not hinges or _same_anchor(model, joint, hinges[0]))
+        )
+        if not fits:
+            groups.append(Group(tuple(slides), tuple(hinges)))
+            slides, hinges = [], []
+        (slides if kind == SLIDE else hinges).append(joint)
+    if slides or hinges:
+        groups.append(Group(tuple(slides), tuple(hinges)))
+    return groups
+
+
+def add_joints(draft: Draft, body: int, frame: Body, parent: PhysicalFrame) -> None:
+    """Connect a body to its parent.
+
+    Args:
+        draft: the conversion.
+        body: index of the body.
+        frame: the OpenSim body, already in the model.
+        parent: the frame of the parent body.
+    """
+    model = draft.mj
+    groups = group_joints(draft, body)
+    position = np.array(model.body_pos[body])
+    rotation = quaternion_matrix(model.body_quat[body])
+    if not groups:
+        weld = WeldJoint(name=draft.unique("joint", f"{frame.name}_joint"))
+        turned = angles_of(rotation)
+        draft.model.add(weld.between(parent, frame, at=vector(position), turned=turned))
+        return
+    for number, group in enumerate(groups):
+        is_last = number == len(groups) - 1
+        if is_last:
+            child, suffix = frame, ""
+        else:
+            name = draft.unique("body", f"{frame.name}_{number + 1}")
+            child, suffix = Body(name=name, mass=0.0), f"_{number + 1}"
+            draft.model.add(child)
+        name = draft.unique("joint", f"{frame.name}_joint{suffix}")
+        if group.special >= 0:
+            joint = _make_special_joint(draft, group.special, name, position, rotation)
+            anchor = np.array(model.jnt_pos[group.special])
+            if int(model.jnt_type[group.special]) == FREE:
+                # MuJoCo's coordinates of a free joint are the pose in the world, not relative to
+                # `body_pos`. The child frame is turned, so that the angles are 0 at the default.
+                joint.between(parent, child, child_turned=angles_of(rotation.T))
+            else:
+                joint.between(
+                    parent,
+                    child,
+                    at=vector(position + rotation @ anchor),
+                    turned=angles_of(rotation),
+                    child_at=vector(anchor),
+                )
+        else:
+            anchor = np.array(model.jnt_pos[(group.hinges or group.slides)[0]])
+            joint = _make_custom_joint(draft, group, name)
+            joint.between(
+                parent,
+                child,
+                at=vector(position + rotation @ anchor),
+                turned=angles_of(rotation),
+                child_at=vector(anchor),
+            )
+        draft.model.add(joint)
+        parent, position, rotation = child, np.zeros(3), np.eye(3)
+    if len(groups) > 1:
+        draft.record(
+            "body",
+            body,
+            "joints with different anchors, or a slide after a hinge",
+            "several joints with bodies of zero mass between them, which move the same",
+            f"{len(groups) - 1} helper bodies",
+        )
+
+
+def _make_custom_joint(draft: Draft, group: Group, name: str) -> CustomJoint:
+    model = draft.mj
+    axes: dict[str, TransformAxis] = {}
+    coordinates = []
+    for kind, members in (("rotation", group.hinges), ("translation", group.slides)):
+        directions = _complete_axes([np.array(model.jnt_axis[joint]) for joint in members])
+        for number, direction in enumerate(directions):
+            axis = TransformAxis(name=f"{kind}{number + 1}", axis=vector(direction))
+            if number < len(members):
+                joint = members[number]
+                reference = float(model.qpos0[model.jnt_qposadr[joint]])
+                coordinate = _make_coordinate(draft, joint, reference)
+                axis.coordinates = (coordinate.name,)
+                axis.function = LinearFunction(name="function", coefficients=(1.0, -reference))
+                coordinates.append(coordinate)
+            axes[axis.name] = axis
+    return _make_joint(name, coordinates, axes)
+
+
+def _make_coordinate(draft: Draft, joint: int, value: float) -> Coordinate:
+    """Make the coordinate of a hinge or slide."""
+    model = draft.mj
+    name = draft.unique("coordinate", draft.source.name_of("joint", joint))
+    rotational = int(model.jnt_type[joint]) == HINGE
+    limited = bool(model.jnt_limited[joint])
+    half = math.pi if rotational else FREE_RANGE_M
+    low, high = map(float, model.jnt_range[joint]) if limited else (value - half, value + half)
+    if not low <= value <= high:
+        # OpenSim moves a default value into the range of a clamped coordinate.
+        draft.record(
+            "joint",
+            joint,
+            "a default value outside of the range",
+            "the range is widened to contain the default",
+            f"range {low:g} to {high:g}, default {value:g}",
+        )
+        low, high = min(low, value), max(high, value)
+    coordinate = Coordinate(name=name, default_value=value, range=(low, high), clamped=limited)
+    draft.coordinates[joint] = (name,)
+    draft.made[name] = coordinate
+    draft.translated("joint", joint, f"coordinate {name}")
+    return coordinate
+
+
+def _make_special_joint(
+    draft: Draft, joint: int, name: str, position: Array, rotation: Array
+) -> CustomJoint:
+    """Make a ball or free joint as a CustomJoint of body-fixed X-Y-Z angles."""
+    model = draft.mj
+    free = int(model.jnt_type[joint]) == FREE
+    base = draft.source.name_of("joint", joint)
+    words = ("rx", "ry", "rz", "tx", "ty", "tz") if free else ("rx", "ry", "rz")
+    values = (0.0, 0.0, 0.0, *map(float, position))
+    axes, coordinates = {}, []
+    for number, word in enumerate(words):
+        half = math.pi if number < 3 else FREE_RANGE_M
+        value = values[number]
+        coordinate = Coordinate(
+            name=draft.unique("coordinate", f"{base}_{word}"),
+            default_value=value,
+            range=(value - half, value + half),
+        )
+        coordinates.append(coordinate)
+        draft.made[coordinate.name] = coordinate
+        kind = "rotation" if number < 3 else "translation"
+        place = f"{kind}{number % 3 + 1}"
+        axes[place] = TransformAxis(
+            name=place,
+            axis=vector(np.eye(3)[number % 3]),
+            coordinates=(coordinate.name,),
+            function=LinearFunction(name="function", coefficients=(1.0, 0.0)),
+        )
+    draft.coordinates[joint] = tuple(item.name for item in coordinates)
+    draft.translated("joint", joint, f"joint {name}")
+    draft.record(
+        "joint",
+        joint,
+        "a quaternion, and speeds that are an angular velocity",
+        "three body-fixed X-Y-Z angles, which are 0 at the default orientation; poses are the "
+        "same, but 90 degrees of the second angle is singular",
+        "coordinates " + " ".join(draft.coordinates[joint]),
+    )
+    if bool(model.jnt_limited[joint]):
+        draft.record(
+            "joint",
+            joint,
+            "a limit of the total angle of a ball joint",
+            LEFT_OUT,
+            f"at most {float(model.jnt_range[joint, 1]):g} rad",
+        )
+    return _make_joint(name, coordinates, axes)
+
+
+def _make_joint(
+    name: str, coordinates: list[Coordinate], axes: dict[str, TransformAxis]
+) -> CustomJoint:
+    transform = SpatialTransform()
+    for place, axis in axes.items():
+        setattr(transform, place, axis)
+    return CustomJoint(name=name, coordinates=coordinates, spatial_transform=transform)
+
+
+def add_joint_forces(draft: Draft) -> None:
+    """Add springs, dampers, limits and armature of joints, and record friction."""
+    model = draft.mj
+    dependent = _find_dependent_joints(draft)
+    for joint in range(model.njnt):
+        kind = int(model.jnt_type[joint])
+        if kind in (FREE, BALL):
+            _record_special_forces(draft, joint)
+            continue
+        (name,) = draft.coordinates[joint]
+        _add_spring(draft, joint, name)
+        _add_armature(draft, joint, name)
+        dof = int(model.jnt_dofadr[joint])
+        if model.dof_frictionloss[dof]:
+            draft.record(
+                "joint",
+                joint,
+                "dry friction of a joint",
+                LEFT_OUT,
+                f"frictionloss {float(model.dof_frictionloss[dof]):g}",
+            )
+        if bool(model.jnt_limited[joint]) and joint not in dependent:
+            _add_limit(draft, joint, name)
+        if bool(model.jnt_actfrclimited[joint]):
+            low, high = map(float, model.jnt_actfrcrange[joint])
+            draft.record(
+                "joint",
+                joint,
+                "a limit of the total force of the actuators of a joint",
+                LEFT_OUT,
+                f"{low:g} to {high:g}",
+            )
+
+
+def _add_spring(draft: Draft, joint: int, name: str) -> None:
+    model = draft.mj
+    address, dof = int(model.jnt_qposadr[joint]), int(model.jnt_dofadr[joint])
+    stiffness, rest = float(model.jnt_stiffness[joint]), float(model.qpos_spring[address])
+    damping = float(model.dof_damping[dof])
+    springs, dampers = (
+        _polynomial(model, "jnt_stiffnesspoly", joint),
+        _polynomial(model, "dof_dampingpoly", dof),
+    )
+    if any(springs) or any(dampers) or min(stiffness, damping) < 0.0:
+        # MuJoCo: force = -x (k + k1 |x| + k2 x^2), and the same for the speed.
+        terms = _force_expression(stiffness, springs, f"(q-({rest!r}))") + _force_expression(
+            damping, dampers, "qdot"
+        )
+        force = ExpressionBasedCoordinateForce(
+            name=draft.unique("force", f"{name}_spring"), coordinate=name, expression=terms
+        )
+        draft.model.add(force)
+    elif stiffness or damping:
+        draft.model.add(
+            SpringGeneralizedForce(
+                name=draft.unique("force", f"{name}_spring"),
+                coordinate=name,
+                stiffness=stiffness,
+                rest_length=rest if stiffness else 0.0,
+                viscosity=damping,
+            )
+        )
+
+
+def _polynomial(model: object, name: str, index: int) -> tuple[float, ...]:
+    """Return the higher coefficients of a spring or damper; versions before 3.6 have none."""
+    rows = getattr(model, name, None)
+    if rows is None:
+        return ()
+    return tuple(float(value) for value in np.atleast_1d(rows[index]))
+
+
+def _force_expression(first: float, higher: tuple[float, ...], x: str) -> str:
+    """Return the formula of -(first x + higher_1 |x| x + higher_2 x^3 ...)."""
+    text = ""
+    for power, value in enumerate((first, *higher)):
+        if value:
+            size = f"abs({x})" if power % 2 else ""
+            factor = f"*{x}^{power - power % 2}" if power > 1 else ""
+            text += f"-({value!r})*{x}{factor}" + (f"*{size}" if size else "")
+    return text
+
+
+def _add_armature(draft: Draft, joint: int, name: str) -> None:
+    """Add a rotor that has the armature as its inertia and turns as the coordinate does."""
+    from osimlite.schema.constraint_types import CoordinateCouplerConstraint
+    from osimlite.schema.joints import PinJoint
+
+    model = draft.mj
+    armature = float(model.dof_armature[int(model.jnt_dofadr[joint])])
+    if not armature:
+        return
+    rotational = int(model.jnt_type[joint]) == HINGE
+    unit = "kg m^2" if rotational else "kg"
+    if draft.options.armature == "none":
+        draft.record(
+            "joint", joint, "armature", f"{LEFT_OUT}, as requested", f"armature {armature:g} {unit}"
+        )
+        return
+    rotor = Body(
+        name=draft.unique("body", f"{name}_rotor"),
+        mass=ROTOR_MASS_KG,
+        inertia=(armature, armature, armature, 0.0, 0.0, 0.0),
+    )
+    draft.model.add(rotor)
+    turn = Coordinate(
+        name=draft.unique("coordinate", f"{name}_rotor"),
+        default_value=draft.made[name].default_value,
+        range=draft.made[name].range,
+        is_free_to_satisfy_constraints=True,
+    )
+    draft.made[turn.name] = turn
+    draft.rotors[turn.name] = name
+    pin = PinJoint(name=draft.unique("joint", f"{name}_rotor_joint"), coordinates=[turn])
+    draft.model.add(pin.between(draft.model.ground, rotor))
+    draft.model.add(
+        CoordinateCouplerConstraint(
+            name=draft.unique("constraint", f"{name}_rotor_coupler"),
+            coupled_coordinates_function=LinearFunction(
+                name="coupled_coordinates_function", coefficients=(1.0, 0.0)
+            ),
+            independent_coordinate_names=(name,),
+            dependent_coordinate_name=turn.name,
+        )
+    )
+    draft.record(
+        "joint",
+        joint,
+        "armature",
+        "a rotor with that inertia, which turns in ground as the coordinate does (exact)",
+        f"armature {armature:g} {unit}, body {rotor.name}",
+    )
+
+
+def _add_limit(draft: Draft, joint: int, name: str) -> None:
+    """Add a stiff spring beyond the range of a joint."""
+    model = draft.mj
+    low, high = map(float, model.jnt_range[joint])
+    text = f"range {low:g} to {high:g}"
+    if draft.options.limits == "range":
+        draft.record(
+            "joint", joint, "a soft joint limit", "the range of the coordinate alone", text
+        )
+        return
+    dof = int(model.jnt_dofadr[joint])
+    stiffness, damping = compute_softness(
+        model.jnt_solref[joint], model.jnt_solimp[joint], float(model.dof_invweight0[dof])
+    )
+    rotational = int(model.jnt_type[joint]) == HINGE
+    scale = math.pi / 180.0 if rotational else 1.0
+    draft.model.add(
+        CoordinateLimitForce(
+            name=draft.unique("force", f"{name}_limit"),
+            coordinate=name,
+            upper_stiffness=stiffness * scale,
+            upper_limit=high / scale,
+            lower_stiffness=stiffness * scale,
+            lower_limit=low / scale,
+            damping=damping * scale,
+            transition=LIMIT_TRANSITION["rotational" if rotational else "translational"],
+        )
+    )
+    units = ("N m/rad", "N m s/rad") if rotational else ("N/m", "N s/m")
+    draft.record(
+        "joint",
+        joint,
+        "a soft joint limit",
+        "a CoordinateLimitForce with the stiffness of MuJoCo's limit at rest in the default pose",
+        f"{text}, stiffness {stiffness:.4g} {units[0]}, damping {damping:.4g} {units[1]}",
+    )
+
+
+def compute_softness(
+    reference: Array, impedance: Array, inverse_mass: float
+) -> tuple[float, float]:
+    """Return stiffness and damping of a spring that yields as a constraint of MuJoCo does at rest.
+
+    MuJoCo's constraint accelerates with (1 - d) a0 + d (-b v - k r) (Computation, "Constraint
+    model"), so that a load F at rest is held at r = F (1 - d) / (d k m). The impedance d is that of
+    a deep violation (`dmax`).
+
+    Args:
+        reference: MuJoCo's ``solref`` (2,): time constant (s) and damping ratio, or -stiffness and
+            -damping.
+        impedance: MuJoCo's ``solimp`` (5,).
+        inverse_mass: inverse of the effective mass in the default pose.
+
+    Returns:
+        Stiffness and damping in the units of the mass.
+    """
+    first, second = map(float, reference[:2])
+    most = min(max(float(impedance[1]), 1e-4), 0.9999)
+    if first > 0.0:
+        k = 1.0 / max(most * most * first * first * second * second, 1e-15)
+        b = 2.0 / max(most * first, 1e-15)
+    else:
+        k, b = -first / most**2, -second / most
+    mass = 1.0 / max(inverse_mass, 1e-9)
+    factor = mass * most / (1.0 - most)
+    return max(factor * k, 1e-9), max(factor * b, 0.0)
+
+
+def _record_special_forces(draft: Draft, joint: int) -> None:
+    """Record what a ball or free joint has besides its motion."""
+    model = draft.mj
+    first = int(model.jnt_dofadr[joint])
+    count = 6 if int(model.jnt_type[joint]) == FREE else 3
+    dofs = slice(first, first + count)
+    for what, values in (
+        ("stiffness", np.atleast_1d(model.jnt_stiffness[joint])),
+        ("damping", model.dof_damping[dofs]),
+        ("armature", model.dof_armature[dofs]),
+        ("dry friction", model.dof_frictionloss[dofs]),
+    ):
+        if np.any(values):
+            draft.record(
+                "joint",
+                joint,
+                f"{what} of a ball or free joint",
+                LEFT_OUT,
+                f"{what} " + " ".join(f"{float(value):g}" for value in dict.fromkeys(values)),
+            )
+
+
+def _find_dependent_joints(draft: Draft) -> set[int]:
+    """Return the joints that an active equality determines."""
+    model, kinds = draft.mj, draft.source.mujoco.mjtEq
+    return {
+        int(model.eq_obj1id[number])
+        for number in range(model.neq)
+        if int(model.eq_type[number]) == int(kinds.mjEQ_JOINT) and model.eq_active0[number]
+    }
+
+
+def _same_anchor(model: object, one: int, other: int) -> bool:
+    positions = model.jnt_pos  # type: ignore[attr-defined]
+    return bool(np.linalg.norm(positions[one] - positions[other]) <= SAME_ANCHOR_M)
+
+
+def _is_independent(model: object, joint: int, others: list[int]) -> bool:
+    """Whether no other axis is parallel to that of a joint."""
+    axes = model.jnt_axis  # type: ignore[attr-defined]
+    return all(
+        float(np.linalg.norm(np.cross(axes[joint], axes[other]))) > PARALLEL for other in others
+    )
+
+
+def _complete_axes(axes: list[Array]) -> list[Array]:
+    """Return three axes, no two parallel, of which the first are those given."""
+    result = list(axes)
+    while len(result) < 3:
+        if not result:
+            result.append(np.array((1.0, 0.0, 0.0)))
+        elif len(result) == 1:
+            smallest = np.eye(3)[int(np.argmin(np.abs(result[0])))]
+            across = np.cross(result[0], smallest)
+            result.append(across / np.linalg.norm(across))
+        else:
+            across = np.cross(result[0], result[1])
+            result.append(across / np.linalg.norm(across))
+    return result

@@ -1,0 +1,69 @@
+"""Keyframes: the default pose, and a table of all of them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from osimlite.base.text import suggest_name
+from osimlite.errors import SettingError
+from osimlite.translate.mjcf_import.coordinate_map import CoordinateMap
+from osimlite.translate.mjcf_import.draft import Draft
+
+
+def add_keyframes(draft: Draft) -> None:
+    """Write all keyframes into a table, and set the default pose by the one that is asked for."""
+    model = draft.mj
+    names = [draft.source.name_of("key", key) for key in range(model.nkey)]
+    wanted = draft.options.keyframe
+    if wanted is not None and wanted not in names:
+        known = ", ".join(names) or "none"
+        raise SettingError(
+            f"the file has no keyframe '{wanted}'{suggest_name(wanted, names)}; it has: {known}"
+        )
+    if not names:
+        return
+    coordinates = CoordinateMap.of(model, draft.coordinates, draft.rotors)
+    rows = [coordinates.values(np.array(model.key_qpos[key])) for key in range(model.nkey)]
+    labels = coordinates.names()
+    file = f"{draft.source.path.stem}_keyframes.mot"
+    lines = [
+        "keyframes of MuJoCo, one a row",
+        "version=1",
+        f"nRows={len(rows)}",
+        f"nColumns={len(labels) + 1}",
+        "inDegrees=no",
+        "endheader",
+        "\t".join(["time", *labels]),
+    ]
+    for key, values in enumerate(rows):
+        lines.append("\t".join([str(key), *(repr(values[label]) for label in labels)]))
+        lost = [
+            what
+            for what, numbers in (
+                ("speeds", model.key_qvel[key]),
+                ("activations", model.key_act[key]),
+                ("controls", model.key_ctrl[key]),
+            )
+            if np.any(numbers)
+        ]
+        if lost:
+            draft.record(
+                "key",
+                key,
+                f"{', '.join(lost)} of a keyframe",
+                f"the pose alone, in row {key} of {file}",
+            )
+        else:
+            draft.translated("key", key, f"row {key} of {file}")
+    draft.files[file] = "\n".join(lines) + "\n"
+    if wanted is not None:
+        set_default_pose(draft, rows[names.index(wanted)])
+
+
+def set_default_pose(draft: Draft, values: dict[str, float]) -> None:
+    """Set the default values of coordinates; ranges are widened to contain them."""
+    for name, value in values.items():
+        coordinate = draft.made[name]
+        low, high = coordinate.range
+        coordinate.range = (min(low, value), max(high, value))
+        coordinate.default_value = value

@@ -1,0 +1,148 @@
+"""Appearance of bodies: geoms as shapes, meshes as files beside the model."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from osimlite.mechanics.multibody.spatial import Array
+from osimlite.schema.frames import PhysicalFrame
+from osimlite.schema.geometry import Appearance, Brick, Cylinder, Ellipsoid, Geometry, Mesh, Sphere
+from osimlite.translate.fidelity import LEFT_OUT
+from osimlite.translate.mjcf_import.draft import Draft, quaternion_matrix
+
+PLANE, HFIELD, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX, MESH, SDF = range(9)
+"""MuJoCo's geom types (``mjtGeom``)."""
+GEOMETRY_FOLDER = "Geometry"
+"""Folder of mesh files; OpenSim looks for meshes there."""
+
+Z_TO_Y = np.array(((1.0, 0.0, 0.0), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0)))
+"""Axes of a cylinder along Y (OpenSim's), in the frame of one along Z (MuJoCo's)."""
+
+
+class _Part(NamedTuple):
+    shape: Geometry
+    position: Array  # in the frame of the geom, m
+    rotation: Array
+
+
+def add_shapes(draft: Draft) -> None:
+    """Add geoms as shapes of their bodies, but for those that tendons wrap around."""
+    model = draft.mj
+    for geom in range(model.ngeom):
+        if geom in draft.wrapping_geoms:
+            continue
+        parts = _make_parts(draft, geom)
+        if parts is None:
+            continue
+        name = draft.source.name_of("geom", geom)
+        body = int(model.geom_bodyid[geom])
+        rotation, position = quaternion_matrix(model.geom_quat[geom]), model.geom_pos[geom]
+        for part in parts:
+            frame, _ = draft.frame_at(
+                body,
+                f"{name}_frame",
+                position + rotation @ part.position,
+                rotation @ part.rotation,
+            )
+            _draw(draft, geom, frame, part.shape, name)
+        draft.translated("geom", geom, f"shape {name}")
+
+
+def _draw(draft: Draft, geom: int, frame: PhysicalFrame, shape: Geometry, name: str) -> None:
+    model = draft.mj
+    rgba = model.geom_rgba[geom]
+    material = int(model.geom_matid[geom])
+    if material >= 0 and np.allclose(rgba, (0.5, 0.5, 0.5, 1.0)):
+        rgba = model.mat_rgba[material]
+    color = tuple(float(min(max(value, 0.0), 1.0)) for value in rgba)
+    # Viewers of MuJoCo show the groups 0 to 2 only, unless they are told otherwise.
+    shape.appearance = Appearance(
+        name="appearance",
+        visible=bool(model.geom_group[geom] < 3),
+        opacity=color[3],
+        color=color[:3],
+    )
+    shape.name = draft.unique("shape", name)
+    frame.attach(shape)
+
+
+def _make_parts(draft: Draft, geom: int) -> list[_Part] | None:
+    """Make the shapes of a geom; None if it has none, which is recorded."""
+    model = draft.mj
+    size = [float(value) for value in model.geom_size[geom]]
+    kind = int(model.geom_type[geom])
+    here, straight = np.zeros(3), np.eye(3)
+    if kind == SPHERE:
+        return [_Part(Sphere(radius=size[0]), here, straight)]
+    if kind == ELLIPSOID:
+        return [_Part(Ellipsoid(radii=(size[0], size[1], size[2])), here, straight)]
+    if kind == BOX:
+        return [_Part(Brick(half_lengths=(size[0], size[1], size[2])), here, straight)]
+    if kind in (CYLINDER, CAPSULE):
+        parts = [_Part(Cylinder(radius=size[0], half_height=size[1]), here, Z_TO_Y)]
+        if kind == CAPSULE:
+            for end in (-size[1], size[1]):
+                parts.append(_Part(Sphere(radius=size[0]), np.array((0.0, 0.0, end)), straight))
+        return parts
+    if kind in (MESH, SDF) and int(model.geom_dataid[geom]) >= 0:
+        file = write_mesh(draft, int(model.geom_dataid[geom]))
+        return [_Part(Mesh(mesh_file=file.rpartition("/")[2]), here, straight)]
+    if kind == PLANE:
+        draft.translated("geom", geom, "not drawn: a plane")
+        return None
+    draft.drop("geom", geom, "a height field or another shape that OpenSim does not have")
+    return None
+
+
+def write_mesh(draft: Draft, mesh: int) -> str:
+    """Add the file of a mesh to the draft, once.
+
+    MuJoCo moves a mesh to its mass centre and principal axes when it compiles; the file has the
+    points as they are then, which the poses of geoms refer to.
+
+    Returns:
+        Name of the file relative to the model.
+    """
+    model = draft.mj
+    if mesh not in draft.meshes:
+        name = draft.unique("mesh", draft.source.name_of("mesh", mesh))
+        file = draft.meshes[mesh] = f"{GEOMETRY_FOLDER}/{name}.obj"
+        first, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
+        vertices = model.mesh_vert[first : first + count]
+        first, count = int(model.mesh_faceadr[mesh]), int(model.mesh_facenum[mesh])
+        faces = model.mesh_face[first : first + count] + 1
+        lines = [f"v {x:.8g} {y:.8g} {z:.8g}" for x, y, z in vertices.tolist()]
+        lines += [f"f {a} {b} {c}" for a, b, c in faces.tolist()]
+        draft.files[file] = "\n".join(lines) + "\n"
+        draft.translated("mesh", mesh, f"file {file}")
+    return draft.meshes[mesh]
+
+
+def record_unseen(draft: Draft) -> None:
+    """Record what a viewer of MuJoCo shows, or a program reads, and OpenSim does not have."""
+    model = draft.mj
+    for kind, count, what in (
+        ("camera", model.ncam, "a camera"),
+        ("light", model.nlight, "a light"),
+        ("sensor", model.nsensor, "a sensor"),
+        ("skin", model.nskin, "a skin"),
+        ("flex", model.nflex, "a deformable body"),
+        ("hfield", model.nhfield, "a height field"),
+        ("texture", model.ntex, "a texture"),
+        ("plugin", model.nplugin, "a plugin"),
+        ("numeric", model.nnumeric, "numbers for programs"),
+        ("text", model.ntext, "text for programs"),
+        ("tuple", model.ntuple, "a tuple for programs"),
+    ):
+        for index in range(int(count)):
+            draft.drop(kind, index, what)
+    option = model.opt
+    for what, value in (
+        ("wind", option.wind),
+        ("the density of a fluid", option.density),
+        ("the viscosity of a fluid", option.viscosity),
+    ):
+        if np.any(value):
+            draft.fidelity.add("option", "/option", what, LEFT_OUT, f"{value}")

@@ -1,0 +1,141 @@
+"""Loading of MJCF files by MuJoCo's own compiler."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+from osimlite.base.records import dataclass
+from osimlite.base.require import require
+from osimlite.errors import DocumentError, MissingFileError, UnsupportedError
+
+LARGEST_FILE = 50_000_000
+"""Size (bytes) up to which a file is given to MuJoCo."""
+TRIAL_SECONDS = 600
+"""Time after which the trial compilation in another process ends."""
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """A compiled MJCF file.
+
+    Attributes:
+        path: the file.
+        mujoco: MuJoCo's module.
+        model: the compiled model (``MjModel``).
+        major: first number of the version of MuJoCo that compiled it.
+    """
+
+    path: Path
+    mujoco: Any
+    model: Any
+    major: int
+
+    @property
+    def name(self) -> str:
+        """Name of the model, or of the file where the model has none."""
+        text = bytes(self.model.names).split(b"\0", 1)[0].decode("utf-8", "replace")
+        return self.path.stem if text in ("", "MuJoCo Model") else text
+
+    def name_of(self, kind: str, index: int) -> str:
+        """Return the name of an object, or its kind and index where it has none.
+
+        Args:
+            kind: type of the object in lower case, such as "body", "joint", "geom", "site".
+            index: number of the object among those of its kind.
+        """
+        name = self.mujoco.mj_id2name(
+            self.model, getattr(self.mujoco.mjtObj, f"mjOBJ_{kind.upper()}"), index
+        )
+        return name or f"{kind}_{index}"
+
+    def path_of(self, kind: str, index: int) -> str:
+        """Return the name by which `fidelity.json` calls an object: ``/joint/elbow_flexion``."""
+        return f"/{kind}/{self.name_of(kind, index)}"
+
+
+def load_mjcf(path: Path) -> Source:
+    """Compile an MJCF file.
+
+    MuJoCo's parser can end the process on a damaged file, so the file is first compiled in another
+    process.
+
+    Args:
+        path: the file (.xml).
+
+    Raises:
+        MissingDependency: MuJoCo is not installed.
+        MissingFileError: there is no such file.
+        DocumentError: MuJoCo rejects the file.
+        UnsupportedError: the model has no body, or is larger than osimlite accepts.
+    """
+    mujoco: Any = require("mujoco", extra="mujoco", purpose="conversion from MJCF")
+    if not path.is_file():
+        raise MissingFileError("there is no such file; give an MJCF file (.xml)", file=str(path))
+    if path.stat().st_size > LARGEST_FILE:
+        raise DocumentError(
+            f"the file has more than {LARGEST_FILE / 1e6:g} MB, which is more than osimlite reads",
+            file=str(path),
+        )
+    _try_in_another_process(path)
+    try:
+        model = mujoco.MjModel.from_xml_path(str(path))
+    except Exception as error:  # MuJoCo raises ValueError, and others for lack of memory
+        raise _explain_failure(path, str(error)) from error
+    if model.nbody < 2:
+        raise UnsupportedError(
+            "the MJCF file has no bodies besides the world; there is nothing to convert",
+            file=str(path),
+        )
+    return Source(path, mujoco, model, int(mujoco.__version__.split(".")[0]))
+
+
+def _try_in_another_process(path: Path) -> None:
+    """Raise an error if MuJoCo rejects the file, or crashes on it."""
+    code = (
+        "import sys, mujoco\n"
+        "try:\n"
+        "    mujoco.MjModel.from_xml_path(sys.argv[1])\n"
+        "except Exception as error:\n"
+        "    sys.stderr.write('MJCF:' + str(error)); sys.exit(3)\n"
+    )
+    environment = {**os.environ, "PYTHONSAFEPATH": "1", "PYTHONIOENCODING": "utf-8"}
+    try:
+        done = subprocess.run(
+            [sys.executable, "-c", code, str(path.absolute())],
+            capture_output=True,
+            timeout=TRIAL_SECONDS,
+            check=False,
+            env=environment,
+            cwd=Path(__file__).parent,
+        )
+    except subprocess.TimeoutExpired as error:
+        raise DocumentError(
+            f"MuJoCo did not compile the file within {TRIAL_SECONDS} s", file=str(path)
+        ) from error
+    if done.returncode == 3:
+        text = done.stderr.decode("utf-8", "replace")
+        raise _explain_failure(path, text.rpartition("MJCF:")[2])
+    if done.returncode < 0:
+        raise DocumentError(
+            f"MuJoCo crashed while it compiled the file (signal {-done.returncode})", file=str(path)
+        )
+
+
+def _explain_failure(path: Path, message: str) -> DocumentError:
+    """Return an error with MuJoCo's own message on one line."""
+    line = re.search(r"line (\d+)", message)
+    text = re.sub(r"\s*\n\s*", "; ", message.strip()) or "it gives no reason"
+    text = text.removeprefix("XML Error: ").removeprefix("Error: ")
+    hint = ""
+    if "opening file" in text:
+        hint = "; included files and meshes must be where the file names them"
+    return DocumentError(
+        f"MuJoCo rejects the file: {text}{hint}",
+        file=str(path),
+        line=int(line[1]) if line else None,
+    )

@@ -1,0 +1,171 @@
+"""Comparison of a converted model with MuJoCo, in osimlite and in OpenSim."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+
+import osimlite
+from osimlite.mechanics.multibody.spatial import Array
+from osimlite.translate.mjcf_import.convert import Osim
+
+
+def random_qpos(model: Any, count: int, seed: int = 0) -> Iterator[Array]:
+    """Yield random poses of MuJoCo."""
+    random = np.random.default_rng(seed)
+    for _ in range(count):
+        qpos = model.qpos0 + random.uniform(-1.0, 1.0, model.nq)
+        mujoco.mj_normalizeQuat(model, qpos)
+        yield qpos
+
+
+def pose_errors(path: Path, made: Osim, count: int) -> float:
+    """Return the largest difference of positions (m) and rotation matrices of bodies."""
+    model = mujoco.MjModel.from_xml_path(str(path))
+    data, mechanism = mujoco.MjData(model), osimlite.mechanism(made.model)
+    worst = 0.0
+    for qpos in random_qpos(model, count):
+        data.qpos[:] = qpos
+        mujoco.mj_forward(model, data)
+        poses = mechanism.body_transforms(made.coordinates.values(qpos))
+        for body, name in body_names(model, made):
+            worst = max(worst, float(np.abs(poses[name][:3, 3] - data.xpos[body]).max()))
+            turned = data.xmat[body].reshape(3, 3)
+            worst = max(worst, float(np.abs(poses[name][:3, :3] - turned).max()))
+    return worst
+
+
+def body_names(model: Any, made: Osim) -> list[tuple[int, str]]:
+    """Return the index of each body of MuJoCo but the world, and the name of the OpenSim body."""
+    result = []
+    for body in range(1, model.nbody):
+        name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_BODY, body) or f"body_{body}"
+        result.append((body, made.fidelity.translated[f"/body/{name}"].removeprefix("body ")))
+    return result
+
+
+def mass_matrix(model: Any, data: Any) -> Array:
+    """Return MuJoCo's mass matrix (nv, nv) in the pose of the data."""
+    matrix = np.zeros((model.nv, model.nv))
+    for row, unit in zip(matrix, np.eye(model.nv), strict=True):
+        mujoco.mj_mulM(model, data, row, unit)
+    return matrix
+
+
+def speed_jacobian(model: Any, made: Osim, qpos: Array) -> Array:
+    """Return MuJoCo's velocities (nv, n) for unit rates of the coordinates, rotors left out.
+
+    By central differences of the orientation for balls and free joints.
+    """
+    names = made.coordinates.names()
+    values = made.coordinates.values(qpos)
+    jacobian = np.zeros((model.nv, len(names)))
+    for joint, (kind, _, _, own) in enumerate(made.coordinates.joints):
+        dof = model.jnt_dofadr[joint]
+        columns = [names.index(name) for name in own]
+        if kind in (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE):
+            jacobian[dof, columns[0]] = 1.0
+            continue
+        turns = slice(dof, dof + 3)
+        if kind == mujoco.mjtJoint.mjJNT_FREE:
+            jacobian[dof : dof + 3, columns[3:]] = np.eye(3)
+            turns = slice(dof + 3, dof + 6)
+        angles = [values[name] for name in own[:3]]
+        rest = made.coordinates.joints[joint].rest if len(own) == 6 else np.eye(3)
+        jacobian[turns, columns[:3]] = rest.T @ body_rates(angles)
+    return jacobian
+
+
+def body_rates(angles: list[float]) -> Array:
+    """Return the angular velocity (3, 3) in the body for rates of body-fixed X-Y-Z angles."""
+    _, y, z = angles
+    return np.array(
+        (
+            (np.cos(y) * np.cos(z), np.sin(z), 0.0),
+            (-np.cos(y) * np.sin(z), np.cos(z), 0.0),
+            (np.sin(y), 0.0, 1.0),
+        )
+    )
+
+
+def projection(made: Osim, order: list[str]) -> Array:
+    """Return the rates (n, m) of all coordinates for unit rates of those that are no rotors."""
+    names = made.coordinates.names()
+    matrix = np.zeros((len(order), len(names)))
+    for row, name in enumerate(order):
+        matrix[row, names.index(made.coordinates.rotors.get(name, name))] = 1.0
+    return matrix
+
+
+def mass_errors(path: Path, made: Osim, count: int) -> float:
+    """Return the largest relative difference of the mass matrices, with rotors where there are any."""
+    model = mujoco.MjModel.from_xml_path(str(path))
+    if not made.coordinates.rotors:
+        model.dof_armature[:] = 0.0
+    for joint in range(model.njnt):
+        # OpenSim's model has the armature of hinges and slides only.
+        if int(model.jnt_type[joint]) < int(mujoco.mjtJoint.mjJNT_SLIDE):
+            first = model.jnt_dofadr[joint]
+            model.dof_armature[first : first + 6 - 3 * int(model.jnt_type[joint])] = 0.0
+    data, mechanism = mujoco.MjData(model), osimlite.mechanism(made.model)
+    across = projection(made, list(mechanism.coordinate_names))
+    worst = 0.0
+    for qpos in random_qpos(model, count):
+        data.qpos[:] = qpos
+        mujoco.mj_forward(model, data)
+        jacobian = speed_jacobian(model, made, qpos)
+        theirs = jacobian.T @ mass_matrix(model, data) @ jacobian
+        ours = across.T @ mechanism.mass_matrix(made.coordinates.values(qpos)) @ across
+        worst = max(worst, float(np.abs(ours - theirs).max() / np.abs(theirs).max()))
+    return worst
+
+
+class LiveModel:
+    """A converted model in OpenSim, posed by coordinate values."""
+
+    def __init__(self, made: Osim, folder: Path) -> None:
+        import opensim
+
+        opensim.Logger.setLevelString("error")
+        files = made.write(folder)
+        opensim.ModelVisualizer.addDirToGeometrySearchPaths(str(folder / "Geometry"))
+        self.opensim, self.model = opensim, opensim.Model(str(files[0]))
+        self.state = self.model.initSystem()
+        self.coordinates = {
+            coordinate.getName(): coordinate for coordinate in self.model.getCoordinateSet()
+        }
+
+    def place(self, values: dict[str, float]) -> None:
+        """Set the coordinates, without assembly."""
+        for name, value in values.items():
+            coordinate = self.coordinates[name]
+            coordinate.setLocked(self.state, False)
+            coordinate.setClamped(self.state, False)
+            coordinate.setValue(self.state, value, False)
+        self.model.realizePosition(self.state)
+
+    def body(self, name: str) -> tuple[Array, Array]:
+        """Return position (3,) and rotation (3, 3) of a body in ground."""
+        pose = self.model.getBodySet().get(name).getTransformInGround(self.state)
+        position = pose.p()
+        rotation = pose.R()
+        return (
+            np.array([position.get(k) for k in range(3)]),
+            np.array([[rotation.get(i, j) for j in range(3)] for i in range(3)]),
+        )
+
+    def mass_matrix(self) -> Array:
+        """Return the mass matrix in the order of OpenSim's mobilities."""
+        matrix = self.opensim.Matrix()
+        self.model.getMatterSubsystem().calcM(self.state, matrix)
+        count = matrix.nrow()
+        return np.array([[matrix.get(i, j) for j in range(count)] for i in range(count)])
+
+    def mobilities(self) -> list[str]:
+        """Return the coordinate names in the order of OpenSim's mobilities."""
+        ordered = self.model.getCoordinatesInMultibodyTreeOrder()
+        return [ordered[k].getName() for k in range(len(self.coordinates))]
