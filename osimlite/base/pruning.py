@@ -61,7 +61,7 @@ def prune_cache(folder: Path, now: float, *, max_bytes: int = MAX_CACHE_BYTES) -
         now: seconds since the epoch.
         max_bytes: largest size of all entries together.
     """
-    entries = sorted(_find_entries(os.path.realpath(folder)))
+    entries = sorted(find_entries(os.path.realpath(folder)))
     total = sum(entry.size for entry in entries)
     # Remove a little more than necessary, so that not every run has to remove entries.
     least = total if total <= max_bytes else 0.8 * max_bytes
@@ -74,7 +74,7 @@ def prune_cache(folder: Path, now: float, *, max_bytes: int = MAX_CACHE_BYTES) -
     return removed
 
 
-def _find_entries(folder: str) -> Iterator[_Entry]:
+def find_entries(folder: str) -> Iterator[_Entry]:
     """Yield all entries in the tree of a folder."""
     for parent, folders, names in os.walk(folder, followlinks=False):
         # On Windows Python does not see that a junction is a link.

@@ -102,6 +102,11 @@ SIMPLE_CLASSES = frozenset(
 _memory: OrderedDict[str, list[Obstacle]] = OrderedDict()
 
 
+def forget_obstacles() -> None:
+    """Forget the obstacles of all models, so that the next look at a model builds it again."""
+    _memory.clear()
+
+
 def may_fail(subject: Subject) -> bool:
     """Return whether building a model may find more than the rules that need no numbers.
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from importlib import import_module
 from typing import Any
 
 import pytest
@@ -15,17 +14,12 @@ from osimlite.base.options import list_options
 from osimlite.cli import COMMANDS, app
 from osimlite.cli._command import Command
 from osimlite.simulation.options import Options
+from tests.cli.support import loaded
 
 WORDS = [
     "walker.osim", "b.osim", "-", "1", "0", "-1", "2.5", "1e-6", ".5", "5.", "1_0", "inf", "nan", "x", "a=1", "a==", "",
     "--", "-p", "-o", "-ofolder", "-o=x", "--output", "--no", "--help", "é", "٣",
 ]  # fmt: skip
-
-
-def loaded(name: str) -> Command:
-    function = name.replace("-", "_")
-    command: Command = getattr(import_module(f"osimlite.cli.{function}"), function)
-    return command
 
 
 def by_typer(name: str, words: list[str], monkeypatch: pytest.MonkeyPatch) -> dict[str, Any] | None:

@@ -9,7 +9,7 @@ import pytest
 
 import osimlite
 from tests.cli.command import run
-from tests.cli.test_command import loaded
+from tests.cli.support import loaded
 
 
 @pytest.fixture

@@ -13,7 +13,7 @@ from osimlite.studies.sweep.measures import measure_name
 from osimlite.studies.sweep.optimize import Objective, optimize
 from osimlite.studies.sweep.plan import plan
 from osimlite.studies.sweep.runner import Runner
-from tests.derivatives.test_sensitivity import human, pendulum
+from tests.derivatives.support import human, pendulum
 
 
 def swing(run):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -13,28 +12,11 @@ from osimlite.errors import SettingError, SimulationError
 from osimlite.models.jumper import jumper
 from osimlite.models.walkers import furthest_walker
 from osimlite.simulation.properties import find_properties
-from tests.simulation.test_constrained import MODELS
+from tests.derivatives.support import human, pendulum
+from tests.simulation.support import MODELS
 
 ACCURACY = 1e-11
 ANGLE, SPEED = "/jointset/hinge/angle/value", "/jointset/hinge/angle/speed"
-
-
-@cache
-def human():
-    return osimlite.modify(jumper(), paths="polynomial")
-
-
-def pendulum(gravity=9.81):
-    model = osimlite.Model(name="pendulum", gravity=(0.0, -gravity, 0.0))
-    rod = model.add(
-        osimlite.Body(
-            name="rod", mass=2.0, mass_center=(0.1, -0.5, 0.0), inertia=(0.2, 0.1, 0.2, 0, 0, 0)
-        )
-    )
-    angle = osimlite.Coordinate(name="angle", default_value=0.7)
-    model.add(osimlite.PinJoint(name="hinge", coordinates=[angle]).between(model.ground, rod))
-    model.add(osimlite.CoordinateActuator(name="motor", coordinate="angle", optimal_force=3.0))
-    return model
 
 
 def states_of(trajectory, names):

@@ -14,35 +14,15 @@ import osimlite
 from osimlite.errors import DocumentError, MissingDependency, OsimliteError, SettingError
 from osimlite.fitting.marker_data import MarkerData, read_trc
 from osimlite.io.tables.writers import write_trc
+from tests.fitting.support import MARKERS, free_body, positions
 
 TRIALS = Path(__file__).parents[2] / "fixtures" / "trials"
-MARKERS = ("one", "two", "three", "four")
-POINTS = np.array(((0.1, 0.0, 0.0), (0.0, 0.2, 0.0), (0.0, 0.0, 0.3), (0.1, 0.1, 0.1)))
-
-
-def free_body() -> osimlite.Model:
-    """A body with four markers."""
-    model = osimlite.Model(name="one")
-    body = osimlite.Body(name="b", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0))
-    model.add(body)
-    model.add(
-        osimlite.FreeJoint(name="j", socket_parent_frame=model.ground, socket_child_frame=body)
-    )
-    for name, point in zip(MARKERS, POINTS.tolist(), strict=True):
-        model.add(osimlite.Marker(name=name, socket_parent_frame=body, location=tuple(point)))
-    return model
 
 
 def motion(count: int = 20) -> Any:
     """Poses (t, 6)."""
     t = np.linspace(0.0, 1.0, count)[:, None]
     return 0.4 * np.sin(3.0 * t + np.arange(6.0))
-
-
-def positions(values: Any) -> Any:
-    """Where the markers are (t, 4, 3)."""
-    mechanism = osimlite.mechanism(free_body())
-    return np.array([[mechanism.at(q).point(0, point) for point in POINTS] for q in values])
 
 
 def as_arrays(places: Any) -> dict[str, Any]:

@@ -10,67 +10,16 @@ import pytest
 
 import osimlite
 from osimlite.errors import OsimliteError, SettingError
-from osimlite.fitting.inverse_kinematics import find_marker_stations
 from osimlite.fitting.person import fit
 from osimlite.fitting.person_files import SETUP, create_person_files
 from osimlite.fitting.scale_tool import compute_scaled_model
-from osimlite.fitting.scaling import scale_model
 from osimlite.fitting.segments import Segments, get_opposite_name
 from osimlite.fitting.shape import ScalableMarkers
 from osimlite.io.document.reader import read_any
-from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.schema.tools.scale import ScaleTool
-from tests.fitting.test_scaling import assert_same
+from tests.fitting.support import HELD, SIZES, assert_same, marked, person
 
 FIXTURES = Path(__file__).parents[2] / "fixtures"
-SIZES = {
-    "Pelvis": 1.06,
-    "RightThigh": 1.12,
-    "LeftThigh": 1.12,
-    "RightShank": 0.93,
-    "LeftShank": 0.93,
-}
-BONES = {"lateral": (0.0, -0.15, 0.05), "medial": (0.0, -0.15, -0.05)}
-CLUSTER = {"upper": (0.05, 0.02, 0.02), "front": (0.08, -0.1, 0.0), "back": (-0.07, -0.05, 0.03)}
-HELD = tuple(f"{body}_{name}" for body in SIZES for name in BONES)
-
-
-def marked() -> osimlite.Model:
-    """A walker with five markers on each segment."""
-    model = dynamic_walker()
-    for body in list(model.components(osimlite.Body)):
-        if body.name in SIZES:
-            for name, place in (BONES | CLUSTER).items():
-                model.add(
-                    osimlite.Marker(
-                        name=f"{body.name}_{name}", socket_parent_frame=body, location=place
-                    )
-                )
-    return model
-
-
-def person(
-    seed: int, noise: float = 0.0, frames: int = 60
-) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Markers (t, 3) of somebody who moves, and by how much those of the clusters are elsewhere."""
-    rng, model = np.random.default_rng(seed), marked()
-    scale_model(model, {body: (size,) * 3 for body, size in SIZES.items()})
-    offsets = {}
-    for marker in model.components(osimlite.Marker):
-        if marker.name not in HELD:
-            offsets[marker.name] = rng.normal(0.0, 0.02, 3)
-            marker.location = tuple((np.array(marker.location) + offsets[marker.name]).tolist())
-    mechanism = osimlite.mechanism(model)
-    moments, rate = np.arange(frames) / frames, rng.uniform(1.0, 6.0, len(mechanism.coordinates))
-    stations = find_marker_stations(model, mechanism)
-    result: dict[str, list[Any]] = {name: [] for name in stations}
-    for t in moments:
-        q = 0.5 * np.sin(rate * (t + 0.2))
-        q[mechanism.coordinate_index("platform_rz")] = 0.0
-        state = mechanism.at(q)
-        for name, place in stations.items():
-            result[name].append(state.point(*place) + rng.normal(0.0, noise, 3))
-    return {name: np.array(rows) for name, rows in result.items()}, offsets
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -23,6 +23,7 @@ from osimlite.mechanics.multibody.constraints import Coupler
 from osimlite.mechanics.multibody.mechanism import FramePlacement, Mechanism, StationPlacement
 from osimlite.mechanics.multibody.spatial import make_transform, rotation_xyz
 from osimlite.simulation.engines.linking import MACHINE_CODE, PYTHON_CODE
+from tests.fitting.support import cost_of, places_at
 from tests.mechanics.multibody.strategies import Case, cases, constraint_of
 
 ROUND = "ConstantCurvatureJoint"
@@ -38,19 +39,6 @@ def markers_of(mechanism: Mechanism, rng: np.random.Generator, each: int = 3) ->
         for body in range(len(mechanism.bodies))
         for _ in range(each)
     ]
-
-
-def places_at(mechanism: Mechanism, markers: list[MarkerTarget], q: Any) -> Any:
-    """Where the markers are (m, 3)."""
-    state = mechanism.at(q)
-    return np.array([state.point(*marker.station) for marker in markers])
-
-
-def cost_of(mechanism: Mechanism, markers: list[MarkerTarget], measured: Any, q: Any) -> float:
-    """What OpenSim minimises."""
-    weights = np.array([marker.weight for marker in markers]) * np.isfinite(measured).all(axis=1)
-    squares = np.sum((places_at(mechanism, markers, q) - np.nan_to_num(measured)) ** 2, axis=1)
-    return float(0.5 * weights @ squares / weights.sum())
 
 
 def derivatives(fit: PoseFit, frame: Any, q: Any) -> tuple[float, Any, Any]:

@@ -16,46 +16,11 @@ from osimlite.fitting.measuring import select_frames
 from osimlite.fitting.scale_tool import compute_scaled_model
 from osimlite.fitting.scaling import get_scale_rules, scale_model
 from osimlite.io.tables.storage import read_sto
-from osimlite.schema.base import Object
 from osimlite.schema.facts import HOLDER, OWN, PATH
 from osimlite.schema.registry import MODULES
+from tests.fitting.support import assert_same
 
 CASE = "oracle/tools/reference/scale_gait2354"
-
-
-def numbers_of(item: Object, path: str = "") -> dict[str, Any]:
-    """Every value of an object and of all that it holds, by where it is."""
-    result: dict[str, Any] = {f"{path}": type(item).__name__}
-    for spec in type(item).field_specs().values():
-        value = getattr(item, spec.name)
-        many = value if isinstance(value, list) else [value]
-        for number, one in enumerate(many):
-            if isinstance(one, Object):
-                result |= numbers_of(one, f"{path}/{spec.name}[{number}]")
-            else:
-                result[f"{path}/{spec.name}"] = one
-    return result
-
-
-def assert_same(ours: Object, theirs: Object, but: str = "/socket_frame") -> None:
-    """Objects mean the same; numbers agree to 1e-9."""
-    left_out = "/socket_frame", but
-    one, other = (
-        {k: v for k, v in numbers_of(item).items() if not k.endswith(left_out)}
-        for item in (ours, theirs)
-    )
-    assert one.keys() == other.keys()
-    for place, value in other.items():
-        if isinstance(value, float) or (
-            isinstance(value, tuple) and value and isinstance(value[0], float)
-        ):
-            # Of the points of a spline OpenSim prints six digits.
-            rel = 1e-5 if place.endswith(("/x", "/y")) else 1e-9
-            assert np.asarray(one[place]) == pytest.approx(
-                np.asarray(value), rel=rel, abs=1e-12, nan_ok=True
-            ), place
-        else:
-            assert one[place] == value, place
 
 
 def test_every_rule_is_about_a_property_that_is_there() -> None:

@@ -9,72 +9,7 @@ import pytest
 from scipy.optimize import least_squares  # type: ignore[import-untyped]
 
 import osimlite
-
-NAMES = ("pelvis_tilt", "pelvis_list", "pelvis_rotation", "pelvis_tx", "pelvis_ty", "pelvis_tz")
-AXES = ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
-PLACES = ((0.05, 0.05, 0.13), (0.05, 0.05, -0.13), (-0.12, 0.04, 0.0), (0.02, 0.4, 0.03))
-FACING = 2
-"""The place of pelvis_rotation."""
-
-
-def turner(low: float, high: float) -> osimlite.Model:
-    """A pelvis, jointed as gait models are, whose rotation is clamped (degrees), and a thigh."""
-    model = osimlite.Model(name="turner")
-    bodies = [
-        osimlite.Body(name=name, mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0))
-        for name in ("pelvis", "leg")
-    ]
-    for body in bodies:
-        model.add(body)
-        for number, place in enumerate(PLACES):
-            model.add(
-                osimlite.Marker(
-                    name=f"{body.name}{number}", socket_parent_frame=body, location=place
-                )
-            )
-    coordinates = [osimlite.Coordinate(name=name) for name in NAMES]
-    coordinates[FACING].clamped, coordinates[FACING].range = (
-        True,
-        (float(np.radians(low)), float(np.radians(high))),
-    )
-    moves = osimlite.SpatialTransform()
-    for number, name in enumerate(NAMES):
-        kind = f"{'translation' if number > 2 else 'rotation'}{number % 3 + 1}"
-        line = osimlite.LinearFunction(coefficients=(1.0, 0.0))
-        axis = np.eye(3)[number % 3].tolist() if number > 2 else AXES[number]
-        setattr(
-            moves,
-            kind,
-            osimlite.TransformAxis(name=kind, coordinates=(name,), axis=tuple(axis), function=line),
-        )
-    joint = osimlite.CustomJoint(
-        name="root", socket_parent_frame=model.ground, socket_child_frame=bodies[0], coordinates=coordinates,
-        spatial_transform=moves,
-    )  # fmt: skip
-    hip = osimlite.PinJoint(
-        name="hip", socket_parent_frame=bodies[0], socket_child_frame=bodies[1],
-        coordinates=[osimlite.Coordinate(name="hip", clamped=True, range=(-2.0, 0.5))],
-    )  # fmt: skip
-    model.add(joint)
-    model.add(hip)
-    return model
-
-
-def poses(angles: Any) -> Any:
-    """Of somebody who walks in a circle, facing these angles (degrees): (t, 7)."""
-    facing, steps = np.radians(angles), np.arange(len(angles))
-    return np.column_stack(
-        [0.1 * np.sin(0.3 * steps), 0.05 * np.cos(0.2 * steps), facing, np.sin(facing), 0.9 + 0.0 * facing,
-         np.cos(facing), 0.4 * np.sin(0.25 * steps)]
-    )  # fmt: skip
-
-
-def trial_of(model: osimlite.Model, values: Any, noise: float = 0.0) -> Any:
-    """The mechanism, its stations, and where they were measured (t, m, 3)."""
-    mechanism: Any = osimlite.mechanism(model)
-    stations = [mechanism.stations[marker.path] for marker in model.components(osimlite.Marker)]
-    places = np.array([[mechanism.at(q).point(*station) for station in stations] for q in values])
-    return mechanism, stations, places + noise * np.random.default_rng(5).normal(size=places.shape)
+from tests.fitting.support import FACING, poses, trial_of, turner
 
 
 def fitted(model: osimlite.Model, places: Any) -> Any:

@@ -71,7 +71,7 @@ def test_a_folder_that_becomes_a_link_meanwhile_is_left(
     cache, home = tmp_path / "cache", tmp_path / "home"
     make_entry(cache, "09/a.json", OLD_S)
     precious = make_entry(home, "a.json", OLD_S)
-    find = pruning._find_entries
+    find = pruning.find_entries
 
     def find_and_swap(folder: str):
         entries = [*find(folder)]
@@ -79,7 +79,7 @@ def test_a_folder_that_becomes_a_link_meanwhile_is_left(
         (cache / "09").symlink_to(home)
         return iter(entries)
 
-    monkeypatch.setattr(pruning, "_find_entries", find_and_swap)
+    monkeypatch.setattr(pruning, "find_entries", find_and_swap)
     assert prune_cache(cache, time.time()) == 0
     assert precious.exists()
 

@@ -182,7 +182,7 @@ def test_every_message_is_reported_by_a_rule_wherever_the_builder_raises_it(erro
                 context.setattr(construction, "build_mechanism", raised(message))
             else:
                 context.setattr(ElementBuilder, "make_element", raised(message))
-            remembering._memory.clear()
+            remembering.forget_obstacles()
             report = validate(source)
         codes = {"OSIM421", "OSIM531"} if error is ModelError else {"OSIM533"}
         assert codes & {*report.codes}, f"{message}:\n{report}"

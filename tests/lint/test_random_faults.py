@@ -9,14 +9,12 @@ from __future__ import annotations
 import os
 import random
 from itertools import islice
-from pathlib import Path
 
 import pytest
 
-from osimlite.lint.diagnostic import Finding
-from osimlite.lint.engine import load_subject, run_rules
 from tests.lint.project_faults import faults, harmless
-from tests.lint.projects import FIXTURES, Fault, Project, pendulum, walking
+from tests.lint.projects import FIXTURES, Fault, pendulum, walking
+from tests.lint.support import Folder, in_place
 from tests.suite import choose
 
 WANTED = int(os.environ.get("OSIMLITE_FAULTS", choose("60", "300")))
@@ -39,54 +37,9 @@ PROCESSOR = """
 """The model of a study."""
 
 
-class Folder:
-    """A project in files, in which one may be changed at a time."""
-
-    def __init__(self, path: Path, project: Project) -> None:
-        self.path = path
-        self.project = project
-        for name, text in project.texts.items():
-            (path / name).write_bytes(text.encode())
-        self.now = 0
-
-    def check(self, *files: str) -> list[Finding]:
-        """What is found in files, of those that are there."""
-        return [
-            f
-            for name in files
-            if (self.path / name).exists()
-            for f in run_rules(load_subject(str(self.path / name)))
-        ]
-
-    def put(self, texts: dict[str, str | None]) -> None:
-        # Files of one length that are written within one tick of the clock look the same.
-        self.now += 1
-        for name, text in texts.items():
-            if text is None:
-                (self.path / name).unlink()
-            else:
-                (self.path / name).write_bytes(text.encode())
-                os.utime(self.path / name, (self.now, self.now))
-
-    def found(self, fault: Fault) -> list[Finding]:
-        """What is found in the project with a fault: in the file that it changes, and in those that use it."""
-        self.put(fault.texts)
-        files = {fault.file, *self.project.users(fault.file), *(file for file, _ in fault.places)}
-        try:
-            # Of the model, whose meshes are not there, what is wrong with its text.
-            return [f for f in self.check(*sorted(files)) if f.code != "OSIM701"]
-        finally:
-            self.put({name: self.project.texts[name] for name in fault.texts})
-
-
 @pytest.fixture(scope="module", params=[walking, pendulum], ids=["walking", "pendulum"])
 def folder(request, tmp_path_factory):
     return Folder(tmp_path_factory.mktemp("project"), request.param())
-
-
-def in_place(fault: Fault, findings: list[Finding]) -> list[Finding]:
-    """The findings that are where the fault is."""
-    return [f for f in findings if (Path(str(f.file)).name, f.line) in fault.places]
 
 
 def test_the_project_is_without_findings(folder):

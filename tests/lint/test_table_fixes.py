@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
 from shutil import copy
 
 import pytest
@@ -12,42 +11,8 @@ from hypothesis import strategies as st
 
 from osimlite.io.document.source import Source
 from osimlite.lint.engine import make_subject, run_rules
-from osimlite.lint.fixes import apply_fixes, select_edits
-
-LINT = Path(__file__).resolve().parents[2] / "fixtures" / "lint"
-MOTION = b"knee\nversion=1\nnRows=3\nnColumns=3\ninDegrees=yes\nendheader\ntime\tknee\thip\n0\t1\t2\n0.1\t1\t3\n0.2\t1\t4\n"
-MARKERS = (LINT / "leg.trc").read_bytes().replace(b"Z3\t\n", b"Z3\n")
-
-BROKEN = [
-    ("count", MOTION, rb"nRows=3", b"nRows=2"),
-    ("count-of-columns", MOTION, rb"nColumns=3", b"nColumns=4"),
-    ("count-missing", MOTION, rb"nRows=3", b"nRows="),
-    ("count-without-its-mark", MOTION, rb"nColumns=3", b"nColumns3"),
-    ("true", MOTION, rb"=yes", b"=true"),
-    ("case-of-a-key", MOTION, rb"inDegrees", b"indegrees"),
-    ("case-of-the-end", MOTION, rb"endheader", b"EndHeader"),
-    ("no-end", MOTION, rb"endheader\n", b""),
-    ("time", MOTION, rb"time", b"Time"),
-    ("no-count-of-columns", MOTION.replace(b"inDegrees=yes\n", b""), rb"nColumns=3\n", b""),
-    ("blank-lines", MOTION.replace(b"=1", b"=3", 1), rb"(?<=0.1\t1\t3\n)", b"\n\n"),
-    ("mark", MARKERS, rb"^", b"\xef\xbb\xbf"),
-    ("key", MARKERS, rb"NumMarkers", b"NumMarker"),
-    ("count-of-markers", MARKERS, rb"(\d+\t\d+\t\d+\t)\d+\t", rb"\g<1>77\t"),
-    ("frame", MARKERS, rb"Frame#", b"Frame"),
-    ("axis", MARKERS, rb"Y2", b"Y1"),
-    ("no-axes", MARKERS, rb"\t\tX1.*\n", b""),
-    ("units", MARKERS, rb"\tmm?\t", lambda match: match[0].upper()),
-    ("last-tabs", MARKERS, rb"(?m)^(\d.*\d)\t*$(?=\n\d|\n\Z)", rb"\1\t\t\t"),
-]
-
-
-def mend(name: str, data: bytes, *, unsafe: bool = False) -> bytes:
-    for _ in range(5):
-        source = Source(data, name)
-        data, count = apply_fixes(source, run_rules(make_subject(source)), unsafe=unsafe)
-        if not count:
-            break
-    return data
+from osimlite.lint.fixes import select_edits
+from tests.lint.support import BROKEN, LINT, MARKERS, MOTION, mend
 
 
 @pytest.mark.parametrize("end", [b"\n", b"\r\n"], ids=["unix", "windows"])

@@ -16,7 +16,7 @@ from osimlite.schema.muscles import Muscle
 from osimlite.schema.path_forces import PathSpring
 from osimlite.simulation import Simulation
 from osimlite.simulation.elements.registry import FORCE_TYPES
-from tests.oracle.test_constraints import CASES, _chain
+from tests.oracle.support import CASES, _chain
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytestmark = pytest.mark.oracle

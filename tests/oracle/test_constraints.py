@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from tempfile import NamedTemporaryFile
@@ -15,95 +14,9 @@ import osimlite
 from osimlite.mechanics.multibody import Mechanism, build_mechanism
 from osimlite.mechanics.multibody.mechanism import MassProperties
 from tests.oracle.opensim_runs import put
+from tests.oracle.support import CASES, Bodies, Change, _chain, _coupler, _linear, _vec, opensim
 
-opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytestmark = pytest.mark.oracle
-
-Bodies = list[Any]
-Change = Callable[[Any, Bodies], None]
-
-
-def _vec(*values: float) -> Any:
-    return opensim.Vec3(*values)
-
-
-def _chain(rng: np.random.Generator) -> tuple[Any, Bodies]:
-    """Ground, a body on a ball joint, one on a pin beyond, one that floats."""
-    opensim.Logger.setLevelString("off")
-    model = opensim.Model()
-    model.setName("m")
-    model.setGravity(_vec(0.3, -9.5, 0.7))
-    bodies = []
-    for name in ("inner", "outer", "loose"):
-        body = opensim.Body()
-        body.setName(name)
-        body.set_mass(rng.uniform(0.5, 2.0))
-        body.set_mass_center(_vec(*rng.uniform(-0.2, 0.2, 3)))
-        body.set_inertia(opensim.Vec6(*rng.uniform(0.2, 0.3, 3), *rng.uniform(-0.03, 0.03, 3)))
-        model.addBody(body)
-        bodies.append(body)
-    inner, outer, loose = bodies
-    for kind, name, parent, child, count in (
-        ("BallJoint", "ball", model.getGround(), inner, 3),
-        ("PinJoint", "pin", inner, outer, 1),
-        ("FreeJoint", "free", model.getGround(), loose, 6),
-    ):
-        spots = [_vec(*rng.uniform(-size, size, 3)) for size in (0.3, 1.0, 0.3, 1.0)]
-        joint = getattr(opensim, kind)(name, parent, spots[0], spots[1], child, spots[2], spots[3])
-        for index in range(count):
-            coordinate = joint.upd_coordinates(index)
-            coordinate.setName(f"{name}_{index}")
-            coordinate.set_default_value(0.2 * (index + 1))
-        model.addJoint(joint)
-    return model, bodies
-
-
-def _point(model: Any, bodies: Bodies) -> None:
-    model.addConstraint(
-        opensim.PointConstraint(bodies[1], _vec(0.1, 0.2, 0.3), bodies[2], _vec(0.2, -0.1, 0.1))
-    )
-
-
-def _rod(model: Any, bodies: Bodies) -> None:
-    constraint = opensim.ConstantDistanceConstraint(
-        bodies[1], _vec(0.1, 0.2, 0.3), bodies[2], _vec(0.2, -0.1, 0.1), 0.8
-    )
-    model.addConstraint(constraint)
-
-
-def _line(model: Any, bodies: Bodies) -> None:
-    constraint = opensim.PointOnLineConstraint(
-        bodies[1], _vec(0.3, 1.0, -0.2), _vec(0.1, 0.0, 0.2), bodies[2], _vec(0.2, -0.1, 0.1)
-    )
-    model.addConstraint(constraint)
-
-
-def _weld(model: Any, bodies: Bodies) -> None:
-    constraint = opensim.WeldConstraint(
-        "weld",
-        bodies[1],
-        _vec(0.1, 0.2, 0.3),
-        _vec(0.3, 0.2, 0.1),
-        bodies[2],
-        _vec(0.0, 0.1, 0.0),
-        _vec(0.1, 0.3, 0.2),
-    )
-    model.addConstraint(constraint)
-
-
-def _point_on_offset_frame(model: Any, bodies: Bodies) -> None:
-    """OpenSim takes the location in the body, not in the frame."""
-    frame = opensim.PhysicalOffsetFrame(
-        "spot",
-        bodies[1],
-        opensim.Transform(opensim.Rotation(0.5, opensim.CoordinateAxis(1)), _vec(0.3, 0.0, 0.1)),
-    )
-    bodies[1].addComponent(frame)
-    constraint = opensim.PointConstraint(
-        bodies[0], _vec(0.1, 0.2, 0.3), bodies[2], _vec(0.2, -0.1, 0.1)
-    )
-    constraint.updSocket("body_1").connect(frame)
-    model.addConstraint(constraint)
 
 
 def _rolling(model: Any, bodies: Bodies) -> None:
@@ -120,58 +33,6 @@ def _rolling(model: Any, bodies: Bodies) -> None:
             opensim.OpenSimObject.makeObjectFromFile(file.name)
         )
     model.addConstraint(constraint.clone())
-
-
-def _coupler(
-    names: tuple[str, ...], dependent: str, function: Any, scale: float = 1.0
-) -> Callable[[Any, Bodies], None]:
-    def add(model: Any, bodies: Bodies) -> None:
-        constraint = opensim.CoordinateCouplerConstraint()
-        independent = opensim.ArrayStr()
-        for name in names:
-            independent.append(name)
-        constraint.setIndependentCoordinateNames(independent)
-        constraint.setDependentCoordinateName(dependent)
-        constraint.setFunction(function)
-        opensim.PropertyHelper.setValueDouble(scale, constraint.updPropertyByName("scale_factor"))
-        model.addConstraint(constraint)
-
-    return add
-
-
-def _spline() -> Any:
-    spline = opensim.SimmSpline()
-    for x, y in ((-2.0, 0.4), (-0.7, 0.1), (0.3, 0.5), (1.1, 0.2), (2.5, -0.3)):
-        spline.addPoint(x, y)
-    return spline
-
-
-def _polynomial() -> Any:
-    return opensim.PolynomialFunction(opensim.Vector.createFromMat(np.array((0.3, -0.5, 0.2, 0.1))))
-
-
-def _linear(coefficients: tuple[float, ...]) -> Any:
-    array = opensim.ArrayDouble()
-    for value in coefficients:
-        array.append(value)
-    function = opensim.LinearFunction()
-    function.setCoefficients(array)
-    return function
-
-
-def _prescribed(model: Any, bodies: Bodies) -> None:
-    for joint, place, function in (
-        ("pin", 0, opensim.Sine(0.4, 3.0, 0.2, 0.1)),
-        ("ball", 1, _linear((0.5, 0.2))),
-    ):
-        coordinate = model.updJointSet().get(joint).upd_coordinates(place)
-        coordinate.setPrescribedFunction(function)
-        coordinate.set_prescribed(True)
-
-
-def _prescribed_with_rod(model: Any, bodies: Bodies) -> None:
-    _prescribed(model, bodies)
-    _rod(model, bodies)
 
 
 LOOP = (_vec(0.1, 0.0, 0.2), _vec(0.3, 0.2, 0.1), _vec(0.0, 0.1, 0.0), _vec(0.1, 0.3, 0.2))
@@ -199,20 +60,6 @@ def _loop(kind: str, count: int) -> Change:
         model.addJoint(joint)
 
     return add
-
-
-CASES: dict[str, Change] = {
-    "point": _point,
-    "rod": _rod,
-    "line": _line,
-    "weld": _weld,
-    "point-on-offset-frame": _point_on_offset_frame,
-    "coupler-spline": _coupler(("pin_0",), "free_3", _spline()),
-    "coupler-of-ball-angles": _coupler(("ball_1",), "ball_0", _polynomial(), 0.6),
-    "coupler-of-two": _coupler(("ball_0", "pin_0"), "free_1", _linear((0.4, -0.7, 0.1))),
-    "prescribed": _prescribed,
-    "prescribed-with-rod": _prescribed_with_rod,
-}
 
 
 def test_a_coupler_by_a_constant_binds_the_dependent_coordinate(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from osimlite.io.document.reader import read_document
 from osimlite.io.document.source import Source
 from osimlite.schema.base import Object
 from tests.conftest import ROOT
-from tests.oracle.test_schema import COMMENT_LINE
+from tests.oracle.support import COMMENT_LINE
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytestmark = pytest.mark.oracle

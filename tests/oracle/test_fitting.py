@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import gzip
 import json
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -21,11 +19,18 @@ from osimlite.fitting.pose_layout import MarkerTarget
 from osimlite.fitting.scaling import scale_model
 from osimlite.io.tables.storage import read_sto
 from osimlite.io.tables.writers import write_trc
-from tests.fitting.test_person import HELD, marked, person
-from tests.fitting.test_pose_fit import cost_of
-from tests.fitting.test_scaling import assert_same
-from tests.fitting.test_turning import poses, trial_of, turner
-from tests.tools.test_fitting_tools import unpacked
+from tests.fitting.support import (
+    HELD,
+    assert_same,
+    cost_of,
+    marked,
+    person,
+    poses,
+    trial_of,
+    turner,
+)
+from tests.oracle.support import ask, model_with
+from tests.tools.support import unpacked
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytestmark = pytest.mark.oracle
@@ -59,19 +64,6 @@ tool.run()
 """
 
 
-def ask(script: str, folder: Path, *words: str) -> None:
-    """Let OpenSim work in a process of its own, which may crash."""
-    done = subprocess.run(
-        [sys.executable, "-c", script, *words],
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        timeout=240,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-
-
 @pytest.mark.parametrize(
     "name", ["m0005", "m0013", "m0036", "m0065", "m0109", "m0139", "m0163", "m0172", "m0954"]
 )
@@ -93,51 +85,6 @@ def test_real_models_are_scaled_alike(corpus: Any, name: str, ground: bool, tmp_
     scale_model(model, factors, mass, preserve_mass_distribution=preserves)
     osimlite.write(model, tmp_path / "ours.osim", numbers="opensim")
     assert_same(osimlite.read(tmp_path / "ours.osim"), osimlite.read(tmp_path / "theirs.osim"))
-
-
-def model_with(kind: str) -> osimlite.Model:
-    """A pelvis, a thigh and a shank with markers, whose knee is clamped, coupled, locked or loose."""
-    model = osimlite.Model(name="leg")
-    carrier: Any = model.ground
-    for number, joint in enumerate(
-        (osimlite.FreeJoint, osimlite.BallJoint, osimlite.UniversalJoint)
-    ):
-        body = osimlite.Body(name=f"b{number}", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0))
-        model.add(body)
-        at = model.add(
-            osimlite.PhysicalOffsetFrame(
-                name=f"f{number}",
-                socket_parent=carrier,
-                translation=(0.0, -0.4 * (number > 0), 0.0),
-            )
-        )
-        model.add(joint(name=f"j{number}", socket_parent_frame=at, socket_child_frame=body))
-        for count, point in enumerate(
-            ((0.1, 0.0, 0.05), (0.0, -0.2, -0.06), (-0.08, -0.3, 0.04), (0.02, -0.1, 0.1))
-        ):
-            model.add(
-                osimlite.Marker(name=f"m{number}{count}", socket_parent_frame=body, location=point)
-            )
-        carrier = body
-    knee = [item for item in model.components(osimlite.Coordinate) if "/j2/" in item.path]
-    for number, item in enumerate(knee):
-        item.name = f"knee{number}"
-    if kind == "clamped":
-        knee[0].clamped, knee[0].range = True, (-0.3, 2.0)
-    if kind == "locked":
-        knee[1].locked, knee[1].default_value = True, 0.1
-    if kind == "coupled":
-        model.add(
-            osimlite.CoordinateCouplerConstraint(
-                name="c",
-                independent_coordinate_names=("knee0",),
-                dependent_coordinate_name="knee1",
-                coupled_coordinates_function=osimlite.PolynomialFunction(
-                    coefficients=(0.4, -0.3, 0.05)
-                ),
-            )
-        )
-    return model
 
 
 @pytest.mark.parametrize("kind", ["loose", "clamped", "locked", "coupled"])

@@ -15,8 +15,8 @@ import osimlite
 from osimlite.io.tables.storage import write_sto
 from osimlite.io.tables.writers import write_trc
 from osimlite.mechanics.multibody.spatial import quaternion_of, rotation_of, rotation_xyz
-from tests.fitting.test_scaling import assert_same
-from tests.oracle.test_fitting import ask, model_with
+from tests.fitting.support import assert_same
+from tests.oracle.support import ask, model_with
 
 pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytestmark = pytest.mark.oracle

@@ -20,7 +20,7 @@ import osimlite
 from osimlite.errors import UnsupportedError
 from osimlite.lint import validate
 from osimlite.mechanics.multibody.build import build_mechanism
-from tests.oracle.test_lint_structural_edits import claims_refusal
+from tests.oracle.support import claims_refusal
 from tests.suite import choose
 
 pytestmark = pytest.mark.oracle

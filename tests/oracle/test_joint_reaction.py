@@ -15,7 +15,7 @@ from osimlite.schema.actuators import ScalarActuator
 from osimlite.schema.constraint_types import RollingOnSurfaceConstraint
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.model import Model
-from tests.oracle.test_run_tools import both, compare, real
+from tests.oracle.support import both, compare, real
 
 pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytestmark = pytest.mark.oracle

@@ -5,24 +5,17 @@ A few hundred cases by default; ``OSIMLITE_BREAKAGES=2000`` asks for that many.
 
 from __future__ import annotations
 
-import gzip
 import os
 import random
 import re
-import shutil
 import time
-from collections.abc import Iterator
-from pathlib import Path
 from typing import NamedTuple
 
 import pytest
 
-from osimlite.io.document.source import Source
-from osimlite.io.document.survey import survey_source
 from osimlite.lint import validate
-from osimlite.lint.subject import Subject
-from tests.conftest import CorpusModel
 from tests.oracle.structural_edits import CHANGES
+from tests.oracle.support import Victim, victim
 from tests.suite import choose
 
 pytestmark = pytest.mark.oracle
@@ -39,108 +32,11 @@ SILENTLY = ("OpenSim disables the whole probe", "OpenSim welds a hidden body bet
 ASSEMBLY = ("projectQ", "CableSpan")
 
 
-class Place(NamedTuple):
-    """A word of the text that names a component: what kind of reference it is, and where it stands."""
-
-    kind: str
-    start: int
-    word: str
-
-
-class Target(NamedTuple):
-    """A component that a reference leads to: its class, its name, its element and the value of its name attribute."""
-
-    cls: str
-    name: str
-    start: int
-    end: int
-    name_start: int
-
-
 class Breakage(NamedTuple):
     """A changed text, and what was done to it."""
 
     what: str
     text: str
-
-
-class Victim(NamedTuple):
-    """A model to break: its text, where it is kept with the files it needs, its references by kind, their targets."""
-
-    name: str
-    folder: Path
-    text: str
-    places: dict[str, list[Place]]
-    names: list[str]
-    targets: dict[str, list[Target]]
-
-
-def places_of(source: Source) -> Iterator[Place]:
-    """Every reference in a document that stands in its text."""
-    subject = Subject(survey_source(source))
-    seen = set()
-    for use in subject.uses:
-        if use.reference.rule in ("file", "column", "positional", "point-index", "input"):
-            continue
-        number = use.holder.source_index
-        if number is None or not isinstance(use.value, str):
-            continue
-        if use.spec.name == "name":
-            line, column, _ = source.of_attribute(number, "name")
-            start, kind = source.line_start(line) + column - 1, f"{type(use.holder).__name__}.name"
-        else:
-            element = source.child(number, use.spec.tag)
-            if element is None:
-                continue
-            span = source.spans[element]
-            start = source.text.find(use.value, span.tag_end, span.inner_end)
-            kind = f"{use.spec.declared_in.__name__}.{use.spec.tag}"
-        if source.text.startswith(use.value, start) and start >= 0 and start not in seen:
-            seen.add(start)
-            yield Place(kind, start, use.value)
-
-
-def targets_of(source: Source) -> Iterator[Target]:
-    """Every component of a document that a reference leads to and that has a name in the text."""
-    subject = Subject(survey_source(source))
-    seen = set()
-    for use in subject.uses:
-        target = subject.resolution(use).target
-        if (
-            target is None
-            or target.source_index is None
-            or target is use.owner
-            or target.source_index in seen
-        ):
-            continue
-        seen.add(target.source_index)
-        span = source.spans[target.source_index]
-        line, column, _ = source.of_attribute(target.source_index, "name")
-        start = source.line_start(line) + column - 1
-        if target.name and source.text.startswith(f'"{target.name}"', start - 1):
-            yield Target(type(target).__name__, target.name, span.start, span.end, start)
-
-
-def victim(model: CorpusModel, folder: Path) -> Victim | None:
-    """A model that OpenSim loads, in OpenSim's own print of it; None if the validator finds errors in it as it is."""
-    if model.converted is None:
-        return None
-    folder.mkdir()
-    for other in model.path.parent.iterdir():
-        if other.is_file() and other != model.path:
-            shutil.copy(other, folder / other.name)
-    text = gzip.decompress(model.converted.read_bytes()).decode()
-    source = Source(text.encode())
-    if not validate(source, ignore="OSIM63").ok:
-        return None
-    places: dict[str, list[Place]] = {}
-    for place in places_of(source):
-        places.setdefault(place.kind, []).append(place)
-    names = sorted({place.word for group in places.values() for place in group})
-    targets: dict[str, list[Target]] = {}
-    for target in targets_of(source):
-        targets.setdefault(target.cls, []).append(target)
-    return Victim(model.id, folder, text, places, names, targets) if names else None
 
 
 def broken(model: Victim, draw: random.Random) -> Breakage:

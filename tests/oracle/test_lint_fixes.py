@@ -12,7 +12,7 @@ import pytest
 from osimlite.io.document.source import Source
 from osimlite.lint import validate
 from osimlite.lint.fixes import apply_fixes
-from tests.oracle.test_lint_corpus_references import victim
+from tests.oracle.support import victim
 
 pytestmark = pytest.mark.oracle
 

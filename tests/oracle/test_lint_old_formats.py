@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from osimlite.lint import validate
-from tests.oracle.test_lint_structural_edits import claims_refusal
+from tests.oracle.support import claims_refusal
 
 pytestmark = pytest.mark.oracle
 

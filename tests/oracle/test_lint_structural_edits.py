@@ -9,7 +9,6 @@ from __future__ import annotations
 import gzip
 import os
 import random
-import re
 import shutil
 import time
 from collections import Counter
@@ -20,6 +19,7 @@ import pytest
 from osimlite.lint import Finding, Report, validate
 from tests.conftest import CorpusModel
 from tests.oracle.structural_edits import Text, edits
+from tests.oracle.support import claims_refusal
 from tests.suite import choose
 
 pytestmark = pytest.mark.oracle
@@ -28,22 +28,6 @@ WANTED = int(os.environ.get("OSIMLITE_EDITS", choose("20", "100")))
 # Of the hundred; whoever asks for more waits for them, and for the large models.
 SECONDS = 60 if "OSIMLITE_EDITS" not in os.environ else 7200
 LARGEST = 150_000 if "OSIMLITE_EDITS" not in os.environ else 10_000_000
-
-REFUSES = re.compile(r"(?:OpenSim|and) (?:refuses|rejects|crashes|cannot load)|which rejects it")
-# Words of another fate, or of a refusal that is only one of several.
-ELSE = re.compile(
-    r"OpenSim (?:ignores|takes the first|uses the first|keeps)|leaves the object out|crashes or|, or |needs (?:one|a value)|"
-    r"other programs reject|OpenSim creates|disables the whole"
-)
-# Rules whose page says that OpenSim refuses whatever they find.
-ALWAYS = re.compile(r"OSIM(?:107|209|30[1-5]|312|33[123]|402|405|41[13]|501|611|615|622)")
-
-
-def claims_refusal(finding: Finding) -> bool:
-    """Whether a finding says, without an alternative, that OpenSim does not take the model."""
-    if ELSE.search(finding.message):
-        return False
-    return ALWAYS.match(finding.code) is not None or REFUSES.search(finding.message) is not None
 
 
 def new_errors(report: Report, before: Counter[tuple[str, str]]) -> list[Finding]:

@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from tests.lint.test_table_fixes import BROKEN, MARKERS, MOTION, mend
+from tests.lint.support import BROKEN, MARKERS, MOTION, mend
 
 pytestmark = pytest.mark.oracle
 

@@ -11,7 +11,6 @@ import pytest
 
 import osimlite
 from osimlite.io.tables.storage import read_sto
-from osimlite.schema.model import Model
 from osimlite.schema.muscles import (
     DeGrooteFregly2016Muscle,
     MeyerFregly2016Muscle,
@@ -26,7 +25,7 @@ from osimlite.schema.old_muscles import Schutte1993Muscle_Deprecated, Thelen2003
 pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytestmark = pytest.mark.oracle
 
-from tests.oracle.test_run_tools import both  # noqa: E402
+from tests.oracle.support import both, with_muscles_of  # noqa: E402
 
 MORE = """<output_precision>17</output_precision><initial_time>0.1</initial_time><final_time>0.2</final_time>
     <solve_for_equilibrium_for_auxiliary_states>{equilibrium}</solve_for_equilibrium_for_auxiliary_states>
@@ -34,13 +33,6 @@ MORE = """<output_precision>17</output_precision><initial_time>0.1</initial_time
 OTHERS = """<MuscleAnalysis name="Some"><muscle_list> {muscle} </muscle_list>
     <moment_arm_coordinate_list> {coordinate} </moment_arm_coordinate_list></MuscleAnalysis>
     <MuscleAnalysis name="No"><compute_moments>false</compute_moments></MuscleAnalysis>"""
-KEPT = (
-    "name",
-    "max_isometric_force",
-    "optimal_fiber_length",
-    "tendon_slack_length",
-    "pennation_angle_at_optimal",
-)
 CLASSES: dict[str, tuple[type[Muscle], dict[str, Any]]] = {
     "millard": (Millard2012EquilibriumMuscle, {}),
     "millard, rigid tendon": (Millard2012EquilibriumMuscle, {"ignore_tendon_compliance": True}),
@@ -87,16 +79,6 @@ def compare(ours: Path, theirs: Path, tolerance: float = 1e-8, small: float = 5e
         assert (
             np.abs(np.nan_to_num(mine - known)).max(axis=0) <= tolerance * largest + small
         ).all(), file.name
-
-
-def with_muscles_of(model: Model, cls: type[Muscle], more: dict[str, Any]) -> Model:
-    """A model whose muscles are of another class."""
-    forces = model.force_set.objects
-    for index, muscle in enumerate(list(forces)):
-        if isinstance(muscle, Muscle):
-            forces[index] = cls(**{name: getattr(muscle, name) for name in KEPT}, **more)
-            forces[index].geometry_path = muscle.geometry_path.copy_deep()
-    return model
 
 
 @pytest.mark.parametrize("equilibrium", ["false", "true"])

@@ -17,8 +17,7 @@ from osimlite.schema.muscles import Millard2012AccelerationMuscle
 from osimlite.schema.states import list_outputs
 from osimlite.tools.job import NotRunnable
 from osimlite.tools.outputs import LAW_OUTPUTS
-from tests.oracle.test_muscle_analysis import with_muscles_of
-from tests.oracle.test_run_tools import both, real
+from tests.oracle.support import both, real, with_muscles_of
 
 pytestmark = pytest.mark.oracle
 
@@ -133,7 +132,7 @@ def test_what_is_not_there_is_told(
     tmp_path: Path, asked: str, error: type[Exception], words: str
 ) -> None:
     """Before anything is written."""
-    from tests.tools.test_reporters import tables
+    from tests.tools.support import tables
 
     model = jumper()
     names = {

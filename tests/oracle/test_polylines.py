@@ -10,7 +10,7 @@ pytest.importorskip("opensim")
 import opensim
 
 import osimlite
-from tests.simulation.test_path_wraps import PATH, SETUPS, wrapped
+from tests.simulation.support import PATH, SETUPS, wrapped
 
 pytestmark = pytest.mark.oracle
 

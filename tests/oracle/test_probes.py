@@ -8,16 +8,11 @@ import pytest
 import osimlite
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.schema.actuators import (
-    ActivationCoordinateActuator,
     CoordinateActuator,
-    PointActuator,
-    PointToPointActuator,
-    TorqueActuator,
 )
 from osimlite.schema.functions import PiecewiseLinearFunction, Sine
 from osimlite.schema.muscles import (
     DeGrooteFregly2016Muscle,
-    PathActuator,
     RigidTendonMuscle,
     Thelen2003Muscle,
 )
@@ -44,14 +39,8 @@ pytestmark = pytest.mark.oracle
 
 from tests.oracle.force_carrier import JOINTS, STATES, TIME, along, carrier, drive  # noqa: E402
 from tests.oracle.opensim_runs import put  # noqa: E402
+from tests.oracle.support import OPERATIONS, add_actuators  # noqa: E402
 from tests.simulation.elements.muscle_rows import hung, line  # noqa: E402
-
-OPERATIONS = "value", "integrate", "differentiate", "minimum", "minabs", "maximum", "maxabs"
-
-
-@pytest.fixture(params=list(JOINTS.values()), ids=list(JOINTS))
-def model(request):
-    return carrier(request.param)
 
 
 def opened(model, tmp_path):
@@ -92,42 +81,6 @@ def compare(model, tmp_path, tolerance=1e-9):
         for ours, row in zip(result, expected, strict=True):
             scale = max([1.0, *(abs(x) for x in row if np.isfinite(x))])
             assert ours == pytest.approx(row, rel=tolerance, abs=tolerance * scale, nan_ok=True)
-
-
-def add_actuators(model):
-    """One of each class that has one control and pushes bodies or coordinates."""
-    bodies = {"bodyA": "b2", "bodyB": "b0"}
-    for there in (False, True):
-        model.add(
-            PointActuator(
-                name=f"point{there:d}", body="b1", point=(0.1, 0.2, 0.3), point_is_global=there
-            ),
-            PointToPointActuator(
-                name=f"points{there:d}", pointA=(0.1, 0.2, 0.3), points_are_global=there, **bodies
-            ),
-            TorqueActuator(
-                name=f"torque{there:d}", axis=(1.0, 2.0, -0.5), torque_is_global=there, **bodies
-            ),
-        )
-    model.add(
-        TorqueActuator(
-            name="turned",
-            bodyA="/bodyset/b2/f2",
-            bodyB="b1",
-            axis=(1.0, 0.0, 0.5),
-            torque_is_global=False,
-        ),
-        CoordinateActuator(name="motor", coordinate="q1_0", optimal_force=7.0),
-        CoordinateActuator(name="off", coordinate="q0_0", appliesForce=False),
-        ActivationCoordinateActuator(name="slow", coordinate="q2_0"),
-        *along(PathActuator, optimal_force=30.0),
-    )
-    muscles = along(Thelen2003Muscle, optimal_fiber_length=0.4)
-    for muscle in muscles:
-        muscle.name = f"muscle_{muscle.name}"
-    model.add(*muscles)
-    names = [force.name for force in model.force_set.objects]
-    drive(model, *names)
 
 
 @pytest.mark.parametrize("exponent", [1.0, 2.0, 0.5, -2.0])

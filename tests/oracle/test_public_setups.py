@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 import osimlite
-from tests.oracle.test_run_tools import compare
+from tests.oracle.support import compare
 
 pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytestmark = pytest.mark.oracle

@@ -23,7 +23,7 @@ import pytest
 
 from tests.lint.project_faults import UNKNOWABLE, faults
 from tests.lint.projects import Fault, Project, pendulum, walking
-from tests.lint.test_random_faults import Folder, in_place
+from tests.lint.support import Folder, in_place
 from tests.oracle.opensim_tools import LOG
 from tests.suite import choose
 

@@ -23,8 +23,7 @@ pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle'
 pytestmark = pytest.mark.oracle
 
 from tests.oracle.force_carrier import JOINTS, carrier  # noqa: E402
-from tests.oracle.test_probes import OPERATIONS, add_actuators  # noqa: E402
-from tests.oracle.test_run_tools import both, compare  # noqa: E402
+from tests.oracle.support import OPERATIONS, add_actuators, both, compare  # noqa: E402  # noqa: E402
 
 REPORTERS = """<StatesReporter name="S"/><Actuation name="A"/><ProbeReporter name="P"/>
     <ProbeReporter name="Some"><step_interval>3</step_interval></ProbeReporter>"""

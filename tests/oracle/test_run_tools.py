@@ -5,7 +5,6 @@ from __future__ import annotations
 import gzip
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -17,22 +16,12 @@ from osimlite.io.tables.storage import read_sto, write_sto
 from osimlite.models.jumper import jumper
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.joints import ScapulothoracicJoint
-from osimlite.schema.model import Model
 from osimlite.schema.muscles import Muscle
+from tests.oracle.support import both, compare, real
 
 pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 pytestmark = pytest.mark.oracle
 
-SETUP = """<OpenSimDocument Version="40600">
-    <{tool} name="it">
-        <model_file>model.osim</model_file>
-        <results_directory>{results}</results_directory>
-        <coordinates_file>motion.mot</coordinates_file>
-        <lowpass_cutoff_frequency_for_coordinates>{cutoff}</lowpass_cutoff_frequency_for_coordinates>
-        {more}
-    </{tool}>
-</OpenSimDocument>
-"""
 ANALYSES = """
         <output_precision>16</output_precision>
         <initial_time>{start}</initial_time>
@@ -67,72 +56,6 @@ ANALYSES = """
             </objects>
         </AnalysisSet>
 """
-
-
-def real(corpus: Any, name: str) -> Path:
-    """The file of a real model."""
-    path: Path = next(model.path for model in corpus if model.id == name)
-    return path
-
-
-def both(
-    folder: Path, model: Model, tool: str, more: str, cutoff: float = -1.0,
-    change: Callable[[Path], object] | None = None,
-) -> tuple[Path, Path]:  # fmt: skip
-    """Where we and OpenSim have put the results of a tool on some motion of a model, which may be changed."""
-    osimlite.write(model, folder / "model.osim")
-    mechanism = osimlite.mechanism(model)
-    times = np.linspace(0.0, 0.5, 26)
-    infos = mechanism.coordinates
-    rows = np.array(
-        [
-            info.default_value + 0.15 * np.sin(5 * times + k) * (not info.locked)
-            for k, info in enumerate(infos)
-        ]
-    )
-    if mechanism.constraints and tool != "InverseDynamicsTool":
-        # Where constraints are to be fulfilled, OpenSim moves coordinates by 1e-5 rad off the ends
-        # of their ranges.
-        low, high = np.array([info.range for info in infos]).T[:, :, None]
-        starts = np.clip(rows[:, :1], low + 0.2, high - 0.2)
-        moved = np.clip(rows + starts - rows[:, :1], low + 0.1, high - 0.1)
-        rows = np.where(np.array([[info.locked] for info in infos]), rows, moved)
-        rows = np.array([mechanism.assemble(q) for q in rows.T]).T
-    turns = [info.motion_type == "rotational" for info in mechanism.coordinates]
-    write_sto(
-        folder / "motion.mot", "motion", times, mechanism.coordinate_names,
-        np.where(turns, np.degrees(rows.T), rows.T).tolist(), in_degrees=True,
-    )  # fmt: skip
-    if change is not None:
-        change(folder)
-    for results in ("ours", "theirs"):
-        (folder / f"{results}.xml").write_text(
-            SETUP.format(tool=tool, results=results, cutoff=cutoff, more=more)
-        )
-    script = f"import opensim; opensim.Logger.setLevelString('Error'); assert opensim.{tool}('theirs.xml').run()"
-    subprocess.run(
-        [sys.executable, "-c", script], cwd=folder, check=True, capture_output=True, timeout=100
-    )
-    osimlite.run(folder / "ours.xml")
-    return folder / "ours", folder / "theirs"
-
-
-def compare(ours: Path, theirs: Path, tolerance: float, small: float = 1e-11) -> None:
-    """All files are there, with the same words and numbers that differ by parts of the largest of their columns."""
-    assert sorted(path.name for path in ours.iterdir()) == sorted(
-        path.name for path in theirs.iterdir()
-    )
-    for file in ours.iterdir():
-        one, two = (
-            path.read_text().partition("endheader\n") for path in (file, theirs / file.name)
-        )
-        assert (one[0], one[2].partition("\n")[0]) == (two[0], two[2].partition("\n")[0]), file.name
-        mine, known = read_sto(file), read_sto(theirs / file.name)
-        assert mine.times.tolist() == known.times.tolist()
-        largest = np.abs(known.rows).max(axis=0)
-        assert (np.abs(mine.rows - known.rows).max(axis=0) <= tolerance * largest + small).all(), (
-            file.name
-        )
 
 
 @pytest.mark.parametrize(

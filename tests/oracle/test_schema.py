@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 from typing import Any
 
@@ -14,12 +13,12 @@ from osimlite.schema.fields import Held, Reference, Value
 from osimlite.schema.model import Model
 from osimlite.schema.registry import find_class, list_tags
 from osimlite.schema.specs import get_field_specs
-from tests.schema.test_catalogue import UNREGISTERED
+from tests.oracle.support import COMMENT_LINE
+from tests.schema.support import UNREGISTERED
 
 pytestmark = pytest.mark.oracle
 opensim = pytest.importorskip("opensim")
 
-COMMENT_LINE = re.compile(r"[ \t]*<!--.*?-->\n", re.DOTALL)
 
 KNOWN = [(tag, find_class(tag) or Object) for tag in list_tags()]
 COMPONENTS = [

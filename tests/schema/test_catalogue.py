@@ -16,6 +16,7 @@ from osimlite.schema.fields import Held, Reference, Value
 from osimlite.schema.registry import MODULES, find_class, list_tags
 from osimlite.schema.specs import get_field_specs
 from tests.cases import of_each
+from tests.schema.support import UNREGISTERED
 
 SCHEMAS = Path(__file__).resolve().parents[2] / "schemas"
 CATALOGUE = json.loads((SCHEMAS / "opensim-4.6.json").read_text())["classes"]
@@ -28,14 +29,6 @@ CONCRETE = sorted(
 )
 """The classes that a document may hold; of SimbodyEngine nothing is left but its name."""
 
-UNREGISTERED = {
-    "APDMDataReaderSettings",
-    "MocoConstraintInfo",
-    "MocoControlTrackingGoalReference",
-    "MocoStepTimeAsymmetryGoalGroup",
-    "Set_FunctionBasedPath_",
-}
-"""What OpenSim writes, or reads where it knows beforehand what it will be, and finds by no tag."""
 
 NOT_IN_FILES = {"PathWrapPoint"}
 """Concrete in OpenSim's C++ but never written to a file: declared as internal parts, without a tag."""

@@ -10,49 +10,8 @@ import osimlite
 from osimlite import ContactHalfSpace, ContactSphere
 from osimlite.errors import ModelError, UnsupportedError
 from osimlite.schema.contact import ContactCylinder, ContactEllipsoid, ContactTorus
-from osimlite.schema.path_forces import PathSpring
-from osimlite.schema.paths import PathPoint
-from osimlite.schema.scholz_paths import (
-    Scholz2015GeometryPath,
-    Scholz2015GeometryPathObstacle,
-    Scholz2015GeometryPathPoint,
-)
 from osimlite.simulation.stepper import IntegrationError
-
-
-def cable(*elements, surface=None, slides=0.0):
-    """A path from left to right over a surface in ground; its right end slides to the right."""
-    model = osimlite.Model(name="cable")
-    body = model.add(osimlite.Body(name="b", mass=1.0, inertia=(1, 1, 1, 0, 0, 0)))
-    slide = osimlite.Coordinate(name="x", default_value=slides)
-    model.add(
-        osimlite.SliderJoint(name="j", coordinates=[slide]).between(
-            model.ground, body, at=(0.3, 0, 0)
-        )
-    )
-    if surface is not None:
-        surface.name, surface.socket_frame = "o", "/ground"
-        model.add(surface)
-    spring = PathSpring(name="s", resting_length=0.1, stiffness=100.0, dissipation=0.1)
-    spring.geometry_path = Scholz2015GeometryPath(name="path")
-    spring.geometry_path.path_elements += elements
-    model.add(spring)
-    return model
-
-
-def point(frame, *location):
-    return Scholz2015GeometryPathPoint(
-        path_point=PathPoint(socket_parent_frame=frame, location=location)
-    )
-
-
-def over(hint=(nan, nan, nan)):
-    return Scholz2015GeometryPathObstacle(
-        socket_contact_geometry="/contactgeometryset/o", contact_hint=hint
-    )
-
-
-LEFT, RIGHT = point("/ground", -0.3, 0.01, 0), point("/bodyset/b", 0, 0.01, 0)
+from tests.simulation.support import LEFT, RIGHT, cable, over, point
 
 
 @pytest.mark.parametrize(

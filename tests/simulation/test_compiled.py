@@ -30,24 +30,6 @@ from osimlite import (
 from osimlite.errors import OsimliteError, SimulationError
 from osimlite.mechanics.kernels.layout import OUTCOME, STAGE
 from osimlite.mechanics.multibody import build_mechanism
-from osimlite.mechanics.multibody import functions as f
-from osimlite.mechanics.multibody.joints import (
-    MOTIONS,
-    Mobilizer,
-    TransformAxis,
-    constant_curvature,
-    make_custom_motions,
-    make_ellipsoid_motions,
-    make_scapulothoracic_motions,
-)
-from osimlite.mechanics.multibody.mechanism import (
-    CoordinateInfo,
-    MassProperties,
-    Mechanism,
-    MobileBody,
-)
-from osimlite.mechanics.multibody.smoothing_spline import smoothing_spline
-from osimlite.mechanics.multibody.spatial import make_offset
 from osimlite.schema.functions import PiecewiseConstantFunction
 from osimlite.simulation import Simulation
 from osimlite.simulation.elements import Forces, force_elements
@@ -55,6 +37,7 @@ from osimlite.simulation.engines.compiled import CompiledEngine
 from osimlite.simulation.engines.linking import PYTHON_CODE
 from osimlite.simulation.engines.protocol import Settings
 from osimlite.simulation.system import System
+from tests.simulation.support import JOINTS, tree
 
 NO_BULLET = "needs pybullet (extra 'bullet')"
 
@@ -75,74 +58,6 @@ def state_of(mechanism, seed):
 
 
 # ------------------------------------------------------------------------------------- joints of every kind
-AXES = ((1, 0.2, 0), (0, 1, -0.5), (0, 0, -1), (-1, 0, 0), (0, -1, 0), (0.3, 0.4, 0.8))
-KNOTS = (-1.5, -0.4, 0.1, 0.8, 1.6)
-POINTS = (0.1, -0.3, 0.2, 0.4, -0.2)
-FUNCTIONS = {
-    "constant": f.Constant(0.3),
-    "linear": f.Linear(-0.7, 0.2),
-    "polynomial": f.Polynomial((0.1, -0.2, 0.3, 0.1)),
-    "sine": f.Sine(0.5, 1.3, 0.2, 0.1),
-    "step": f.Step(-2.0, 2.0, -0.3, 0.4),
-    "spline": f.SimmSpline(KNOTS, POINTS),
-    "spline of two": f.SimmSpline(KNOTS[:2], POINTS[:2]),
-    "smoothing spline": smoothing_spline(KNOTS, POINTS, 2, 0.0),
-    "lines": f.PiecewiseLinear(KNOTS, POINTS),
-    "stairs": f.PiecewiseConstant(KNOTS, POINTS),
-    "scaled": f.Scaled(-2.0, f.Scaled(0.4, f.Sine(0.5, 1.3, 0.2, 0.1))),
-}
-CONSTANT = (f.Constant, f.PiecewiseConstant)
-
-
-def custom_joint(function):
-    """One coordinate drives a rotation and two translations by a function, two more move axes together."""
-    both = f.MultivariatePolynomial.complete((0.1, 0.2, -0.3, 0.4, 0.5, -0.2), 2, 2)
-    turns = (
-        # What is constant moves no mass.
-        TransformAxis((0,), AXES[0], f.Linear() if isinstance(function, CONSTANT) else function),
-        TransformAxis((1,), AXES[1], f.Linear()),
-        TransformAxis((1, 2), AXES[2], f.WeightedSum((0.4, 1.1), 0.2)),
-    )
-    slides = (
-        TransformAxis((0,), AXES[3], function),
-        TransformAxis((1, 2), AXES[4], both),
-        TransformAxis((2,), AXES[5], f.Linear(1.0, 0.1)),
-    )
-    return make_custom_motions(turns, slides)
-
-
-JOINTS = {
-    **{name: motions for name, motions in MOTIONS.items() if name != "WeldJoint"},
-    "EllipsoidJoint": make_ellipsoid_motions((0.1, 0.2, 0.3)),
-    "ConstantCurvatureJoint": constant_curvature(0.4, (0.1, -0.05, 0.2)),
-    "ScapulothoracicJoint": make_scapulothoracic_motions((0.1, 0.2, 0.3), (0.05, -0.1), 0.4),
-    **{f"CustomJoint, {name}": custom_joint(function) for name, function in FUNCTIONS.items()},
-}
-
-
-def tree(joints, *, parents=None, reversed=(), locked=()):
-    """A mechanism of bodies of odd inertia."""
-    bodies, coordinates = [], []
-    for number, name in enumerate(joints):
-        motions = MOTIONS["WeldJoint"] if name == "WeldJoint" else JOINTS[name]
-        count = 1 + max((place for motion in motions for place in motion.coordinates), default=-1)
-        own = tuple(range(len(coordinates), len(coordinates) + count))
-        coordinates += [
-            CoordinateInfo(
-                f"q{k}", f"/q{k}", f"/j{number}", "coupled", default_value=0.4, locked=k in locked
-            )
-            for k in own
-        ]
-        inertia = np.array(((0.5, 0.03, -0.04), (0.03, 0.6, 0.02), (-0.04, 0.02, 0.7)))
-        mass = MassProperties(1.0 + number, np.array((0.1, -0.2, 0.05 * number)), inertia)
-        ends = (
-            make_offset((0.1, 0.2, -0.3), (0.3, -0.2, 0.5)),
-            make_offset((-0.2, 0.1, 0.1), (0.1, 0.6, -0.4)),
-        )
-        mobilizer = Mobilizer(f"/j{number}", name, motions, own, *ends, number in reversed)
-        parent = number - 1 if parents is None else parents[number]
-        bodies.append(MobileBody(f"b{number}", f"/b{number}", parent, mass, mobilizer))
-    return Mechanism("tree", tuple(bodies), tuple(coordinates), np.array((1.0, -9.0, 2.0)))
 
 
 def check(mechanism, seeds=3):

@@ -28,7 +28,7 @@ from osimlite.simulation.engines.linking import PYTHON_CODE
 from osimlite.simulation.engines.protocol import Settings
 from osimlite.simulation.system import System
 from tests.mechanics.multibody.strategies import KINDS, Case, cases, constraint_of
-from tests.simulation.test_constrained import MODELS, four_bars, knee, patella, pins
+from tests.simulation.support import MODELS, four_bars, knee, patella, pins
 
 
 def accelerations(mechanism: Mechanism, q: Any, u: Any, t: float = 0.0) -> Any:
@@ -99,7 +99,7 @@ SEVERAL = {
 
 @pytest.mark.parametrize("name", SEVERAL)
 def test_couplers_of_all_kinds(name: str):
-    from tests.simulation.test_compiled import tree
+    from tests.simulation.support import tree
 
     mechanism = replace(tree(FREE_AND_BALL), constraints=(SEVERAL[name],))
     rng = np.random.default_rng(2)

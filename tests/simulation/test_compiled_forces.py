@@ -17,7 +17,7 @@ from osimlite.mechanics.multibody.smoothing_spline import smoothing_spline
 from osimlite.mechanics.multibody.spatial import make_offset
 from osimlite.schema.contact_forces import SmoothSphereHalfSpaceForce
 from osimlite.schema.muscles import Muscle
-from osimlite.simulation.elements import Forces, force_elements
+from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.registry import FORCE_TYPES
 
 pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
@@ -38,48 +38,8 @@ from tests.simulation.force_cases import (
     stone,
     with_force,
 )
+from tests.simulation.support import assert_close, assert_same, engines, states
 from tests.suite import choose
-
-
-def engines(model, **settings):
-    mechanism = build_mechanism(model)
-    forces = force_elements(model, mechanism, **settings)
-    return mechanism, CompiledEngine(mechanism, forces), BulletEngine(mechanism, forces)
-
-
-def states(mechanism, count):
-    rng, size = np.random.default_rng(5), len(mechanism.coordinates)
-    for _ in range(count):
-        q, u = rng.uniform(-1.0, 1.0, size), rng.uniform(-2.0, 2.0, size)
-        for index, info in enumerate(mechanism.coordinates):
-            if info.locked:
-                q[index], u[index] = info.default_value, 0.0
-        yield rng.uniform(0.0, 2.0), q.tolist(), u.tolist()
-
-
-def assert_close(ours, theirs, tolerance=1e-9):
-    scale = max(1.0, np.abs(theirs).max(initial=0.0))
-    assert np.abs(np.subtract(ours, theirs)).max(initial=0.0) <= tolerance * scale
-
-
-def assert_same(mechanism, ours, theirs, count=8) -> int:
-    """Compare at some states; returns the bits of the contacts that touched."""
-    touched = 0
-    assert (ours.contacts, ours.columns) == (theirs.contacts, theirs.columns)
-    for t, q, u in states(mechanism, count):
-        assert_close(ours.compute_accelerations(t, q, u), theirs.compute_accelerations(t, q, u))
-        assert ours.loads[-1] == theirs.loads[-1]
-        for number in range(len(ours.contacts)):
-            if ours.loads[-1] >> number & 1:
-                assert_close(ours.loads[number], theirs.loads[number])
-        touched |= ours.loads[-1]
-        y, z = ours.state.pack(q, u), theirs.state.pack(q, u)
-        assert_close(ours.force_records(t, y), theirs.force_records(t, z))
-        assert ours.force_table([t, t], [y, y]).tolist() == [ours.force_records(t, y)] * 2
-        assert ours.compute_energies(t, y) == pytest.approx(
-            theirs.compute_energies(t, z), rel=1e-9, abs=1e-9
-        )
-    return touched
 
 
 @pytest.mark.parametrize("name", FORCE_NAMES)

@@ -13,8 +13,7 @@ from osimlite.studies.sweep import registry
 from osimlite.studies.sweep.plan import plan
 from tests.simulation.force_cases import chain, floor
 from tests.simulation.meshes import ball, block, write_obj
-from tests.simulation.test_compiled_forces import assert_same, engines, states
-from tests.simulation.test_mesh_contact import thrown
+from tests.simulation.support import assert_same, engines, states, thrown
 
 
 def touching(surfaces) -> ElasticFoundationForce:

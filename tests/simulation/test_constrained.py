@@ -17,13 +17,9 @@ from osimlite import Body, Coordinate, Model
 from osimlite.errors import SimulationError, UnsupportedError
 from osimlite.io.document.reader import read_text
 from osimlite.mechanics.multibody import Mechanism, build_mechanism
-from osimlite.mechanics.multibody import functions as f
-from osimlite.mechanics.multibody.joints import Mobilizer, TransformAxis, make_custom_motions
-from osimlite.mechanics.multibody.mechanism import CoordinateInfo, MassProperties, MobileBody
 from osimlite.schema import constraint_types as kinds
-from osimlite.schema.custom_joint import CustomJoint
 from osimlite.schema.forces import Force
-from osimlite.schema.functions import LinearFunction, PolynomialFunction, SimmSpline, Sine
+from osimlite.schema.functions import Sine
 from osimlite.simulation import Simulation, simulate
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.engines.protocol import Settings
@@ -32,8 +28,7 @@ from tests.mechanics.multibody.strategies import KINDS, Case, cases, constraint_
 pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
 
 from osimlite.simulation.engines.bullet.engine import BulletEngine
-
-INERTIA = (0.02, 0.03, 0.025, 0.001, -0.002, 0.003)
+from tests.simulation.support import MODELS, constrain, four_bars, half_locked, knee, patella, pins
 
 
 def accelerations(mechanism: Mechanism, q: Any, u: Any, t: float = 0.0, route: str = "auto") -> Any:
@@ -78,31 +73,6 @@ def test_bullet_and_our_recursion_agree_on_any_mechanism(
     assert np.abs(result - expected).max() < 1e-9 * scale
 
 
-def knee(*, opensim_derivatives: bool, inertia: Any = None) -> Mechanism:
-    """A shank whose one coordinate drives three rotations and two translations, upside down in the tree."""
-    axes = [
-        TransformAxis((0,), (0.0, 0.0, 1.0), f.IDENTITY),
-        TransformAxis((0,), (1.0, 0.1, 0.0), f.Polynomial((0.3, 0.5, 0.1))),
-        TransformAxis((0, 1), (0.0, 1.0, 0.0), f.WeightedSum((-0.7, 1.0))),
-        TransformAxis((0,), (1.0, 0.0, 0.0), f.Polynomial((0.1, -0.2, 0.0))),
-        TransformAxis((1,), (0.0, 1.0, 0.0), f.Sine(0.1, 2.0, 0.0, 0.0)),
-        TransformAxis((), (0.0, 0.0, 1.0), f.Constant(0.05)),
-    ]
-    motions = make_custom_motions(axes[:3], axes[3:], opensim_derivatives=opensim_derivatives)
-    properties = MassProperties(
-        2.0,
-        np.array((0.1, -0.3, 0.05)),
-        np.diag((0.03, 0.02, 0.04)) if inertia is None else inertia,
-    )
-    bodies = tuple(
-        MobileBody(name, f"/bodyset/{name}", parent, properties, Mobilizer(f"/j/{name}", "CustomJoint", motions, own,
-                                                                           reversed=parent >= 0))
-        for name, parent, own in (("thigh", -1, (0, 1)), ("shank", 0, (2, 3)))
-    )  # fmt: skip
-    coordinates = tuple(CoordinateInfo(name, f"/j/{name}", "/j", "coupled") for name in "abcd")
-    return Mechanism("knee", bodies, coordinates)
-
-
 @pytest.mark.parametrize("opensim_derivatives", [False, True])
 def test_the_derivatives_of_opensim_are_those_of_our_recursion(opensim_derivatives: bool):
     mechanism = knee(opensim_derivatives=opensim_derivatives)
@@ -133,113 +103,6 @@ def test_routes_that_are_none_are_refused():
 
 
 # --------------------------------------------------------------------------------------------------- whole models
-def add(model: Model, name: str, joint: Any, carrier: Any, at=(0, 0, 0), **more: Any) -> Body:
-    body = model.add(Body(name=name, mass=1.0, mass_center=(0.05, -0.2, 0.02), inertia=INERTIA))
-    for index, coordinate in enumerate(joint.coordinates):
-        coordinate.name = f"{name}{index}" if len(joint.coordinates) > 1 else name
-    model.add(joint.between(carrier, body, at=at, **more))
-    return body
-
-
-def pins(count: int, length: float = 0.4) -> tuple[Model, list[Body]]:
-    """A chain of pendulums."""
-    model = Model(name="pins")
-    bodies: list[Body] = []
-    for number in range(count):
-        carrier = bodies[-1] if bodies else model.ground
-        at = (0.0, -length, 0.0) if bodies else (0.0, 0.0, 0.0)
-        bodies.append(add(model, f"p{number}", osimlite.PinJoint(name=f"j{number}"), carrier, at))
-        next(
-            item for item in model.components(Coordinate) if item.name == f"p{number}"
-        ).default_value = 0.7 - number
-    return model, bodies
-
-
-def constrain(model: Model, constraint: Any) -> Model:
-    model.constraint_set.objects.append(constraint)
-    return model
-
-
-def four_bars() -> Model:
-    """Three pins, and the end of the last bar on a point of ground."""
-    model, bodies = pins(3)
-    return constrain(
-        model,
-        kinds.PointConstraint(
-            name="loop", socket_body_1=model.ground, location_body_1=(0.5, 0.0, 0.0),
-            socket_body_2=bodies[-1], location_body_2=(0.0, -0.4, 0.0),
-        ),
-    )  # fmt: skip
-
-
-def patella() -> Model:
-    """A thigh and shank on splines, and a patella that a coupler moves."""
-    model, _ = pins(1)
-    thigh = next(iter(model.components(Body)))
-    joint = CustomJoint(name="knee", coordinates=[Coordinate(name="flexion", default_value=-0.4)])
-    transform = joint.spatial_transform
-    transform.rotation1.axis, transform.rotation1.coordinates = (0, 0, 1), ("flexion",)
-    transform.rotation1.function = LinearFunction(coefficients=(1.0, 0.0))
-    for axis, y in (
-        (transform.translation1, (0.03, -0.01, 0.02)),
-        (transform.translation2, (-0.4, -0.41, -0.39)),
-    ):
-        axis.coordinates, axis.function = ("flexion",), SimmSpline(x=(-2.0, -0.7, 0.2), y=y)
-    shank = model.add(Body(name="shank", mass=3.0, mass_center=(0.0, -0.2, 0.0), inertia=INERTIA))
-    model.add(joint.between(thigh, shank))
-    add(model, "cap", osimlite.PinJoint(name="patellofemoral"), thigh, (0.05, -0.4, 0.0))
-    law = PolynomialFunction(coefficients=(0.2, 0.8, 0.1))
-    return constrain(
-        model,
-        kinds.CoordinateCouplerConstraint(
-            name="beta", coupled_coordinates_function=law, independent_coordinate_names=("flexion",),
-            dependent_coordinate_name="cap",
-        ),
-    )  # fmt: skip
-
-
-def rod() -> Model:
-    model, bodies = pins(2)
-    ball = add(model, "ball", osimlite.FreeJoint(name="free"), model.ground)
-    return constrain(
-        model,
-        kinds.ConstantDistanceConstraint(
-            name="rod", socket_body_1=bodies[-1], location_body_1=(0.0, -0.4, 0.1), socket_body_2=ball,
-            location_body_2=(0.1, 0.0, 0.0), constant_distance=0.6,
-        ),
-    )  # fmt: skip
-
-
-def bead() -> Model:
-    model, bodies = pins(1)
-    ball = add(model, "bead", osimlite.FreeJoint(name="free"), model.ground)
-    return constrain(
-        model,
-        kinds.PointOnLineConstraint(
-            name="wire", socket_line_body=bodies[-1], line_direction_vec=(0.3, -1.0, 0.2), point_on_line=(0.1, 0, 0),
-            socket_follower_body=ball, point_on_follower=(0.0, 0.1, 0.0),
-        ),
-    )  # fmt: skip
-
-
-def welded() -> Model:
-    """A loop of four bars whose end is welded to a block that slides: most of the six equations say it twice."""
-    model, bodies = pins(3)
-    slider = add(model, "block", osimlite.PlanarJoint(name="plane"), model.ground)
-    return constrain(
-        model, kinds.WeldConstraint(name="weld", socket_frame1=bodies[-1], socket_frame2=slider)
-    )
-
-
-def half_locked() -> Model:
-    model = Model(name="half locked")
-    add(model, "b", osimlite.BallJoint(name="ball"), model.ground)
-    next(iter(model.components(Coordinate))).locked = True
-    next(iter(model.components(Coordinate))).default_value = 0.3
-    return model
-
-
-MODELS = {make.__name__: make for make in (four_bars, patella, rod, bead, welded, half_locked)}
 
 
 @pytest.mark.parametrize("make", MODELS.values(), ids=MODELS)

@@ -16,7 +16,6 @@ from osimlite import (
     Coordinate,
     HuntCrossleyForce,
     Model,
-    PinJoint,
     SliderJoint,
 )
 from osimlite.errors import ModelError, UnsupportedError
@@ -48,26 +47,8 @@ from osimlite.schema.springs import (
     PointToPointSpring,
     SpringGeneralizedForce,
 )
-from osimlite.schema.wrapping import WrapSphere
 from osimlite.simulation.elements import force_elements
-
-
-def arm() -> Model:
-    """Two pendulums on a slide."""
-    model = Model(name="arm")
-    below = model.ground
-    for number, kind in enumerate((SliderJoint, PinJoint, PinJoint)):
-        inertia = (0.02, 0.02, 0.02, 0, 0, 0)
-        body = model.add(
-            Body(name=f"b{number}", mass=1.0, mass_center=(0, -0.2, 0), inertia=inertia)
-        )
-        joint = kind(
-            name=f"j{number}", coordinates=[Coordinate(name=f"q{number}", default_value=0.3)]
-        )
-        model.add(joint.between(below, body, at=(0, -0.4 if number else 0, 0), turned=(0, 0, 0.2)))
-        below = body
-    below.wrap_object_set.objects.append(WrapSphere(name="ball", radius=0.05))
-    return model
+from tests.simulation.support import arm
 
 
 def path(*points) -> GeometryPath:

@@ -10,7 +10,7 @@ import pytest
 import osimlite
 from osimlite.errors import SettingError
 from tests.simulation.checked import Checked
-from tests.simulation.test_path_wraps import PATH, SETUPS, wrapped
+from tests.simulation.support import PATH, SETUPS, wrapped
 
 integrate = pytest.importorskip("scipy.integrate")
 

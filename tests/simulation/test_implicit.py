@@ -38,7 +38,7 @@ from osimlite.simulation.options import IntegrationOptions
 from osimlite.simulation.system import System
 from tests.simulation.elements.muscle_rows import hung, muscle
 from tests.simulation.equations import Equations, last, oscillator
-from tests.simulation.test_constrained import MODELS
+from tests.simulation.support import MODELS
 
 METHODS = "adams", "bdf", "rosenbrock"
 

@@ -9,41 +9,9 @@ import numpy as np
 import pytest
 
 import osimlite
-from osimlite import Body, ContactHalfSpace, ContactMesh, Model, PlanarJoint
 from osimlite.errors import ModelError
-from osimlite.schema.contact_forces import ElasticFoundationForce
 from osimlite.view.shown import Shown
-from tests.simulation.meshes import ball, block, write_obj
-
-
-def thrown(folder, *, dissipation=0.0, friction=0.0) -> Model:
-    """An egg that falls on a hexagonal stone, which stands on the floor it may reach too."""
-    write_obj(folder / "egg.obj", *ball((0.15, 0.1, 0.1), 12, 8))
-    write_obj(folder / "stone.obj", *block((0.2, 0.2, 0.2)))
-    model = Model(name="thrown")
-    body = model.add(Body(name="egg", mass=1.0, inertia=(0.004, 0.006, 0.006, 0, 0, 0)))
-    joint = PlanarJoint(name="flies")
-    for index, (name, value) in enumerate((("turn", 0.3), ("along", 0.15), ("height", 0.33))):
-        joint.coordinates[index].name, joint.coordinates[index].default_value = name, value
-    model.add(joint.between(model.ground, body))
-    floor = ContactHalfSpace(
-        name="floor", socket_frame=model.ground, orientation=(0, 0, -np.pi / 2)
-    )
-    stone = ContactMesh(name="stone", socket_frame=model.ground, filename="stone.obj")
-    shell = ContactMesh(name="shell", socket_frame=body, filename="egg.obj")
-    model.add(floor, stone, shell)
-    force = ElasticFoundationForce(name="contact", transition_velocity=0.1)
-    force.contact_parameters.objects.append(
-        ElasticFoundationForce.ContactParameters(
-            geometry=(floor, stone, shell),
-            stiffness=1e6,
-            dissipation=dissipation,
-            static_friction=friction,
-            dynamic_friction=friction,
-        )
-    )
-    model.add(force)
-    return model
+from tests.simulation.support import thrown
 
 
 def test_energy_on_a_plane_is_kept_without_dissipation(tmp_path):

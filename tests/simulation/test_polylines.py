@@ -10,7 +10,7 @@ from osimlite.schema.contact import ContactEllipsoid, ContactSphere
 from osimlite.schema.muscles import PathActuator
 from osimlite.schema.paths import PathPoint, PathWrap
 from tests.simulation.checked import Checked
-from tests.simulation.test_cables import LEFT, RIGHT, cable, over
+from tests.simulation.support import LEFT, RIGHT, cable, over
 
 
 def paths_over(surface, *stations, wrapping):

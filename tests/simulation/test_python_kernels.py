@@ -12,7 +12,7 @@ from osimlite.simulation.elements import force_elements
 from osimlite.simulation.engines.compiled import CompiledEngine
 from tests.simulation.checked import Checked, bounded
 from tests.simulation.force_cases import FORCE_NAMES, FORCES, with_force
-from tests.simulation.test_compiled_forces import states
+from tests.simulation.support import states
 
 FILES = (
     "walker/DynamicWalkerModel.osim",

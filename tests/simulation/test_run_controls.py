@@ -17,7 +17,7 @@ from osimlite.simulation import Simulation, StoTable, read_sto, write_sto
 from osimlite.simulation.engines.linking import MACHINE_CODE, PYTHON_CODE
 from osimlite.simulation.run_controls import add_controls
 from osimlite.simulation.system import System
-from tests.simulation.test_force_elements import arm
+from tests.simulation.support import arm
 
 TIMES, VALUES = (0.0, 0.1, 0.3), (1.0, 3.0, -1.0)
 

@@ -17,40 +17,10 @@ import pytest
 
 import osimlite
 from osimlite.errors import OsimliteError
-from tests.fitting.test_inverse_kinematics import free_body
-from tests.tools.test_many import make_trial
+from tests.tools.support import laid_out, state
 
 COUNT = int(os.environ.get("OSIMLITE_DAMAGES", "30"))
 
-ANALYZE = """<OpenSimDocument Version="40600"><AnalyzeTool name="an">
-<model_file>../model.osim</model_file><results_directory>analyzed</results_directory>
-<initial_time>0.1</initial_time><final_time>0.6</final_time>
-<AnalysisSet name="Analyses"><objects><Kinematics name="K"/><BodyKinematics name="B"/>
-<JointReaction name="J"><apply_on_bodies>parent</apply_on_bodies></JointReaction></objects></AnalysisSet>
-<coordinates_file>motion.mot</coordinates_file>
-<lowpass_cutoff_frequency_for_coordinates>6</lowpass_cutoff_frequency_for_coordinates>
-</AnalyzeTool></OpenSimDocument>
-"""
-FORWARD = """<OpenSimDocument Version="40600"><ForwardTool name="fw">
-<model_file>../model.osim</model_file><results_directory>moved</results_directory>
-<initial_time>0.2</initial_time><final_time>0.3</final_time><states_file>states.sto</states_file>
-<integrator_error_tolerance>0.001</integrator_error_tolerance>
-</ForwardTool></OpenSimDocument>
-"""
-SCALE = """<OpenSimDocument Version="40600"><ScaleTool name="sc"><mass>70</mass>
-<GenericModelMaker><model_file>../model.osim</model_file></GenericModelMaker>
-<ModelScaler><apply>true</apply><scaling_order>measurements</scaling_order>
-<MeasurementSet name="m"><objects><Measurement name="len"><apply>true</apply>
-<MarkerPairSet name="p"><objects><MarkerPair><markers>one two</markers></MarkerPair></objects></MarkerPairSet>
-<BodyScaleSet name="b"><objects><BodyScale name="b"><axes>X Y Z</axes></BodyScale></objects></BodyScaleSet>
-</Measurement></objects></MeasurementSet>
-<marker_file>trial.trc</marker_file><time_range>0 1</time_range>
-<output_model_file>scaled.osim</output_model_file></ModelScaler>
-<MarkerPlacer><apply>true</apply><IKTaskSet><objects><IKMarkerTask name="one"/><IKMarkerTask name="two"/></objects>
-</IKTaskSet><marker_file>trial.trc</marker_file><time_range>0.1 0.5</time_range>
-<output_model_file>placed.osim</output_model_file><output_motion_file>static.mot</output_motion_file></MarkerPlacer>
-</ScaleTool></OpenSimDocument>
-"""
 SETUPS = "z_ik.xml", "id.xml", "analyze.xml", "forward.xml", "scale.xml"
 WORDS = (
     "nan",
@@ -82,22 +52,6 @@ LOST = (
     ".",
     "id.xml",
 )
-
-
-def laid_out(folder: Path) -> Path:
-    """A model and a trial with every kind of setup; returns the folder of the trial."""
-    osimlite.write(free_body(), folder / "model.osim")
-    trial = folder / "trial"
-    make_trial(trial, 1, 40)
-    for name, text in (("analyze.xml", ANALYZE), ("forward.xml", FORWARD), ("scale.xml", SCALE)):
-        (trial / name).write_text(text)
-    osimlite.run(trial / "z_ik.xml")
-    for name in ("motion.mot", "ik.mot"):
-        (trial / name).write_bytes((trial / "ik.mot").read_bytes())
-    osimlite.simulate(osimlite.read(folder / "model.osim"), to=0.4, report_interval=0.1).write(
-        trial
-    )
-    return trial
 
 
 def number(text: str, random: random.Random) -> str:
@@ -194,14 +148,6 @@ DAMAGES: tuple[Callable[[str, random.Random], str], ...] = (
     number, number, number, line_gone, line_twice, lines_shuffled, cut, letter, cell_gone, columns_gone, units,
     line_ends, every_second, name_lost, name_lost, tag_lost,
 )  # fmt: skip
-
-
-def state(folder: Path) -> dict[str, bytes]:
-    return {
-        str(path.relative_to(folder)): path.read_bytes()
-        for path in folder.rglob("*")
-        if path.is_file()
-    }
 
 
 @pytest.fixture(scope="module")

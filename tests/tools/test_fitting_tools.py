@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gzip
 from pathlib import Path
 
 import numpy as np
@@ -11,16 +10,9 @@ import pytest
 import osimlite
 from osimlite.io.tables.storage import read_sto
 from osimlite.tools.running import run
+from tests.tools.support import unpacked
 
 REFERENCE = "oracle/tools/reference"
-
-
-def unpacked(source: Path, to: Path, name: str) -> None:
-    """A file, out of its .gz if it has one."""
-    packed = source.with_name(f"{source.name}.gz")
-    (to / name).write_bytes(
-        gzip.decompress(packed.read_bytes()) if packed.exists() else source.read_bytes()
-    )
 
 
 def test_inverse_kinematics_writes_opensims_files(shared: Path, tmp_path: Path) -> None:

@@ -10,49 +10,15 @@ import sys
 import time
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 import osimlite
 from osimlite.errors import OsimliteError
-from osimlite.io.tables.writers import write_trc
 from osimlite.tools.many import JOURNAL, compute_digest, find_setups, run_many
 from osimlite.tools.running import list_runnable
 from tests.cli.command import ROOT, run
-from tests.fitting.test_inverse_kinematics import MARKERS, free_body, positions
-
-
-def make_trial(folder: Path, seed: int, frames: int = 60) -> None:
-    """Markers of a moving body, and setups that fit the motion and find its forces."""
-    folder.mkdir(parents=True)
-    times = np.linspace(0.0, 1.0, frames)
-    values = 0.3 * np.sin(3.0 * times[:, None] + np.arange(6.0) + seed)
-    write_trc(
-        folder / "trial.trc",
-        times.tolist(),
-        MARKERS,
-        positions(values).reshape(frames, -1).tolist(),
-    )
-    osimlite.write(
-        osimlite.InverseKinematicsTool(
-            name="ik",
-            model_file="../model.osim",
-            marker_file="trial.trc",
-            output_motion_file="ik.mot",
-            time_range=(0.0, 1.0),
-        ),
-        folder / "z_ik.xml",
-    )
-    osimlite.write(
-        osimlite.InverseDynamicsTool(
-            name="id",
-            model_file="../model.osim",
-            coordinates_file="ik.mot",
-            output_gen_force_file="id.sto",
-            time_range=(0.0, 1.0),
-        ),
-        folder / "id.xml",
-    )
+from tests.fitting.support import free_body
+from tests.tools.support import make_trial
 
 
 @pytest.fixture

@@ -12,34 +12,13 @@ pytest.importorskip("scipy", reason="needs scipy (extra 'sim')")
 import numpy as np
 
 import osimlite
-from osimlite.io.tables.storage import StoTable, write_sto
 from osimlite.models.jumper import jumper
 from osimlite.schema.actuators import BodyActuator, CoordinateActuator
-from osimlite.schema.model import Model
 from osimlite.schema.muscles import Muscle, RigidTendonMuscle
 from osimlite.schema.old_muscles import Delp1990Muscle_Deprecated
 from osimlite.schema.probe_types import ActuatorPowerProbe
 from osimlite.tools.job import NotRunnable
-
-SETUP = """<OpenSimDocument Version="40600">
-    <AnalyzeTool name="it">
-        <model_file>model.osim</model_file>
-        <coordinates_file>motion.sto</coordinates_file>
-        <AnalysisSet><objects>{}</objects></AnalysisSet>
-    </AnalyzeTool>
-</OpenSimDocument>
-"""
-
-
-def tables(folder: Path, model: Model, analyses: str) -> dict[str, StoTable]:
-    """What analyses of a slow motion of a model make."""
-    osimlite.write(model, folder / "model.osim")
-    mechanism = osimlite.mechanism(model)
-    times = np.linspace(0.0, 0.2, 11)
-    rows = [[info.default_value + 0.1 * np.sin(t) for info in mechanism.coordinates] for t in times]
-    write_sto(folder / "motion.sto", "motion", times.tolist(), mechanism.coordinate_names, rows)
-    (folder / "it.xml").write_text(SETUP.format(analyses))
-    return dict(osimlite.run(folder / "it.xml").tables)
+from tests.tools.support import tables
 
 
 def test_powers_are_forces_times_speeds(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ import osimlite
 from osimlite.errors import OsimliteError
 from osimlite.tools.many import JOURNAL
 from tests.cli.command import run
-from tests.tools.test_damaged import laid_out, state
+from tests.tools.support import laid_out, state
 
 
 @pytest.fixture

@@ -26,7 +26,7 @@ from osimlite.schema.joints import SliderJoint
 from osimlite.simulation.robot.urdf import UNLIMITED, urdf_text
 from osimlite.translate import build_robot, to_urdf
 from tests.simulation.robot.readers import in_bullet, written
-from tests.translate.test_export import kinds, one_body, unaccounted
+from tests.translate.support import kinds, one_body, unaccounted
 
 
 def with_surfaces():

@@ -28,9 +28,7 @@ from osimlite import (
 )
 from osimlite.errors import OsimliteError, SimulationError
 from osimlite.translate.mjcf.driven import COMPUTED
-from tests.translate.mjcf.test_corpus import assert_refused
-from tests.translate.mjcf.test_couplings import coupled, on_a_function
-from tests.translate.mjcf.test_forces import chain
+from tests.translate.mjcf.support import assert_refused, chain, coupled, on_a_function
 
 SPLINE = SimmSpline(x=(-1.0, 0.0, 0.5, 1.2, 2.0), y=(0.1, 0.3, 0.2, 0.25, 0.4))
 

@@ -18,7 +18,7 @@ from osimlite.schema.base import Unknown
 from osimlite.schema.contact import ContactGeometry
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.forces import Force
-from osimlite.schema.frames import Body, PhysicalOffsetFrame
+from osimlite.schema.frames import PhysicalOffsetFrame
 from osimlite.schema.geometry import (
     Appearance,
     Brick,
@@ -29,48 +29,12 @@ from osimlite.schema.geometry import (
     Sphere,
     SurfaceProperties,
 )
-from osimlite.schema.joints import BallJoint, FreeJoint, WeldJoint
+from osimlite.schema.joints import BallJoint, FreeJoint
 from osimlite.schema.markers import Marker
-from osimlite.schema.model import Model
 from osimlite.translate import to_urdf
-from osimlite.translate.export import Urdf
-from osimlite.translate.survey import CONTAINERS
 from tests.simulation.robot.readers import in_bullet, mujoco_poses, worst_body, yourdfpy_poses
 from tests.translate.evaluator import Reader
-
-
-def kinds(urdf: Urdf) -> dict[str, list[str]]:
-    """Components by kind of record."""
-    result: dict[str, list[str]] = {}
-    for record in urdf.fidelity:
-        result.setdefault(record.kind, []).append(record.component)
-    return result
-
-
-def unaccounted(model: Model, urdf: Urdf) -> list[str]:
-    paths = [
-        component.path for component in model.components() if not isinstance(component, CONTAINERS)
-    ]
-    return urdf.fidelity.list_missing(paths)
-
-
-def one_body(*shapes, joint=None, **body) -> Model:
-    """A model of one body with these shapes, on a weld unless a joint is given."""
-    model = Model(name="one")
-    block = model.add(Body(name="block", mass=2.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0), **body))
-    block.attach(*shapes)
-    joint = joint or WeldJoint(name="weld")
-    model.add(joint.between(model.ground, block, at=(0.0, 1.0, 0.0)))
-    return model
-
-
-def visuals(urdf: Urdf, link: str = "block"):
-    return ElementTree.fromstring(urdf.text).findall(f"link[@name='{link}']/visual")
-
-
-def vertices(content: bytes):
-    lines = [line.split() for line in content.decode().splitlines()]
-    return np.array([[float(word) for word in line[1:]] for line in lines if line[0] == "v"])
+from tests.translate.support import kinds, one_body, unaccounted, vertices, visuals
 
 
 # ------------------------------------------------------------------------------------------------------ the account

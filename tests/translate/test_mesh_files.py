@@ -16,7 +16,7 @@ from osimlite.schema.geometry import Appearance, Mesh
 from osimlite.translate import to_urdf
 from osimlite.translate.export import Urdf
 from tests.simulation.robot.readers import in_bullet, written
-from tests.translate.test_export import kinds, one_body, vertices, visuals
+from tests.translate.support import kinds, one_body, vertices, visuals
 
 TETRAHEDRON = ((0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3))
 CORNERS = ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))

@@ -50,7 +50,7 @@ from osimlite.translate.function_data import as_data
 from osimlite.translate.sidecar import coordinates_json
 from tests.mechanics.multibody.strategies import Case, cases
 from tests.simulation.robot.readers import mujoco_poses, worst_body, yourdfpy_poses
-from tests.simulation.robot.test_robot import one_body
+from tests.simulation.robot.support import one_body
 from tests.translate.evaluator import Reader, evaluate
 
 

@@ -12,7 +12,7 @@ from osimlite.mechanics.multibody import build_mechanism
 from osimlite.mechanics.multibody.constraints import Coupler
 from osimlite.simulation.polylines import Polylines, TraceablePath
 from osimlite.view.kernels import kernels_text, program_data
-from tests.simulation.test_compiled import JOINTS, tree
+from tests.simulation.support import JOINTS, tree
 
 MODELS = [
     "m0001",

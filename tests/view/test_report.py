@@ -21,8 +21,8 @@ from osimlite.tools.evidence import find_root_coordinates, find_steps, split_sid
 from osimlite.tools.outcome import Outcome
 from osimlite.tools.report import TrialOutcomes, collect_angles, collect_moments, report
 from tests.cli.command import run
-from tests.fitting.test_inverse_kinematics import free_body
-from tests.tools.test_many import make_trial
+from tests.fitting.support import free_body
+from tests.tools.support import make_trial
 
 FORCE = """<ExternalForce name="{side}"><applied_to_body>calcn_{side}</applied_to_body>
 <force_expressed_in_body>ground</force_expressed_in_body><force_identifier>{side}_v</force_identifier></ExternalForce>"""

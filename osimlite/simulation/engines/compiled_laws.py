@@ -145,14 +145,15 @@ def _save_library(library: Path) -> Path | None:
             return path
         except OsimliteError as error:
             refusals.append(str(error))
-    _warn_once(
+    warn_once(
         f"machine code is compiled anew in every run, since it can be kept nowhere: {'; '.join(refusals)}"
     )
     return None
 
 
 @cache
-def _warn_once(sentence: str) -> None:
+def warn_once(sentence: str) -> None:
+    """Log a warning, the first time that the process meets this sentence."""
     _log.warning(sentence)
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import os
 import platform
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from osimlite.base.text import suggest_or_list
 from osimlite.errors import OsimliteError
@@ -57,6 +57,15 @@ def get_address(name: str) -> int:
     """
     prepare_laws([name])
     return _addresses[name]
+
+
+def use_addresses(addresses: Mapping[str, int]) -> None:
+    """Take laws from a library that the caller has loaded, in place of those found here.
+
+    Args:
+        addresses: address of each law's function by name of the law.
+    """
+    _addresses.update(addresses)
 
 
 def is_ready(name: str) -> bool:

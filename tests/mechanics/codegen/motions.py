@@ -51,10 +51,12 @@ def load_kernels(path: str) -> None:
     """Take all kernels from a library."""
     library = ctypes.CDLL(path)
     names = json.loads(Path(path).with_suffix(".json").read_text(encoding="utf-8"))
-    for name, symbol in names.items():
-        machine_code._addresses[name] = (
-            ctypes.cast(getattr(library, symbol), ctypes.c_void_p).value or 0
-        )
+    machine_code.use_addresses(
+        {
+            name: ctypes.cast(getattr(library, symbol), ctypes.c_void_p).value or 0
+            for name, symbol in names.items()
+        }
+    )
 
 
 def describe(*arrays: Any) -> str:

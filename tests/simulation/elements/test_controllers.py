@@ -20,7 +20,7 @@ from osimlite.schema.functions import Constant
 from osimlite.schema.reporters import SignalGenerator, TableSource__double_
 from osimlite.simulation import write_sto
 from osimlite.simulation.elements import force_elements
-from tests.simulation.test_force_elements import arm
+from tests.simulation.support import arm
 
 
 def told(model: Model, folder) -> OsimliteError:

@@ -27,7 +27,7 @@ from osimlite.simulation.elements import force_elements
 from osimlite.simulation.engines.linking import MACHINE_CODE, PYTHON_CODE
 from osimlite.simulation.system import System
 from tests.simulation.elements.muscle_rows import hung, line
-from tests.simulation.test_force_elements import arm
+from tests.simulation.support import arm
 
 
 @pytest.fixture

@@ -86,7 +86,7 @@ def test_code_that_others_could_have_written_is_neither_loaded_nor_kept(folder, 
     compile_function("answer", answer, 0)
     folder.chmod(mode)
     assert load_function("answer", answer, 0) is None
-    compiled_laws._warn_once.cache_clear()
+    compiled_laws.warn_once.cache_clear()
     for path in folder.iterdir():
         path.unlink()
     assert run(compile_function("answer", answer, 0)) == 48
@@ -97,7 +97,7 @@ def test_without_a_folder_the_code_lasts_for_the_process(tmp_path, monkeypatch, 
     blocked = tmp_path / "file"
     blocked.write_text("no folder")
     monkeypatch.setattr(compiled_laws, "cache_folders", lambda: [blocked / "inside"])
-    compiled_laws._warn_once.cache_clear()
+    compiled_laws.warn_once.cache_clear()
     for _ in range(2):
         assert run(compile_function("answer", answer, 0)) == 48
     (message,) = caplog.messages

@@ -8,12 +8,9 @@ from hypothesis import given
 
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.mechanics.multibody.functions import IDENTITY, Linear
-from osimlite.mechanics.multibody.joints import Mobilizer, TransformAxis, make_custom_motions
+from osimlite.mechanics.multibody.joints import TransformAxis, make_custom_motions
 from osimlite.mechanics.multibody.mechanism import (
-    CoordinateInfo,
-    MassProperties,
     Mechanism,
-    MobileBody,
 )
 from osimlite.mechanics.multibody.spatial import make_offset, skew_matrix
 from osimlite.models.dynamic_walker import dynamic_walker
@@ -25,37 +22,11 @@ from osimlite.simulation.robot.robot import WORLD, Robot
 from tests.mechanics.multibody.cases import mixed_tree
 from tests.mechanics.multibody.strategies import Case, cases
 from tests.simulation.robot.readers import worst_body
+from tests.simulation.robot.support import one_body
 
 
 def walker() -> Mechanism:
     return build_mechanism(dynamic_walker())
-
-
-def one_body(motions, count, *, child_frame=None, names=None, locked=()) -> Mechanism:
-    """Ground and a body B through one joint with `count` coordinates."""
-    names = names or [f"q{k}" for k in range(count)]
-    infos = tuple(
-        CoordinateInfo(
-            name,
-            f"/jointset/j/{name}",
-            "/jointset/j",
-            "coupled",
-            default_value=0.4,
-            range=(-1.0, 2.0),
-            locked=k in locked,
-        )
-        for k, name in enumerate(names)
-    )
-    mobilizer = Mobilizer(
-        "/jointset/j",
-        "CustomJoint",
-        motions,
-        tuple(range(count)),
-        make_offset((0.1, 0.2, 0.3), (0.3, -0.2, 0.5)),
-        np.eye(4) if child_frame is None else child_frame,
-    )
-    body = MobileBody("B", "/bodyset/B", -1, MassProperties(2.0), mobilizer)
-    return Mechanism("one", (body,), infos)
 
 
 @given(cases())

@@ -30,7 +30,7 @@ from tests.simulation.robot.readers import (
     worst_body,
     yourdfpy_poses,
 )
-from tests.simulation.robot.test_robot import one_body
+from tests.simulation.robot.support import one_body
 
 
 def walker() -> Mechanism:

@@ -19,7 +19,7 @@ from osimlite.studies.sweep.optimize import BEST, HISTORY, SUMMARY, Objective, o
 from osimlite.studies.sweep.plan import plan
 from osimlite.studies.sweep.run import sweep
 from osimlite.studies.sweep.sampling import choose_samples
-from tests.studies.sweep.test_controls import pulled
+from tests.studies.sweep.support import pulled
 
 distributed = pytest.importorskip("distributed", reason="needs dask.distributed (extra 'sweep')")
 pq = pytest.importorskip("pyarrow.parquet", reason="needs pyarrow (extra 'sweep')")

@@ -13,7 +13,7 @@ from osimlite.studies.sweep.runner import Runner
 
 pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
 
-from tests.simulation.test_constrained import four_bars
+from tests.simulation.support import four_bars
 
 VARY = {"p0/speed": (-1.0, 1.0), "p1": (-0.6, -0.2)}
 MEASURES = ("p0/value", "p2/value", "p2/speed")

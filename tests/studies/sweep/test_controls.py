@@ -8,7 +8,6 @@ import pytest
 import osimlite
 from osimlite.errors import SettingError
 from osimlite.mechanics.multibody import build_mechanism
-from osimlite.schema.actuators import CoordinateActuator
 from osimlite.schema.controller_types import PrescribedController
 from osimlite.schema.examples import ToyReflexController
 from osimlite.schema.functions import GCVSpline, PiecewiseConstantFunction
@@ -22,20 +21,10 @@ from osimlite.studies.sweep.runner import Runner
 from osimlite.studies.sweep.sampling import choose_samples
 from osimlite.studies.sweep.variables import resolve_variables
 from osimlite.studies.sweep.variants import Variants
-from tests.simulation.elements.muscle_rows import hung, muscle
+from tests.studies.sweep.support import pulled
 
 TO = 0.03
 ENDS = ("x/value", "x/speed", "/forceset/mu/activation")
-
-
-def pulled():
-    """A block that a muscle, which is taut, and a motor pull."""
-    model = hung(
-        muscle("thelen_default", default_activation=0.3, default_fiber_length=0.064), [0.3, 0.3]
-    )
-    model.tree().by_path["/jointset/slide/x"].default_value = 0.34
-    model.add(CoordinateActuator(name="motor", coordinate="x", optimal_force=100.0))
-    return model
 
 
 def ends(model, initial=None, **controls):

@@ -10,7 +10,7 @@ from osimlite.schema.probe_types import ActuatorPowerProbe
 from osimlite.simulation import Simulation
 from osimlite.studies.sweep.plan import plan
 from osimlite.studies.sweep.runner import Runner
-from tests.studies.sweep.test_controls import pulled
+from tests.studies.sweep.support import pulled
 
 
 def measured(model, *measures, vary=None, row=(0.345,), **choices):

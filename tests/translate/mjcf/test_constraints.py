@@ -25,7 +25,7 @@ from osimlite import (
 from osimlite.mechanics.multibody.spatial import angles_xyz
 from osimlite.translate import to_mjcf
 from tests.translate.mjcf.compiled import Compiled
-from tests.translate.mjcf.test_forces import A, chain
+from tests.translate.mjcf.support import A, chain
 
 B = "/bodyset/b2"
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import mujoco
 import numpy as np
-import pytest
 
 import osimlite
 from osimlite.errors import OsimliteError
@@ -12,18 +11,9 @@ from osimlite.mechanics.multibody.constraints import Coupler
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.translate import to_mjcf
-from tests.conftest import CorpusModel
 from tests.translate.mjcf.compiled import Compiled
-from tests.translate.mjcf.test_couplings import off
-from tests.translate.test_export import unaccounted
-
-
-def assert_refused(corpus_model: CorpusModel, error: OsimliteError) -> None:
-    """What is refused here, reading or simulation refuses with the same words."""
-    with pytest.raises(type(error)) as result:
-        model = osimlite.read(corpus_model.path)
-        osimlite.simulate(model, to=1e-6, folder=corpus_model.path.parent, skip_unsupported=True)
-    assert result.value.message == error.message
+from tests.translate.mjcf.support import assert_refused, off
+from tests.translate.support import unaccounted
 
 
 def random_pose(mechanism: Mechanism, random: np.random.Generator) -> Array:

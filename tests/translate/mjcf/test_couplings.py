@@ -11,8 +11,6 @@ from osimlite import (
     Body,
     Constant,
     Coordinate,
-    CoordinateCouplerConstraint,
-    CustomJoint,
     EllipsoidJoint,
     LinearFunction,
     Model,
@@ -25,49 +23,7 @@ from osimlite import (
 )
 from osimlite.translate import to_mjcf
 from tests.translate.mjcf.compiled import Compiled
-
-INERTIA = (0.1, 0.1, 0.1, 0, 0, 0)
-
-
-def on_a_function(function, *, range=(-1.0, 2.0), name="tx") -> Model:
-    """A body that turns by a coordinate, and slides by a function of it."""
-    model = Model(name="one")
-    body = model.add(Body(name="b", mass=1.0, inertia=INERTIA))
-    joint = CustomJoint(
-        name="j", coordinates=[Coordinate(name="q", range=range, default_value=0.3)]
-    )
-    transform = joint.spatial_transform
-    transform.rotation3 = TransformAxis(
-        coordinates=("q",), axis=(0, 0, 1), function=LinearFunction()
-    )
-    transform.translation1 = TransformAxis(coordinates=("q",), axis=(1, 0, 0), function=function)
-    model.add(joint.between(model.ground, body))
-    return model
-
-
-def equalities(compiled: Compiled) -> dict[str, tuple[str | None, np.ndarray]]:
-    """The leader and the polynomial of every joint that follows, as MuJoCo has them."""
-    model, result = compiled.model, {}
-    for k in range(model.neq):
-        if model.eq_type[k] == mujoco.mjtEq.mjEQ_JOINT:
-            leader = model.eq_obj2id[k]
-            result[model.joint(model.eq_obj1id[k]).name] = (
-                model.joint(leader).name if leader >= 0 else None,
-                model.eq_data[k, :5],
-            )
-    return result
-
-
-def off(compiled: Compiled, q: np.ndarray) -> dict[str, float]:
-    """How far each following joint is from where the model has it, with all others where the model has them."""
-    values = compiled.mjcf.joint_values(q)
-    return {
-        name: float(np.polynomial.polynomial.polyval(values[leader] if leader else 0.0, polynomial))
-        - values[name]
-        for name, (leader, polynomial) in equalities(compiled).items()
-        if name in values and (leader is None or leader in values)
-    }
-
+from tests.translate.mjcf.support import INERTIA, coupled, equalities, off, on_a_function
 
 EXACT = {
     "line": LinearFunction(coefficients=(0.2, 0.1)),
@@ -143,28 +99,6 @@ def test_a_range_that_nobody_meant_is_that_of_the_knots():
     (wide,) = to_mjcf(on_a_function(spline, range=(-99999.9, 99999.9))).fidelity.records
     (record,) = to_mjcf(on_a_function(spline)).fidelity.records
     assert wide.errors == record.errors and "from -1 to 2" in wide.detail
-
-
-def coupled(function) -> Model:
-    """A second body that turns by a coordinate which a coupler makes a function of the first one's."""
-    model = on_a_function(LinearFunction(coefficients=(0.1, 0.0)))
-    body = model.add(Body(name="c", mass=1.0, inertia=INERTIA))
-    joint = CustomJoint(name="k", coordinates=[Coordinate(name="beta", range=(-9.0, 9.0))])
-    joint.spatial_transform.rotation1 = TransformAxis(
-        coordinates=("beta",),
-        axis=(1, 0, 0),
-        function=PolynomialFunction(coefficients=(1.0, 0.0, 0.0)),
-    )
-    model.add(joint.between(model["/bodyset/b"], body))
-    model.constraint_set.objects.append(
-        CoordinateCouplerConstraint(
-            name="c",
-            coupled_coordinates_function=function,
-            independent_coordinate_names=("q",),
-            dependent_coordinate_name="beta",
-        )
-    )
-    return model
 
 
 def test_couplers_are_composed_into_the_functions_of_the_coordinate():

@@ -19,7 +19,7 @@ from osimlite.translate import to_mjcf
 from osimlite.translate.mjcf.export import Mjcf
 from tests.translate.mjcf.compiled import Compiled
 from tests.translate.mjcf.conftest import OLDER
-from tests.translate.test_export import unaccounted
+from tests.translate.support import unaccounted
 
 # Prints where all bodies of each file are at its keyframe.
 READER = """

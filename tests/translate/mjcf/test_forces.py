@@ -9,22 +9,16 @@ import pytest
 import osimlite
 from osimlite import (
     ActivationCoordinateActuator,
-    Body,
     BodyActuator,
     BushingForce,
-    Coordinate,
     CoordinateActuator,
     CoordinateLimitForce,
     Model,
-    PhysicalOffsetFrame,
-    PinJoint,
     PointActuator,
     PointToPointActuator,
     PointToPointSpring,
-    SliderJoint,
     SpringGeneralizedForce,
     TorqueActuator,
-    UniversalJoint,
 )
 from osimlite.mechanics.kernels.layout import STAGE
 from osimlite.simulation.elements import force_elements
@@ -33,37 +27,7 @@ from osimlite.simulation.run_controls import add_controls
 from osimlite.simulation.system import System
 from osimlite.translate import to_mjcf
 from tests.translate.mjcf.compiled import Compiled
-
-A, B = "/bodyset/b1", "/bodyset/b3"
-
-
-def chain(*forces) -> Model:
-    """A slide, a pin, a universal joint and a pin, each turned against the one before."""
-    model = Model(name="chain")
-    below, count = model.ground, 0
-    for number, kind in enumerate((SliderJoint, PinJoint, UniversalJoint, PinJoint)):
-        inertia = (0.02, 0.03, 0.04, 0, 0, 0)
-        body = model.add(
-            Body(name=f"b{number}", mass=1.0, mass_center=(0, -0.2, 0), inertia=inertia)
-        )
-        names = [f"q{count + k}" for k in range(2 if kind is UniversalJoint else 1)]
-        count += len(names)
-        joint = kind(
-            name=f"j{number}",
-            coordinates=[Coordinate(name=name, default_value=0.3) for name in names],
-        )
-        model.add(
-            joint.between(below, body, at=(0, -0.4 if number else 0, 0), turned=(0.4, 0.1, 0.2))
-        )
-        below = body
-    model.add(
-        PhysicalOffsetFrame(
-            name="hook", socket_parent=B, translation=(0.1, 0.0, 0.02), orientation=(0.1, 0.5, 0)
-        )
-    )
-    if forces:
-        model.add(*forces)
-    return model
+from tests.translate.mjcf.support import A, B, chain
 
 
 def both(model: Model, q, u, control: float = 0.7) -> tuple[np.ndarray, np.ndarray]:

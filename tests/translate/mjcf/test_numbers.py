@@ -19,7 +19,7 @@ from osimlite.schema.base import Object
 from osimlite.schema.functions import SimmSpline
 from osimlite.schema.geometry import Brick, Cylinder, Ellipsoid, Geometry, Sphere
 from osimlite.schema.muscles import Millard2012EquilibriumMuscle
-from tests.translate.mjcf.test_names import HOSTILE, hostile
+from tests.translate.mjcf.support import HOSTILE, hostile
 
 FIXTURES = Path(__file__).resolve().parents[3] / "fixtures"
 FILES = ("lint/skeleton.osim", "lint/limb.osim", "walker/DynamicWalkerModel.osim")

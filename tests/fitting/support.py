@@ -1,0 +1,217 @@
+"""Models, data and comparisons that several test modules of this package share."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import osimlite
+from osimlite.fitting.inverse_kinematics import find_marker_stations
+from osimlite.fitting.pose_layout import MarkerTarget
+from osimlite.fitting.scaling import scale_model
+from osimlite.mechanics.multibody.mechanism import Mechanism
+from osimlite.models.dynamic_walker import dynamic_walker
+from osimlite.schema.base import Object
+
+MARKERS = ("one", "two", "three", "four")
+
+
+POINTS = np.array(((0.1, 0.0, 0.0), (0.0, 0.2, 0.0), (0.0, 0.0, 0.3), (0.1, 0.1, 0.1)))
+
+
+def free_body() -> osimlite.Model:
+    """A body with four markers."""
+    model = osimlite.Model(name="one")
+    body = osimlite.Body(name="b", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0))
+    model.add(body)
+    model.add(
+        osimlite.FreeJoint(name="j", socket_parent_frame=model.ground, socket_child_frame=body)
+    )
+    for name, point in zip(MARKERS, POINTS.tolist(), strict=True):
+        model.add(osimlite.Marker(name=name, socket_parent_frame=body, location=tuple(point)))
+    return model
+
+
+def positions(values: Any) -> Any:
+    """Where the markers are (t, 4, 3)."""
+    mechanism = osimlite.mechanism(free_body())
+    return np.array([[mechanism.at(q).point(0, point) for point in POINTS] for q in values])
+
+
+SIZES = {
+    "Pelvis": 1.06,
+    "RightThigh": 1.12,
+    "LeftThigh": 1.12,
+    "RightShank": 0.93,
+    "LeftShank": 0.93,
+}
+
+
+BONES = {"lateral": (0.0, -0.15, 0.05), "medial": (0.0, -0.15, -0.05)}
+
+
+CLUSTER = {"upper": (0.05, 0.02, 0.02), "front": (0.08, -0.1, 0.0), "back": (-0.07, -0.05, 0.03)}
+
+
+HELD = tuple(f"{body}_{name}" for body in SIZES for name in BONES)
+
+
+def marked() -> osimlite.Model:
+    """A walker with five markers on each segment."""
+    model = dynamic_walker()
+    for body in list(model.components(osimlite.Body)):
+        if body.name in SIZES:
+            for name, place in (BONES | CLUSTER).items():
+                model.add(
+                    osimlite.Marker(
+                        name=f"{body.name}_{name}", socket_parent_frame=body, location=place
+                    )
+                )
+    return model
+
+
+def person(
+    seed: int, noise: float = 0.0, frames: int = 60
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Markers (t, 3) of somebody who moves, and by how much those of the clusters are elsewhere."""
+    rng, model = np.random.default_rng(seed), marked()
+    scale_model(model, {body: (size,) * 3 for body, size in SIZES.items()})
+    offsets = {}
+    for marker in model.components(osimlite.Marker):
+        if marker.name not in HELD:
+            offsets[marker.name] = rng.normal(0.0, 0.02, 3)
+            marker.location = tuple((np.array(marker.location) + offsets[marker.name]).tolist())
+    mechanism = osimlite.mechanism(model)
+    moments, rate = np.arange(frames) / frames, rng.uniform(1.0, 6.0, len(mechanism.coordinates))
+    stations = find_marker_stations(model, mechanism)
+    result: dict[str, list[Any]] = {name: [] for name in stations}
+    for t in moments:
+        q = 0.5 * np.sin(rate * (t + 0.2))
+        q[mechanism.coordinate_index("platform_rz")] = 0.0
+        state = mechanism.at(q)
+        for name, place in stations.items():
+            result[name].append(state.point(*place) + rng.normal(0.0, noise, 3))
+    return {name: np.array(rows) for name, rows in result.items()}, offsets
+
+
+def places_at(mechanism: Mechanism, markers: list[MarkerTarget], q: Any) -> Any:
+    """Where the markers are (m, 3)."""
+    state = mechanism.at(q)
+    return np.array([state.point(*marker.station) for marker in markers])
+
+
+def cost_of(mechanism: Mechanism, markers: list[MarkerTarget], measured: Any, q: Any) -> float:
+    """What OpenSim minimises."""
+    weights = np.array([marker.weight for marker in markers]) * np.isfinite(measured).all(axis=1)
+    squares = np.sum((places_at(mechanism, markers, q) - np.nan_to_num(measured)) ** 2, axis=1)
+    return float(0.5 * weights @ squares / weights.sum())
+
+
+def numbers_of(item: Object, path: str = "") -> dict[str, Any]:
+    """Every value of an object and of all that it holds, by where it is."""
+    result: dict[str, Any] = {f"{path}": type(item).__name__}
+    for spec in type(item).field_specs().values():
+        value = getattr(item, spec.name)
+        many = value if isinstance(value, list) else [value]
+        for number, one in enumerate(many):
+            if isinstance(one, Object):
+                result |= numbers_of(one, f"{path}/{spec.name}[{number}]")
+            else:
+                result[f"{path}/{spec.name}"] = one
+    return result
+
+
+def assert_same(ours: Object, theirs: Object, but: str = "/socket_frame") -> None:
+    """Objects mean the same; numbers agree to 1e-9."""
+    left_out = "/socket_frame", but
+    one, other = (
+        {k: v for k, v in numbers_of(item).items() if not k.endswith(left_out)}
+        for item in (ours, theirs)
+    )
+    assert one.keys() == other.keys()
+    for place, value in other.items():
+        if isinstance(value, float) or (
+            isinstance(value, tuple) and value and isinstance(value[0], float)
+        ):
+            # Of the points of a spline OpenSim prints six digits.
+            rel = 1e-5 if place.endswith(("/x", "/y")) else 1e-9
+            assert np.asarray(one[place]) == pytest.approx(
+                np.asarray(value), rel=rel, abs=1e-12, nan_ok=True
+            ), place
+        else:
+            assert one[place] == value, place
+
+
+NAMES = ("pelvis_tilt", "pelvis_list", "pelvis_rotation", "pelvis_tx", "pelvis_ty", "pelvis_tz")
+
+
+AXES = ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
+
+
+PLACES = ((0.05, 0.05, 0.13), (0.05, 0.05, -0.13), (-0.12, 0.04, 0.0), (0.02, 0.4, 0.03))
+
+
+FACING = 2
+"""The place of pelvis_rotation."""
+
+
+def turner(low: float, high: float) -> osimlite.Model:
+    """A pelvis, jointed as gait models are, whose rotation is clamped (degrees), and a thigh."""
+    model = osimlite.Model(name="turner")
+    bodies = [
+        osimlite.Body(name=name, mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0))
+        for name in ("pelvis", "leg")
+    ]
+    for body in bodies:
+        model.add(body)
+        for number, place in enumerate(PLACES):
+            model.add(
+                osimlite.Marker(
+                    name=f"{body.name}{number}", socket_parent_frame=body, location=place
+                )
+            )
+    coordinates = [osimlite.Coordinate(name=name) for name in NAMES]
+    coordinates[FACING].clamped, coordinates[FACING].range = (
+        True,
+        (float(np.radians(low)), float(np.radians(high))),
+    )
+    moves = osimlite.SpatialTransform()
+    for number, name in enumerate(NAMES):
+        kind = f"{'translation' if number > 2 else 'rotation'}{number % 3 + 1}"
+        line = osimlite.LinearFunction(coefficients=(1.0, 0.0))
+        axis = np.eye(3)[number % 3].tolist() if number > 2 else AXES[number]
+        setattr(
+            moves,
+            kind,
+            osimlite.TransformAxis(name=kind, coordinates=(name,), axis=tuple(axis), function=line),
+        )
+    joint = osimlite.CustomJoint(
+        name="root", socket_parent_frame=model.ground, socket_child_frame=bodies[0], coordinates=coordinates,
+        spatial_transform=moves,
+    )  # fmt: skip
+    hip = osimlite.PinJoint(
+        name="hip", socket_parent_frame=bodies[0], socket_child_frame=bodies[1],
+        coordinates=[osimlite.Coordinate(name="hip", clamped=True, range=(-2.0, 0.5))],
+    )  # fmt: skip
+    model.add(joint)
+    model.add(hip)
+    return model
+
+
+def poses(angles: Any) -> Any:
+    """Of somebody who walks in a circle, facing these angles (degrees): (t, 7)."""
+    facing, steps = np.radians(angles), np.arange(len(angles))
+    return np.column_stack(
+        [0.1 * np.sin(0.3 * steps), 0.05 * np.cos(0.2 * steps), facing, np.sin(facing), 0.9 + 0.0 * facing,
+         np.cos(facing), 0.4 * np.sin(0.25 * steps)]
+    )  # fmt: skip
+
+
+def trial_of(model: osimlite.Model, values: Any, noise: float = 0.0) -> Any:
+    """The mechanism, its stations, and where they were measured (t, m, 3)."""
+    mechanism: Any = osimlite.mechanism(model)
+    stations = [mechanism.stations[marker.path] for marker in model.components(osimlite.Marker)]
+    places = np.array([[mechanism.at(q).point(*station) for station in stations] for q in values])
+    return mechanism, stations, places + noise * np.random.default_rng(5).normal(size=places.shape)

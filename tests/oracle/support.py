@@ -1,0 +1,514 @@
+"""Models, data and comparisons that several test modules of this package share."""
+
+from __future__ import annotations
+
+import gzip
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+
+import osimlite
+from osimlite.io.document.source import Source
+from osimlite.io.document.survey import survey_source
+from osimlite.io.tables.storage import read_sto, write_sto
+from osimlite.lint import Finding, validate
+from osimlite.lint.subject import Subject
+from osimlite.schema.actuators import (
+    ActivationCoordinateActuator,
+    CoordinateActuator,
+    PointActuator,
+    PointToPointActuator,
+    TorqueActuator,
+)
+from osimlite.schema.model import Model
+from osimlite.schema.muscles import (
+    Muscle,
+    PathActuator,
+    Thelen2003Muscle,
+)
+from tests.conftest import CorpusModel
+from tests.oracle.force_carrier import JOINTS, along, carrier, drive
+
+opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
+
+
+Bodies = list[Any]
+
+
+Change = Callable[[Any, Bodies], None]
+
+
+def _vec(*values: float) -> Any:
+    return opensim.Vec3(*values)
+
+
+def _chain(rng: np.random.Generator) -> tuple[Any, Bodies]:
+    """Ground, a body on a ball joint, one on a pin beyond, one that floats."""
+    opensim.Logger.setLevelString("off")
+    model = opensim.Model()
+    model.setName("m")
+    model.setGravity(_vec(0.3, -9.5, 0.7))
+    bodies = []
+    for name in ("inner", "outer", "loose"):
+        body = opensim.Body()
+        body.setName(name)
+        body.set_mass(rng.uniform(0.5, 2.0))
+        body.set_mass_center(_vec(*rng.uniform(-0.2, 0.2, 3)))
+        body.set_inertia(opensim.Vec6(*rng.uniform(0.2, 0.3, 3), *rng.uniform(-0.03, 0.03, 3)))
+        model.addBody(body)
+        bodies.append(body)
+    inner, outer, loose = bodies
+    for kind, name, parent, child, count in (
+        ("BallJoint", "ball", model.getGround(), inner, 3),
+        ("PinJoint", "pin", inner, outer, 1),
+        ("FreeJoint", "free", model.getGround(), loose, 6),
+    ):
+        spots = [_vec(*rng.uniform(-size, size, 3)) for size in (0.3, 1.0, 0.3, 1.0)]
+        joint = getattr(opensim, kind)(name, parent, spots[0], spots[1], child, spots[2], spots[3])
+        for index in range(count):
+            coordinate = joint.upd_coordinates(index)
+            coordinate.setName(f"{name}_{index}")
+            coordinate.set_default_value(0.2 * (index + 1))
+        model.addJoint(joint)
+    return model, bodies
+
+
+def _point(model: Any, bodies: Bodies) -> None:
+    model.addConstraint(
+        opensim.PointConstraint(bodies[1], _vec(0.1, 0.2, 0.3), bodies[2], _vec(0.2, -0.1, 0.1))
+    )
+
+
+def _rod(model: Any, bodies: Bodies) -> None:
+    constraint = opensim.ConstantDistanceConstraint(
+        bodies[1], _vec(0.1, 0.2, 0.3), bodies[2], _vec(0.2, -0.1, 0.1), 0.8
+    )
+    model.addConstraint(constraint)
+
+
+def _line(model: Any, bodies: Bodies) -> None:
+    constraint = opensim.PointOnLineConstraint(
+        bodies[1], _vec(0.3, 1.0, -0.2), _vec(0.1, 0.0, 0.2), bodies[2], _vec(0.2, -0.1, 0.1)
+    )
+    model.addConstraint(constraint)
+
+
+def _weld(model: Any, bodies: Bodies) -> None:
+    constraint = opensim.WeldConstraint(
+        "weld",
+        bodies[1],
+        _vec(0.1, 0.2, 0.3),
+        _vec(0.3, 0.2, 0.1),
+        bodies[2],
+        _vec(0.0, 0.1, 0.0),
+        _vec(0.1, 0.3, 0.2),
+    )
+    model.addConstraint(constraint)
+
+
+def _point_on_offset_frame(model: Any, bodies: Bodies) -> None:
+    """OpenSim takes the location in the body, not in the frame."""
+    frame = opensim.PhysicalOffsetFrame(
+        "spot",
+        bodies[1],
+        opensim.Transform(opensim.Rotation(0.5, opensim.CoordinateAxis(1)), _vec(0.3, 0.0, 0.1)),
+    )
+    bodies[1].addComponent(frame)
+    constraint = opensim.PointConstraint(
+        bodies[0], _vec(0.1, 0.2, 0.3), bodies[2], _vec(0.2, -0.1, 0.1)
+    )
+    constraint.updSocket("body_1").connect(frame)
+    model.addConstraint(constraint)
+
+
+def _coupler(
+    names: tuple[str, ...], dependent: str, function: Any, scale: float = 1.0
+) -> Callable[[Any, Bodies], None]:
+    def add(model: Any, bodies: Bodies) -> None:
+        constraint = opensim.CoordinateCouplerConstraint()
+        independent = opensim.ArrayStr()
+        for name in names:
+            independent.append(name)
+        constraint.setIndependentCoordinateNames(independent)
+        constraint.setDependentCoordinateName(dependent)
+        constraint.setFunction(function)
+        opensim.PropertyHelper.setValueDouble(scale, constraint.updPropertyByName("scale_factor"))
+        model.addConstraint(constraint)
+
+    return add
+
+
+def _spline() -> Any:
+    spline = opensim.SimmSpline()
+    for x, y in ((-2.0, 0.4), (-0.7, 0.1), (0.3, 0.5), (1.1, 0.2), (2.5, -0.3)):
+        spline.addPoint(x, y)
+    return spline
+
+
+def _polynomial() -> Any:
+    return opensim.PolynomialFunction(opensim.Vector.createFromMat(np.array((0.3, -0.5, 0.2, 0.1))))
+
+
+def _linear(coefficients: tuple[float, ...]) -> Any:
+    array = opensim.ArrayDouble()
+    for value in coefficients:
+        array.append(value)
+    function = opensim.LinearFunction()
+    function.setCoefficients(array)
+    return function
+
+
+def _prescribed(model: Any, bodies: Bodies) -> None:
+    for joint, place, function in (
+        ("pin", 0, opensim.Sine(0.4, 3.0, 0.2, 0.1)),
+        ("ball", 1, _linear((0.5, 0.2))),
+    ):
+        coordinate = model.updJointSet().get(joint).upd_coordinates(place)
+        coordinate.setPrescribedFunction(function)
+        coordinate.set_prescribed(True)
+
+
+def _prescribed_with_rod(model: Any, bodies: Bodies) -> None:
+    _prescribed(model, bodies)
+    _rod(model, bodies)
+
+
+CASES: dict[str, Change] = {
+    "point": _point,
+    "rod": _rod,
+    "line": _line,
+    "weld": _weld,
+    "point-on-offset-frame": _point_on_offset_frame,
+    "coupler-spline": _coupler(("pin_0",), "free_3", _spline()),
+    "coupler-of-ball-angles": _coupler(("ball_1",), "ball_0", _polynomial(), 0.6),
+    "coupler-of-two": _coupler(("ball_0", "pin_0"), "free_1", _linear((0.4, -0.7, 0.1))),
+    "prescribed": _prescribed,
+    "prescribed-with-rod": _prescribed_with_rod,
+}
+
+
+def ask(script: str, folder: Path, *words: str) -> None:
+    """Let OpenSim work in a process of its own, which may crash."""
+    done = subprocess.run(
+        [sys.executable, "-c", script, *words],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        timeout=240,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+
+
+def model_with(kind: str) -> osimlite.Model:
+    """A pelvis, a thigh and a shank with markers, whose knee is clamped, coupled, locked or loose."""
+    model = osimlite.Model(name="leg")
+    carrier: Any = model.ground
+    for number, joint in enumerate(
+        (osimlite.FreeJoint, osimlite.BallJoint, osimlite.UniversalJoint)
+    ):
+        body = osimlite.Body(name=f"b{number}", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0))
+        model.add(body)
+        at = model.add(
+            osimlite.PhysicalOffsetFrame(
+                name=f"f{number}",
+                socket_parent=carrier,
+                translation=(0.0, -0.4 * (number > 0), 0.0),
+            )
+        )
+        model.add(joint(name=f"j{number}", socket_parent_frame=at, socket_child_frame=body))
+        for count, point in enumerate(
+            ((0.1, 0.0, 0.05), (0.0, -0.2, -0.06), (-0.08, -0.3, 0.04), (0.02, -0.1, 0.1))
+        ):
+            model.add(
+                osimlite.Marker(name=f"m{number}{count}", socket_parent_frame=body, location=point)
+            )
+        carrier = body
+    knee = [item for item in model.components(osimlite.Coordinate) if "/j2/" in item.path]
+    for number, item in enumerate(knee):
+        item.name = f"knee{number}"
+    if kind == "clamped":
+        knee[0].clamped, knee[0].range = True, (-0.3, 2.0)
+    if kind == "locked":
+        knee[1].locked, knee[1].default_value = True, 0.1
+    if kind == "coupled":
+        model.add(
+            osimlite.CoordinateCouplerConstraint(
+                name="c",
+                independent_coordinate_names=("knee0",),
+                dependent_coordinate_name="knee1",
+                coupled_coordinates_function=osimlite.PolynomialFunction(
+                    coefficients=(0.4, -0.3, 0.05)
+                ),
+            )
+        )
+    return model
+
+
+class Place(NamedTuple):
+    """A word of the text that names a component: what kind of reference it is, and where it stands."""
+
+    kind: str
+    start: int
+    word: str
+
+
+class Target(NamedTuple):
+    """A component that a reference leads to: its class, its name, its element and the value of its name attribute."""
+
+    cls: str
+    name: str
+    start: int
+    end: int
+    name_start: int
+
+
+class Victim(NamedTuple):
+    """A model to break: its text, where it is kept with the files it needs, its references by kind, their targets."""
+
+    name: str
+    folder: Path
+    text: str
+    places: dict[str, list[Place]]
+    names: list[str]
+    targets: dict[str, list[Target]]
+
+
+def places_of(source: Source) -> Iterator[Place]:
+    """Every reference in a document that stands in its text."""
+    subject = Subject(survey_source(source))
+    seen = set()
+    for use in subject.uses:
+        if use.reference.rule in ("file", "column", "positional", "point-index", "input"):
+            continue
+        number = use.holder.source_index
+        if number is None or not isinstance(use.value, str):
+            continue
+        if use.spec.name == "name":
+            line, column, _ = source.of_attribute(number, "name")
+            start, kind = source.line_start(line) + column - 1, f"{type(use.holder).__name__}.name"
+        else:
+            element = source.child(number, use.spec.tag)
+            if element is None:
+                continue
+            span = source.spans[element]
+            start = source.text.find(use.value, span.tag_end, span.inner_end)
+            kind = f"{use.spec.declared_in.__name__}.{use.spec.tag}"
+        if source.text.startswith(use.value, start) and start >= 0 and start not in seen:
+            seen.add(start)
+            yield Place(kind, start, use.value)
+
+
+def targets_of(source: Source) -> Iterator[Target]:
+    """Every component of a document that a reference leads to and that has a name in the text."""
+    subject = Subject(survey_source(source))
+    seen = set()
+    for use in subject.uses:
+        target = subject.resolution(use).target
+        if (
+            target is None
+            or target.source_index is None
+            or target is use.owner
+            or target.source_index in seen
+        ):
+            continue
+        seen.add(target.source_index)
+        span = source.spans[target.source_index]
+        line, column, _ = source.of_attribute(target.source_index, "name")
+        start = source.line_start(line) + column - 1
+        if target.name and source.text.startswith(f'"{target.name}"', start - 1):
+            yield Target(type(target).__name__, target.name, span.start, span.end, start)
+
+
+def victim(model: CorpusModel, folder: Path) -> Victim | None:
+    """A model that OpenSim loads, in OpenSim's own print of it; None if the validator finds errors in it as it is."""
+    if model.converted is None:
+        return None
+    folder.mkdir()
+    for other in model.path.parent.iterdir():
+        if other.is_file() and other != model.path:
+            shutil.copy(other, folder / other.name)
+    text = gzip.decompress(model.converted.read_bytes()).decode()
+    source = Source(text.encode())
+    if not validate(source, ignore="OSIM63").ok:
+        return None
+    places: dict[str, list[Place]] = {}
+    for place in places_of(source):
+        places.setdefault(place.kind, []).append(place)
+    names = sorted({place.word for group in places.values() for place in group})
+    targets: dict[str, list[Target]] = {}
+    for target in targets_of(source):
+        targets.setdefault(target.cls, []).append(target)
+    return Victim(model.id, folder, text, places, names, targets) if names else None
+
+
+REFUSES = re.compile(r"(?:OpenSim|and) (?:refuses|rejects|crashes|cannot load)|which rejects it")
+
+
+# Words of another fate, or of a refusal that is only one of several.
+ELSE = re.compile(
+    r"OpenSim (?:ignores|takes the first|uses the first|keeps)|leaves the object out|crashes or|, or |needs (?:one|a value)|"
+    r"other programs reject|OpenSim creates|disables the whole"
+)
+
+
+# Rules whose page says that OpenSim refuses whatever they find.
+ALWAYS = re.compile(r"OSIM(?:107|209|30[1-5]|312|33[123]|402|405|41[13]|501|611|615|622)")
+
+
+def claims_refusal(finding: Finding) -> bool:
+    """Whether a finding says, without an alternative, that OpenSim does not take the model."""
+    if ELSE.search(finding.message):
+        return False
+    return ALWAYS.match(finding.code) is not None or REFUSES.search(finding.message) is not None
+
+
+KEPT = (
+    "name",
+    "max_isometric_force",
+    "optimal_fiber_length",
+    "tendon_slack_length",
+    "pennation_angle_at_optimal",
+)
+
+
+def with_muscles_of(model: Model, cls: type[Muscle], more: dict[str, Any]) -> Model:
+    """A model whose muscles are of another class."""
+    forces = model.force_set.objects
+    for index, muscle in enumerate(list(forces)):
+        if isinstance(muscle, Muscle):
+            forces[index] = cls(**{name: getattr(muscle, name) for name in KEPT}, **more)
+            forces[index].geometry_path = muscle.geometry_path.copy_deep()
+    return model
+
+
+OPERATIONS = "value", "integrate", "differentiate", "minimum", "minabs", "maximum", "maxabs"
+
+
+@pytest.fixture(params=list(JOINTS.values()), ids=list(JOINTS))
+def model(request):
+    return carrier(request.param)
+
+
+def add_actuators(model):
+    """One of each class that has one control and pushes bodies or coordinates."""
+    bodies = {"bodyA": "b2", "bodyB": "b0"}
+    for there in (False, True):
+        model.add(
+            PointActuator(
+                name=f"point{there:d}", body="b1", point=(0.1, 0.2, 0.3), point_is_global=there
+            ),
+            PointToPointActuator(
+                name=f"points{there:d}", pointA=(0.1, 0.2, 0.3), points_are_global=there, **bodies
+            ),
+            TorqueActuator(
+                name=f"torque{there:d}", axis=(1.0, 2.0, -0.5), torque_is_global=there, **bodies
+            ),
+        )
+    model.add(
+        TorqueActuator(
+            name="turned",
+            bodyA="/bodyset/b2/f2",
+            bodyB="b1",
+            axis=(1.0, 0.0, 0.5),
+            torque_is_global=False,
+        ),
+        CoordinateActuator(name="motor", coordinate="q1_0", optimal_force=7.0),
+        CoordinateActuator(name="off", coordinate="q0_0", appliesForce=False),
+        ActivationCoordinateActuator(name="slow", coordinate="q2_0"),
+        *along(PathActuator, optimal_force=30.0),
+    )
+    muscles = along(Thelen2003Muscle, optimal_fiber_length=0.4)
+    for muscle in muscles:
+        muscle.name = f"muscle_{muscle.name}"
+    model.add(*muscles)
+    names = [force.name for force in model.force_set.objects]
+    drive(model, *names)
+
+
+TOOL_SETUP = """<OpenSimDocument Version="40600">
+    <{tool} name="it">
+        <model_file>model.osim</model_file>
+        <results_directory>{results}</results_directory>
+        <coordinates_file>motion.mot</coordinates_file>
+        <lowpass_cutoff_frequency_for_coordinates>{cutoff}</lowpass_cutoff_frequency_for_coordinates>
+        {more}
+    </{tool}>
+</OpenSimDocument>
+"""
+
+
+def real(corpus: Any, name: str) -> Path:
+    """The file of a real model."""
+    path: Path = next(model.path for model in corpus if model.id == name)
+    return path
+
+
+def both(
+    folder: Path, model: Model, tool: str, more: str, cutoff: float = -1.0,
+    change: Callable[[Path], object] | None = None,
+) -> tuple[Path, Path]:  # fmt: skip
+    """Where we and OpenSim have put the results of a tool on some motion of a model, which may be changed."""
+    osimlite.write(model, folder / "model.osim")
+    mechanism = osimlite.mechanism(model)
+    times = np.linspace(0.0, 0.5, 26)
+    infos = mechanism.coordinates
+    rows = np.array(
+        [
+            info.default_value + 0.15 * np.sin(5 * times + k) * (not info.locked)
+            for k, info in enumerate(infos)
+        ]
+    )
+    if mechanism.constraints and tool != "InverseDynamicsTool":
+        # Where constraints are to be fulfilled, OpenSim moves coordinates by 1e-5 rad off the ends
+        # of their ranges.
+        low, high = np.array([info.range for info in infos]).T[:, :, None]
+        starts = np.clip(rows[:, :1], low + 0.2, high - 0.2)
+        moved = np.clip(rows + starts - rows[:, :1], low + 0.1, high - 0.1)
+        rows = np.where(np.array([[info.locked] for info in infos]), rows, moved)
+        rows = np.array([mechanism.assemble(q) for q in rows.T]).T
+    turns = [info.motion_type == "rotational" for info in mechanism.coordinates]
+    write_sto(
+        folder / "motion.mot", "motion", times, mechanism.coordinate_names,
+        np.where(turns, np.degrees(rows.T), rows.T).tolist(), in_degrees=True,
+    )  # fmt: skip
+    if change is not None:
+        change(folder)
+    for results in ("ours", "theirs"):
+        (folder / f"{results}.xml").write_text(
+            TOOL_SETUP.format(tool=tool, results=results, cutoff=cutoff, more=more)
+        )
+    script = f"import opensim; opensim.Logger.setLevelString('Error'); assert opensim.{tool}('theirs.xml').run()"
+    subprocess.run(
+        [sys.executable, "-c", script], cwd=folder, check=True, capture_output=True, timeout=100
+    )
+    osimlite.run(folder / "ours.xml")
+    return folder / "ours", folder / "theirs"
+
+
+def compare(ours: Path, theirs: Path, tolerance: float, small: float = 1e-11) -> None:
+    """All files are there, with the same words and numbers that differ by parts of the largest of their columns."""
+    assert sorted(path.name for path in ours.iterdir()) == sorted(
+        path.name for path in theirs.iterdir()
+    )
+    for file in ours.iterdir():
+        one, two = (
+            path.read_text().partition("endheader\n") for path in (file, theirs / file.name)
+        )
+        assert (one[0], one[2].partition("\n")[0]) == (two[0], two[2].partition("\n")[0]), file.name
+        mine, known = read_sto(file), read_sto(theirs / file.name)
+        assert mine.times.tolist() == known.times.tolist()
+        largest = np.abs(known.rows).max(axis=0)
+        assert (np.abs(mine.rows - known.rows).max(axis=0) <= tolerance * largest + small).all(), (
+            file.name
+        )
+
+
+COMMENT_LINE = re.compile(r"[ \t]*<!--.*?-->\n", re.DOTALL)

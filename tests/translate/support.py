@@ -1,0 +1,47 @@
+"""Models, data and comparisons that several test modules of this package share."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ElementTree
+
+import numpy as np
+
+from osimlite.schema.frames import Body
+from osimlite.schema.joints import WeldJoint
+from osimlite.schema.model import Model
+from osimlite.translate.export import Urdf
+from osimlite.translate.survey import CONTAINERS
+
+
+def kinds(urdf: Urdf) -> dict[str, list[str]]:
+    """Components by kind of record."""
+    result: dict[str, list[str]] = {}
+    for record in urdf.fidelity:
+        result.setdefault(record.kind, []).append(record.component)
+    return result
+
+
+def unaccounted(model: Model, urdf: Urdf) -> list[str]:
+    paths = [
+        component.path for component in model.components() if not isinstance(component, CONTAINERS)
+    ]
+    return urdf.fidelity.list_missing(paths)
+
+
+def one_body(*shapes, joint=None, **body) -> Model:
+    """A model of one body with these shapes, on a weld unless a joint is given."""
+    model = Model(name="one")
+    block = model.add(Body(name="block", mass=2.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0), **body))
+    block.attach(*shapes)
+    joint = joint or WeldJoint(name="weld")
+    model.add(joint.between(model.ground, block, at=(0.0, 1.0, 0.0)))
+    return model
+
+
+def visuals(urdf: Urdf, link: str = "block"):
+    return ElementTree.fromstring(urdf.text).findall(f"link[@name='{link}']/visual")
+
+
+def vertices(content: bytes):
+    lines = [line.split() for line in content.decode().splitlines()]
+    return np.array([[float(word) for word in line[1:]] for line in lines if line[0] == "v"])
