@@ -189,7 +189,7 @@ def main() -> None:
     sys.path.insert(0, str(HERE.parent))
     import opensim
 
-    from tests.oracle.test_lint_structural_edits import ALWAYS, ELSE, REFUSES
+    from tests.oracle.support import ALWAYS, ELSE, REFUSES
 
     opensim.Logger.setLevelString("Off")
     opensim.Logger.removeFileSink()
