@@ -34,3 +34,31 @@ def make_notebook_repr(by: str) -> Callable[[Any], str]:
         return getattr(import_module("osimlite.view.notebook"), by)(self)
 
     return _repr_html_
+
+
+def make_plot(by: str) -> Callable[..., Any]:
+    """Return the ``plot`` method of a class, which draws its objects by matplotlib.
+
+    Args:
+        by: name of the function in :mod:`osimlite.view.plotted` that returns the pictures.
+    """
+
+    def plot(self: Any, folder: Any = None) -> Any:
+        """Draw the columns: left and right in one panel, one unit per axis, twelve panels a page.
+
+        Args:
+            folder: folder to write the pages into as PNG; nothing is written without one.
+
+        Returns:
+            The pages, which notebooks show: a list with the name and the matplotlib figure of each.
+
+        Raises:
+            MissingDependency: matplotlib is not installed.
+            OsimliteError: there is no time to draw, or the folder cannot be written.
+        """
+        pages = getattr(import_module("osimlite.view.plotted"), by)(self)
+        if folder is not None:
+            pages.write(folder)
+        return pages
+
+    return plot

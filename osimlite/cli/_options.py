@@ -178,6 +178,13 @@ Folder = Annotated[
         show_default="named after the model's file",
     ),
 ]
+Plot = Annotated[
+    bool,
+    Option(
+        "--plot",
+        help="Draw the results as PNG: left and right in one panel, at most 12 panels a page.",
+    ),
+]
 Geometry = Annotated[
     list[Path] | None,
     Option(

@@ -1,15 +1,20 @@
-"""What the commands on recorded motions share: writing tables."""
+"""What the commands on recorded motions share: writing and drawing tables."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from osimlite.base.files import make_folder
 from osimlite.base.text import join_words
 from osimlite.cli._console import say
 from osimlite.io.tables.storage import StoTable, write_sto
 from osimlite.simulation.recorded_motion import RecordedMotion
+
+if TYPE_CHECKING:
+    from osimlite.mechanics.multibody.mechanism import Mechanism
+    from osimlite.schema.model import Model
 
 
 def written(
@@ -46,3 +51,66 @@ def say_motion(recorded: RecordedMotion, files: Iterable[Path]) -> None:
     times = recorded.times
     paths = join_words([str(file) for file in files])
     say(f"{len(times)} times from {times[0]:g} s to {times[-1]:g} s; wrote {paths}")
+
+
+def require_plots(*, plot: bool) -> None:
+    """Raise MissingDependency if pictures are requested, but matplotlib is not installed."""
+    if plot:
+        from osimlite.base.require import require
+
+        require("matplotlib", extra="plot", purpose="drawing")
+
+
+def draw_tables(
+    tables: Mapping[str, StoTable],
+    folder: Path,
+    model: Model | None,
+    mechanism: Mechanism | None,
+    loads: Any = None,
+    *,
+    err: bool = False,
+) -> list[Path]:
+    """Draw tables into a folder, and say how many pictures there are.
+
+    Args:
+        tables: tables by the names of their files.
+        folder: folder to write into.
+        model: model of the tables, for units of actuators and regions of muscles.
+        mechanism: mechanism of the model, for units of coordinates.
+        loads: file of measured loads, in which steps are searched; None without.
+        err: whether to report on standard error.
+
+    Returns:
+        The PNG files.
+    """
+    from osimlite.cli._progress import progress_bar
+    from osimlite.view.table_plots import Names, plot_tables
+
+    with progress_bar("drawing", len(tables)) as progress:
+        names = Names.of_model(model, mechanism)
+        steps = _find_steps(loads, mechanism)
+        written = plot_tables(tables, folder, names, steps=steps, report=progress)
+    say(describe_pictures(written), err=err)
+    return written
+
+
+def describe_pictures(files: list[Path]) -> str:
+    """Return what was drawn, in a sentence."""
+    if not files:
+        return "no picture: nothing changes over time"
+    if len(files) == 1:
+        return f"drew {files[0]}"
+    return f"drew {len(files)} pictures into {files[0].parent}"
+
+
+def _find_steps(loads: Any, mechanism: Mechanism | None) -> dict[str, Any]:
+    """Return the steps of the feet by side; none if the loads do not show them."""
+    if mechanism is None or loads is None or Path(str(loads)).suffix.lower() != ".xml":
+        return {}
+    from osimlite.errors import OsimliteError
+    from osimlite.tools.evidence import find_steps
+
+    try:
+        return dict(find_steps(Path(loads), int(abs(mechanism.gravity).argmax())))
+    except OsimliteError:
+        return {}

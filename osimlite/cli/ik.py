@@ -32,6 +32,7 @@ def ik(
     free: Annotated[
         bool, Option("--without-constraints", help="Ignore the constraints of the model.")
     ] = False,
+    plot: options.Plot = False,
     output: options.Folder = None,
 ) -> None:
     """Compute the motion that fits measured markers: writes ik.mot and marker_errors.sto.
@@ -47,6 +48,7 @@ def ik(
     from osimlite.base.files import make_folder, write_atomically
     from osimlite.base.text import join_words
     from osimlite.cli._console import say
+    from osimlite.cli._recorded import draw_tables, require_plots
     from osimlite.fitting.fit_messages import NO_EFFECT, describe_fit, describe_unknown
     from osimlite.fitting.ik_tool import create_motion_table
     from osimlite.fitting.inverse_kinematics import inverse_kinematics
@@ -54,9 +56,10 @@ def ik(
     from osimlite.fitting.orientation_data import holds_orientations
     from osimlite.io.document.reader import read
     from osimlite.io.tables.old_storage import UNITS, format_old_table
-    from osimlite.io.tables.storage import write_sto
+    from osimlite.io.tables.storage import StoTable, write_sto
     from osimlite.schema.markers import Marker
 
+    require_plots(plot=plot)
     weights, kept = (
         options.parse_named_numbers(weight, "--weight"),
         options.parse_named_numbers(keep, "--keep"),
@@ -75,9 +78,8 @@ def ik(
     )
     folder = options.results_folder(file, output)
     make_folder(folder)
-    write_atomically(
-        folder / "ik.mot", "".join(format_old_table(create_motion_table(motion), f"\n{UNITS}"))
-    )
+    table = create_motion_table(motion)
+    write_atomically(folder / "ik.mot", "".join(format_old_table(table, f"\n{UNITS}")))
     what, names, errors = "marker", motion.markers, motion.marker_errors
     if of_sensors:
         what, names, errors = "orientation", motion.sensors, motion.orientation_errors
@@ -100,3 +102,7 @@ def ik(
         if unknown := [name for name in data.names if name not in known]:
             say(f"in the data, but not in the model: {join_words(unknown)}")
     say(f"wrote {folder / 'ik.mot'} and {folder / f'{what}_errors.sto'}")
+    if plot:
+        of_errors = StoTable(f"{what} errors", motion.times, tuple(names), errors)
+        tables = {"ik.mot": table, f"{what}_errors.sto": of_errors}
+        draw_tables(tables, folder, model, motion.mechanism)

@@ -24,6 +24,7 @@ def inverse_dynamics(
     lowpass: options.Lowpass = None,
     first: options.FirstFrame = float("-inf"),
     last: options.LastFrame = float("inf"),
+    plot: options.Plot = False,
     output: options.Folder = None,
     **chosen: Any,
 ) -> None:
@@ -36,12 +37,14 @@ def inverse_dynamics(
 
     Example: osimlite inverse-dynamics gait2392.osim walk.mot --lowpass 6 --external-loads grf.xml
     """
-    from osimlite.cli._recorded import written
+    from osimlite.cli._recorded import draw_tables, require_plots, written
     from osimlite.io.document.reader import read
     from osimlite.simulation.inverse_dynamics import inverse_dynamics as forces_of
 
+    require_plots(plot=plot)
+    model = read(file)
     table = forces_of(
-        read(file),
+        model,
         motion,
         applied_to=options.parse_applied_loads(applied),
         exclude=exclude or ["Muscles"],
@@ -52,4 +55,8 @@ def inverse_dynamics(
         **chosen,
     )
     assert table.motion is not None
-    written(table.motion, {"inverse_dynamics.sto": table}, options.results_folder(file, output))
+    folder, tables = options.results_folder(file, output), {"inverse_dynamics.sto": table}
+    written(table.motion, tables, folder)
+    if plot:
+        loads = chosen.get("external_loads")
+        draw_tables(tables, folder, model, table.motion.mechanism, loads)

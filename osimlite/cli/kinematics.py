@@ -22,6 +22,7 @@ def kinematics(
     lowpass: options.Lowpass = None,
     first: options.FirstFrame = float("-inf"),
     last: options.LastFrame = float("inf"),
+    plot: options.Plot = False,
     output: options.Folder = None,
 ) -> None:
     """Compute positions of bodies and markers along a recorded motion: writes bodies.sto and markers.sto.
@@ -32,12 +33,15 @@ def kinematics(
 
     Example: osimlite kinematics gait2392.osim walk.mot -o results
     """
-    from osimlite.cli._recorded import written
+    from osimlite.cli._recorded import draw_tables, require_plots, written
     from osimlite.io.document.reader import read
     from osimlite.simulation.inverse_dynamics import kinematics as followed
 
-    recorded = followed(
-        read(file), motion, assemble=assemble, lowpass=lowpass, start=first, end=last
-    )
+    require_plots(plot=plot)
+    model = read(file)
+    recorded = followed(model, motion, assemble=assemble, lowpass=lowpass, start=first, end=last)
     tables = {"bodies.sto": recorded.bodies(), "markers.sto": recorded.markers()}
-    written(recorded, tables, options.results_folder(file, output), trc=trc)
+    folder = options.results_folder(file, output)
+    written(recorded, tables, folder, trc=trc)
+    if plot:
+        draw_tables(tables, folder, model, recorded.mechanism)

@@ -54,6 +54,13 @@ def run(
             show_default=False,
         ),
     ] = None,
+    plot: Annotated[
+        bool,
+        Option(
+            "--plot",
+            help="Draw every table as PNG, at most 12 panels a page, into a folder <setup>-plots.",
+        ),
+    ] = False,
     refine: Annotated[
         str | None,
         Option(
@@ -104,22 +111,25 @@ def run(
     """
     from osimlite.base.files import expect_folder_of
     from osimlite.cli._progress import progress_bar
+    from osimlite.cli._recorded import require_plots
     from osimlite.errors import SettingError
     from osimlite.tools.many import find_setups, run_many
     from osimlite.tools.named_files import find_inputs
 
+    require_plots(plot=plot)
     files = find_setups(setups)
-    if report is not None:
+    for option in (["--report"] if report is not None else []) + (["--plot"] if plot else []):
         if resume or cluster or workers not in (None, 1):
             raise SettingError(
-                "--report runs setups one after the other; leave out --workers, --cluster and --resume"
+                f"{option} runs setups one after the other; leave out --workers, --cluster and --resume"
             )
+        workers = 1
+    if report is not None:
         expect_folder_of(report)
         if any(find_inputs([report], setup) for setup in files):
             raise SettingError(
                 f"--report would replace '{report}', which the results come from; give it another name"
             )
-        workers = 1
     if len(files) == 1 and not as_json and not (resume or cluster):
         outcome = _run_alone(
             files[0],
@@ -130,12 +140,14 @@ def run(
             write_outside=write_outside,
         )
         _write_report({files[0]: outcome}, report)
+        if plot:
+            _draw_outcome(files[0], outcome, output)
         raise SystemExit(0 if outcome.done else 1)
     if refine is not None:
         raise SettingError(
             "--refine takes one study; leave out the others, --json, --resume and --cluster"
         )
-    kept: dict[str | Path, Outcome] | None = None if report is None else {}
+    kept: dict[str | Path, Outcome] | None = {} if report is not None or plot else None
     count = 1 if workers is None and cluster is None and len(files) < WORTH_SHARING else workers
     with progress_bar("running", len(files)) as progress:
         trials = run_many(
@@ -159,6 +171,8 @@ def run(
         _show_trials(trials)
     if kept:
         _write_report(kept, report, err=as_json)
+        for setup, outcome in kept.items() if plot else ():
+            _draw_outcome(Path(setup), outcome, output, err=as_json)
     raise SystemExit(max(_codes(trials), default=0))
 
 
@@ -210,6 +224,31 @@ def _write_report(
         from osimlite.tools.report import report as write_report
 
         say(f"wrote {write_report(outcomes, report)}", err=err)
+
+
+def _draw_outcome(setup: Path, outcome: Outcome, output: Path | None, *, err: bool = False) -> None:
+    """Draw the tables of a setup into a folder that is named after it.
+
+    Args:
+        setup: the setup.
+        outcome: its results.
+        output: folder of all results; the current folder if the setups name theirs.
+        err: whether to report on standard error.
+    """
+    from osimlite.base.writing import expect_folder_inside
+    from osimlite.cli._recorded import draw_tables
+    from osimlite.mechanics.multibody import build_mechanism
+
+    if not outcome.tables:
+        return
+    folder = Path(output or "", f"{setup.stem}-plots")
+    if output is None:
+        expect_folder_inside(folder)
+    evidence = outcome.evidence
+    model = None if evidence is None else evidence.model
+    mechanism = None if model is None else build_mechanism(model)
+    loads = None if evidence is None else evidence.loads
+    draw_tables(outcome.tables, folder, model, mechanism, loads, err=err)
 
 
 def _show_findings(report: Report) -> None:

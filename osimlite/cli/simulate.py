@@ -139,6 +139,9 @@ def simulate(
 ENGINE_NAMES = {"bullet": "PyBullet"}
 """Names of engines for people, where they differ from those of the option."""
 
+MAX_PAGES = 1000
+"""More pages than plots of a simulation can have."""
+
 INTEGRATOR_NAMES = {
     "RungeKuttaMerson": "Runge-Kutta-Merson",
     "SemiImplicitEuler": "semi-implicit Euler",
@@ -158,6 +161,18 @@ SOME = {
     ),
 }
 """What not every simulation writes: --plot and --animate draw pictures."""
+
+
+def _list_earlier(folder: Path) -> set[str]:
+    """Return the names of files that an earlier simulation may have left, with further pages."""
+    names = set(SOME)
+    for picture in (Path(name) for name in SOME if name.endswith(".png")):
+        for page in range(2, MAX_PAGES):
+            name = f"{picture.stem}-{page}.png"
+            if not (folder / name).is_file():
+                break
+            names.add(name)
+    return names
 
 
 def write_files(
@@ -191,7 +206,7 @@ def write_files(
         for path in written:
             replace_with(path, folder / path.name)
         # Files of an earlier simulation would be taken for those of this one.
-        for name in SOME - {path.name for path in written}:
+        for name in _list_earlier(folder) - {path.name for path in written}:
             (folder / name).unlink(missing_ok=True)
     except BaseException as error:
         shutil.rmtree(folder if is_new else beside, ignore_errors=True)

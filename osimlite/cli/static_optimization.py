@@ -41,6 +41,7 @@ def static_optimization(
     lowpass: options.Lowpass = None,
     first: options.FirstFrame = float("-inf"),
     last: options.LastFrame = float("inf"),
+    plot: options.Plot = False,
     output: options.Folder = None,
     **chosen: Any,
 ) -> None:
@@ -57,12 +58,14 @@ def static_optimization(
         --forces reserves.xml
     """
     from osimlite.cli._console import complain
-    from osimlite.cli._recorded import say_motion
+    from osimlite.cli._recorded import draw_tables, require_plots, say_motion
     from osimlite.io.document.reader import read
     from osimlite.simulation.muscle_forces import static_optimization as shared_forces
 
+    require_plots(plot=plot)
+    model = read(file)
     found = shared_forces(
-        read(file),
+        model,
         motion,
         applied_to=options.parse_applied_loads(applied),
         forces=forces or (),
@@ -76,7 +79,15 @@ def static_optimization(
         **chosen,
     )
     assert found.motion is not None
-    say_motion(found.motion, found.write(options.results_folder(file, output)))
+    folder = options.results_folder(file, output)
+    files = found.write(folder)
+    say_motion(found.motion, files)
+    if plot:
+        from osimlite.simulation.inverse_dynamics import add_forces
+
+        add_forces(model, forces or (), replace=replace)
+        tables = {files[0].name: found, files[1].name: found.forces or found}
+        draw_tables(tables, folder, model, found.motion.mechanism, chosen.get("external_loads"))
     if said := found.describe_unsolved():
         complain(said)
         raise SystemExit(1)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from osimlite.cli import _options as options
 from osimlite.cli import _sweeping as sweeping
 from osimlite.cli._command import Option, command_with
-from osimlite.cli._console import Facts, complain
+from osimlite.cli._console import Facts, complain, say
 
 if TYPE_CHECKING:
     from osimlite.studies.sweep.plan import Plan
@@ -63,6 +63,13 @@ def sweep(
         ),
     ] = Path("results.parquet"),
     resume: Annotated[bool, Option("--resume", help="Continue an interrupted sweep.")] = False,
+    plot: Annotated[
+        bool,
+        Option(
+            "--plot",
+            help="Draw each measure over the varied quantities as PNG, beside the results.",
+        ),
+    ] = False,
     force: Annotated[bool, Option("--force", help="Replace results of other settings.")] = False,
     controls: options.Controls = None,
     controller: options.Controller = None,
@@ -78,9 +85,11 @@ def sweep(
         --samples 1000
     """
     from osimlite.cli._progress import progress_bar
+    from osimlite.cli._recorded import describe_pictures, require_plots
     from osimlite.studies.sweep.run import sweep as run
     from osimlite.studies.sweep.sampling import choose_samples as choose
 
+    require_plots(plot=plot)
     plan = sweeping.make_plan(
         source,
         vary,
@@ -111,6 +120,17 @@ def sweep(
             progress=progress,
         )
     _describe_sweep(plan, outcome).show()
+    if plot:
+        from osimlite.studies.sweep.measures import measure_name
+        from osimlite.view.sweep_plots import plot_runs
+
+        names = [measure_name(spec) for spec in plan.measures]
+        variables = [variable.name for variable in plan.variables]
+        with progress_bar("drawing", None):
+            written = plot_runs(
+                outcome.to_arrow().to_pydict(), variables, names, output.parent, output.stem
+            )
+        say(describe_pictures(written))
     if outcome.status["failed"] == outcome.count:
         complain("every run failed")
         raise SystemExit(1)

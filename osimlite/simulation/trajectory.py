@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from osimlite.base.files import make_folder, write_atomically
-from osimlite.base.lazy import make_notebook_repr
+from osimlite.base.lazy import make_notebook_repr, make_plot
 from osimlite.base.require import require
 from osimlite.base.text import format_json
 from osimlite.io.tables.storage import StoTable, format_sto
@@ -42,6 +42,7 @@ class Trajectory(Tabular):
     """
 
     _repr_html_ = make_notebook_repr("trajectory")
+    plot = make_plot("plot_trajectory")
 
     def __init__(
         self,
@@ -284,6 +285,8 @@ class Movement(Tabular):
     mechanism: Mechanism  # the mechanism
     times: Array  # times (t,), s
     values: Array  # values of all n coordinates (t, n), in the mechanism's order, rad and m
+
+    plot = make_plot("plot_movement")
 
     @property
     def coordinates(self) -> tuple[str, ...]:

@@ -32,7 +32,7 @@ from osimlite.tools.trials.check import check_trial
 from osimlite.tools.trials.folder import SETUPS
 from osimlite.view.lettering import plain_lettering
 from osimlite.view.motion import contact_forces
-from osimlite.view.plots import COLORS, STYLES, figure_of
+from osimlite.view.panels import COLORS, STYLES, figure_of
 from osimlite.view.recording import MeasuredMarkers, Recording, compute_forces
 from osimlite.view.shown import Shown
 

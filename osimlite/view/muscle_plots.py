@@ -1,7 +1,8 @@
-"""Pictures of muscles over one coordinate or two."""
+"""Plots of muscles over one coordinate or two."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping, Sequence
 from math import ceil
 from pathlib import Path
 from typing import Any
@@ -10,16 +11,10 @@ import numpy as np
 
 from osimlite.base.files import make_folder
 from osimlite.mechanics.multibody.mechanism import Mechanism
+from osimlite.mechanics.multibody.spatial import Array
 from osimlite.simulation.muscle_curves import QUANTITIES, MuscleCurves
-from osimlite.view.lettering import plain_lettering
-from osimlite.view.plots import (
-    divide_among_panels,
-    figure_of,
-    finish_panels,
-    lines_in,
-    make_sheet,
-    save_figure,
-)
+from osimlite.view.panels import COLORS, figure_of, split_sides, style_axes, write_pages
+from osimlite.view.plots import divide_among_panels
 
 _TITLES = {
     "length": "Muscle-tendon length",
@@ -27,9 +22,12 @@ _TITLES = {
     "active_fiber_force": "Active fiber force along the tendon, at rest",
     "passive_fiber_force": "Passive fiber force along the tendon",
 }
-_MOST = 60
-"""Muscles of one picture."""
-_ACROSS = 4
+MAX_LINE_PANELS = 6
+"""Panels of a page of curves, each with up to seven muscles."""
+MAX_MAPS = 12
+"""Maps of a page."""
+MAPS_ACROSS = 4
+"""Maps side by side."""
 
 
 def plot_muscles(
@@ -37,43 +35,45 @@ def plot_muscles(
     mechanism: Mechanism,
     folder: str | Path,
     other: MuscleCurves | None = None,
+    *,
+    regions: Mapping[str, str] | None = None,
 ) -> list[Path]:
-    """Draw each quantity over the coordinates that were swept.
+    """Draw each quantity over the swept coordinates, on pages that fit a screen.
+
+    The muscles of a region share panels; the left muscle of a pair is dashed.
 
     Args:
-        curves: of one coordinate or two.
-        mechanism: of their model.
-        folder: where the pictures go; made if it is not there.
-        other: of the same muscles and poses of another model, drawn thin and dashed.
+        curves: curves over one coordinate or two.
+        mechanism: mechanism of the model.
+        folder: folder to write into; it is made if it does not exist.
+        other: curves of the same muscles in the same poses of another model, drawn thin.
+        regions: bodies between which the muscles run, by name.
 
     Returns:
-        The PNG files, one for each quantity: ``moment_arm_knee_angle_r.png``, ``tendon_force.png``.
+        The PNG files: ``moment_arm_knee_angle_r.png``, ``tendon_force.png``, and further pages as
+        ``tendon_force-2.png``. A quantity that is unknown for all muscles has none.
 
     Raises:
         MissingDependency: matplotlib is not installed.
         OsimliteError: the folder cannot be written to.
     """
-    base = Path(folder)
-    make_folder(base)
+    base = make_folder(Path(folder))
     written = []
-    with plain_lettering():
-        for quantity, rows in curves.columns.items():
-            title = _title(quantity)
-            if len(curves.coordinates) == 2:
-                figure = _draw_maps(curves, mechanism, rows, title)
-            else:
-                figure = _draw_lines(
-                    curves,
-                    mechanism,
-                    rows,
-                    title,
-                    None if other is None else other.columns[quantity],
-                )
-            written.append(save_figure(figure, base / f"{quantity}.png"))
+    for quantity, rows in curves.columns.items():
+        if not np.isfinite(rows).any():
+            continue
+        title = _make_title(quantity)
+        if len(curves.coordinates) == 2:
+            pages = _draw_maps(curves, mechanism, rows, title)
+        else:
+            beside = None if other is None else other.columns[quantity]
+            pages = _draw_lines(curves, mechanism, rows, title, beside, regions or {})
+        written += write_pages(pages, base, quantity)
     return written
 
 
-def _title(quantity: str) -> str:
+def _make_title(quantity: str) -> str:
+    """Return the title of a quantity with its unit."""
     if quantity in QUANTITIES:
         unit = QUANTITIES[quantity]
         title = _TITLES.get(quantity, quantity.replace("_", " ").capitalize())
@@ -82,55 +82,112 @@ def _title(quantity: str) -> str:
     return f"{title} ({unit})" if unit else title
 
 
-def _axis(curves: MuscleCurves, mechanism: Mechanism, place: int) -> tuple[str, Any]:
-    """Label and values of a coordinate, angles in degrees."""
-    name, values = curves.coordinates[place], curves.poses[:, place]
+def _get_abscissa(curves: MuscleCurves, mechanism: Mechanism, index: int) -> tuple[str, Array]:
+    """Return label and values of a coordinate, angles in degrees."""
+    name, values = curves.coordinates[index], curves.poses[:, index]
     info = mechanism.coordinates[mechanism.coordinate_index(name)]
     is_angle = info.motion_type == "rotational"
-    return f"{name} (deg)" if is_angle else f"{name} (m)", np.degrees(
-        values
-    ) if is_angle else values
+    label = f"{name.rpartition('/')[2]} ({'deg' if is_angle else 'm'})"
+    return label, np.degrees(values) if is_angle else values
 
 
-def _names(curves: MuscleCurves) -> list[str]:
+def _get_names(curves: MuscleCurves) -> list[str]:
+    """Return the names of the muscles."""
     return [path.rpartition("/")[2] for path in curves.muscles]
 
 
 def _draw_lines(
-    curves: MuscleCurves, mechanism: Mechanism, rows: Any, title: str, other: Any
-) -> Any:
-    label, across = _axis(curves, mechanism, 0)
-    parts = divide_among_panels(dict(zip(_names(curves)[:_MOST], rows.T, strict=False)))
-    figure, axes = make_sheet(title, [3.0] * len(parts))
-    for panel, part in zip(axes, parts, strict=True):
-        lines_in(panel, across, part)
-        if other is not None:
-            beside = dict(zip(_names(curves), other.T, strict=True))
-            lines_in(panel, across, {name: beside[name] for name in part}, ls="--", lw=0.9)
-    finish_panels(axes, across, _add_note(curves), label)
-    return figure
+    curves: MuscleCurves,
+    mechanism: Mechanism,
+    rows: Array,
+    title: str,
+    other: Array | None,
+    regions: Mapping[str, str],
+) -> Iterator[Any]:
+    """Yield the pages of one quantity over a coordinate."""
+    label, across = _get_abscissa(curves, mechanism, 0)
+    names = _get_names(curves)
+    sides, columns = split_sides(names), dict(zip(names, rows.T, strict=True))
+    beside = {} if other is None else dict(zip(names, other.T, strict=True))
+    # A pair is one entry of a panel, whatever the number of its sides.
+    groups: dict[str, dict[str, list[str]]] = {}
+    for name in names:
+        if np.isfinite(columns[name]).any():
+            group = groups.setdefault(regions.get(name, ""), {})
+            group.setdefault(sides[name][0], []).append(name)
+    panels = [
+        (region, part) for region, pairs in groups.items() for part in divide_among_panels(pairs)
+    ]
+    pages = ceil(len(panels) / MAX_LINE_PANELS)
+    size = ceil(len(panels) / pages)
+    for number, first in enumerate(range(0, len(panels), size), 1):
+        page = panels[first : first + size]
+        count = f" ({number} of {pages})" if pages > 1 else ""
+        across_page = min(2, len(page))
+        down = ceil(len(page) / across_page)
+        figure = figure_of(f"{title}{count}", (6.5 * across_page, 0.6 + 2.9 * down))
+        axes = figure.subplots(down, across_page, squeeze=False).ravel()
+        for place in axes[len(page) :]:
+            place.remove()
+        for place, (region, pairs) in zip(axes, page, strict=False):
+            _draw_pairs(place, across, pairs, columns, beside, sides)
+            place.set_title(region, fontsize=10, loc="left")
+            style_axes(place, label)
+        yield figure
 
 
-def _draw_maps(curves: MuscleCurves, mechanism: Mechanism, rows: Any, title: str) -> Any:
-    (label, x), (other, y) = (_axis(curves, mechanism, place) for place in (0, 1))
+def _draw_pairs(
+    place: Any,
+    across: Array,
+    pairs: Mapping[str, Sequence[str]],
+    columns: Mapping[str, Array],
+    beside: Mapping[str, Array],
+    sides: Mapping[str, tuple[str, str]],
+) -> None:
+    """Draw muscles in the colors of their pairs, and a legend beside the panel."""
+    for number, names in enumerate(pairs.values()):
+        for name in names:
+            looks = {
+                "color": COLORS[number % len(COLORS)],
+                "ls": "--" if sides[name][1] == "l" else "-",
+            }
+            # Matplotlib leaves a label that begins with an underscore out of the legend.
+            shown = f" {name}" if name.startswith("_") else name
+            place.plot(across, columns[name], lw=1.6, label=shown, **looks)
+            if name in beside:
+                place.plot(across, beside[name], lw=0.8, alpha=0.8, **looks)
+    place.legend(
+        loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0, frameon=False, fontsize=8
+    )
+
+
+def _draw_maps(
+    curves: MuscleCurves, mechanism: Mechanism, rows: Array, title: str
+) -> Iterator[Any]:
+    """Yield the pages of one quantity over two coordinates, a map for each muscle."""
+    (label, x), (other, y) = (_get_abscissa(curves, mechanism, index) for index in (0, 1))
     xs, ys = np.unique(x), np.unique(y)
-    names = _names(curves)[:_MOST]
-    down = ceil(len(names) / _ACROSS)
-    figure = figure_of(title, (11.0, 0.9 + 2.4 * down))
-    panels = figure.subplots(down, _ACROSS, sharex=True, sharey=True, squeeze=False)
-    for panel in panels.ravel()[len(names) :]:
-        panel.set_visible(False)
-    for place, (panel, name) in enumerate(zip(panels.ravel(), names, strict=False)):
-        drawn = panel.pcolormesh(
-            xs, ys, rows[:, place].reshape(len(xs), len(ys)).T, shading="nearest", cmap="viridis"
-        )
-        figure.colorbar(drawn, ax=panel)
-        panel.set_title(name, fontsize=9)
-    figure.supxlabel(label)
-    figure.supylabel(other)
-    return figure
-
-
-def _add_note(curves: MuscleCurves) -> str:
-    left = len(curves.muscles) - _MOST
-    return f"the first {_MOST} muscles; {left} more are in the table" if left > 0 else ""
+    names = _get_names(curves)
+    pages = ceil(len(names) / MAX_MAPS)
+    for number in range(pages):
+        indices = range(number * MAX_MAPS, min(len(names), (number + 1) * MAX_MAPS))
+        across = min(MAPS_ACROSS, len(indices))
+        down = ceil(len(indices) / across)
+        count = f" ({number + 1} of {pages})" if pages > 1 else ""
+        figure = figure_of(f"{title}{count}", (1.0 + 2.9 * across, 0.9 + 2.4 * down))
+        places = figure.subplots(down, across, sharex=True, sharey=True, squeeze=False).ravel()
+        for place in places[len(indices) :]:
+            place.remove()
+        for index, place in zip(indices, places, strict=False):
+            drawn = place.pcolormesh(
+                xs,
+                ys,
+                rows[:, index].reshape(len(xs), len(ys)).T,
+                shading="nearest",
+                cmap="viridis",
+            )
+            figure.colorbar(drawn, ax=place)
+            place.set_title(names[index], fontsize=9)
+        figure.supxlabel(label)
+        figure.supylabel(other)
+        yield figure

@@ -1,8 +1,7 @@
-"""Pictures of a simulation: coordinates, states of muscles, forces, probes and energy over time."""
+"""Plots of a simulation: coordinates, states of muscles, forces, probes and energy over time."""
 
 from __future__ import annotations
 
-import io
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from math import ceil
@@ -11,19 +10,24 @@ from typing import Any
 
 import numpy as np
 
-from osimlite.base.files import make_folder, write_atomically
-from osimlite.base.require import require
+from osimlite.base.files import make_folder
+from osimlite.base.writing import write_into
 from osimlite.errors import OsimliteError
+from osimlite.io.tables.storage import StoTable
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.view.lettering import plain_lettering
 from osimlite.view.motion import ContactForce, Motion, contact_forces, in_mechanism_order
-
-COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
-"""Colours that colour-blind people tell apart (Okabe and Ito, 2008), without the yellow, too pale for lines."""
-
-STYLES = ("-", "--", ":")
-"""Once all colours are used they come again in another style."""
+from osimlite.view.panels import (
+    COLORS,
+    STYLES,
+    draw_pages,
+    figure_of,
+    group_columns,
+    name_pages,
+    render_png,
+)
+from osimlite.view.table_plots import Names, describe_columns
 
 LINES_IN_PANEL = 7
 
@@ -31,14 +35,6 @@ MOST_ENERGIES = 400
 """Moments at which energy is worked out; more would not show."""
 
 STORED = "stored in contacts, springs, muscles"
-
-_UNITS = {
-    "fiber_length": " (m)",
-    "fiber_velocity": " (m/s)",
-    "stretch": " (m)",
-    "dissipatedEnergy": " (J)",
-}
-"""Of the states of forces that have one."""
 
 _NEVER_MIND = 1e-9
 """A force below this part of the largest counts as none."""
@@ -56,8 +52,9 @@ def plot_simulation(
             told into angles and lengths, and there is no picture of the energy.
 
     Returns:
-        The PNG files: ``coordinates.png``, and as far as there is something to show ``states.png``,
-        ``contact_forces.png``, ``other_forces.png``, ``probes.png`` and ``energy.png``.
+        The PNG files, as far as there is something to show: ``coordinates.png``, ``states.png``,
+        ``contact_forces.png``, ``other_forces.png``, ``probes.png`` and ``energy.png``; further
+        pages are ``states-2.png`` and so on.
 
     Raises:
         MissingDependency: matplotlib is not installed.
@@ -68,19 +65,11 @@ def plot_simulation(
     known = mechanism if mechanism is not None else getattr(trajectory, "mechanism", None)
     base = Path(folder)
     make_folder(base)
-    written = []
     with plain_lettering():
-        for name, figure in draw_figures(trajectory, known):
-            written.append(save_figure(figure, base / name))
-    return written
-
-
-def save_figure(figure: Any, path: Path, dpi: float = 150) -> Path:
-    """Write a figure of matplotlib as PNG, whole or not at all."""
-    out = io.BytesIO()
-    figure.savefig(out, format="png", dpi=dpi)
-    write_atomically(path, out.getvalue())
-    return path
+        return [
+            write_into(base, name, render_png(figure))
+            for name, figure in draw_figures(trajectory, known)
+        ]
 
 
 def compute_energies(motion: Motion, mechanism: Mechanism) -> tuple[Array, dict[str, Array]]:
@@ -104,65 +93,40 @@ def compute_energies(motion: Motion, mechanism: Mechanism) -> tuple[Array, dict[
 
 
 def draw_figures(motion: Motion, mechanism: Mechanism | None) -> Iterator[tuple[str, Any]]:
-    """Yield file name and figure of each plot of a motion."""
+    """Yield file name and figure of each page of the plots of a motion."""
     times = np.asarray(motion.times, dtype=float)
-    yield "coordinates.png", _plot_coordinates(times, motion, mechanism)
+    names = Names.of_model(getattr(motion, "model", None), mechanism)
+    values = np.asarray(motion.values, dtype=float)
+    yield from _draw_table(
+        "Coordinates", times, dict(zip(motion.coordinates, values.T, strict=True)), names
+    )
     states = getattr(motion, "auxiliary", {})
-    if states:
-        yield "states.png", _plot_states(times, states)
+    yield from _draw_table("States", times, states, names)
     contacts = list(_one_of_each_pair(contact_forces(motion)))
     if contacts:
         yield "contact_forces.png", _plot_contacts(times, contacts)
     others = {
-        label: np.asarray(column)
+        label: column
         for label, column in motion.forces.items()
         if ".force." not in label and ".torque." not in label and "PotentialEnergy" not in label
     }
-    acting = {label: column for label, column in others.items() if np.any(column)}
-    if acting:
-        idle = [label for label in others if label not in acting]
-        note = f"never acting: {', '.join(idle)}" if idle else ""
-        kinds = {"force (N) or torque (N·m)": acting}
-        yield (
-            "other_forces.png",
-            _make_panels(times, "Forces of muscles, springs and others", kinds, note),
-        )
-    probes = getattr(motion, "probes", {})
-    if probes:
-        yield "probes.png", _make_panels(times, "Probes", {"what a probe reports": probes})
+    yield from _draw_table("Other forces", times, others, names, "ModelForces")
+    yield from _draw_table("Probes", times, getattr(motion, "probes", {}), names, "ModelProbes")
     if mechanism is not None:
         yield "energy.png", _plot_energy(*compute_energies(motion, mechanism))
 
 
-def _plot_coordinates(times: Array, motion: Motion, mechanism: Mechanism | None) -> Any:
-    kinds: dict[str, dict[str, Array]] = {}
-    held = []
-    for k, name in enumerate(motion.coordinates):
-        column = np.asarray(motion.values)[:, k]
-        if mechanism is None:
-            kinds.setdefault("value (rad, m)", {})[name] = column
-            continue
-        info = mechanism.coordinates[mechanism.coordinate_index(name)]
-        if info.motion_type == "rotational":
-            label, column, unit = "angle (deg)", np.degrees(column), "deg"
-        elif info.motion_type == "translational":
-            label, unit = "displacement (m)", "m"
-        else:
-            label, unit = "coupled (rad, m)", ""
-        if info.locked:
-            held.append(f"{name} is locked at {column[0]:.4g} {unit}".rstrip())
-        else:
-            kinds.setdefault(label, {})[name] = column
-    return _make_panels(times, "Coordinates", kinds, "; ".join(held))
-
-
-def _plot_states(times: Array, states: Mapping[str, Array]) -> Any:
-    kinds: dict[str, dict[str, Array]] = {}
-    for path, column in states.items():
-        owner, _, kind = path.rpartition("/")
-        label = kind.replace("_", " ") + _UNITS.get(kind, "")
-        kinds.setdefault(label, {})[owner.rpartition("/")[2]] = column
-    return _make_panels(times, "States of muscles and other forces", kinds)
+def _draw_table(
+    title: str, times: Array, columns: Mapping[str, Array], names: Names, name: str = ""
+) -> Iterator[tuple[str, Any]]:
+    """Yield file name and figure of each page of columns."""
+    if not columns:
+        return
+    rows = np.column_stack([np.asarray(column, dtype=float) for column in columns.values()])
+    table = StoTable(name or title, times, tuple(columns), rows)
+    panels, note = group_columns(describe_columns(table, names), times)
+    stem = title.lower().replace(" ", "_")
+    yield from name_pages(stem, draw_pages(title, panels, note=note))
 
 
 def _one_of_each_pair(forces: Sequence[ContactForce]) -> Iterator[ContactForce]:
@@ -200,21 +164,6 @@ def _plot_contacts(times: Array, forces: Sequence[ContactForce]) -> Any:
     return figure
 
 
-def _make_panels(
-    times: Array, title: str, kinds: Mapping[str, Mapping[str, Array]], note: str = ""
-) -> Any:
-    """A figure with as many panels as the lines of each kind, which has one unit, take."""
-    panels = [
-        (label, part) for label, lines in kinds.items() for part in divide_among_panels(lines)
-    ]
-    figure, axes = make_sheet(title, [3.0] * max(1, len(panels)))
-    for panel, (label, lines) in zip(axes, panels, strict=False):
-        lines_in(panel, times, lines)
-        panel.set_ylabel(label)
-    finish_panels(axes, times, note)
-    return figure
-
-
 def _plot_energy(times: Array, parts: Mapping[str, Array]) -> Any:
     figure, (panel,) = make_sheet("Energy", [3.6])
     lines_in(panel, times, {**parts, "sum": np.sum(list(parts.values()), axis=0)})
@@ -223,15 +172,6 @@ def _plot_energy(times: Array, parts: Mapping[str, Array]) -> Any:
     if STORED not in parts:
         note += "; energy stored in contacts and limit springs is not in the sum"
     finish_panels((panel,), times, note)
-    return figure
-
-
-def figure_of(title: str, size: tuple[float, float]) -> Any:
-    """An empty figure (width and height in inches)."""
-    figures = require("matplotlib.figure", extra="plot", purpose="a picture")
-    require("matplotlib.backends.backend_agg", extra="plot", purpose="a picture")
-    figure = figures.Figure(figsize=size, layout="constrained")
-    figure.suptitle(title, fontsize=13, x=0.02, ha="left", fontweight="bold")
     return figure
 
 

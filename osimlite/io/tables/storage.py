@@ -11,6 +11,7 @@ from types import MappingProxyType
 import numpy as np
 
 from osimlite.base.files import open_atomically
+from osimlite.base.lazy import make_plot
 from osimlite.base.records import dataclass, field
 from osimlite.base.text import format_count
 from osimlite.errors import OsimliteError, SettingError, SimulationError
@@ -43,6 +44,8 @@ class StoTable(Tabular):
     header: dict[str, str] = field(default_factory=dict)
     kind: str = "double"
     file: str | None = None
+
+    plot = make_plot("plot_table")
 
     def __getitem__(self, column: str) -> Array:
         """Return the first column (n,) with a label; raise KeyError if there is none."""

@@ -6,9 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
+from osimlite.base.files import write_atomically
 from osimlite.studies.gait.basin import Basin
 from osimlite.view.lettering import plain_lettering
-from osimlite.view.plots import figure_of, save_figure
+from osimlite.view.panels import figure_of, render_png
 
 
 def draw_basin(basin: Basin, path: str | Path, *, title: str = "Steps before the fall") -> Path:
@@ -66,4 +67,5 @@ def _draw_panels(basin: Basin, path: Path, title: str) -> Path:
     bar = figure.colorbar(image, ax=axes)
     bar.set_label(f"steps, {basin.target_steps} or more count as walking")
     bar.set_ticks(np.linspace(0, basin.target_steps, 5).round().astype(int))
-    return save_figure(figure, path, dpi=110)
+    write_atomically(path, render_png(figure))
+    return path

@@ -1,0 +1,448 @@
+"""Pages of curves: left and right in one panel, one unit per axis, at most twelve panels on a page."""
+
+from __future__ import annotations
+
+import io
+import re
+import textwrap
+from collections import Counter
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from math import ceil
+from pathlib import Path
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+
+from osimlite.base.require import require
+from osimlite.base.writing import write_into
+from osimlite.mechanics.multibody.spatial import Array
+from osimlite.view.lettering import plain_lettering
+
+COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
+"""Colors that color-blind people tell apart (Okabe and Ito 2008), without yellow, which is too pale for lines."""
+
+STYLES = ("-", "--", ":")
+"""Line styles; when all colors are used, they are used again with the next style."""
+
+MAX_PANELS = 12
+"""Panels of one page: more cannot be read on one screen."""
+MAX_COLUMNS = 3
+"""Panels side by side, each at least 3.5 inches wide."""
+PERCENT = np.linspace(0.0, 100.0, 101)
+"""Points of the gait cycle at which curves are drawn, %."""
+MAX_CONSTANTS = 12
+"""Constant curves that the note of a page names."""
+RELATIVE_CHANGE = 1e-9
+"""A curve whose range is below this part of its largest value is constant."""
+SIDES = {"r": (COLORS[0], "right"), "l": (COLORS[1], "left"), "": ("#444444", "")}
+"""Color and name of the curves of each side."""
+DASHES = (0.0, (4.0, 4.0))
+"""Line style of a curve that lies on another."""
+DPI = 110
+"""Resolution of the pages, dots per inch: a page of twelve panels has 1,210 by 1,050 pixels."""
+
+_SIDE_TOKENS = (
+    (re.compile(r"(?:^|(?<=[._/ ]))[rl](?=[._/ ]|$)"), {"r": "l", "l": "r"}),
+    (re.compile(r"(?:^|(?<=[._/ ]))[RL](?=[._/ ]|[A-Z]|$)"), {"R": "L", "L": "R"}),
+    (re.compile(r"right|left"), {"right": "left", "left": "right"}),
+    (re.compile(r"Right|Left"), {"Right": "Left", "Left": "Right"}),
+)
+"""Patterns of the letters and words for a side in names of models, each with their opposites."""
+
+
+class StepTimes(Protocol):
+    """Steps of one foot."""
+
+    @property
+    def strikes(self) -> Sequence[float]:
+        """Times at which the foot touches the ground, s."""
+
+    @property
+    def offs(self) -> Sequence[float]:
+        """Times at which the foot leaves the ground, s."""
+
+    @property
+    def cycles(self) -> Sequence[tuple[float, float]]:
+        """Gait cycles: from each strike to the next, s."""
+
+
+class Column(NamedTuple):
+    """A quantity over time, or over whatever a page has as its abscissa."""
+
+    name: str  # name with its side, such as "hip_flexion_r"
+    unit: str  # unit, "" for numbers without one
+    values: Array  # values (n,)
+    group: str = ""  # body region, joint or coordinate to which it belongs
+    section: str = ""  # title of the pages on which it is drawn, "" for none
+
+
+class Curve(NamedTuple):
+    """One curve of a panel."""
+
+    times: Array  # abscissa (n,), s
+    values: Array  # ordinate (n,), NaN where unknown
+    side: str = ""  # "r", "l" or "" for neither
+    style: Any = "-"  # line style of matplotlib; it distinguishes trials
+    label: str = ""  # name of the trial or model
+    steps: Mapping[str, StepTimes] = {}  # steps by side, if they are known
+
+
+class Panel(NamedTuple):
+    """Curves of one quantity in one unit."""
+
+    title: str
+    unit: str
+    curves: list[Curve]
+    group: str = ""
+    section: str = ""
+
+
+def split_sides(names: Iterable[str]) -> dict[str, tuple[str, str]]:
+    """Find the side that each name says, from its letters and from the other names.
+
+    A name has a side if the name of the opposite side is there as well, as for ``RHip_rz`` and
+    ``LHip_rz``, or if it ends in ``_r`` or ``_l``.
+
+    Args:
+        names: names of columns.
+
+    Returns:
+        For each name, the name without its side, and the side: "r", "l" or "".
+    """
+    known = dict.fromkeys(names)
+    return {name: _split_side(name, known) for name in known}
+
+
+def _split_side(name: str, known: Collection[str]) -> tuple[str, str]:
+    """Return a name without its side, and the side."""
+    matches = [
+        (match, opposite) for token, opposite in _SIDE_TOKENS for match in token.finditer(name)
+    ]
+    for match, opposite in matches:
+        other = name[: match.start()] + opposite[match[0]] + name[match.end() :]
+        if other in known or name[max(0, match.start() - 1) :] in ("_r", "_l"):
+            stem = _trim(name[: match.start()] + name[match.end() :])
+            return stem or name, match[0][0].lower()
+    if matches and _mirror(name) in known:
+        stem = name
+        for token, _ in _SIDE_TOKENS:
+            stem = token.sub("", stem)
+        return _trim(stem) or name, matches[0][0][0][0].lower()
+    return name, ""
+
+
+def _mirror(name: str) -> str:
+    """Return a name with every side replaced by the opposite one, as in ``calcn_r_right``."""
+    for token, opposite in _SIDE_TOKENS:
+        name = token.sub(lambda match, words=opposite: words[match[0]], name)
+    return name
+
+
+def _trim(stem: str) -> str:
+    """Remove the separators that a side has left."""
+    return re.sub(r"(?<=[._/ ])[._ ]+|^[._/ ]|[._/ ]$", "", stem)
+
+
+def is_constant(values: Array) -> bool:
+    """Return whether known values do not change, or none is known."""
+    known = values[np.isfinite(values)]
+    return not known.size or bool(
+        np.ptp(known) <= RELATIVE_CHANGE * max(1e-3, float(np.abs(known).max()))
+    )
+
+
+def group_columns(
+    columns: Iterable[Column],
+    times: Array,
+    *,
+    steps: Mapping[str, StepTimes] | None = None,
+    style: str = "-",
+    label: str = "",
+) -> tuple[list[Panel], str]:
+    """Group columns into panels: one for the left and right column of a quantity.
+
+    Columns without any change have no panel, but the note names them.
+
+    Args:
+        columns: columns, each (n,).
+        times: abscissa (n,).
+        steps: steps by side, over which curves are cut into gait cycles.
+        style: line style of the curves.
+        label: name of the curves in the legend.
+
+    Returns:
+        The panels, with those of one group one after the other, and the note, "" without constant
+        columns.
+    """
+    listed = list(columns)
+    sides = split_sides(column.name for column in listed)
+    panels: dict[tuple[str, str, str], Panel] = {}
+    constant = []
+    for column in listed:
+        stem, side = sides[column.name]
+        values = np.asarray(column.values, dtype=float)
+        if is_constant(values):
+            constant.append(_describe_constant(column, values))
+            continue
+        # A quantity without a curve on the other side keeps its name.
+        panel = panels.setdefault(
+            (stem, column.unit, column.section),
+            Panel(stem, column.unit, [], column.group, column.section),
+        )
+        panel.curves.append(Curve(times, values, side, style, label, steps or {}))
+    groups: dict[tuple[str, str], list[Panel]] = {}
+    for panel in panels.values():
+        groups.setdefault((panel.section, panel.group), []).append(panel)
+    return [panel for group in groups.values() for panel in group], _describe_constants(constant)
+
+
+def _describe_constant(column: Column, values: Array) -> str:
+    known = values[np.isfinite(values)]
+    if not known.size:
+        return f"{column.name} (no values)"
+    unit = f" {column.unit}" if column.unit else ""
+    return f"{column.name} {0.0 + round(float(known[0]), 9):.4g}{unit}"
+
+
+def _describe_constants(words: Sequence[str]) -> str:
+    if not words:
+        return ""
+    more = f", and {len(words) - MAX_CONSTANTS} more" if len(words) > MAX_CONSTANTS else ""
+    return f"Constant: {', '.join(words[:MAX_CONSTANTS])}{more}"
+
+
+def merge_panels(panels: Iterable[Panel]) -> list[Panel]:
+    """Put the curves of panels with the same title and unit into one panel."""
+    result: dict[tuple[str, str], Panel] = {}
+    for panel in panels:
+        known = result.setdefault((panel.title, panel.unit), panel._replace(curves=[]))
+        known.curves.extend(panel.curves)
+    return list(result.values())
+
+
+def draw_pages(
+    title: str, panels: Sequence[Panel], *, abscissa: str = "time (s)", note: str = ""
+) -> Iterator[Any]:
+    """Yield the figures of panels, at most `MAX_PANELS` on each.
+
+    Curves are drawn over the gait cycle if there is a complete cycle for each of them, otherwise
+    over time, with lines at the strikes of the feet.
+
+    Args:
+        title: title of the figures; "" for none.
+        panels: what to draw; without any panel there is no figure.
+        abscissa: label of the abscissa, where it is not the gait cycle.
+        note: sentence below the panels of the last page.
+    """
+    cyclic = has_cycles(panels)
+    sections: dict[str, list[Panel]] = {}
+    for panel in panels:
+        sections.setdefault(panel.section, []).append(panel)
+    pages = [
+        (section, number, page)
+        for section, part in sections.items()
+        for number, page in enumerate(_divide_into_pages(part), 1)
+    ]
+    counts = Counter(section for section, _, _ in pages)
+    for index, (section, number, page) in enumerate(pages, 1):
+        words = f"{title}: {section}" if title and section else title
+        if words and counts[section] > 1:
+            words += f" ({number} of {counts[section]})"
+        yield _draw_page(
+            words,
+            page,
+            "gait cycle (%)" if cyclic else abscissa,
+            note if index == len(pages) else "",
+            cyclic=cyclic,
+        )
+
+
+def has_cycles(panels: Iterable[Panel]) -> bool:
+    """Return whether every curve has a complete gait cycle of its side."""
+    curves = [curve for panel in panels for curve in panel.curves]
+    return bool(curves) and all(_select_cycles(curve) for curve in curves)
+
+
+def _select_cycles(curve: Curve) -> list[tuple[float, float]]:
+    """Return the gait cycles that a curve covers; a curve without a side follows the right foot."""
+    steps = curve.steps.get(curve.side or "r")
+    if steps is None:
+        return []
+    return [
+        (first, last)
+        for first, last in steps.cycles
+        if curve.times[0] <= first and last <= curve.times[-1]
+    ]
+
+
+def _divide_into_pages(panels: Sequence[Panel]) -> Iterator[list[list[Panel]]]:
+    """Yield the rows of each page.
+
+    A group starts a new row where it fits in one row, but not in the rest of the row before.
+    """
+    count = len(panels)
+    width = count if count < MAX_COLUMNS else 2 if count == 4 else MAX_COLUMNS
+    rows: list[list[Panel]] = []
+    groups: dict[str, list[Panel]] = {}
+    for panel in panels:
+        groups.setdefault(panel.group, []).append(panel)
+    for group in groups.values():
+        for index, panel in enumerate(group):
+            room = width - len(rows[-1]) if rows else 0
+            splits = index == 0 and len(group) > 1 and room < len(group) <= width
+            if not room or splits:
+                rows.append([])
+            rows[-1].append(panel)
+    height = MAX_PANELS // MAX_COLUMNS
+    pages = ceil(len(rows) / height)
+    for first in range(0, len(rows), size := ceil(len(rows) / max(1, pages)) or 1):
+        yield rows[first : first + size]
+
+
+def _draw_page(
+    title: str, rows: Sequence[Sequence[Panel]], abscissa: str, note: str, *, cyclic: bool
+) -> Any:
+    """Draw the rows of one page."""
+    columns = max(len(row) for row in rows)
+    width = 11.0 if columns == MAX_COLUMNS else 4.5 + 4.0 * (columns - 1)
+    figure = figure_of(title, (width, 0.75 + 2.35 * len(rows) + (0.25 if note else 0.0)))
+    axes = figure.subplots(len(rows), columns, squeeze=False)
+    for row, places in zip(rows, axes, strict=True):
+        for panel, place in zip(row, places, strict=False):
+            draw_panel(place, panel, abscissa, cyclic=cyclic)
+        for place in places[len(row) :]:
+            place.remove()
+    add_legend(figure, [curve for row in rows for panel in row for curve in panel.curves])
+    if note:
+        text = textwrap.fill(note, round(13 * width), break_on_hyphens=False)
+        figure.supxlabel(text, fontsize=8, color="0.35", x=0.02, ha="left")
+    return figure
+
+
+def draw_panel(place: Any, panel: Panel, abscissa: str, *, cyclic: bool = False) -> None:
+    """Draw a panel into axes of matplotlib."""
+    for index, curve in enumerate(panel.curves):
+        if any(_coincide(curve, other) for other in panel.curves[:index]):
+            # The curve below shows through, as in a symmetric motion.
+            curve = curve._replace(style=DASHES)
+        _draw_curve(place, curve, cyclic=cyclic)
+    words = panel.title.replace("_", " ")
+    unit = f" ({panel.unit})" if panel.unit else ""
+    place.set_title(f"{words}{unit}", fontsize=10, loc="left")
+    group = panel.group.replace("_", " ")
+    if group and group not in words and len(words + unit + group) < 40:
+        place.set_title(group, fontsize=8, loc="right", color="0.5")
+    style_axes(place, abscissa)
+
+
+def _coincide(curve: Curve, other: Curve) -> bool:
+    """Return whether two curves cannot be distinguished in a picture."""
+    if len(curve.values) != len(other.values):
+        return False
+    near = 1e-3 * np.nanmax(np.abs(curve.values), initial=0.0)
+    return bool(np.allclose(curve.values, other.values, rtol=0.0, atol=near, equal_nan=True))
+
+
+def _draw_curve(place: Any, curve: Curve, *, cyclic: bool) -> None:
+    """Draw a curve over time, or each gait cycle and their mean."""
+    color, _ = SIDES[curve.side]
+    if not cyclic:
+        place.plot(curve.times, curve.values, color=color, ls=curve.style, lw=1.5)
+        for side, steps in curve.steps.items():
+            if side == (curve.side or side):
+                for style, moments in (("-", steps.strikes), (":", steps.offs)):
+                    for moment in moments:
+                        if curve.times[0] <= moment <= curve.times[-1]:
+                            place.axvline(moment, color=SIDES[side][0], ls=style, lw=0.6, alpha=0.6)
+        return
+    cycles = [
+        np.interp(first + (last - first) * PERCENT / 100.0, curve.times, curve.values)
+        for first, last in _select_cycles(curve)
+    ]
+    if len(cycles) > 1:
+        for cycle in cycles:
+            place.plot(PERCENT, cycle, color=color, ls=curve.style, lw=0.7, alpha=0.5)
+    place.plot(PERCENT, np.mean(cycles, axis=0), color=color, ls=curve.style, lw=1.8)
+
+
+def add_legend(figure: Any, curves: Sequence[Curve]) -> None:
+    """Add a legend of sides and trials at the top of a figure."""
+    from matplotlib.lines import Line2D
+
+    sides = [
+        Line2D([], [], color=color, label=name)
+        for side, (color, name) in SIDES.items()
+        if name and any(curve.side == side for curve in curves)
+    ]
+    trials = dict.fromkeys((curve.label, curve.style) for curve in curves if curve.label)
+    styles = (
+        [Line2D([], [], color="#444444", ls=style, label=label) for label, style in trials]
+        if len(trials) > 1
+        else []
+    )
+    if sides or styles:
+        figure.legend(
+            handles=[*sides, *styles], loc="outside upper right", ncols=6, frameon=False, fontsize=9
+        )
+
+
+def style_axes(place: Any, label: str) -> None:
+    """Set grid, ticks and abscissa of a panel."""
+    place.grid(True, color="0.92", lw=0.8)
+    place.set_axisbelow(True)
+    place.spines[["top", "right"]].set_visible(False)
+    place.tick_params(labelsize=8)
+    place.ticklabel_format(axis="y", useOffset=False, scilimits=(-4, 6))
+    place.margins(x=0.0)
+    place.set_xlabel(label, fontsize=8)
+
+
+def figure_of(title: str, size: tuple[float, float]) -> Any:
+    """Return an empty figure of matplotlib.
+
+    Args:
+        title: bold title at the top left.
+        size: width and height, inches.
+
+    Raises:
+        MissingDependency: matplotlib is not installed.
+    """
+    figures = require("matplotlib.figure", extra="plot", purpose="a picture")
+    require("matplotlib.backends.backend_agg", extra="plot", purpose="a picture")
+    figure = figures.Figure(figsize=size, layout="constrained")
+    figure.suptitle(title, fontsize=13, x=0.02, ha="left", fontweight="bold")
+    return figure
+
+
+def name_pages(stem: str, figures: Iterable[Any]) -> Iterator[tuple[str, Any]]:
+    """Yield figures with their file names: ``stem.png``, ``stem-2.png`` and so on."""
+    for number, figure in enumerate(figures, 1):
+        yield f"{stem}.png" if number == 1 else f"{stem}-{number}.png", figure
+
+
+def write_pages(figures: Iterable[Any], folder: Path, stem: str) -> list[Path]:
+    """Write figures into a folder as ``stem.png``, ``stem-2.png`` and so on.
+
+    Args:
+        figures: figures of matplotlib; they may be drawn while they are written.
+        folder: existing folder to write into.
+        stem: name of the first file, without its suffix.
+
+    Returns:
+        The files.
+
+    Raises:
+        OsimliteError: a file cannot be written.
+    """
+    with plain_lettering():
+        return [
+            write_into(folder, name, render_png(figure))
+            for name, figure in name_pages(stem, figures)
+        ]
+
+
+def render_png(figure: Any, dpi: float = DPI) -> bytes:
+    """Return a figure of matplotlib as a PNG file."""
+    out = io.BytesIO()
+    figure.savefig(out, format="png", dpi=dpi)
+    return out.getvalue()

@@ -1,0 +1,100 @@
+"""Pages of plots of results, which notebooks show and which can be written as PNG."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Iterator
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from osimlite.base.files import make_folder
+from osimlite.base.writing import write_into
+from osimlite.errors import OsimliteError
+from osimlite.view.lettering import plain_lettering
+from osimlite.view.panels import draw_pages, group_columns, name_pages, render_png
+from osimlite.view.plots import draw_figures
+from osimlite.view.table_plots import Names, describe_columns, make_title
+
+if TYPE_CHECKING:
+    from osimlite.io.tables.storage import StoTable
+    from osimlite.simulation.trajectory import Movement, Trajectory
+
+
+class Pages(list[tuple[str, Any]]):
+    """File names and matplotlib figures of pages; notebooks show the figures."""
+
+    def __repr__(self) -> str:
+        return f"Pages: {', '.join(name for name, _ in self) or 'none, nothing changes over time'}"
+
+    def _repr_html_(self) -> str:
+        with plain_lettering():
+            pictures = [
+                (name, base64.b64encode(render_png(figure)).decode()) for name, figure in self
+            ]
+        return "".join(
+            f"<img alt='{escape(name, quote=True)}' style='max-width:100%' "
+            f"src='data:image/png;base64,{data}'>"
+            for name, data in pictures
+        ) or escape(repr(self))
+
+    @property
+    def figures(self) -> list[Any]:
+        """The matplotlib figures."""
+        return [figure for _, figure in self]
+
+    def write(self, folder: str | Path) -> list[Path]:
+        """Write the pages as PNG files.
+
+        Args:
+            folder: folder to write into; it is made if it does not exist.
+
+        Returns:
+            The files.
+
+        Raises:
+            OsimliteError: the folder or a file cannot be written.
+        """
+        base = make_folder(Path(folder))
+        with plain_lettering():
+            return [write_into(base, name, render_png(figure)) for name, figure in self]
+
+
+def plot_trajectory(item: Trajectory) -> Pages:
+    """Return the pages of a simulation: coordinates, states, forces, probes and energies."""
+    _require_times(len(item.times))
+    with plain_lettering():
+        return Pages(draw_figures(item, item.mechanism))
+
+
+def plot_movement(item: Movement) -> Pages:
+    """Return the pages of the coordinates of a motion."""
+    from osimlite.io.tables.storage import StoTable
+
+    table = StoTable("Coordinates", item.times, item.coordinates, item.in_degrees, in_degrees=True)
+    names = Names.of_model(getattr(item, "model", None), item.mechanism)
+    return _plot_columns(table, names)
+
+
+def plot_table(item: StoTable) -> Pages:
+    """Return the pages of a table over time."""
+    motion = getattr(item, "motion", None)
+    return _plot_columns(item, Names.of_model(None, getattr(motion, "mechanism", None)))
+
+
+def _plot_columns(table: StoTable, names: Names) -> Pages:
+    _require_times(len(table.times))
+    panels, note = group_columns(describe_columns(table, names), table.times)
+    stem = Path(table.file).stem if table.file else table.name.lower().replace(" ", "_") or "table"
+
+    def draw() -> Iterator[tuple[str, Any]]:
+        yield from name_pages(stem, draw_pages(make_title(stem), panels, note=note))
+
+    with plain_lettering():
+        return Pages(draw())
+
+
+def _require_times(count: int) -> None:
+    """Raise an error if there is nothing to draw."""
+    if not count:
+        raise OsimliteError("the motion has no moments; nothing can be drawn")

@@ -1,0 +1,122 @@
+"""Plots of sweeps: measures of the runs over the varied quantities."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from math import ceil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from osimlite.base.files import make_folder
+from osimlite.mechanics.multibody.spatial import Array
+from osimlite.view.panels import COLORS, MAX_COLUMNS, MAX_PANELS, figure_of, write_pages
+
+MAX_VARIABLES = 12
+"""Variables over which a measure is drawn: those with the largest correlation."""
+
+
+def plot_runs(
+    columns: Mapping[str, Any],
+    variables: Sequence[str],
+    measures: Sequence[str],
+    folder: str | Path,
+    stem: str,
+) -> list[Path]:
+    """Draw each measure over the varied quantities: as a map over two of them, else as points.
+
+    Args:
+        columns: columns of the runs (n,) by name.
+        variables: names of the varied quantities.
+        measures: names of the measures.
+        folder: folder to write into; it is made if it does not exist.
+        stem: name of the first file, without its suffix.
+
+    Returns:
+        The PNG files; none if no measure has a number.
+
+    Raises:
+        MissingDependency: matplotlib is not installed.
+        OsimliteError: the folder or a file cannot be written.
+    """
+    known = {
+        name: _to_numbers(columns[name]) for name in (*variables, *measures) if name in columns
+    }
+    drawn = [name for name in measures if name in known and np.isfinite(known[name]).any()]
+    varied = [name for name in variables if name in known]
+    if len(varied) == 2:
+        panels = [(varied[0], varied[1], name) for name in drawn]
+    else:
+        panels = [
+            (name, measure, "")
+            for measure in drawn
+            for name in _rank_variables(known, varied, measure)
+        ]
+    return write_pages(_draw_pages(known, panels), make_folder(Path(folder)), stem)
+
+
+def _to_numbers(column: Any) -> Array:
+    """Return a column as numbers; NaN where there is none."""
+    return np.array([np.nan if value is None else value for value in column], dtype=float)
+
+
+def _rank_variables(known: Mapping[str, Array], varied: Sequence[str], measure: str) -> list[str]:
+    """Return the variables of a measure, without the least correlated ones if there are too many."""
+    if len(varied) <= MAX_VARIABLES:
+        return list(varied)
+    finite = np.isfinite(known[measure])
+
+    def correlate(name: str) -> float:
+        x, y = known[name][finite], known[measure][finite]
+        if np.ptp(x) == 0.0 or np.ptp(y) == 0.0:
+            return 0.0
+        return float(abs(np.corrcoef(x, y)[0, 1]))
+
+    return sorted(varied, key=correlate, reverse=True)[:MAX_VARIABLES]
+
+
+def _draw_pages(
+    known: Mapping[str, Array], panels: Sequence[tuple[str, str, str]]
+) -> Iterator[Any]:
+    """Yield pages of panels, each with abscissa, ordinate, and what the color shows."""
+    pages = ceil(len(panels) / MAX_PANELS)
+    for number in range(pages):
+        page = panels[number * MAX_PANELS : (number + 1) * MAX_PANELS]
+        across = min(MAX_COLUMNS, len(page)) if len(page) != 4 else 2
+        down = ceil(len(page) / across)
+        count = f" ({number + 1} of {pages})" if pages > 1 else ""
+        size = (1.0 + 3.6 * across, 0.7 + 2.8 * down)
+        figure = figure_of(f"{len(known[page[0][0]])} runs{count}", size)
+        places = figure.subplots(down, across, squeeze=False).ravel()
+        for place in places[len(page) :]:
+            place.remove()
+        for place, (x, y, color) in zip(places, page, strict=False):
+            if color:
+                _draw_map(figure, place, known[x], known[y], known[color])
+            else:
+                place.plot(known[x], known[y], ".", color=COLORS[0], ms=4, alpha=0.7)
+            place.set_title(color or y, fontsize=10, loc="left")
+            place.set_xlabel(x, fontsize=8)
+            if color:
+                place.set_ylabel(y, fontsize=8)
+            if not color:
+                place.grid(color="0.92", lw=0.8)
+            place.set_axisbelow(True)
+            place.tick_params(labelsize=8)
+            place.spines[["top", "right"]].set_visible(False)
+        yield figure
+
+
+def _draw_map(figure: Any, place: Any, x: Array, y: Array, color: Array) -> None:
+    """Draw a measure over two quantities: cells of a grid, or points; runs without it are crosses."""
+    xs, ys = np.unique(x), np.unique(y)
+    if len(xs) * len(ys) == len(x) and len(xs) > 1 and len(ys) > 1:
+        cells = np.full((len(ys), len(xs)), np.nan)
+        cells[np.searchsorted(ys, y), np.searchsorted(xs, x)] = color
+        drawn = place.pcolormesh(xs, ys, cells, shading="nearest", cmap="viridis")
+    else:
+        finite = np.isfinite(color)
+        drawn = place.scatter(x[finite], y[finite], c=color[finite], s=14, cmap="viridis")
+        place.plot(x[~finite], y[~finite], "x", color="0.6", ms=4)
+    figure.colorbar(drawn, ax=place)

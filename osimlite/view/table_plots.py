@@ -1,0 +1,322 @@
+"""Plots of the tables that tools write: motions, moments, muscle forces, states, controls and errors."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from pathlib import Path, PurePath
+from typing import NamedTuple
+
+import numpy as np
+
+from osimlite.base.files import make_folder
+from osimlite.io.tables.storage import StoTable
+from osimlite.mechanics.multibody.mechanism import Mechanism
+from osimlite.mechanics.multibody.parts import CoordinateInfo
+from osimlite.mechanics.multibody.spatial import Array
+from osimlite.schema.actuators import Actuator, CoordinateActuator, TorqueActuator
+from osimlite.schema.model import Model
+from osimlite.schema.muscles import PathActuator
+from osimlite.schema.paths import GeometryPath
+from osimlite.view.panels import (
+    Column,
+    StepTimes,
+    draw_pages,
+    group_columns,
+    split_sides,
+    write_pages,
+)
+
+FORCE, MOMENT, POWER = "N", "N·m", "W"
+FORCE_OR_MOMENT = "N or N·m"
+"""Unit of an actuator about which nothing is known."""
+
+SPEED = "m/s or rad/s"
+"""Unit of the speed of an actuator about which nothing is known."""
+
+ACTUATOR_TABLES = (
+    "ActuatorForces",
+    "ActuatorSpeeds",
+    "ActuatorPowers",
+    "ModelForces",
+    "controls",
+    "Static Optimization",
+)
+"""First lines of tables whose columns have the names of actuators and other forces."""
+
+TABLE_UNITS = {
+    "ActuatorPowers": POWER,
+    "ActuatorSpeeds": SPEED,
+    "controls": "",
+    "Static Optimization": "",
+    "ActuatorForces": FORCE_OR_MOMENT,
+    "ModelForces": FORCE_OR_MOMENT,
+    "Length": "m",
+    "FiberLength": "m",
+    "TendonLength": "m",
+    "FiberVelocity": "m/s",
+    "FiberForce": FORCE,
+    "TendonForce": FORCE,
+    "ActiveFiberForce": FORCE,
+    "PassiveFiberForce": FORCE,
+    "ActiveFiberForceAlongTendon": FORCE,
+    "PassiveFiberForceAlongTendon": FORCE,
+    "FiberActivePower": POWER,
+    "FiberPassivePower": POWER,
+    "TendonPower": POWER,
+    "MusclePower": POWER,
+    "PennationAngle": "rad",
+    "PennationAngularVelocity": "rad/s",
+    "marker errors": "m",
+    "orientation errors": "rad",
+}
+"""Units of tables whose columns have one unit, by their first lines."""
+
+STATE_UNITS = {
+    "fiber_length": "m",
+    "fiber_velocity": "m/s",
+    "stretch": "m",
+    "dissipatedEnergy": "J",
+}
+"""Units of states of forces that have one, by the last word of their paths."""
+
+SECTIONS = {
+    "value": "values",
+    "speed": "speeds",
+    "activation": "activations",
+    "fiber_length": "fiber lengths",
+}
+"""Titles of the pages of states, by the last word of their paths."""
+
+RATE_UNITS = ("", "/s", "/s²")
+"""Ends of the units of positions, velocities and accelerations."""
+
+_RATES = {
+    "Speeds": 1,
+    "Velocities": 1,
+    "PointVelocity": 1,
+    "Accelerations": 2,
+    "PointAcceleration": 2,
+}
+"""Order of the time derivative of tables of motion, by their first lines."""
+
+
+class Names(NamedTuple):
+    """What a model says about the columns of tables."""
+
+    coordinates: Mapping[str, CoordinateInfo]  # coordinates by name
+    units: Mapping[str, str]  # units of the forces of actuators by name
+    regions: Mapping[str, str]  # bodies between which muscles run, by name
+
+    @classmethod
+    def of_model(cls, model: Model | None, mechanism: Mechanism | None = None) -> Names:
+        """Return the names of a model; none of what is not known.
+
+        Args:
+            model: the model, with the actuators that a tool has added.
+            mechanism: mechanism of the model, for the coordinates.
+        """
+        infos = {info.name: info for info in mechanism.coordinates} if mechanism else {}
+        units, regions = dict[str, str](), dict[str, str]()
+        for item in model.components(Actuator) if model is not None else ():
+            if isinstance(item, PathActuator):
+                units[item.name] = FORCE
+                regions[item.name] = _describe_region(item)
+            elif isinstance(item, CoordinateActuator):
+                info = infos.get(str(item.coordinate))
+                turns = info is None or info.motion_type == "rotational"
+                units[item.name] = MOMENT if turns else FORCE
+            else:
+                units[item.name] = MOMENT if isinstance(item, TorqueActuator) else FORCE
+        return cls(infos, units, regions)
+
+
+def _describe_region(item: PathActuator) -> str:
+    """Return the bodies between which a muscle runs, without their side; "" without points."""
+    path = item.geometry_path
+    if not isinstance(path, GeometryPath) or not path.path_point_set.objects:
+        return ""
+    points = path.path_point_set.objects
+    frames = [points[index].socket_parent_frame for index in (0, -1)]
+    ends = [str(getattr(frame, "name", frame)).rpartition("/")[2] for frame in frames]
+    # Muscles of both legs belong to one region, though the names of bodies say a side.
+    stems = [next(iter(split_sides([end]).values()))[0] for end in ends]
+    return " – ".join(dict.fromkeys(stems)).replace("_", " ")
+
+
+def describe_columns(table: StoTable, names: Names) -> list[Column]:
+    """Return the columns of a table with their units and groups; angles are in degrees.
+
+    Args:
+        table: the table.
+        names: what the model says about them.
+    """
+    columns: dict[str, list[Column]] = {}
+    for label, values in table.table[1].items():
+        column = _describe_column(label, np.asarray(values, dtype=float), table, names)
+        # Values, speeds, activations and so on of a table of states come one after the other.
+        kind = _find_kind(label)
+        section = SECTIONS.get(kind, kind.replace("_", " "))
+        columns.setdefault(kind, []).append(column._replace(section=section))
+    listed = [column for group in columns.values() for column in group]
+    groups = split_sides(column.group for column in listed)
+    return [column._replace(group=groups[column.group][0]) for column in listed]
+
+
+def _find_kind(label: str) -> str:
+    """Return the kind of a state by its label; "" for columns that are no states."""
+    owner, _, kind = label.rpartition("/")
+    if owner:
+        return kind
+    word = label.partition(".")[2]
+    return word if word in SECTIONS or word in STATE_UNITS else ""
+
+
+def _describe_column(label: str, values: Array, table: StoTable, names: Names) -> Column:
+    owner, _, last = label.rpartition("/")
+    if owner:
+        item = owner.rpartition("/")[2]
+        if last in ("value", "speed"):
+            return _describe_coordinate(item, values, table, names, last == "speed")
+        return Column(
+            item if last in SECTIONS else f"{item} {last.replace('_', ' ')}",
+            STATE_UNITS.get(last, ""),
+            values,
+            names.regions.get(item, ""),
+        )
+    item, _, last = label.partition(".")
+    if last in ("activation", *STATE_UNITS):
+        words = item if last in SECTIONS else f"{item} {last.replace('_', ' ')}"
+        return Column(words, STATE_UNITS.get(last, ""), values, names.regions.get(item, ""))
+    is_vector = any(pattern.fullmatch(label) for pattern in _VECTORS)
+    if table.name in ACTUATOR_TABLES and not is_vector:
+        # Actuators of a coordinate often have its name.
+        return _describe_actuator(label, values, table, names)
+    if label in names.coordinates:
+        return _describe_coordinate(label, values, table, names, False)
+    if label.endswith("_u") and label[:-2] in names.coordinates:
+        return _describe_coordinate(label[:-2], values, table, names, True)
+    for pattern, describe in _ENDINGS:
+        if match := pattern.fullmatch(label):
+            unit = describe(match["end"], table)
+            stem = match["stem"]
+            group = _find_group(stem, names)
+            words = f"{stem} {match['end']}" if pattern in _VECTORS else stem
+            factor = 1.0
+            if unit.startswith("rad"):
+                factor, unit = np.degrees(1.0), unit.replace("rad", "deg", 1)
+            return Column(words, unit, factor * values, group)
+    unit = TABLE_UNITS.get(table.name, "")
+    if table.name.startswith("MomentArm_"):
+        unit = "m"
+    elif table.name.startswith("Moment_"):
+        unit = MOMENT
+    return Column(label, unit, values, names.regions.get(label, ""))
+
+
+def _describe_actuator(label: str, values: Array, table: StoTable, names: Names) -> Column:
+    """Return the column of an actuator or another force, by the name of the actuator."""
+    group = names.regions.get(label, "")
+    info = names.coordinates.get(re.sub(r"_reserve$|^reserve_", "", label))
+    group = group or ("" if info is None else _find_group(info.name, names))
+    turns = info is None or info.motion_type == "rotational"
+    force = names.units.get(label, "" if info is None else MOMENT if turns else FORCE)
+    unit = TABLE_UNITS[table.name]
+    if unit == FORCE_OR_MOMENT:
+        unit = force or unit
+    elif unit == SPEED:
+        unit = {FORCE: "m/s", MOMENT: "rad/s"}.get(force, unit)
+    return Column(label, unit, values, group)
+
+
+def _describe_coordinate(
+    name: str, values: Array, table: StoTable, names: Names, is_speed: bool
+) -> Column:
+    """Return the column of a coordinate, in degrees if it is an angle."""
+    info = names.coordinates.get(name)
+    end = RATE_UNITS[1 if is_speed else _RATES.get(table.name, 0)]
+    kind = info.motion_type if info is not None else ""
+    unit = {"rotational": "deg", "translational": "m"}.get(kind, "")
+    if kind == "rotational" and not table.in_degrees:
+        values = np.degrees(values)
+    return Column(name, f"{unit}{end}" if unit else "", values, _find_group(name, names))
+
+
+def _find_group(name: str, names: Names) -> str:
+    """Return the joint of a coordinate, or the body of a vector."""
+    info = names.coordinates.get(name)
+    if info is None:
+        return name
+    return re.sub(r"^ground_|_[rl]$", "", info.joint.rpartition("/")[2])
+
+
+def _describe_vector(end: str, table: StoTable) -> str:
+    """Return the unit of a component of a body's position, velocity or acceleration."""
+    rate = RATE_UNITS[_RATES.get(table.name, 0)]
+    if not end.startswith("O"):
+        return f"m{rate}"
+    return f"{'deg' if table.in_degrees else 'rad'}{rate}"
+
+
+_ENDINGS: tuple[tuple[re.Pattern[str], Callable[[str, StoTable], str]], ...] = (
+    (re.compile(r"(?P<stem>.+)_(?P<end>moment)"), lambda end, table: MOMENT),
+    (re.compile(r"(?P<stem>.+)_(?P<end>force)"), lambda end, table: FORCE),
+    (re.compile(r"(?P<stem>.+)_(?P<end>O[xyzXYZ]|[XYZ])"), _describe_vector),
+    (
+        re.compile(r"(?P<stem>.+)_(?P<end>[fmp][xyz])"),
+        lambda end, table: {"f": FORCE, "m": MOMENT, "p": "m"}[end[0]],
+    ),
+    (
+        re.compile(r"(?P<stem>.+)_(?P<end>[FTp][xyz])"),
+        lambda end, table: {"F": FORCE, "T": MOMENT, "p": "m"}[end[0]],
+    ),
+    (re.compile(r"(?P<stem>.+)\.(?P<end>force\.[XYZ])"), lambda end, table: FORCE),
+    (re.compile(r"(?P<stem>.+)\.(?P<end>torque\.[XYZ])"), lambda end, table: MOMENT),
+    (re.compile(r"(?P<stem>.+)\.?(?P<end>PotentialEnergy)"), lambda end, table: "J"),
+)
+"""Ends of labels, and the functions that return their units."""
+_VECTORS = [pattern for pattern, _ in _ENDINGS[2:]]
+"""Patterns whose ends distinguish quantities."""
+
+
+def plot_tables(
+    tables: Mapping[str, StoTable],
+    folder: str | Path,
+    names: Names,
+    *,
+    steps: Mapping[str, StepTimes] | None = None,
+    report: Callable[[int, int], None] | None = None,
+) -> list[Path]:
+    """Draw tables over time or over the gait cycle, each on pages of at most twelve panels.
+
+    Args:
+        tables: tables by the names of their files, such as ``ik.mot``.
+        folder: folder to write into; it is made if it does not exist.
+        names: what the model says about the columns.
+        steps: steps of the feet by side, if they are known.
+        report: called with the number of finished tables and the number of all.
+
+    Returns:
+        The PNG files; a table in which nothing changes has none.
+
+    Raises:
+        MissingDependency: matplotlib is not installed.
+        OsimliteError: the folder or a file cannot be written.
+    """
+    written = []
+    base = make_folder(Path(folder))
+    for number, (name, table) in enumerate(tables.items(), 1):
+        # A dot in the name of a tool is no ending.
+        stem = re.sub(r"\.(sto|mot|xml|trc)$", "", PurePath(name).name)
+        if len(table.times) > 1:
+            panels, note = group_columns(describe_columns(table, names), table.times, steps=steps)
+            written += write_pages(draw_pages(make_title(stem), panels, note=note), base, stem)
+        if report is not None:
+            report(number, len(tables))
+    return written
+
+
+def make_title(stem: str) -> str:
+    """Return the title of a picture from the name of its file."""
+    words = stem.strip("_").replace("_", " ")
+    return words[:1].upper() + words[1:]
