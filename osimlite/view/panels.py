@@ -133,8 +133,12 @@ def _split_side(name: str, known: Collection[str]) -> tuple[str, str]:
 
 def _mirror(name: str) -> str:
     """Return a name with every side replaced by the opposite one, as in ``calcn_r_right``."""
-    for token, opposite in _SIDE_TOKENS:
-        name = token.sub(lambda match, words=opposite: words[match[0]], name)
+
+    def replace(match: re.Match[str]) -> str:
+        return next(words[match[0]] for _, words in _SIDE_TOKENS if match[0] in words)
+
+    for token, _ in _SIDE_TOKENS:
+        name = token.sub(replace, name)
     return name
 
 

@@ -6,7 +6,7 @@ import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from math import ceil
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -29,7 +29,11 @@ from osimlite.view.panels import (
 )
 from osimlite.view.table_plots import Names, describe_columns
 
+Line = TypeVar("Line")
+"""Type of what is drawn as one line."""
+
 LINES_IN_PANEL = 7
+"""Lines of one panel: more cannot be told apart."""
 
 MOST_ENERGIES = 400
 """Moments at which energy is worked out; more would not show."""
@@ -183,8 +187,8 @@ def make_sheet(title: str, heights: Sequence[float]) -> tuple[Any, Any]:
     return figure, panels
 
 
-def divide_among_panels(lines: Mapping[str, Array]) -> list[dict[str, Array]]:
-    """The lines of each panel: as many in one as in another, and no more than a reader can follow."""
+def divide_among_panels(lines: Mapping[str, Line]) -> list[dict[str, Line]]:
+    """Return the lines of each panel: equal numbers, at most `LINES_IN_PANEL` in one."""
     items = list(lines.items())
     size = ceil(len(items) / ceil(len(items) / LINES_IN_PANEL))
     return [dict(items[first : first + size]) for first in range(0, len(items), size)]

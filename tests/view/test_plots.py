@@ -11,7 +11,8 @@ from osimlite.mechanics.multibody import build_mechanism
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.simulation import simulate
 from osimlite.view import plot_simulation
-from osimlite.view.plots import STORED, compute_energies, draw_figures, figure_of, lines_in
+from osimlite.view.panels import figure_of
+from osimlite.view.plots import STORED, compute_energies, draw_figures, lines_in
 from tests.view.motions import Recorded, stroll
 
 pytest.importorskip("matplotlib")
