@@ -1,8 +1,9 @@
 """osimlite: build, check, translate and simulate OpenSim models without OpenSim.
 
 Everything public is here: ``read``, ``read_document``, ``classes_in``, ``write``, ``to_text``,
-``validate``, ``mechanism``, ``paths``, ``muscle_curves``, ``to_urdf``, ``to_mjcf``, ``from_mjcf``,
-``simulate``, ``Feedback``, ``inverse_kinematics``, ``FrameSolver``, ``scale``, ``fit``, ``kinematics``,
+``read_b3d``, ``validate``, ``mechanism``, ``paths``, ``muscle_curves``, ``to_urdf``, ``to_mjcf``,
+``from_mjcf``, ``simulate``, ``Feedback``, ``inverse_kinematics``, ``FrameSolver``, ``scale``, ``fit``,
+``kinematics``,
 ``inverse_dynamics``, ``static_optimization``, ``casadi``, ``tangents``, ``linearize``,
 ``sensitivity``, ``modify``, ``run``, ``check_trial``, ``report``, the errors, and every component
 class under OpenSim's own name (``osimlite.PinJoint``). Names are imported when first used, so that
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from osimlite.fitting.modifying.words import modify as modify
     from osimlite.fitting.person import fit as fit
     from osimlite.fitting.scale_tool import scale as scale
+    from osimlite.io.b3d.subject import read_b3d as read_b3d
     from osimlite.io.document.plugins import classes_in as classes_in
     from osimlite.io.document.printer import to_text as to_text
     from osimlite.io.document.printer import write as write
@@ -70,6 +72,7 @@ if TYPE_CHECKING:
         "muscle_curves",
         "paths",
         "read",
+        "read_b3d",
         "read_document",
         "read_text",
         "report",
@@ -90,6 +93,7 @@ FUNCTIONS = {
     "casadi": "osimlite.derivatives.functions",
     "classes_in": "osimlite.io.document.plugins",
     "read": "osimlite.io.document.reader",
+    "read_b3d": "osimlite.io.b3d.subject",
     "read_document": "osimlite.io.document.reader:read_any",
     "read_text": "osimlite.io.document.reader",
     "write": "osimlite.io.document.printer",

@@ -34,12 +34,25 @@ def modify(
             "width=FACTOR, external-loads=FILE. May be repeated; applied in this order.",
         ),
     ] = None,
+    source: Annotated[
+        str | None,
+        Option(
+            "--from",
+            metavar="PROGRAM",
+            help="'nimble': the model was made for nimblephysics (AddBiomechanics, SKEL, BioAMASS); write one whose "
+            "bodies move in OpenSim as they do there.",
+            show_default=False,
+        ),
+    ] = None,
 ) -> None:
     """Replace parts of a model as OpenSim's ModOps do: muscles, tendons, paths, contact, joints.
 
     With paths=polynomial every path becomes a function of the coordinates, wrapping included, and
     the largest error is reported. For a MocoStudy, MocoTrack or MocoInverse, the model is the result
     of its ModelProcessor.
+
+    With --from nimble, joints that nimblephysics computes otherwise than OpenSim are rewritten, so
+    that the same coordinates give the same poses. It is applied before all replacements.
 
     Example: osimlite modify gait.osim --replace muscles=degroote --replace tendon=rigid --replace
         paths=polynomial
@@ -54,6 +67,8 @@ def modify(
     from osimlite.schema.model import Model
     from osimlite.schema.tools.processors import ModelProcessor
 
+    if source not in (None, "nimble"):
+        raise SettingError(f"--from takes 'nimble', not '{source}'")
     changes = []
     for word in replace or ():
         name, equals, value = word.partition("=")
@@ -62,7 +77,7 @@ def modify(
         changes.append(find_change(name, value))
     top = read_any(file)
     if isinstance(top, Model):
-        if not changes:
+        if not changes and source is None:
             raise SettingError(
                 "there is nothing to replace; add --replace NAME=WORD, such as muscles=degroote"
             )
@@ -72,9 +87,18 @@ def modify(
         if processor is None:
             raise DocumentError(f"a {type(top).__name__} has no model to change", file=str(file))
         model = process_model(processor, file.parent)
+    rewritten = []
+    if source == "nimble":
+        from osimlite.translate.nimble import convert_from_nimble
+
+        rewritten = convert_from_nimble(model)
     fitted = [item for change in changes for item in change(model, file.parent) or ()]
     target = output or file.with_name(f"{file.stem}_modified.osim")
     write(model, target)
+    for each in rewritten:
+        say(f"{each.component}: {each.difference}; {each.done or 'not changed'}")
+    if source == "nimble" and not rewritten:
+        say("OpenSim moves this model as Nimble does; nothing was rewritten")
     if fitted:
         table = plain_table()
         for heading in (

@@ -131,7 +131,37 @@ MJCF_CHOICES = (
 )
 """Options of the conversion from MJCF."""
 
+
+def read_subject(path: Path, *, name: str, processing_pass: str | None = None) -> Imported:
+    """Read a subject of AddBiomechanics; see :class:`osimlite.translate.addbiomechanics.SubjectFolder`."""
+    from osimlite.translate.addbiomechanics import SubjectFolder
+
+    return SubjectFolder(path, name, processing_pass)
+
+
+B3D_CHOICES = (
+    OptionSpec(
+        "processing_pass",
+        str | None,
+        "Processing pass to write the trials of: kinematics, dynamics, lowpass-filter or "
+        "acceleration-minimizing-filter.",
+        unit="TYPE",
+        shown="dynamics, or else the last one",
+        group="AddBiomechanics",
+    ),
+)
+"""Options of the format of AddBiomechanics."""
+
 IMPORTERS: list[Importer] = [
+    Importer(
+        "b3d",
+        "AddBiomechanics",
+        (".b3d",),
+        PROJECT,
+        "models, coordinates, markers, ground forces, plates, sensors, setups for OpenSim",
+        read_subject,
+        choices=B3D_CHOICES,
+    ),
     Importer(
         "mjcf",
         "MJCF (MuJoCo)",

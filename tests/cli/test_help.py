@@ -12,7 +12,7 @@ from osimlite.cli import COMMANDS, app
 
 MEANINGS = {
     "--to": "seconds, but the format of translate and convert",
-    "--from": "seconds, but the format that convert reads",
+    "--from": "seconds, but the format that convert reads, or the program of modify",
     "--output": "a file or a folder, as the command writes",
     "--seed": "of what it makes random",
     "--all": "findings of validate, or classes of info",

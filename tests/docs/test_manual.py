@@ -31,7 +31,7 @@ PAGES = sorted(
     - {"docs/gallery.md"}
 )
 QUICK = (
-    "adoption", "compiled", "constraints", "errors", "format-and-diff", "from-mujoco", "from-urdf", "integrators",
+    "adoption", "addbiomechanics", "compiled", "constraints", "converting", "errors", "format-and-diff", "from-mujoco", "from-urdf", "integrators",
     "lint-in-ci", "modifying", "plugin-classes", "rules", "urdf", "yaml",
 )  # fmt: skip
 """Pages whose blocks take a second or two at most: the quick suite runs these, and reads all others
@@ -84,6 +84,8 @@ def shell(tmp_path: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str,
         "MPLBACKEND": "Agg",
         "MPLCONFIGDIR": fonts,
         "COLUMNS": "100",
+        # For what pages take for granted and tests can make.
+        "OSIMLITE_REPOSITORY": str(ROOT),
         **home,
     }
 

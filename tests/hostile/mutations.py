@@ -84,6 +84,7 @@ KINDS = {
         _PENDULUM,
         (("ik", "model.osim", "@", *_OUT),),
     ),
+    ".b3d": Kind(".b3d", ("@b3d",), (), (("convert", "@", *_OUT),)),
     ".trc": Kind(
         ".trc",
         ("@trc", "setups/walk.trc"),
@@ -339,6 +340,10 @@ def _made(name: str) -> bytes:
             return SETUP.encode()
         case "mesh.osim":
             return MESH_MODEL.encode()
+        case "b3d":
+            from tests.io.b3d_files import make_subject
+
+            return make_subject((4, 3))
         case "yaml":
             return to_yaml(osimlite.read(FIXTURES / _PENDULUM[0])).encode()
         case "human.osim":

@@ -12,7 +12,7 @@ from osimlite.lint.words import describe_object, with_article
 from osimlite.mechanics.laws.vectors import dot
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.frames import Ground
-from osimlite.schema.joints import Joint
+from osimlite.schema.joints import EllipsoidJoint, Joint
 
 
 @rule("OSIM402", "joint-to-itself", severity=ERROR)
@@ -285,3 +285,45 @@ def report_gimbal_lock(subject: Subject, report: FindingCollector) -> None:
                     second,
                     tag="default_value",
                 )
+
+
+@rule("OSIM417", "nimble-ellipsoid", severity=WARNING)
+def report_nimble_ellipsoid(subject: Subject, report: FindingCollector) -> None:
+    """An ellipsoid joint was made for nimblephysics, which moves it otherwise than OpenSim.
+
+    Reports ellipsoid joints whose coordinates are abduction, elevation and upward rotation, in this
+    order, and those of models that AddBiomechanics wrote.
+
+    AddBiomechanics, SKEL and BioAMASS use nimblephysics. It rotates by Ry(q0) Rx(-q1) Rz(q2), OpenSim
+    by Rx(q0) Ry(q1) Rz(q2), so that the child is decimetres away from where it should be.
+    `osimlite modify --from nimble` writes a model that moves in OpenSim as in nimblephysics.
+
+    ```xml
+      <Body name="scapula"> <mass>1</mass> <inertia>0.01 0.01 0.01 0 0 0</inertia> </Body>
+    - <EllipsoidJoint name="scapulothoracic">
+    + <EllipsoidJoint name="ankle">
+          <socket_parent_frame>/bodyset/shank</socket_parent_frame>
+          <socket_child_frame>/bodyset/scapula</socket_child_frame>
+          <coordinates>
+    -         <Coordinate name="scapula_abduction" />
+    -         <Coordinate name="scapula_elevation" />
+    -         <Coordinate name="scapula_upward_rot" />
+    +         <Coordinate name="ankle_rx" />
+    +         <Coordinate name="ankle_ry" />
+    +         <Coordinate name="ankle_rz" />
+          </coordinates>
+          <radii_x_y_z>0.1 0.2 0.1</radii_x_y_z>
+      </EllipsoidJoint>
+    ```
+    """
+    name = "" if subject.model is None else subject.model.name
+    for joint in subject.find_instances(EllipsoidJoint):
+        # Imported here, because few models have such joints.
+        from osimlite.io.nimble import is_nimble_ellipsoid
+
+        if is_nimble_ellipsoid(joint, name):
+            report(
+                f"{describe_object(joint)} seems to be made for nimblephysics, which rotates it in another order "
+                "than OpenSim; 'osimlite modify --from nimble' rewrites it",
+                joint,
+            )

@@ -1,0 +1,88 @@
+"""Frames of .b3d files as arrays.
+
+All frames of a kind have one size, and every number in them has a fixed width. So the layout of the
+first frame of a block is that of all others, unless the file is damaged; this is checked for each
+frame, and frames are taken apart one by one only where the check fails.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from osimlite.io.b3d.wire import BYTES, FIXED64, DamagedMessageError, split_message
+from osimlite.mechanics.multibody.spatial import Array
+
+NUMBER_BYTES = 8
+"""Size of a number of 64 bits."""
+
+Layout = dict[int, tuple[int, int]]
+"""Offset and number of bytes of each field in a frame, by the number of the field."""
+
+
+def decode_frames(
+    rows: np.ndarray[Any, np.dtype[np.uint8]], names: Mapping[int, str]
+) -> dict[str, Array]:
+    """Decode frames of one size.
+
+    Args:
+        rows: bytes of n frames (n, size).
+        names: names of the known fields by their numbers.
+
+    Returns:
+        Numbers of each field (n, m) by name. A field that the frames do not have is left out.
+
+    Raises:
+        DamagedMessageError: a frame is not a message, or has other fields than the first one.
+    """
+    if not len(rows):
+        return {}
+    layout = _find_layout(memoryview(rows[0].tobytes()))
+    is_number = np.zeros(rows.shape[1], dtype=bool)
+    for offset, size in layout.values():
+        is_number[offset : offset + size] = True
+    structure = rows[:, ~is_number]
+    odd = np.flatnonzero((structure != structure[0]).any(axis=1))
+    result = {}
+    for number, (offset, size) in layout.items():
+        if number in names and size:
+            numbers = np.ascontiguousarray(rows[:, offset : offset + size]).view("<f8")
+            result[names[number]] = numbers.astype(float)
+    for index in odd:
+        _replace_row(result, int(index), rows[index], layout, names)
+    return result
+
+
+def _find_layout(frame: memoryview) -> Layout:
+    """Return where the fields of a frame are."""
+    layout: Layout = {}
+    for field in split_message(frame):
+        if not isinstance(field.value, memoryview) or field.wire_type not in (BYTES, FIXED64):
+            raise DamagedMessageError(f"field {field.number} of a frame has another type")
+        if field.number in layout:
+            raise DamagedMessageError(f"field {field.number} occurs twice in a frame")
+        if len(field.value) % NUMBER_BYTES:
+            raise DamagedMessageError(f"field {field.number} of a frame ends within a number")
+        layout[field.number] = (field.offset, len(field.value))
+    return layout
+
+
+def _replace_row(
+    result: dict[str, Array],
+    index: int,
+    row: np.ndarray[Any, np.dtype[np.uint8]],
+    layout: Layout,
+    names: Mapping[int, str],
+) -> None:
+    """Decode a frame whose fields are in other places than those of the first frame."""
+    text = row.tobytes()
+    found = _find_layout(memoryview(text))
+    if {number: size for number, (_, size) in found.items()} != {
+        number: size for number, (_, size) in layout.items()
+    }:
+        raise DamagedMessageError(f"frame {index} has other fields than the first one")
+    for number, (offset, size) in found.items():
+        if number in names and size:
+            result[names[number]][index] = np.frombuffer(text[offset : offset + size], "<f8")
