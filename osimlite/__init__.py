@@ -2,12 +2,11 @@
 
 Everything public is here: ``read``, ``read_document``, ``classes_in``, ``write``, ``to_text``,
 ``read_b3d``, ``validate``, ``mechanism``, ``paths``, ``muscle_curves``, ``to_urdf``, ``to_mjcf``,
-``from_mjcf``, ``simulate``, ``Feedback``, ``inverse_kinematics``, ``FrameSolver``, ``scale``, ``fit``,
-``kinematics``,
-``inverse_dynamics``, ``static_optimization``, ``casadi``, ``tangents``, ``linearize``,
-``sensitivity``, ``modify``, ``run``, ``check_trial``, ``report``, the errors, and every component
-class under OpenSim's own name (``osimlite.PinJoint``). Names are imported when first used, so that
-importing osimlite costs nothing.
+``from_mjcf``, ``simulate``, ``Feedback``, ``inverse_kinematics``, ``FrameSolver``, ``scale``,
+``fit``, ``kinematics``, ``inverse_dynamics``, ``static_optimization``, ``casadi``, ``tangents``,
+``linearize``, ``sensitivity``, ``modify``, ``run``, ``check_trial``, ``report``, the errors, and
+every component class under OpenSim's own name (``osimlite.PinJoint``). Names are imported when
+first used, so that importing osimlite costs nothing.
 """
 
 from __future__ import annotations

@@ -152,7 +152,7 @@ class Request:
                 files = imported.write(self.folder)
                 result = Conversion(files, imported.fidelity, dict(imported.summary))
             else:
-                model: Model = imported.model  # type: ignore[attr-defined]
+                model: Model = getattr(imported, "model")  # noqa: B009
                 result = self._export(model, exporter, motion, geometry, values[exporter.name])
                 # Losses of the first step are losses of the result, too.
                 result.fidelity.records[:0] = imported.fidelity.records
@@ -198,8 +198,8 @@ class Request:
             model, mechanism, folders, file=self.file, motion=motion, left_out=left_out
         )
         fidelity = Fidelity(mechanism.name, exporter.name)
-        for path in (component.path for component in model.components(Body)):
-            fidelity.translated[path] = "node"
+        for body in model.components(Body):
+            fidelity.translated[body.path] = "node"
         for force in model.components(Force):
             fidelity.add(
                 "force",

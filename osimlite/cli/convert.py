@@ -17,8 +17,10 @@ if TYPE_CHECKING:
 
 def _list_choices() -> Iterator[OptionSpec]:
     """Yield the options of all formats."""
-    for each in (*IMPORTERS, *EXPORTERS):
-        yield from each.choices
+    for importer in IMPORTERS:
+        yield from importer.choices
+    for exporter in EXPORTERS:
+        yield from exporter.choices
 
 
 @command_with(_list_choices)

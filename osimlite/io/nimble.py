@@ -10,7 +10,7 @@ from __future__ import annotations
 from enum import Enum
 
 from osimlite.errors import ModelError
-from osimlite.schema.base import Component
+from osimlite.schema.base import Component, Object
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.custom_joint import CustomJoint, TransformAxis
 from osimlite.schema.frames import PhysicalOffsetFrame
@@ -154,7 +154,9 @@ def list_coordinates(model: Model) -> list[Coordinate]:
     bodies = {path for body in model.body_set.objects if (path := tree.path_of(body)) is not None}
     bodies = {path for path in bodies if path.rpartition("/")[2] not in OMITTED_BODIES}
     roots: list[tuple[Joint, str]] = []
-    for joint in model.joint_set.objects:
+    # An object of an unknown class is not a Joint.
+    parts: list[Object] = [*model.joint_set.objects]
+    for joint in parts:
         if not isinstance(joint, Joint):
             continue
         child = _find_body(tree, joint, "socket_child_frame")

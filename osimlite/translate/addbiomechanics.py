@@ -204,7 +204,7 @@ class SubjectFolder:
         markers, positions = trial.read_markers()
         if markers:
             # Older programs wrote zeros for markers that were not seen.
-            unseen = ~positions.any(axis=2)
+            unseen = np.asarray(~positions.any(axis=2))
             positions = np.where(unseen[:, :, None], np.nan, positions)
             if unseen.any():
                 self.fidelity.add(
@@ -215,7 +215,7 @@ class SubjectFolder:
                     f"{int(unseen.sum())} positions",
                 )
             rows = positions.reshape(len(times), -1)
-            write_trc(folder / MARKERS_FILE, times, markers, rows)
+            write_trc(folder / MARKERS_FILE, times.tolist(), markers, rows)
             written.append(folder / MARKERS_FILE)
             self.fidelity.translated[f"{place}/markers"] = f"trials/{name}/{MARKERS_FILE}"
         unnamed = len(self.subject.marker_names) - len(markers)
@@ -293,8 +293,8 @@ class SubjectFolder:
         table = trial.read_coordinates(index)
         columns, rows = list(table.columns), [*table.rows.T]
         for coupler in self.subject.read_model(index).components(CoordinateCouplerConstraint):
-            name = _get_last_name(coupler.dependent_coordinate_name)
-            arguments = [_get_last_name(each) for each in coupler.independent_coordinate_names]
+            name = _get_last_name(str(coupler.dependent_coordinate_name))
+            arguments = [_get_last_name(str(each)) for each in coupler.independent_coordinate_names]
             function = coupler.coupled_coordinates_function
             if name in columns or function is None or not {*arguments} <= {*table.columns}:
                 continue

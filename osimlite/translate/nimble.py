@@ -27,6 +27,7 @@ from osimlite.io.nimble import (
 )
 from osimlite.mechanics.multibody import functions as curves
 from osimlite.mechanics.multibody.spatial import Array
+from osimlite.schema.base import Object
 from osimlite.schema.constraint_types import CoordinateCouplerConstraint
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.custom_joint import CustomJoint, TransformAxis
@@ -95,7 +96,8 @@ def convert_from_nimble(model: Model) -> list[NimbleChange]:
         UnsupportedError: Nimble cannot read the model, so that it has no motion there.
     """
     changes: list[NimbleChange] = []
-    for joint in model.joint_set.objects:
+    parts: list[Object] = [*model.joint_set.objects]
+    for joint in parts:
         if not isinstance(joint, Joint) or joint.name in OMITTED_JOINTS:
             continue
         if not isinstance(joint, JOINT_CLASSES):
@@ -207,7 +209,7 @@ def _build_custom_axes(
     """
     names = [coordinate.name for coordinate in joint.coordinates]
     _orthogonalize(joint, vectors[:3], may_tilt=False)
-    functions = []
+    functions: list[tuple[Function, str]] = []
     for axis in axes:
         function, scale = unwrap_function(axis)
         words = axis.names

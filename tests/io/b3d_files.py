@@ -76,9 +76,9 @@ def make_walker() -> osimlite.Model:
         bodies[name] = model.add(osimlite.Body(name=name, mass=2.0, inertia=inertia))
     names = ("tilt", "list", "turn", "tx", "ty", "tz")
     axes = {}
-    units = ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
+    turns = ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
     places = ("rotation1", "rotation2", "rotation3", "translation1", "translation2", "translation3")
-    units += ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    units = (*turns, (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
     for place, unit, name in zip(places, units, names, strict=True):
         function = osimlite.LinearFunction(coefficients=(1.0, 0.0))
         axes[place] = osimlite.TransformAxis(

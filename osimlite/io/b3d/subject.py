@@ -113,7 +113,9 @@ class B3dTrial:
         if not 0.0 <= start <= MAX_START_TIME_S:
             start = 0.0
         # The start has 32 bits only. Without rounding, times such as 0.30000001192092896 result.
-        return round(start, 6) + self.time_step * np.arange(self.frame_count)
+        return np.asarray(
+            round(start, 6) + self.time_step * np.arange(self.frame_count), dtype=float
+        )
 
     @property
     def missing_forces(self) -> Array:

@@ -13,7 +13,7 @@ pytest.importorskip("numpy", reason="needs numpy (extra 'sim')")
 
 import osimlite
 from osimlite.errors import DocumentError, MissingFileError, OsimliteError, SettingError
-from osimlite.io.b3d.messages import HEADER
+from osimlite.io.b3d.messages import HEADER, PASS_FIELDS
 from osimlite.io.b3d.subject import find_pressure_centers, read_b3d
 from tests.io import b3d_files as files
 
@@ -101,16 +101,15 @@ def test_points_of_small_forces_are_those_of_the_nearest_large_one() -> None:
     assert not find_pressure_centers(torque, np.zeros((6, 3)), 0.3).any()
 
 
-def test_forces_serve_where_a_file_has_no_wrenches(path: Path) -> None:
+def test_forces_serve_where_a_file_has_no_wrenches(
+    path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     trial = read_b3d(path).trials[0]
     expected = trial.read_wrenches()
     arrays = trial.read_arrays(1)
     del arrays["contact_wrenches"]
-    type(trial).read_arrays, read = (lambda self, index=None: arrays), type(trial).read_arrays
-    try:
-        np.testing.assert_allclose(trial.read_wrenches(), expected, atol=1e-12)
-    finally:
-        type(trial).read_arrays = read
+    monkeypatch.setattr(type(trial), "read_arrays", lambda self, index=None: arrays)
+    np.testing.assert_allclose(trial.read_wrenches(), expected, atol=1e-12)
 
 
 def test_passes_are_found_by_type_or_index(path: Path) -> None:
@@ -200,7 +199,7 @@ def test_a_file_that_is_not_there(tmp_path: Path) -> None:
 def test_a_frame_with_its_fields_in_another_order_is_read(tmp_path: Path) -> None:
     content = files.make_subject((2,), (1,))
     _, processed = files.make_arrays(2)
-    last = files.encode_frame({n: v[1] for n, v in processed.items()}, files.PASS_FIELDS)
+    last = files.encode_frame({n: v[1] for n, v in processed.items()}, PASS_FIELDS)
     assert content.endswith(last)
     length = 2 + 8 * len(files.NIMBLE_ORDER)
     moved = content[: -len(last)] + last[length:] + last[:length]
