@@ -24,7 +24,7 @@ from osimlite.fitting.pose_layout import CoordinateTarget, MarkerTarget, SensorT
 from osimlite.fitting.sensors import find_sensor_frames
 from osimlite.fitting.undetermined import find_undetermined
 from osimlite.mechanics.multibody import build_mechanism
-from osimlite.mechanics.multibody.constraints import Lock, Prescribed
+from osimlite.mechanics.multibody.constraints import Lock, PrescribedCoordinate
 from osimlite.mechanics.multibody.mechanism import Mechanism, StationPlacement
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.markers import Marker as ModelMarker
@@ -215,7 +215,7 @@ def lock_translations(mechanism: Mechanism) -> Mechanism:
         for info in mechanism.coordinates
     )
     others = tuple(
-        item for item in mechanism.constraints if not isinstance(item, Lock | Prescribed)
+        item for item in mechanism.constraints if not isinstance(item, Lock | PrescribedCoordinate)
     )
     return replace(mechanism, coordinates=infos, constraints=others)
 

@@ -19,7 +19,7 @@ from osimlite.fitting.pose_layout import (
 from osimlite.mechanics.kernels import pose_record as fit
 from osimlite.mechanics.kernels.pointers import Floats, Ints
 from osimlite.mechanics.kernels.pose_fit import APART, STUCK, UNSEEN
-from osimlite.mechanics.multibody.constraints import Lock, Prescribed
+from osimlite.mechanics.multibody.constraints import Lock, PrescribedCoordinate
 from osimlite.mechanics.multibody.functions import Function
 from osimlite.mechanics.multibody.links import Places
 from osimlite.mechanics.multibody.mechanism import Mechanism
@@ -96,7 +96,9 @@ class PoseFit:
                 self._held[index] = None if info.locked else info.prescribed
                 infos[index] = replace(info, locked=False, prescribed=None)
         acting = [
-            item for item in mechanism.constraints if not isinstance(item, Lock | Prescribed)
+            item
+            for item in mechanism.constraints
+            if not isinstance(item, Lock | PrescribedCoordinate)
         ] * constraints
         fixed = {index for index in range(len(infos)) if index not in free or index in self._held}
         self._couplers, others = separate_couplers(acting, fixed)

@@ -15,7 +15,7 @@ from osimlite.fitting.pose_layout import MarkerTarget, separate_couplers
 from osimlite.fitting.scaling import scale_model
 from osimlite.fitting.segments import Segments
 from osimlite.mechanics.multibody import build_mechanism
-from osimlite.mechanics.multibody.constraints import Lock, Prescribed
+from osimlite.mechanics.multibody.constraints import Lock, PrescribedCoordinate
 from osimlite.mechanics.multibody.mechanism import Mechanism, StationPlacement
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.markers import Marker as ModelMarker
@@ -152,7 +152,11 @@ class _MarkerPoints:
             [frame[:3, :3] @ station.location + frame[:3, 3] for frame, station in located]
         )
         self._turned = np.array([frame[:3, :3] for frame in frames])
-        holds = [item for item in mechanism.constraints if not isinstance(item, Lock | Prescribed)]
+        holds = [
+            item
+            for item in mechanism.constraints
+            if not isinstance(item, Lock | PrescribedCoordinate)
+        ]
         self._couplers, _ = separate_couplers(holds, set())
         self._holds = holds
         self._still = [

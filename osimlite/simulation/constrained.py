@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from osimlite.mechanics.multibody.constraints import Constraint, Lock, Prescribed
+from osimlite.mechanics.multibody.constraints import Constraint, Lock, PrescribedCoordinate
 from osimlite.mechanics.multibody.functions import Constant
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.spatial import Array
@@ -51,7 +51,7 @@ def select_constraints(mechanism: Mechanism, order: Sequence[int]) -> tuple[list
             kept.append(item)
         elif item.coordinate in order:
             value = mechanism.coordinates[item.coordinate].default_value
-            kept.append(Prescribed(item.coordinate, Constant(value), item.name))
+            kept.append(PrescribedCoordinate(item.coordinate, Constant(value), item.name))
         else:
             locks += 1
     return kept, locks

@@ -21,7 +21,7 @@ from osimlite.mechanics.multibody.functions import (
     Constant,
     Evaluated,
     Function,
-    Scaled,
+    ScaledFunction,
     make_zero_derivatives,
 )
 from osimlite.mechanics.multibody.schema_functions import convert_function
@@ -162,7 +162,7 @@ def require_table_span(controls: Controls, start: float, to: float) -> None:
         SimulationError: a table does not cover the motion.
     """
     for function in (function for functions in controls.functions for function in functions):
-        column = function.function if isinstance(function, Scaled) else function
+        column = function.function if isinstance(function, ScaledFunction) else function
         if isinstance(column, TableColumn) and not column.x[0] <= start < to <= column.x[-1]:
             raise SimulationError(
                 f"the table of '{column.source}' goes from {column.x[0]:g} to {column.x[-1]:g} s, and the motion from "

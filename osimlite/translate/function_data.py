@@ -46,7 +46,7 @@ def as_data(function: f.Function) -> dict[str, Any]:
                 "coefficients": coefficients,
                 "powers": powers,
             }
-        case f.Scaled(scale, inner):
+        case f.ScaledFunction(scale, inner):
             return {"type": "scaled", "scale": scale, "function": as_data(inner)}
         case f.PiecewiseLinear(x, y):
             return {"type": "piecewise-linear", "x": x, "y": y}

@@ -16,7 +16,7 @@ import numpy as np
 from osimlite.io.meshes.surface import Surface
 from osimlite.io.meshes.unit_shapes import compute_normals
 from osimlite.lint.diagnostic import Finding
-from osimlite.mechanics.multibody.constraints import Coupler, Lock, Prescribed
+from osimlite.mechanics.multibody.constraints import Coupler, Lock, PrescribedCoordinate
 from osimlite.mechanics.multibody.extremes import any_numbers
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.spatial import Array
@@ -105,7 +105,7 @@ def page_data(
     others = [
         item.name
         for item in mechanism.constraints
-        if not isinstance(item, Coupler | Lock | Prescribed)
+        if not isinstance(item, Coupler | Lock | PrescribedCoordinate)
     ]
     data: dict[str, Any] = finite(
         {

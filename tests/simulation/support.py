@@ -125,7 +125,7 @@ FUNCTIONS = {
     "smoothing spline": smoothing_spline(KNOTS, POINTS, 2, 0.0),
     "lines": f.PiecewiseLinear(KNOTS, POINTS),
     "stairs": f.PiecewiseConstant(KNOTS, POINTS),
-    "scaled": f.Scaled(-2.0, f.Scaled(0.4, f.Sine(0.5, 1.3, 0.2, 0.1))),
+    "scaled": f.ScaledFunction(-2.0, f.ScaledFunction(0.4, f.Sine(0.5, 1.3, 0.2, 0.1))),
 }
 
 

@@ -16,7 +16,7 @@ from osimlite.mechanics.kernels import linear_algebra as ls
 from osimlite.mechanics.kernels.layout import MODEL, OUTCOME, STAGE, WORK
 from osimlite.mechanics.multibody import Mechanism, build_mechanism
 from osimlite.mechanics.multibody import functions as f
-from osimlite.mechanics.multibody.constraints import Coupler, Prescribed
+from osimlite.mechanics.multibody.constraints import Coupler, PrescribedCoordinate
 from osimlite.schema.forces import CoordinateLimitForce
 from osimlite.schema.functions import Sine
 from osimlite.simulation import Simulation, simulate
@@ -83,13 +83,17 @@ SEVERAL = {
         ),
     ),
     "scaled spline": Coupler(
-        0, (10,), f.Scaled(-1.5, f.SimmSpline((-1.5, -0.4, 0.3, 1.6), (0.1, 0.4, -0.2, 0.3)))
+        0,
+        (10,),
+        f.ScaledFunction(-1.5, f.SimmSpline((-1.5, -0.4, 0.3, 1.6), (0.1, 0.4, -0.2, 0.3))),
     ),
-    "angle of a ball": Prescribed(7, f.Sine(0.4, 3.0, 0.2, 0.1)),
-    "polynomial of time": Prescribed(3, f.MultivariatePolynomial.complete((0.1, 0.2, -0.3), 1, 2)),
-    "polynomial of time as OpenSim": Prescribed(
+    "angle of a ball": PrescribedCoordinate(7, f.Sine(0.4, 3.0, 0.2, 0.1)),
+    "polynomial of time": PrescribedCoordinate(
+        3, f.MultivariatePolynomial.complete((0.1, 0.2, -0.3), 1, 2)
+    ),
+    "polynomial of time as OpenSim": PrescribedCoordinate(
         3,
-        f.Scaled(
+        f.ScaledFunction(
             0.7, f.MultivariatePolynomial.complete((0.1, 0.2, -0.3), 1, 2, opensim_derivatives=True)
         ),
     ),

@@ -16,7 +16,7 @@ from osimlite.mechanics.kernels.linear_algebra import diagonalize
 from osimlite.mechanics.multibody import Mechanism, build_mechanism
 from osimlite.mechanics.multibody import functions as f
 from osimlite.mechanics.multibody.assembly import tolerance_of
-from osimlite.mechanics.multibody.constraints import Coupler, Prescribed
+from osimlite.mechanics.multibody.constraints import Coupler, PrescribedCoordinate
 from osimlite.simulation.engines.linking import MACHINE_CODE, PYTHON_CODE, Code
 from osimlite.simulation.pose_assembly import assemble_motion
 from osimlite.simulation.recorded_motion import RecordedMotion
@@ -98,7 +98,7 @@ def build_tree() -> Mechanism:
     infos[9] = replace(infos[9], clamped=True, range=(-0.05, 0.05))
     couplers = (
         Coupler(6, (0, 1, 9), f.WeightedSum((0.4, -0.3, 0.2), 0.1)),
-        Prescribed(3, f.Sine(0.4, 3.0, 0.2, 0.1)),
+        PrescribedCoordinate(3, f.Sine(0.4, 3.0, 0.2, 0.1)),
     )
     return replace(mechanism, coordinates=tuple(infos), constraints=couplers)
 

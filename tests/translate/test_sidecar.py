@@ -19,7 +19,7 @@ from osimlite.mechanics.multibody import build_mechanism
 from osimlite.mechanics.multibody import functions as f
 from osimlite.mechanics.multibody.arc import ArcPoint
 from osimlite.mechanics.multibody.constraints import Coupler
-from osimlite.mechanics.multibody.functions import Function, Linear, Scaled
+from osimlite.mechanics.multibody.functions import Function, Linear, ScaledFunction
 from osimlite.mechanics.multibody.joints import TransformAxis, make_custom_motions
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.motions import AccelerationErrorAngle, EllipsoidPoint
@@ -160,7 +160,7 @@ FUNCTIONS: list[tuple[Function, int]] = [
     (f.Sine(0.5, 2.0, 0.1, -0.2), 1),
     (f.Step(-0.5, 0.5, 1.0, 3.0), 1),
     (f.MultivariatePolynomial.complete((1.0, 2.0, 3.0, -4.0, 0.5, 0.1), 2, 2), 2),
-    (Scaled(-0.5, f.SimmSpline(X, Y)), 1),
+    (ScaledFunction(-0.5, f.SimmSpline(X, Y)), 1),
     (f.PiecewiseLinear(X, Y), 1),
     (f.PiecewiseConstant(X, Y), 1),
     (f.SimmSpline(X, Y), 1),

@@ -20,7 +20,7 @@ from osimlite.lint.measuring.muscles import compute_reach, compute_start, find_f
 from osimlite.lint.measuring.points import measure_moving_points
 from osimlite.lint.measuring.sweeps import Sweep, sweep_coordinates
 from osimlite.lint.measuring.wrapping import compare_wrappings
-from osimlite.mechanics.multibody.constraints import Coupler, Lock, Prescribed
+from osimlite.mechanics.multibody.constraints import Coupler, Lock, PrescribedCoordinate
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.model import Model
@@ -140,7 +140,10 @@ def _refuse_many_loops(mechanism: Mechanism) -> None:
     Raises:
         UnsupportedError: there are more than `MAX_LOOP_CONSTRAINTS` constraints that close loops.
     """
-    count = sum(not isinstance(each, Coupler | Lock | Prescribed) for each in mechanism.constraints)
+    count = sum(
+        not isinstance(each, Coupler | Lock | PrescribedCoordinate)
+        for each in mechanism.constraints
+    )
     if count > MAX_LOOP_CONSTRAINTS:
         raise UnsupportedError(
             f"{count} constraints close loops; models with more than {MAX_LOOP_CONSTRAINTS} are "

@@ -13,7 +13,7 @@ import numpy as np
 
 from osimlite.lint.measures import MovingPoint, Value
 from osimlite.mechanics.kernels.paths import MOVING
-from osimlite.mechanics.multibody.functions import Scaled
+from osimlite.mechanics.multibody.functions import ScaledFunction
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.simulation.elements.geometries.paths.geometry_path import Node, ThroughPoints
 from osimlite.simulation.paths import Paths
@@ -55,7 +55,7 @@ def _find_defined_range(point: Node) -> tuple[float, float]:
 
 
 def _find_function_range(function: Any) -> tuple[float, float]:
-    while isinstance(function, Scaled):
+    while isinstance(function, ScaledFunction):
         function = function.function
     x: Any = getattr(function, "x", getattr(function, "knots", ()))
     return (float(x[0]), float(x[-1])) if len(x) else (-inf, inf)

@@ -2,7 +2,7 @@
 
 The integers are the number of criteria, and per criterion a `CRITERION`. The numbers of a criterion
 are the times between which it is active (s), and those of its kind. The workspace of a criterion is
-laid out by `NOTED`, that of a gait by `GAIT_NOTED`, and that of a jump by `JUMP_NOTED`. Behind the
+laid out by `SAMPLE_WORK`, that of a gait by `GAIT_WORK`, and that of a jump by `JUMP_WORK`. Behind the
 workspace of a gait follow its steps, each with its time (s) and length (m).
 """
 
@@ -12,7 +12,7 @@ from math import cos, pi, sin
 
 from osimlite.mechanics.kernels.layout import Record
 from osimlite.mechanics.kernels.pointers import Floats, Ints, at
-from osimlite.mechanics.kernels.sensors import SENSED, SENSES, foot_position
+from osimlite.mechanics.kernels.sensors import SENSES, SENSOR_NUMBERS, foot_position
 
 GAIT = 0
 """Kind of criterion: steps of a gait."""
@@ -75,7 +75,7 @@ class CRITERION_NUMBERS(metaclass=Record):
     SLOW, MASSES = 2, 3
 
 
-class NOTED(metaclass=Record):
+class SAMPLE_WORK(metaclass=Record):
     """Workspace of a criterion that samples a value.
 
     Attributes:
@@ -88,7 +88,7 @@ class NOTED(metaclass=Record):
     BEGUN, TIME, VALUE, TOTAL, SPAN, HIGHEST, LOWEST, START, HERE, SIZE = range(10)
 
 
-class GAIT_NOTED(metaclass=Record):
+class GAIT_WORK(metaclass=Record):
     """Workspace of a gait.
 
     Attributes:
@@ -102,7 +102,7 @@ class GAIT_NOTED(metaclass=Record):
     BEFORE, HERE, HEIGHT, FALLEN, COUNT, TOUCHES, STEPS = 0, 1, 2, 3, 4, 5, 7
 
 
-class JUMP_NOTED(metaclass=Record):
+class JUMP_WORK(metaclass=Record):
     """Workspace of a jump.
 
     Attributes:
@@ -128,20 +128,20 @@ def begin_criteria(senses: Ints, i: Ints, row: Floats, room: Floats) -> None:
         criterion = at(i, 1 + CRITERION.SIZE * number)
         noted, centre = at(room, criterion[CRITERION.ROOM]), senses[SENSES.CENTRE]
         if criterion[CRITERION.KIND] == GAIT:
-            noted[GAIT_NOTED.BEFORE] = noted[GAIT_NOTED.HERE] = walked_distance(senses, row)
-            noted[GAIT_NOTED.HEIGHT] = row[centre + 1]
-            noted[GAIT_NOTED.FALLEN] = noted[GAIT_NOTED.COUNT] = 0.0
+            noted[GAIT_WORK.BEFORE] = noted[GAIT_WORK.HERE] = walked_distance(senses, row)
+            noted[GAIT_WORK.HEIGHT] = row[centre + 1]
+            noted[GAIT_WORK.FALLEN] = noted[GAIT_WORK.COUNT] = 0.0
             # Unknown contact, so that a foot that stands from the start does not count as one that
             # lands.
-            noted[GAIT_NOTED.TOUCHES] = noted[GAIT_NOTED.TOUCHES + 1] = -1.0
+            noted[GAIT_WORK.TOUCHES] = noted[GAIT_WORK.TOUCHES + 1] = -1.0
         elif criterion[CRITERION.KIND] == JUMP:
-            for k in range(JUMP_NOTED.ENDED):
+            for k in range(JUMP_WORK.ENDED):
                 noted[k] = row[centre + 1]
-            noted[JUMP_NOTED.ENDED], noted[JUMP_NOTED.DOES] = 0.0, PREPARES
+            noted[JUMP_WORK.ENDED], noted[JUMP_WORK.DOES] = 0.0, PREPARES
         else:
-            for k in range(NOTED.SIZE):
+            for k in range(SAMPLE_WORK.SIZE):
                 noted[k] = 0.0
-            noted[NOTED.START] = noted[NOTED.HERE] = row[centre]
+            noted[SAMPLE_WORK.START] = noted[SAMPLE_WORK.HERE] = row[centre]
 
 
 def update_criteria(
@@ -168,11 +168,11 @@ def update_criteria(
             continue
         if criterion[CRITERION.KIND] == GAIT:
             note_gait(senses, numbers, t, row, noted)
-            has_fallen = has_fallen or noted[GAIT_NOTED.FALLEN] > 0.0
+            has_fallen = has_fallen or noted[GAIT_WORK.FALLEN] > 0.0
             continue
         if criterion[CRITERION.KIND] == JUMP:
             note_jump(senses, numbers, t, row, noted)
-            has_fallen = has_fallen or noted[JUMP_NOTED.ENDED] > 0.0
+            has_fallen = has_fallen or noted[JUMP_WORK.ENDED] > 0.0
             continue
         if criterion[CRITERION.KIND] == WANG:
             value = metabolic_power(senses, known, numbers, row, u)
@@ -184,7 +184,7 @@ def update_criteria(
             value = range_penalty(
                 senses, criterion[CRITERION.KIND], criterion[CRITERION.PLACE], numbers, row
             )
-        noted[NOTED.HERE] = row[senses[SENSES.CENTRE]]
+        noted[SAMPLE_WORK.HERE] = row[senses[SENSES.CENTRE]]
         add_sample(noted, t, value)
     return has_fallen
 
@@ -193,19 +193,19 @@ def add_sample(noted: Floats, t: float, value: float) -> None:
     """Add a sample of a value to its integral by the trapezoidal rule, and to its extremes.
 
     Args:
-        noted: workspace of the criterion, see `NOTED`.
+        noted: workspace of the criterion, see `SAMPLE_WORK`.
         t: time (s).
         value: value.
     """
-    if noted[NOTED.BEGUN] > 0.0:
-        dt = t - noted[NOTED.TIME]
-        noted[NOTED.TOTAL] += 0.5 * dt * (noted[NOTED.VALUE] + value)
-        noted[NOTED.SPAN] += dt
-        noted[NOTED.HIGHEST] = max(noted[NOTED.HIGHEST], value)
-        noted[NOTED.LOWEST] = min(noted[NOTED.LOWEST], value)
+    if noted[SAMPLE_WORK.BEGUN] > 0.0:
+        dt = t - noted[SAMPLE_WORK.TIME]
+        noted[SAMPLE_WORK.TOTAL] += 0.5 * dt * (noted[SAMPLE_WORK.VALUE] + value)
+        noted[SAMPLE_WORK.SPAN] += dt
+        noted[SAMPLE_WORK.HIGHEST] = max(noted[SAMPLE_WORK.HIGHEST], value)
+        noted[SAMPLE_WORK.LOWEST] = min(noted[SAMPLE_WORK.LOWEST], value)
     else:
-        noted[NOTED.HIGHEST] = noted[NOTED.LOWEST] = value
-    noted[NOTED.BEGUN], noted[NOTED.TIME], noted[NOTED.VALUE] = 1.0, t, value
+        noted[SAMPLE_WORK.HIGHEST] = noted[SAMPLE_WORK.LOWEST] = value
+    noted[SAMPLE_WORK.BEGUN], noted[SAMPLE_WORK.TIME], noted[SAMPLE_WORK.VALUE] = 1.0, t, value
 
 
 def walked_distance(senses: Ints, row: Floats) -> float:
@@ -239,30 +239,27 @@ def note_gait(senses: Ints, numbers: Floats, t: float, row: Floats, noted: Float
         numbers: numbers of the criterion.
         t: time (s).
         row: sensor row.
-        noted: workspace of the criterion, see `GAIT_NOTED`.
+        noted: workspace of the criterion, see `GAIT_WORK`.
     """
-    noted[GAIT_NOTED.HERE] = walked_distance(senses, row)
-    if (
-        row[senses[SENSES.CENTRE] + 1]
-        < numbers[CRITERION_NUMBERS.HEIGHT] * noted[GAIT_NOTED.HEIGHT]
-    ):
-        noted[GAIT_NOTED.FALLEN] = 1.0
+    noted[GAIT_WORK.HERE] = walked_distance(senses, row)
+    if row[senses[SENSES.CENTRE] + 1] < numbers[CRITERION_NUMBERS.HEIGHT] * noted[GAIT_WORK.HEIGHT]:
+        noted[GAIT_WORK.FALLEN] = 1.0
     has_touched = False
     for leg in range(2):
         touches = 1.0 if row[senses[SENSES.LOADS] + leg] >= numbers[CRITERION_NUMBERS.LOAD] else 0.0
-        has_touched = has_touched or (touches > 0.0 and noted[GAIT_NOTED.TOUCHES + leg] == 0.0)
-        noted[GAIT_NOTED.TOUCHES + leg] = touches
-    count = int(noted[GAIT_NOTED.COUNT])
-    last = noted[GAIT_NOTED.STEPS + 2 * (count - 1)] if count > 0 else 0.0
+        has_touched = has_touched or (touches > 0.0 and noted[GAIT_WORK.TOUCHES + leg] == 0.0)
+        noted[GAIT_WORK.TOUCHES + leg] = touches
+    count = int(noted[GAIT_WORK.COUNT])
+    last = noted[GAIT_WORK.STEPS + 2 * (count - 1)] if count > 0 else 0.0
     if (
         has_touched
-        and noted[GAIT_NOTED.FALLEN] == 0.0
+        and noted[GAIT_WORK.FALLEN] == 0.0
         and t - last > numbers[CRITERION_NUMBERS.SHORTEST]
     ):
-        step = at(noted, GAIT_NOTED.STEPS + 2 * count)
-        step[0], step[1] = t, noted[GAIT_NOTED.HERE] - noted[GAIT_NOTED.BEFORE]
-        noted[GAIT_NOTED.BEFORE] = noted[GAIT_NOTED.HERE]
-        noted[GAIT_NOTED.COUNT] += 1.0
+        step = at(noted, GAIT_WORK.STEPS + 2 * count)
+        step[0], step[1] = t, noted[GAIT_WORK.HERE] - noted[GAIT_WORK.BEFORE]
+        noted[GAIT_WORK.BEFORE] = noted[GAIT_WORK.HERE]
+        noted[GAIT_WORK.COUNT] += 1.0
 
 
 def note_jump(senses: Ints, numbers: Floats, t: float, row: Floats, noted: Floats) -> None:
@@ -276,24 +273,24 @@ def note_jump(senses: Ints, numbers: Floats, t: float, row: Floats, noted: Float
         numbers: numbers of the criterion.
         t: time (s).
         row: sensor row.
-        noted: workspace of the criterion, see `JUMP_NOTED`.
+        noted: workspace of the criterion, see `JUMP_WORK`.
     """
     height, rise, does = (
         row[senses[SENSES.CENTRE] + 1],
         row[senses[SENSES.RISE]],
-        noted[JUMP_NOTED.DOES],
+        noted[JUMP_WORK.DOES],
     )
     has_load = row[senses[SENSES.LOADS]] + row[senses[SENSES.LOADS] + 1] > 0.0
-    noted[JUMP_NOTED.HERE], noted[JUMP_NOTED.PEAK] = height, max(noted[JUMP_NOTED.PEAK], height)
-    if height < numbers[CRITERION_NUMBERS.HEIGHT] * noted[JUMP_NOTED.START]:
-        noted[JUMP_NOTED.ENDED] = 1.0
+    noted[JUMP_WORK.HERE], noted[JUMP_WORK.PEAK] = height, max(noted[JUMP_WORK.PEAK], height)
+    if height < numbers[CRITERION_NUMBERS.HEIGHT] * noted[JUMP_WORK.START]:
+        noted[JUMP_WORK.ENDED] = 1.0
     elif does == PREPARES:
         if t >= numbers[CRITERION_NUMBERS.PREPARE] and (rise > 0.0 or not has_load):
-            noted[JUMP_NOTED.DOES], noted[JUMP_NOTED.PREPARED] = TAKES_OFF, height
+            noted[JUMP_WORK.DOES], noted[JUMP_WORK.PREPARED] = TAKES_OFF, height
     elif does == TAKES_OFF and not has_load:
-        noted[JUMP_NOTED.DOES] = FLIES
+        noted[JUMP_WORK.DOES] = FLIES
     elif does < COMES_DOWN and (rise < 0.0 or (does == FLIES and has_load)):
-        noted[JUMP_NOTED.DOES], noted[JUMP_NOTED.ENDED] = (
+        noted[JUMP_WORK.DOES], noted[JUMP_WORK.ENDED] = (
             COMES_DOWN,
             numbers[CRITERION_NUMBERS.AT_PEAK],
         )
@@ -335,7 +332,7 @@ def muscle_effort(senses: Ints, known: Floats, kind: int, power: int, row: Float
         row: sensor row.
     """
     count, total = senses[SENSES.MUSCLES], 1.0 if kind == TENSIONS else 0.0
-    strengths = at(known, SENSED.HEAD + count)
+    strengths = at(known, SENSOR_NUMBERS.HEAD + count)
     for k in range(count):
         each = 1.0
         if kind == TENSIONS:
@@ -368,7 +365,7 @@ def metabolic_power(
         excitations: excitations of the muscles.
     """
     count, slow, total = senses[SENSES.MUSCLES], numbers[CRITERION_NUMBERS.SLOW], 0.0
-    optimal, strengths = at(known, SENSED.HEAD), at(known, SENSED.HEAD + count)
+    optimal, strengths = at(known, SENSOR_NUMBERS.HEAD), at(known, SENSOR_NUMBERS.HEAD + count)
     for k in range(count):
         u, a = QUARTER * excitations[k], QUARTER * row[senses[SENSES.ACTIVATIONS] + k]
         n = row[senses[SENSES.LENGTHS] + k]
@@ -386,4 +383,4 @@ def metabolic_power(
             + heat
             + work
         )
-    return AT_REST * known[SENSED.MASS] + total
+    return AT_REST * known[SENSOR_NUMBERS.MASS] + total

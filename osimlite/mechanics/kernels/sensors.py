@@ -3,7 +3,7 @@
 The plan of a row consists of integers: a head, `SENSES`; per muscle the indices in `data` of
 `OF_MUSCLES`; per coordinate limit force the coordinate and the index of the force in `data`; the
 link of each body; per leg its hip-side body (pelvis) and its foot, and the range of the contacts of the foot.
-The numbers of a row are a head, `SENSED`; optimal fiber lengths (m) and strengths (N); smallest and
+The numbers of a row are a head, `SENSOR_NUMBERS`; optimal fiber lengths (m) and strengths (N); smallest and
 largest controls; mass centres in the links (m) and masses (kg).
 """
 
@@ -54,7 +54,7 @@ class SENSES(metaclass=Record):
     LOADS, PLACES, CENTRE, RISE, SIZE, HEAD = range(15, 21)
 
 
-class SENSED(metaclass=Record):
+class SENSOR_NUMBERS(metaclass=Record):
     """Head of the numbers of a sensor row.
 
     Attributes:
@@ -148,7 +148,7 @@ def fill_sensor_row(model: Ints, data: Floats, y: Floats, i: Ints, p: Floats, ro
         row: filled.
     """
     muscles, freedoms, bodies = i[SENSES.MUSCLES], i[SENSES.COORDINATES], i[SENSES.BODIES]
-    muscle_ints, optimal = at(i, SENSES.HEAD), at(p, SENSED.HEAD)
+    muscle_ints, optimal = at(i, SENSES.HEAD), at(p, SENSOR_NUMBERS.HEAD)
     strengths = at(optimal, muscles)
     for k in range(muscles):
         places = at(muscle_ints, OF_MUSCLE * k)
@@ -172,14 +172,14 @@ def fill_sensor_row(model: Ints, data: Floats, y: Floats, i: Ints, p: Floats, ro
         total = add_scaled(total, centres[3 * bodies + k], position)
         rise += centres[3 * bodies + k] * velocity(model, data, links[k], position)[1]
     # The mass centre is the mean of those of the bodies, weighted by mass.
-    store_vector(row, i[SENSES.CENTRE], divide(total, p[SENSED.MASS]))
-    row[i[SENSES.RISE]] = rise / p[SENSED.MASS]
+    store_vector(row, i[SENSES.CENTRE], divide(total, p[SENSOR_NUMBERS.MASS]))
+    row[i[SENSES.RISE]] = rise / p[SENSOR_NUMBERS.MASS]
     for k in range(i[SENSES.LEGS]):
         leg, push = at(links, bodies + OF_LEG * k), ZERO
         # All contacts of a foot together carry its leg.
         for pair in range(leg[2], leg[3]):
             push = plus(push, contact_force(model, data, pair))
-        row[i[SENSES.LOADS] + k] = norm(push) / p[SENSED.WEIGHT]
+        row[i[SENSES.LOADS] + k] = norm(push) / p[SENSOR_NUMBERS.WEIGHT]
 
 
 def contact_force(model: Ints, data: Floats, pair: int) -> Vector:

@@ -32,7 +32,7 @@ from osimlite.mechanics.kernels.reflexes import (
     update_leg_states,
 )
 from osimlite.mechanics.kernels.runs import integrate_run, select_run
-from osimlite.mechanics.kernels.sensors import SENSED, SENSES, fill_sensor_row
+from osimlite.mechanics.kernels.sensors import SENSES, SENSOR_NUMBERS, fill_sensor_row
 
 FEEL = -1
 """Order to fill the sensor rows only, in place of a number of control steps."""
@@ -216,7 +216,7 @@ def walk_several(
         states: per walk the state; changed.
         peaks: per walk the largest forces of contacts.
         senses: plan of the sensor rows, see `sensors.SENSES`.
-        known: numbers of the sensor rows, see `sensors.SENSED`.
+        known: numbers of the sensor rows, see `sensors.SENSOR_NUMBERS`.
         driven: offsets in reals of the excitations.
         plan: integers of the reflexes, see `reflexes.REFLEXES`.
         numbers: per walk the numbers of the reflexes, see `reflexes.LIMITS`.
@@ -302,14 +302,16 @@ def take_control_steps(a: Walk, y: Floats, steps: int, is_recorded: bool) -> Non
         steps: largest number of control steps.
         is_recorded: whether each step is recorded.
     """
-    m, progress, lags = a.m, a.progress, a.known[SENSED.LAGS] > 0.0
+    m, progress, lags = a.m, a.progress, a.known[SENSOR_NUMBERS.LAGS] > 0.0
     size, controls = m.model[MODEL.STATE_SIZE], a.senses[SENSES.CONTROLS]
     # Evaluate the end of the step before with its excitations, which a lagging step begins with.
     if lags:
         apply_excitations(a)
         previous = at(m.data, m.model[MODEL.WORK_STATE])
         copy_numbers(size, y, previous)
-        evaluate_state(m, a.known[SENSED.STEP], previous, at(previous, size), STAGE.ACCELERATION)
+        evaluate_state(
+            m, a.known[SENSOR_NUMBERS.STEP], previous, at(previous, size), STAGE.ACCELERATION
+        )
     for number in range(steps):
         if progress[GOING] == 0:
             return
@@ -340,7 +342,7 @@ def take_control_steps(a: Walk, y: Floats, steps: int, is_recorded: bool) -> Non
         )
         progress[FRAMES] += 1
         # Time in control steps, which has no accumulated rounding.
-        t = progress[STEPS] * a.known[SENSED.STEP]
+        t = progress[STEPS] * a.known[SENSOR_NUMBERS.STEP]
         if update_criteria(
             a.senses, a.known, a.criteria, a.bounds, t, a.row, a.excitations, criteria_work(a)
         ):
@@ -368,7 +370,7 @@ def update_excitations(a: Walk) -> None:
     add_reflexes(a.plan, a.numbers, frames, history, a.room, a.excitations)
     # Noise is added before bounds apply, as in SCONE.
     add_noise(a.plan, a.numbers, a.progress[STEPS], count, a.excitations)
-    least = at(a.known, SENSED.HEAD + 2 * a.senses[SENSES.MUSCLES])
+    least = at(a.known, SENSOR_NUMBERS.HEAD + 2 * a.senses[SENSES.MUSCLES])
     most = at(least, count)
     for k in range(count):
         a.excitations[k] = min(max(a.excitations[k], least[k]), most[k])
@@ -426,7 +428,7 @@ def run_by_reflexes(
         levels: numbers of the watches.
         endings: filled with the ending of each run, see `record.DONE`.
         senses: plan of the sensor rows, see `sensors.SENSES`.
-        known: per run the numbers of the sensor row, see `sensors.SENSED`.
+        known: per run the numbers of the sensor row, see `sensors.SENSOR_NUMBERS`.
         driven: offsets in reals of the excitations.
         plan: integers of the reflexes, see `reflexes.REFLEXES`.
         numbers: per run the numbers of the reflexes, see `reflexes.LIMITS`.
@@ -508,14 +510,16 @@ def integrate_with_reflexes(a: Walk, y: Floats) -> int:
     h = at(m.data, m.sizes[METHOD_AT])
     end, ending = h[LAST_TIME], DONE
     while ending == DONE:
-        if m.clock[0] >= progress[STEPS] * a.known[SENSED.STEP] and not begin_control_step(a, y):
+        if m.clock[0] >= progress[STEPS] * a.known[SENSOR_NUMBERS.STEP] and not begin_control_step(
+            a, y
+        ):
             ending = FAILED
         elif m.clock[0] >= end:
             break
         else:
             apply_excitations(a)
             # Integrate to the end of the control step or of the run, the earlier of both.
-            h[LAST_TIME] = min(progress[STEPS] * a.known[SENSED.STEP], end)
+            h[LAST_TIME] = min(progress[STEPS] * a.known[SENSOR_NUMBERS.STEP], end)
             ending = integrate_run(m, y, False)
     h[LAST_TIME] = end
     return ending

@@ -14,7 +14,7 @@ from osimlite.mechanics.multibody.extremes import any_numbers
 from osimlite.mechanics.multibody.functions import Function
 from osimlite.mechanics.multibody.joints import MOTIONS, Mobilizer, motion_types
 from osimlite.mechanics.multibody.mechanism import Mechanism
-from osimlite.mechanics.multibody.motions import Motion, SphericalMotion
+from osimlite.mechanics.multibody.motions import JointMotion, SphericalMotion
 from osimlite.mechanics.multibody.parts import (
     GROUND,
     CoordinateInfo,
@@ -89,7 +89,7 @@ class _Edge:
     child: str  # path of the child body, or of ground
     parent_frame: Array  # the joint's parent frame in the parent body (4, 4)
     child_frame: Array  # the joint's child frame in the child body (4, 4)
-    motions: tuple[Motion, ...]  # factors of the joint's transform
+    motions: tuple[JointMotion, ...]  # factors of the joint's transform
     coordinates: tuple[int, ...]  # indices of its coordinates in the mechanism
 
     def build_mobilizer(self, *, reversed: bool) -> Mobilizer:

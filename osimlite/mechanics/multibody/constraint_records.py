@@ -20,7 +20,7 @@ from osimlite.mechanics.kernels.constraint_equations import (
 from osimlite.mechanics.kernels.layout import COORDINATE
 from osimlite.mechanics.kernels.linear_algebra import factor_size
 from osimlite.mechanics.multibody import body_constraints as b
-from osimlite.mechanics.multibody.constraints import Constraint, Coupler, Lock, Prescribed
+from osimlite.mechanics.multibody.constraints import Constraint, Coupler, Lock, PrescribedCoordinate
 from osimlite.mechanics.multibody.function_tables import function_table, table_of_one
 from osimlite.mechanics.multibody.functions import Constant
 from osimlite.mechanics.multibody.parts import GROUND, FramePlacement, StationPlacement
@@ -77,7 +77,7 @@ def constraint_record(constraint: Constraint, places: Places, balls: Balls) -> C
             return ConstraintRecord(
                 "prescribe", own, table_of_one(Constant(0.0), constraint.name), positions=0
             )
-        case Prescribed():
+        case PrescribedCoordinate():
             table = table_of_one(constraint.function, f"the function of '{constraint.name}'")
             return ConstraintRecord(
                 "prescribe", _coordinate(constraint.coordinate, places, balls), table

@@ -100,7 +100,7 @@ class Lock(Constraint):
 
 
 @dataclass(frozen=True)
-class Prescribed(Constraint):
+class PrescribedCoordinate(Constraint):
     """Makes one coordinate follow a function of time (s).
 
     The error is the coordinate minus the function.

@@ -78,7 +78,7 @@ _TOKEN = re.compile(
 )
 
 
-class Step(NamedTuple):
+class FormulaStep(NamedTuple):
     """One operation of a formula, which fills one register."""
 
     law: str  # "number", "negative", "+", "-", "*", or the name of a law
@@ -91,7 +91,7 @@ class Formula:
     """Formula as a list of steps, so that neither its length nor its depth has a limit."""
 
     variables: tuple[str, ...]  # names of the variables, which are in the first registers
-    steps: tuple[Step, ...]  # each fills the next register; the last one gives the result
+    steps: tuple[FormulaStep, ...]  # each fills the next register; the last one gives the result
 
     @classmethod
     def parse(cls, text: str, variables: Sequence[str], where: str) -> Formula:
@@ -197,8 +197,8 @@ class _Reader:
     def __init__(self, variables: Sequence[str]) -> None:
         self.known = {name: index for index, name in enumerate(variables)}
         self.unknown: list[str] = []
-        self.steps: list[Step] = []
-        self._registers: dict[Step, int] = {}
+        self.steps: list[FormulaStep] = []
+        self._registers: dict[FormulaStep, int] = {}
         self._numbers: dict[float, int] = {}
         self._derived: set[int] = set()
         self._first = len(variables)
@@ -222,13 +222,13 @@ class _Reader:
             return self._append("number", value=_compute(law, *constants))
         return self._simplify(law, arguments, constants)
 
-    def append_steps(self, steps: Sequence[Step]) -> None:
+    def append_steps(self, steps: Sequence[FormulaStep]) -> None:
         """Append the steps of another formula of the same variables as they are."""
         for step in steps:
             self._registers.setdefault(step, self._first + len(self.steps))
             self.steps.append(step)
 
-    def ending_with(self, result: int) -> tuple[Step, ...]:
+    def ending_with(self, result: int) -> tuple[FormulaStep, ...]:
         """Return the steps that a result needs; the last one gives it.
 
         Args:
@@ -247,7 +247,7 @@ class _Reader:
                 needed.add(register)
                 waiting += self._step(register).arguments
         places = {register: register for register in range(self._first)}
-        steps: list[Step] = []
+        steps: list[FormulaStep] = []
         for register in sorted(needed):
             step = self._step(register)
             self._expect_meaning(step)
@@ -257,7 +257,7 @@ class _Reader:
             )
         if not steps:
             # The result is a variable, but a formula ends with a step: add 0.
-            steps = [Step("number"), Step("+", (result, self._first))]
+            steps = [FormulaStep("number"), FormulaStep("+", (result, self._first))]
         return tuple(steps)
 
     def _append(self, law: str, *arguments: int, value: float = 0.0) -> int:
@@ -268,7 +268,7 @@ class _Reader:
             arguments: registers of the operands.
             value: value of a number.
         """
-        step = Step(law, arguments, value)
+        step = FormulaStep(law, arguments, value)
         if step not in self._registers:
             self._registers[step] = self._first + len(self.steps)
             self.steps.append(step)
@@ -282,18 +282,18 @@ class _Reader:
         if value not in self._numbers:
             self._numbers[value] = self._first + len(self.steps)
             self._derived.add(self._numbers[value])
-            self.steps.append(Step("number", value=value))
+            self.steps.append(FormulaStep("number", value=value))
         return self._numbers[value]
 
     def _is_same(self, one: int, two: int) -> bool:
         first = self._constant(one)
         return one == two or (first is not None and first == self._constant(two))
 
-    def _step(self, register: int) -> Step:
+    def _step(self, register: int) -> FormulaStep:
         return (
             self.steps[register - self._first]
             if register >= self._first
-            else Step("variable", (register,))
+            else FormulaStep("variable", (register,))
         )
 
     def _constant(self, register: int) -> float | None:
@@ -465,7 +465,7 @@ class _Reader:
             return self._scale(-multiple[0], multiple[1])
         return self._append("negative", one)
 
-    def _expect_meaning(self, step: Step) -> None:
+    def _expect_meaning(self, step: FormulaStep) -> None:
         """Raise an error for a step without meaning.
 
         Lepton does not terminate for NaN.

@@ -53,7 +53,7 @@ def table_of_one(function: f.Function, where: str) -> list[float]:
 
 
 def _table_of_one(function: f.Function, where: str) -> list[float]:
-    if isinstance(function, f.Scaled):
+    if isinstance(function, f.ScaledFunction):
         kind, factor, *rest = _table_of_one(function.function, where)
         return [kind, function.scale * factor, *rest]
     if isinstance(function, f.WeightedSum):

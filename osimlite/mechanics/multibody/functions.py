@@ -310,7 +310,7 @@ class MultivariatePolynomial(Multivariate):
 
 
 @dataclass(frozen=True)
-class Scaled(Function):
+class ScaledFunction(Function):
     """Multiple of another function."""
 
     scale: float
@@ -427,7 +427,7 @@ def table_at_knots(function: Function) -> list[float]:
     is moved to the next larger float. This matters where slopes or values jump.
     """
     table, inner = [*function.table], function
-    while isinstance(inner, Scaled):
+    while isinstance(inner, ScaledFunction):
         inner = inner.function
     if isinstance(inner, PiecewiseLinear | PiecewiseConstant | SimmSpline):
         # The table of a spline contains the first knot twice.

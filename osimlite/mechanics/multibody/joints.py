@@ -23,8 +23,8 @@ from osimlite.mechanics.multibody.arc import ArcPoint
 from osimlite.mechanics.multibody.functions import Function, Linear
 from osimlite.mechanics.multibody.motions import (
     AxisMotion,
-    Fixed,
-    Motion,
+    FixedTransform,
+    JointMotion,
     SimbodyAccelerationError,
     SphericalMotion,
     place,
@@ -51,7 +51,7 @@ from osimlite.schema.joints import (
 )
 
 
-def _make_plain_motions(kind: type[Joint]) -> tuple[Motion, ...]:
+def _make_plain_motions(kind: type[Joint]) -> tuple[JointMotion, ...]:
     """Return the motions of a joint type without properties, as its schema declares them.
 
     Translations come first, then rotations; those of a ball joint are one motion.
@@ -64,7 +64,7 @@ def _make_plain_motions(kind: type[Joint]) -> tuple[Motion, ...]:
     return (*slides, SphericalMotion(tuple(own for turn in turns for own in turn.coordinates)))
 
 
-MOTIONS: dict[str, tuple[Motion, ...]] = {
+MOTIONS: dict[str, tuple[JointMotion, ...]] = {
     kind.__name__: _make_plain_motions(kind)
     for kind in (
         WeldJoint,
@@ -80,7 +80,7 @@ MOTIONS: dict[str, tuple[Motion, ...]] = {
 """Factors of X_FM of the joint types that have no properties of their own."""
 
 
-def make_ellipsoid_motions(radii: ArrayLike) -> tuple[Motion, ...]:
+def make_ellipsoid_motions(radii: ArrayLike) -> tuple[JointMotion, ...]:
     """Return the motions of an EllipsoidJoint: rx, ry, rz on an ellipsoid.
 
     Args:
@@ -94,7 +94,7 @@ def make_ellipsoid_motions(radii: ArrayLike) -> tuple[Motion, ...]:
 
 def make_scapulothoracic_motions(
     radii: ArrayLike, winging_origin: ArrayLike, winging_direction: float
-) -> tuple[Motion, ...]:
+) -> tuple[JointMotion, ...]:
     """Return the motions of a ScapulothoracicJoint.
 
     The scapula moves on an ellipsoid of the thorax by three rotations, and then wings about an
@@ -123,7 +123,7 @@ def make_scapulothoracic_motions(
     )
 
 
-def constant_curvature(length: float, neutral: Sequence[float]) -> tuple[Motion, ...]:
+def constant_curvature(length: float, neutral: Sequence[float]) -> tuple[JointMotion, ...]:
     """Return the motions of a ConstantCurvatureJoint.
 
     The end of a rod bends about X, then about Z, and twists about Y.
@@ -160,7 +160,7 @@ def make_custom_motions(
     translations: Sequence[TransformAxis],
     *,
     opensim_derivatives: bool = False,
-) -> tuple[Motion, ...]:
+) -> tuple[JointMotion, ...]:
     """Return the motions of a CustomJoint.
 
     They are three translations along axes of F, then three body-fixed rotations.
@@ -196,7 +196,7 @@ def _make_translation(kind: Literal["rotate", "translate"], axis: TransformAxis)
     return AxisMotion(kind, direction / length, axis.coordinates, axis.function)
 
 
-def motion_types(motions: Sequence[Motion], count: int) -> tuple[MotionType, ...]:
+def motion_types(motions: Sequence[JointMotion], count: int) -> tuple[MotionType, ...]:
     """Return the motion type of each coordinate of a joint.
 
     A coordinate that drives an axis with slope exactly 1 or -1 has the motion type of that axis (of
@@ -231,13 +231,13 @@ class Mobilizer:
 
     joint: str  # absolute path of the joint
     joint_type: str  # OpenSim's class name of the joint, for messages
-    motions: tuple[Motion, ...]  # factors of X_FM
+    motions: tuple[JointMotion, ...]  # factors of X_FM
     coordinates: tuple[int, ...] = ()  # index in the mechanism of each of the joint's coordinates
     parent_frame: Array = field(default_factory=make_transform)  # X_PF (4, 4), in the parent body
     child_frame: Array = field(default_factory=make_transform)  # X_CM (4, 4), in the child body
     reversed: bool = False  # whether the child carries the parent
 
-    def elementary(self) -> tuple[Fixed | AxisMotion, ...]:
+    def elementary(self) -> tuple[FixedTransform | AxisMotion, ...]:
         """Return the transform from the carrying to the carried body as one-axis motions.
 
         ``coordinates`` of each motion are indices among the `coordinates` of this mobilizer.
@@ -247,9 +247,9 @@ class Mobilizer:
             Fixed transforms and one-axis motions, in order.
         """
         motions = (
-            Fixed(self.parent_frame),
+            FixedTransform(self.parent_frame),
             *self.motions,
-            Fixed(invert_transform(self.child_frame)),
+            FixedTransform(invert_transform(self.child_frame)),
         )
         chain = [part for motion in motions for part in motion.elementary()]
         return tuple(part.inverse() for part in reversed(chain)) if self.reversed else tuple(chain)
@@ -292,7 +292,7 @@ class Mobilizer:
     @cached_property
     def speeds_are_rates(self) -> bool:
         """Tell whether qdot = u for every coordinate of the joint."""
-        return all(type(motion).rates is Motion.rates for motion in self.motions)
+        return all(type(motion).rates is JointMotion.rates for motion in self.motions)
 
     @cached_property
     def turning(self) -> tuple[tuple[int, ...], ...]:
@@ -306,7 +306,7 @@ class Mobilizer:
         return tuple(
             tuple(self.coordinates[place] for place in motion.coordinates)
             for motion in self.motions
-            if type(motion).rates is not Motion.rates
+            if type(motion).rates is not JointMotion.rates
         )
 
 

@@ -32,8 +32,8 @@ from osimlite.mechanics.multibody.functions import IDENTITY
 from osimlite.mechanics.multibody.joints import Mobilizer
 from osimlite.mechanics.multibody.motions import (
     AxisMotion,
-    Fixed,
-    Motion,
+    FixedTransform,
+    JointMotion,
     SimbodyAccelerationError,
     SphericalMotion,
 )
@@ -209,10 +209,10 @@ def _list_operations(
         Operations, and the frame of the carried body in the new link (4, 4).
     """
     own = mobilizer.coordinates
-    chain: list[Motion] = [
-        Fixed(mobilizer.parent_frame),
+    chain: list[JointMotion] = [
+        FixedTransform(mobilizer.parent_frame),
         *mobilizer.motions,
-        Fixed(invert_transform(mobilizer.child_frame)),
+        FixedTransform(invert_transform(mobilizer.child_frame)),
     ]
     # A reversed joint passes its motions backwards, each inverted.
     if mobilizer.reversed:
@@ -223,7 +223,7 @@ def _list_operations(
     for motion in chain:
         places = [own[number] for number in motion.coordinates]
         still = free.isdisjoint(places)
-        if isinstance(motion, Fixed):
+        if isinstance(motion, FixedTransform):
             frame = frame @ (
                 invert_transform(motion.matrix) if mobilizer.reversed else motion.matrix
             )
@@ -242,7 +242,7 @@ def _list_operations(
             q[list(motion.coordinates)] = [
                 mechanism.coordinates[place].default_value for place in places
             ]
-            matrix = motion.placed(q)
+            matrix = motion.transform(q)
             frame = frame @ (invert_transform(matrix) if mobilizer.reversed else matrix)
         elif isinstance(motion, AxisMotion):
             axis = -motion.axis if mobilizer.reversed else motion.axis

@@ -22,7 +22,7 @@ from osimlite.base.text import suggest_name
 from osimlite.errors import ModelError
 from osimlite.mechanics.multibody import dynamics
 from osimlite.mechanics.multibody.assembly import assemble_pose, project_speeds
-from osimlite.mechanics.multibody.constraints import Constraint, Lock, Prescribed
+from osimlite.mechanics.multibody.constraints import Constraint, Lock, PrescribedCoordinate
 from osimlite.mechanics.multibody.dynamics import MassCentres, Wrench
 from osimlite.mechanics.multibody.extremes import methods_of_any_numbers
 from osimlite.mechanics.multibody.joints import Mobilizer
@@ -103,7 +103,7 @@ class Mechanism:
             if info.locked:
                 holds.append(Lock(index, info.path))
             elif info.prescribed is not None:
-                holds.append(Prescribed(index, info.prescribed, info.path))
+                holds.append(PrescribedCoordinate(index, info.prescribed, info.path))
         object.__setattr__(self, "constraints", (*holds, *self.constraints))
 
     # ------------------------------------------------------------------------------------ names and states

@@ -35,22 +35,22 @@ from osimlite.mechanics.multibody.spatial import (
 from osimlite.mechanics.multibody.spatial import invert_transform as inverse_transform
 
 
-class Motion(ABC):
+class JointMotion(ABC):
     """Factor of the transform of a joint."""
 
     coordinates: tuple[int, ...]
 
     @abstractmethod
-    def elementary(self) -> tuple[Fixed | AxisMotion, ...]:
+    def elementary(self) -> tuple[FixedTransform | AxisMotion, ...]:
         """Return the transform as a product of one-axis motions.
 
         Returns:
             Fixed transforms, and motions about or along one axis, in order.
         """
 
-    def placed(self, q: Array) -> Array:
+    def transform(self, q: Array) -> Array:
         """Return the outgoing frame in the incoming frame (4, 4)."""
-        return reduce(np.matmul, (part.placed(q) for part in self.elementary()), np.eye(4))
+        return reduce(np.matmul, (part.transform(q) for part in self.elementary()), np.eye(4))
 
     def rates(self, q: Array) -> Array | None:
         """Return N (k, k) with qdot = N u for these `coordinates`.
@@ -65,17 +65,17 @@ class Motion(ABC):
 
 
 @dataclass(frozen=True, eq=False)
-class Fixed(Motion):
+class FixedTransform(JointMotion):
     """Transform that never changes."""
 
     matrix: Array  # outgoing frame in the incoming frame (4, 4)
     coordinates: tuple[int, ...] = ()
 
-    def placed(self, q: Array) -> Array:
+    def transform(self, q: Array) -> Array:
         """Return the outgoing frame in the incoming frame (4, 4), whatever the coordinates."""
         return self.matrix
 
-    def elementary(self) -> tuple[Fixed | AxisMotion, ...]:
+    def elementary(self) -> tuple[FixedTransform | AxisMotion, ...]:
         """Return the motion itself, which is elementary.
 
         Returns:
@@ -83,13 +83,13 @@ class Fixed(Motion):
         """
         return (self,)
 
-    def inverse(self) -> Fixed:
+    def inverse(self) -> FixedTransform:
         """Return the transform of the incoming frame in the outgoing frame."""
-        return Fixed(inverse_transform(self.matrix))
+        return FixedTransform(inverse_transform(self.matrix))
 
 
 @dataclass(frozen=True, eq=False)
-class AxisMotion(Motion):
+class AxisMotion(JointMotion):
     """Rotation about or translation along a fixed unit axis, by a function of coordinates."""
 
     kind: Literal["rotate", "translate"]
@@ -106,14 +106,14 @@ class AxisMotion(Motion):
         """Return the amount of the motion (rad or m)."""
         return self.function.evaluate(q[list(self.coordinates)])[0]
 
-    def placed(self, q: Array) -> Array:
+    def transform(self, q: Array) -> Array:
         """Return the outgoing frame, rotated about or moved along the axis (4, 4)."""
         amount = self.amount(q)
         if self.kind == "rotate":
             return make_transform(rotation_about(self.axis, amount))
         return make_transform(None, amount * self.axis)
 
-    def elementary(self) -> tuple[Fixed | AxisMotion, ...]:
+    def elementary(self) -> tuple[FixedTransform | AxisMotion, ...]:
         """Return the motion itself, which is elementary.
 
         Returns:
@@ -127,7 +127,7 @@ class AxisMotion(Motion):
 
 
 @dataclass(frozen=True, eq=False)
-class SimbodyAccelerationError(Motion):
+class SimbodyAccelerationError(JointMotion):
     """Error of Simbody's angular acceleration of a CustomJoint, without any motion.
 
     The angular velocity is W r with the rates r of the three angles and the axes W, each rotated by
@@ -144,7 +144,7 @@ class SimbodyAccelerationError(Motion):
     turns: tuple[AxisMotion, ...]
     coordinates: tuple[int, ...] = ()
 
-    def elementary(self) -> tuple[Fixed | AxisMotion, ...]:
+    def elementary(self) -> tuple[FixedTransform | AxisMotion, ...]:
         """Return three rotations that stay at zero but have an acceleration.
 
         Returns:
@@ -182,7 +182,7 @@ class AccelerationErrorAngle(Function):
 
 
 @dataclass(frozen=True, eq=False)
-class SphericalMotion(Motion):
+class SphericalMotion(JointMotion):
     """Rotation by three body-fixed X-Y-Z angles, whose generalized speeds are the angular velocity.
 
     The angular velocity is that of the outgoing frame in the incoming frame F, along the axes of F,
@@ -193,7 +193,7 @@ class SphericalMotion(Motion):
     coordinates: tuple[int, ...]
     radii: Array = field(default_factory=lambda: np.zeros(3))
 
-    def elementary(self) -> tuple[Fixed | AxisMotion, ...]:
+    def elementary(self) -> tuple[FixedTransform | AxisMotion, ...]:
         """Return the translations to the ellipsoid, if it has a size, and the three rotations.
 
         Returns:
@@ -296,11 +296,13 @@ def translate(axis: Sequence[float], coordinate: int) -> AxisMotion:
     return AxisMotion("translate", np.array(axis), (coordinate,))
 
 
-def place(rotation: Array | None = None, translation: Sequence[float] | None = None) -> Fixed:
+def place(
+    rotation: Array | None = None, translation: Sequence[float] | None = None
+) -> FixedTransform:
     """Return a fixed transform.
 
     Args:
         rotation: rotation (3, 3); None for none.
         translation: translation (3,), m; None for none.
     """
-    return Fixed(make_transform(rotation, translation))
+    return FixedTransform(make_transform(rotation, translation))

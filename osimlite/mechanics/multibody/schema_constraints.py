@@ -11,7 +11,7 @@ from osimlite.base.text import join_words
 from osimlite.errors import ModelError, UnsupportedError
 from osimlite.mechanics.multibody import body_constraints as b
 from osimlite.mechanics.multibody.constraints import Constraint, Coupler
-from osimlite.mechanics.multibody.functions import Scaled
+from osimlite.mechanics.multibody.functions import ScaledFunction
 from osimlite.mechanics.multibody.parts import FramePlacement, StationPlacement
 from osimlite.mechanics.multibody.schema_frames import Placements
 from osimlite.mechanics.multibody.schema_functions import convert_function
@@ -91,7 +91,7 @@ class ConstraintReader:
             tuple(
                 self._find_coordinate(item, "independent_coordinate_names", name) for name in names
             ),
-            function if item.scale_factor == 1.0 else Scaled(item.scale_factor, function),
+            function if item.scale_factor == 1.0 else ScaledFunction(item.scale_factor, function),
             path,
         )
 

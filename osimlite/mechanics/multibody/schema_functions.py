@@ -40,7 +40,7 @@ def convert_function(
             inner = convert_function(
                 function.function, arguments, where, opensim_derivatives=opensim_derivatives
             )
-            return f.Scaled(function.scale, inner)
+            return f.ScaledFunction(function.scale, inner)
         if isinstance(function, schema.MultivariatePolynomialFunction):
             _converts(function, function.dimension, arguments)
             return f.MultivariatePolynomial.complete(

@@ -16,7 +16,7 @@ from osimlite.mechanics.multibody.joints import (
     make_ellipsoid_motions,
     make_scapulothoracic_motions,
 )
-from osimlite.mechanics.multibody.motions import Motion
+from osimlite.mechanics.multibody.motions import JointMotion
 from osimlite.mechanics.multibody.schema_functions import convert_function
 from osimlite.schema import custom_joint as schema
 from osimlite.schema.coordinates import Coordinate
@@ -39,7 +39,7 @@ JOINT_TYPES = (
 
 def joint_motions(
     joint: Joint, path: str, *, opensim_derivatives: bool = False
-) -> tuple[tuple[Motion, ...], Sequence[Coordinate]]:
+) -> tuple[tuple[JointMotion, ...], Sequence[Coordinate]]:
     """Return the motions of a joint.
 
     Args:
@@ -97,7 +97,7 @@ def unknown_joint(path: str, kind: str) -> UnsupportedError:
 
 def _build_custom_motions(
     joint: schema.CustomJoint, path: str, opensim_derivatives: bool
-) -> tuple[tuple[Motion, ...], Sequence[Coordinate]]:
+) -> tuple[tuple[JointMotion, ...], Sequence[Coordinate]]:
     known = {coordinate.name: coordinate for coordinate in joint.coordinates}
     order: dict[str, int] = {}
     axes: list[TransformAxis] = []

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from typing import Generic, NamedTuple, Protocol, TypeVar
 
 
-class Link(Protocol):
+class JointEdge(Protocol):
     """Joint between two bodies (or ground), which are named by absolute paths."""
 
     @property
@@ -29,7 +29,7 @@ class Link(Protocol):
         """
 
 
-L = TypeVar("L", bound=Link)
+L = TypeVar("L", bound=JointEdge)
 
 
 class Branch(NamedTuple, Generic[L]):
@@ -40,7 +40,7 @@ class Branch(NamedTuple, Generic[L]):
     reversed: bool  # whether it leads from its child to its parent
 
 
-def new_base(loose: Sequence[str], links: Sequence[Link]) -> str:
+def new_base(loose: Sequence[str], links: Sequence[JointEdge]) -> str:
     """Return the body that OpenSim connects to ground, of bodies without connection to it.
 
     It is a body that is no child of a joint, if there is such a body, and of these the parent of

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from osimlite.mechanics.multibody.constraints import Lock, Prescribed
+from osimlite.mechanics.multibody.constraints import Lock, PrescribedCoordinate
 from osimlite.schema.muscles import PathActuator
 from osimlite.schema.probe_types import (
     ActuatorForceProbe,
@@ -116,7 +116,7 @@ def _read_joints(builder: ElementBuilder, probe: JointInternalPowerProbe) -> Rea
         [place for place, info in infos if info.joint == builder.path(joint)] for joint in joints
     ]
     if any(driven) and not all(
-        isinstance(item, Lock | Prescribed) for item in mechanism.constraints
+        isinstance(item, Lock | PrescribedCoordinate) for item in mechanism.constraints
     ):
         raise builder.unsupported_error(
             probe, " of prescribed coordinates beside other constraints"

@@ -9,7 +9,7 @@ from osimlite.base.records import dataclass
 from osimlite.base.text import suggest_name
 from osimlite.errors import ModelError, UnsupportedError
 from osimlite.io.tables.storage import find_named_file
-from osimlite.mechanics.multibody.functions import Function, PiecewiseLinear, Scaled
+from osimlite.mechanics.multibody.functions import Function, PiecewiseLinear, ScaledFunction
 from osimlite.schema.controller_types import SynergyController
 from osimlite.schema.reporters import SignalGenerator, TableSource__double_
 from osimlite.simulation.elements.builder import ElementBuilder
@@ -95,4 +95,4 @@ def drive_by_synergies(builder: ElementBuilder, controller: SynergyController) -
                 )
                 yield Drive(actuator, refused)
             else:
-                yield Drive(actuator, Scaled(weight, function), number)
+                yield Drive(actuator, ScaledFunction(weight, function), number)

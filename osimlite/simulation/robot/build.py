@@ -9,10 +9,16 @@ import numpy as np
 
 from osimlite.base.records import replace
 from osimlite.base.text import make_unique_name
-from osimlite.mechanics.multibody.functions import IDENTITY, Constant, Function, Linear, Scaled
+from osimlite.mechanics.multibody.functions import (
+    IDENTITY,
+    Constant,
+    Function,
+    Linear,
+    ScaledFunction,
+)
 from osimlite.mechanics.multibody.joints import Mobilizer
 from osimlite.mechanics.multibody.mechanism import Mechanism, Values
-from osimlite.mechanics.multibody.motions import AxisMotion, Fixed
+from osimlite.mechanics.multibody.motions import AxisMotion, FixedTransform
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.simulation.robot.couplings import as_line
 from osimlite.simulation.robot.robot import WORLD, Link, Robot, RobotJoint, Visual
@@ -168,7 +174,7 @@ class _Builder:
         frames = [start]
         for part in mobilizer.elementary():
             for factor in self._simplify_motion(part, own):
-                if isinstance(factor, Fixed):
+                if isinstance(factor, FixedTransform):
                     frames[-1] = frames[-1] @ factor.matrix
                 else:
                     motions.append(factor)
@@ -176,21 +182,21 @@ class _Builder:
         return motions, frames
 
     def _simplify_motion(
-        self, part: Fixed | AxisMotion, own: Sequence[int]
-    ) -> Iterator[Fixed | AxisMotion]:
+        self, part: FixedTransform | AxisMotion, own: Sequence[int]
+    ) -> Iterator[FixedTransform | AxisMotion]:
         """The same motion with what is constant in it taken out."""
-        if isinstance(part, Fixed):
+        if isinstance(part, FixedTransform):
             yield part
         elif _is_constant(part.function) or all(
             own[place] in self.still for place in part.coordinates
         ):
-            yield Fixed(part.placed(self.values[own]))
+            yield FixedTransform(part.transform(self.values[own]))
         elif part.function == IDENTITY or (line := as_line(part.function)) is None:
             yield part
         else:
             slope = line.slope
             first = AxisMotion(part.kind, part.axis, (0,), Constant(line.start))
-            yield Fixed(first.placed(np.zeros(1)))
+            yield FixedTransform(first.transform(np.zeros(1)))
             unit = abs(slope) == 1.0
             yield AxisMotion(
                 part.kind,
@@ -224,7 +230,7 @@ def _place_link(shapes: Sequence[Visual], frame: Array) -> tuple[Visual, ...]:
 
 
 def _is_constant(function: Function) -> bool:
-    if isinstance(function, Scaled):
+    if isinstance(function, ScaledFunction):
         return function.scale == 0.0 or _is_constant(function.function)
     line = as_line(function)
     return isinstance(function, Constant) or (line is not None and line.slope == 0.0)

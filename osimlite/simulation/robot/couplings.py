@@ -51,7 +51,7 @@ def as_line(function: f.Function) -> Line | None:
             }
             if not any(factor for power, factor in factors.items() if power > 1):
                 return Line(factors.get(1, 0.0), factors.get(0, 0.0))
-        case f.Scaled(scale, inner):
+        case f.ScaledFunction(scale, inner):
             line = as_line(inner)
             return None if line is None else Line(scale, 0.0).after(line)
         case f.PiecewiseLinear((_, _)) | f.SimmSpline() if _is_straight(function):
@@ -205,7 +205,7 @@ def knots(function: f.Function) -> tuple[float, ...]:
             return tuple(function.x)
         case PiecewisePolynomial():
             return tuple(function.knots[1:].tolist())
-        case f.Scaled(_, inner) | Composed(_, inner):
+        case f.ScaledFunction(_, inner) | Composed(_, inner):
             own = knots(inner)
             line = as_line(inner)
             if isinstance(function, Composed) and line is not None and line.slope:

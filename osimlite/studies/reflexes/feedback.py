@@ -14,7 +14,7 @@ import numpy as np
 from osimlite.base.text import join_words, suggest_or_list
 from osimlite.errors import SettingError
 from osimlite.mechanics.kernels.reflexes import LIMITS, TERM
-from osimlite.mechanics.kernels.sensors import SENSED
+from osimlite.mechanics.kernels.sensors import SENSOR_NUMBERS
 from osimlite.schema.model import Model
 from osimlite.simulation.control_steps import Gain, KernelController
 from osimlite.studies.reflexes.controllers import CONTROLLERS, Reflexes
@@ -157,7 +157,7 @@ class Feedback:
         targets = [term.ints[TERM.TARGET] for term in reflexes.terms]
         others = np.setdiff1d(everything, everything if is_noisy else targets)
         # With bounds of 0 the kernels add nothing to a control.
-        first, known = SENSED.HEAD + 2 * len(sensed.muscles), sensed.sensor_numbers.copy()
+        first, known = SENSOR_NUMBERS.HEAD + 2 * len(sensed.muscles), sensed.sensor_numbers.copy()
         known[first + others] = known[first + len(sensed.names) + others] = 0.0
         return KernelController(
             tuple(sensed.paths),

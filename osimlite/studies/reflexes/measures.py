@@ -19,14 +19,14 @@ from osimlite.base.text import suggest_or_list
 from osimlite.mechanics.kernels.criteria import (
     CRITERION,
     GAIT,
-    GAIT_NOTED,
+    GAIT_WORK,
     JUMP,
-    JUMP_NOTED,
+    JUMP_WORK,
     LARGEST_LOAD,
-    NOTED,
     NUMBER,
     POWERS,
     PREPARES,
+    SAMPLE_WORK,
     TENSIONS,
     WANG,
     WHOLE_LOAD,
@@ -79,7 +79,7 @@ class Criteria:
         first = self.size
         self._ints += kind, place, len(self._numbers), first
         self._numbers += measure.start, measure.stop, *numbers
-        self.size += GAIT_NOTED.STEPS + 2 * self.max_steps if kind == GAIT else NOTED.SIZE
+        self.size += GAIT_WORK.STEPS + 2 * self.max_steps if kind == GAIT else SAMPLE_WORK.SIZE
         return first
 
     def pack(self) -> tuple[Ints, Array]:
@@ -201,7 +201,8 @@ class Measure(ABC):
         time.
         """
         total, span, last = (
-            self.read_recorded(first, place) for place in (NOTED.TOTAL, NOTED.SPAN, NOTED.VALUE)
+            self.read_recorded(first, place)
+            for place in (SAMPLE_WORK.TOTAL, SAMPLE_WORK.SPAN, SAMPLE_WORK.VALUE)
         )
         return np.divide(total, span, out=last.copy(), where=span > 0.0)
 
@@ -244,10 +245,10 @@ class GaitMeasure(Measure):
         result, speeds, counts = np.ones(self.count), np.zeros(self.count), np.zeros(self.count)
         target = max(min(abs(self.low), abs(self.high)), self.least_speed)
         for k, room in enumerate(self.walkers.criteria_work[:, self._first :]):
-            row = room[: GAIT_NOTED.STEPS + 2 * int(room[GAIT_NOTED.COUNT])].tolist()
-            numbers = row[GAIT_NOTED.STEPS :]
+            row = room[: GAIT_WORK.STEPS + 2 * int(room[GAIT_WORK.COUNT])].tolist()
+            numbers = row[GAIT_WORK.STEPS :]
             # The kernels note completed steps; the unfinished last one ends with the walk.
-            last = float(times[k]), row[GAIT_NOTED.HERE] - row[GAIT_NOTED.BEFORE]
+            last = float(times[k]), row[GAIT_WORK.HERE] - row[GAIT_WORK.BEFORE]
             steps = [*zip(numbers[::2], numbers[1::2], strict=True), last]
             # SCONE ignores the first steps, but fewer of them if there are hardly more.
             first = min(max(len(steps) - self.first_steps, 0), self.first_steps)
@@ -265,7 +266,7 @@ class GaitMeasure(Measure):
                     off = 0.0
                 good += dt * min(max(1.0 - abs(off) / target, -1.0), 1.0)
                 time, length = time + dt, length + far
-            if times[k] < duration and (row[GAIT_NOTED.FALLEN] or self.always):
+            if times[k] < duration and (row[GAIT_WORK.FALLEN] or self.always):
                 time += duration - float(times[k])
             result[k] = 1.0 - good / time if time else 1.0
             speeds[k] = length / time if time else 0.0
@@ -306,7 +307,7 @@ class JumpMeasure(Measure):
             duration: longest duration (s).
         """
         start, here, peak, prepared, does = (
-            self.read_recorded(self._first, getattr(JUMP_NOTED, name))
+            self.read_recorded(self._first, getattr(JUMP_WORK, name))
             for name in ("START", "HERE", "PEAK", "PREPARED", "DOES")
         )
         early = 100.0 * np.maximum(prepared - start, 0.0)
@@ -354,7 +355,8 @@ class EffortMeasure(Measure):
             duration: longest duration (s).
         """
         total, start, here = (
-            self.read_recorded(self._first, k) for k in (NOTED.TOTAL, NOTED.START, NOTED.HERE)
+            self.read_recorded(self._first, k)
+            for k in (SAMPLE_WORK.TOTAL, SAMPLE_WORK.START, SAMPLE_WORK.HERE)
         )
         far = np.maximum(self.least_distance, np.abs(here - start))
         if self._kind == WANG:
@@ -407,7 +409,11 @@ class Penalty(Measure):
             duration: longest duration (s).
         """
         places, total = (
-            {"sum": NOTED.TOTAL, "highest": NOTED.HIGHEST, "lowest": NOTED.LOWEST},
+            {
+                "sum": SAMPLE_WORK.TOTAL,
+                "highest": SAMPLE_WORK.HIGHEST,
+                "lowest": SAMPLE_WORK.LOWEST,
+            },
             np.zeros(self.count),
         )
         for mode, first in self._statistics:

@@ -46,7 +46,7 @@ def as_polynomial(function: f.Function) -> Polynomial | None:
             for coefficient, (power,) in zip(coefficients, powers, strict=True):
                 dense[power] += coefficient
             return Polynomial(dense).trim()
-        case f.Scaled(scale, inner):
+        case f.ScaledFunction(scale, inner):
             own = as_polynomial(inner)
             return None if own is None else scale * own
         case Composed(outer, inner):

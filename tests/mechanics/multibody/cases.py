@@ -28,7 +28,7 @@ from osimlite.mechanics.multibody.mechanism import (
     Mechanism,
     MobileBody,
 )
-from osimlite.mechanics.multibody.motions import Motion
+from osimlite.mechanics.multibody.motions import JointMotion
 from osimlite.mechanics.multibody.schema_functions import convert_function
 from osimlite.mechanics.multibody.spatial import make_offset
 from osimlite.schema import functions as schema
@@ -61,7 +61,7 @@ def _component(spec: dict[str, Any]) -> schema.Function:
     return component
 
 
-def motions(joint_type: str, properties: dict[str, Any]) -> tuple[Motion, ...]:
+def motions(joint_type: str, properties: dict[str, Any]) -> tuple[JointMotion, ...]:
     """The motions of a joint with the properties that a case gives."""
     match joint_type:
         case "EllipsoidJoint":

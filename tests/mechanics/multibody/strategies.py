@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from osimlite.mechanics.multibody import body_constraints as b
 from osimlite.mechanics.multibody import functions as f
-from osimlite.mechanics.multibody.constraints import Constraint, Coupler, Prescribed
+from osimlite.mechanics.multibody.constraints import Constraint, Coupler, PrescribedCoordinate
 from osimlite.mechanics.multibody.joints import (
     MOTIONS,
     Mobilizer,
@@ -28,7 +28,7 @@ from osimlite.mechanics.multibody.mechanism import (
     MobileBody,
     StationPlacement,
 )
-from osimlite.mechanics.multibody.motions import Motion
+from osimlite.mechanics.multibody.motions import JointMotion
 from osimlite.mechanics.multibody.spatial import Array, make_offset
 
 KINDS = ("point", "distance", "line", "weld", "rolling", "coupler", "prescribed")
@@ -57,7 +57,7 @@ def _radii(rng: np.random.Generator) -> Array:
     return rng.uniform(0.1, 0.4, 3) * rng.choice((-1.0, 1.0))
 
 
-def motions_of(joint_type: str, rng: np.random.Generator) -> tuple[Motion, ...]:
+def motions_of(joint_type: str, rng: np.random.Generator) -> tuple[JointMotion, ...]:
     """The motions of a joint type with random properties."""
     if joint_type == "EllipsoidJoint":
         return make_ellipsoid_motions(_radii(rng))
@@ -74,14 +74,14 @@ def motions_of(joint_type: str, rng: np.random.Generator) -> tuple[Motion, ...]:
             TransformAxis((1,), rng.normal(size=3), spline),
             TransformAxis((0,), rng.normal(size=3), f.Sine(0.4, 1.3, 0.2, 0.1)),
             TransformAxis((0,), rng.normal(size=3), f.Polynomial((0.3, -0.2, 0.5, 0.1))),
-            TransformAxis((1,), rng.normal(size=3), f.Scaled(-0.7, spline)),
+            TransformAxis((1,), rng.normal(size=3), f.ScaledFunction(-0.7, spline)),
             TransformAxis((), rng.normal(size=3), f.Constant(0.07)),
         ]
         return make_custom_motions(axes[:3], axes[3:])
     return MOTIONS[joint_type]
 
 
-def coordinates_of(motions: tuple[Motion, ...]) -> int:
+def coordinates_of(motions: tuple[JointMotion, ...]) -> int:
     """How many coordinates the motions of a joint take."""
     return 1 + max((place for motion in motions for place in motion.coordinates), default=-1)
 
@@ -164,4 +164,6 @@ def constraint_of(kind: str, mechanism: Mechanism, rng: np.random.Generator) -> 
                 tuple(places[1:]),
                 f.Polynomial((0.3, -0.2, 0.1)) if places[1:] else f.Constant(0.2),
             )
-    return Prescribed(int(rng.integers(len(mechanism.coordinates))), f.Sine(0.4, 3.0, 0.2, 0.1))
+    return PrescribedCoordinate(
+        int(rng.integers(len(mechanism.coordinates))), f.Sine(0.4, 3.0, 0.2, 0.1)
+    )

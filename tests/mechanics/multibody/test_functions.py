@@ -55,7 +55,7 @@ def test_only_linear_functions_have_a_slope():
     assert f.Linear(-1.0, 0.3).slope == -1.0
     assert f.IDENTITY.slope == 1.0
     assert f.Constant(2.0).slope is None
-    assert f.Scaled(1.0, f.IDENTITY).slope is None
+    assert f.ScaledFunction(1.0, f.IDENTITY).slope is None
 
 
 @given(

@@ -15,7 +15,7 @@ from osimlite.mechanics.multibody.joints import (
     make_custom_motions,
     motion_types,
 )
-from osimlite.mechanics.multibody.motions import AxisMotion, Fixed
+from osimlite.mechanics.multibody.motions import AxisMotion, FixedTransform
 from osimlite.mechanics.multibody.spatial import invert_transform, make_transform, rotation_about
 from osimlite.schema import joints
 from tests.mechanics.multibody.cases import alone, load, mechanism_of
@@ -81,7 +81,7 @@ def test_a_joint_is_a_chain_of_one_axis_motions(joint_type, seed, turned_round):
     q = rng.uniform(-1.2, 1.2, count)
     product = np.eye(4)
     for part in mobilizer.elementary():
-        if isinstance(part, Fixed):
+        if isinstance(part, FixedTransform):
             product = product @ part.matrix
         elif part.kind == "rotate":
             product = product @ make_transform(rotation_about(part.axis, part.amount(q)))

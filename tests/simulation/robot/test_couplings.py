@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from osimlite.mechanics.multibody import functions as f
-from osimlite.mechanics.multibody.functions import Linear, Scaled
+from osimlite.mechanics.multibody.functions import Linear, ScaledFunction
 from osimlite.simulation.robot.couplings import Line, as_line
 
 X, Y = (0.0, 1.0, 2.0, 3.5), (0.0, 1.0, -1.0, 0.5)
@@ -15,9 +15,9 @@ def test_straight_lines_are_known_in_any_form():
         f.WeightedSum((2.0,), 1.0),
         f.Polynomial((0.0, 2.0, 1.0)),
         f.MultivariatePolynomial.complete((1.0, 2.0, 0.0), 1, 2),
-        Scaled(-2.0, Linear(-1.0, -0.5)),
+        ScaledFunction(-2.0, Linear(-1.0, -0.5)),
         f.SimmSpline((-1.0, 3.0), (-1.0, 7.0)),
-        Scaled(0.5, f.SimmSpline((-1.0, 3.0), (-2.0, 14.0))),
+        ScaledFunction(0.5, f.SimmSpline((-1.0, 3.0), (-2.0, 14.0))),
         f.PiecewiseLinear((-1.0, 3.0), (-1.0, 7.0)),
     ]
     assert [as_line(function) for function in lines] == [Line(2.0, 1.0)] * len(lines)
@@ -28,7 +28,7 @@ def test_straight_lines_are_known_in_any_form():
         f.MultivariatePolynomial.complete((1.0, 2.0, 3.0), 1, 2),
         f.MultivariatePolynomial.complete((1.0, 2.0, 3.0), 2, 1),
         f.Sine(1.0, 1.0, 0.0, 0.0),
-        Scaled(2.0, f.SimmSpline(X, Y)),
+        ScaledFunction(2.0, f.SimmSpline(X, Y)),
         f.SimmSpline((0.0, 0.0), (0.0, 1.0)),
         f.PiecewiseLinear(X, Y),
     ]

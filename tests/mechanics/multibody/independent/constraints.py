@@ -8,7 +8,7 @@ import numpy as np
 
 from osimlite.mechanics.multibody import body_constraints as b
 from osimlite.mechanics.multibody.body_constraints import find_carrier
-from osimlite.mechanics.multibody.constraints import Constraint, Coupler, Lock, Prescribed
+from osimlite.mechanics.multibody.constraints import Constraint, Coupler, Lock, PrescribedCoordinate
 from osimlite.mechanics.multibody.parts import StationPlacement
 from osimlite.mechanics.multibody.spatial import Array, cross, skew_matrix
 from tests.mechanics.multibody.independent.motion import Moved
@@ -33,7 +33,7 @@ def bond(constraint: Constraint, state: Moved) -> Bond:
                 -mechanism.rate_bias(q, u)[[coordinate]],
             )
             return Bond(np.zeros(0), rows, np.zeros(1), drift)
-        case Prescribed(coordinate, function):
+        case PrescribedCoordinate(coordinate, function):
             value, first, second = function.evaluate(np.array((state.time,)))
             rows, bias = (
                 mechanism.rate_matrix(q)[[coordinate]],

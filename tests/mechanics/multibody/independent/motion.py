@@ -11,8 +11,8 @@ from osimlite.mechanics.multibody.joints import Mobilizer
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.motions import (
     AxisMotion,
-    Fixed,
-    Motion,
+    FixedTransform,
+    JointMotion,
     SimbodyAccelerationError,
     SphericalMotion,
 )
@@ -86,19 +86,19 @@ def kinematics(mechanism: Mechanism, q: Array, u: Array, time: float = 0.0) -> M
 def carrying(mobilizer: Mobilizer, q: Array, u: Array) -> RelativeMotion:
     """Motion of the carried body in the carrying body, at the joint's own `q` and `u` (k,)."""
     ends = (
-        Fixed(mobilizer.parent_frame),
+        FixedTransform(mobilizer.parent_frame),
         *mobilizer.motions,
-        Fixed(invert_transform(mobilizer.child_frame)),
+        FixedTransform(invert_transform(mobilizer.child_frame)),
     )
     motion = reduce(RelativeMotion.then, (relative(part, q, u) for part in ends))
     return motion.inverse() if mobilizer.reversed else motion
 
 
-def relative(motion: Motion, q: Array, u: Array) -> RelativeMotion:
+def relative(motion: JointMotion, q: Array, u: Array) -> RelativeMotion:
     """Motion of the outgoing frame in the incoming frame, at `q` and `u` (k,) of the joint."""
     own, block = list(motion.coordinates), np.zeros((6, len(q) + 2))
     match motion:
-        case Fixed(matrix):
+        case FixedTransform(matrix):
             return RelativeMotion(matrix[:3, :3], matrix[:3, 3], block)
         case AxisMotion(kind, axis, _, function):
             amount, gradient, hessian = function.evaluate(q[own])

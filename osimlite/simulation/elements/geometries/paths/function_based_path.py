@@ -14,7 +14,7 @@ from osimlite.mechanics.multibody.function_tables import table_of_one
 from osimlite.mechanics.multibody.functions import (
     Function,
     MultivariatePolynomial,
-    Scaled,
+    ScaledFunction,
     WeightedSum,
 )
 from osimlite.mechanics.multibody.links import Places
@@ -94,7 +94,7 @@ class CoordinatePath:
                 is_part=True,
             )
         factor = 1.0
-        while isinstance(function, Scaled):
+        while isinstance(function, ScaledFunction):
             factor, function = factor * function.scale, function.function
         if isinstance(function, WeightedSum):
             order, coefficients = 1, (function.start, *reversed(function.weights))
