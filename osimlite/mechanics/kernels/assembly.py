@@ -267,7 +267,14 @@ def find_nearest(a: Assembly, target: Floats, q: Floats) -> bool:
 
 
 def list_freed(a: Assembly) -> int:
-    """List the degrees of freedom that may change; return their count."""
+    """List the degrees of freedom that may change.
+
+    Args:
+        a: the assembly; its list is filled.
+
+    Returns:
+        Their number.
+    """
     size, status, count = a.model[MODEL.DOFS], at(a.p, ASSEMBLY_HEAD), 0
     free = at(status, FREE * size)
     for k in range(size):

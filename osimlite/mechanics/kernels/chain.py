@@ -43,7 +43,7 @@ from osimlite.mechanics.laws.vectors import (
 def chain_dynamics(
     model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, unused: int
 ) -> int:
-    """Compute the mass matrix and subtract the bias from the generalized forces.
+    """Compute the mass matrix, and subtract the bias from the generalized forces.
 
     Args:
         model: integers of the model.

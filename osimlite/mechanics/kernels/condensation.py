@@ -223,8 +223,8 @@ def fill_mass_matrix(model: Ints, data: Floats, mass: Floats) -> None:
     """Fill the mass matrix, with heavy masses along the constraint equations.
 
     The equation G du = 0 is replaced by a mass HEAVY times the largest entry of M along each row of
-    G. Exact multipliers would need a larger system; an iteration corrects the small remaining
-    motion.
+    G. Multipliers would need a larger, indefinite system. The small motion that remains
+    across the constraints is removed by the projection of the step.
 
     Args:
         model: integers of the model.

@@ -106,6 +106,10 @@ def evaluate_arc(
 def axial_ratio(table: Floats, cosine: float) -> tuple[float, float, float]:
     """Return (sin θ) / θ and its first and second derivative by cos θ.
 
+    Args:
+        table: table of the function.
+        cosine: cos θ.
+
     Returns:
         Value, first and second derivative.
     """
@@ -116,6 +120,10 @@ def axial_ratio(table: Floats, cosine: float) -> tuple[float, float, float]:
 
 def transverse_ratio(table: Floats, cosine: float) -> tuple[float, float, float]:
     """Return (1 - cos θ) / (θ sin θ) and its first and second derivative by cos θ.
+
+    Args:
+        table: table of the function.
+        cosine: cos θ.
 
     Returns:
         Value, first and second derivative.

@@ -299,7 +299,6 @@ def write_response(
     else:
         # Depth and approach increase the force, so that it resists both.
         change[0], change[1] = -pressed, -damped
-    # The point moves with surface 2 and is at rest, but for sinking, relative to surface 1.
     apply_force(model, data, two, point, way)
     apply_force(model, data, one, point, times(-1.0, way))
     add_rotation_terms(

@@ -147,7 +147,7 @@ def begin_criteria(senses: Ints, i: Ints, row: Floats, room: Floats) -> None:
 def update_criteria(
     senses: Ints, known: Floats, i: Ints, p: Floats, t: float, row: Floats, u: Floats, room: Floats
 ) -> bool:
-    """Update all criteria; return whether the walker has fallen, or its jump has ended.
+    """Update all criteria after a control step.
 
     Args:
         senses: plan of the sensor row.
@@ -158,6 +158,9 @@ def update_criteria(
         row: sensor row.
         u: excitations during the control step.
         room: workspace of the criteria.
+
+    Returns:
+        Whether the walker has fallen, or its jump has ended.
     """
     has_fallen = False
     for number in range(i[0]):

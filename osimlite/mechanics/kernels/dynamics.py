@@ -120,7 +120,7 @@ def inverse(model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, unus
         unused: any number.
 
     Returns:
-        `OUTCOME.OK` or what went wrong, as of `evaluate`.
+        `OUTCOME.OK`, or the outcome of a kernel that failed, see `evaluate`.
     """
     place_links(model, reals, data, y, f)
     status = move_links(model, reals, data, y, f)

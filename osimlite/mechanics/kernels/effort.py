@@ -324,7 +324,7 @@ def solve_weighted_least_squares(
                 multipliers[k] += step_length * step[k]
             transpose_times(sizes, columns, multipliers, y)
             error = update_primal(sizes, numbers, columns, work, x, residual, terms)
-        # Two proximal steps at least; after these, continue only while the residual decreases.
+        # From the third proximal step on, continue only while the residual decreases clearly.
         if error <= CLOSEST or (number > 1 and not error < SLOWEST * error_before):
             break
         error_before = error

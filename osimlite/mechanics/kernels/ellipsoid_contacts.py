@@ -206,7 +206,7 @@ def find_pair(surfaces: Ints, pairs: int, one: int, two: int) -> int:
 def is_separating(
     model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, part: int
 ) -> bool:
-    """Compute one contact, and return whether it touches without a force.
+    """Compute one contact, and tell whether it touches without a force.
 
     Args:
         model: integers of the model.
@@ -215,6 +215,9 @@ def is_separating(
         y: state.
         f: rates of the coordinates.
         part: offset of the contact's item.
+
+    Returns:
+        Whether the surfaces overlap, but separate too fast for a force.
     """
     call(model[part + ITEM.LAW], model, reals, data, y, f, part)
     result = at(data, model[part + ITEM.RECORD])

@@ -138,7 +138,7 @@ def project_by_law(
     tolerance: float,
     limit: float,
 ) -> bool:
-    """Project a state onto the constraints by the law of the model; return whether they hold.
+    """Project a state onto the constraints by the law of the model.
 
     Args:
         model: integers of the model.
@@ -150,6 +150,9 @@ def project_by_law(
         has_errors: 0 if no errors are known.
         tolerance: accepted errors of the constraints.
         limit: largest errors to start from.
+
+    Returns:
+        Whether the constraints hold afterwards.
     """
     data[WORK.TIME], data[WORK.SCRATCH], data[WORK.SCRATCH + 1] = t, tolerance, limit
     return (

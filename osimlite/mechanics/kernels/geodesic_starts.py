@@ -247,7 +247,9 @@ def start_on_cylinder(
 
 
 def turns_left(one: float, before: float, two: float, after: float, sweep: float) -> bool:
-    """Return whether a path turns to the left around a cylinder, to stay on the active side as in OpenSim.
+    """Return whether a path turns to the left around a cylinder.
+
+    The path is to stay on the active side, as in OpenSim.
 
     It follows the tangent of the first end that meets the active side. If both or none do, that of the
     second end decides; if these do not either, the shorter way, but the longer one from behind to

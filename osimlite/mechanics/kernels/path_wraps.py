@@ -189,7 +189,7 @@ def remove_tangents(model: Ints, data: Floats, item: int, number: int) -> None:
 def wrap_surface(
     model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, item: int, number: int
 ) -> int:
-    """Bend the path around one surface; return the result for the last segment that was tried.
+    """Bend the path around one surface.
 
     Args:
         model: integers of the model.

@@ -147,14 +147,21 @@ def convert_ball_columns(m: Fit, y: Floats, angles: Ints) -> None:
 
 
 def add_markers(m: Fit) -> float:
-    """Add the masses and springs of the markers to the links; return their cost."""
+    """Add the masses and springs of the markers to the links.
+
+    Args:
+        m: the fit; inertias and wrenches of links are changed.
+
+    Returns:
+        Cost of the markers.
+    """
     model, data, p, v, value = m.model, m.data, m.p, m.v, 0.0
     for k in range(p[MARKERS]):
         weight, link = v[p[WEIGHTS] + k], p[p[MARKER_AT] + k]
         if not weight > 0.0:
             continue
         point = station(model, data, link, vector(m.c, MARKER_NUMBERS * k))
-        # The spring pulls from the measured position: its force has the sign of the gradient.
+        # Gradient of the cost by the position of the marker: the pull of the spring, reversed.
         off = minus(point, vector(v, p[MEASURED] + 3 * k))
         value += 0.5 * weight * dot(off, off)
         if link < 0:

@@ -66,13 +66,16 @@ def project(
 
 
 def evaluate_equations(model: Ints, reals: Floats, data: Floats, y: Floats) -> int:
-    """Evaluate all constraint equations at a state; return the outcome.
+    """Evaluate all constraint equations at a state.
 
     Args:
         model: integers of the model.
         reals: numbers of the model.
         data: results; changed.
         y: state.
+
+    Returns:
+        Outcome of the evaluation, see `OUTCOME`.
     """
     # Rates go to workspace behind the trial state.
     f = at(data, model[model[MODEL.CONSTRAINED] + CONSTRAINED.WORK_TRIAL] + 2 * model[MODEL.DOFS])
@@ -138,8 +141,8 @@ def project_values(
         before, norm = norm, inf
         if evaluate_equations(model, reals, data, following) == OUTCOME.OK:
             norm = collect_position_errors(model, data, errors)
-        # OpenSim accepts the first step even if it increases the error, and stops at the first
-        # later one that does.
+        # As in Simbody, the first step is accepted even if it increases the errors; a later one
+        # that does ends the search.
         if iteration > 0 and not norm <= before:
             norm = before
             break

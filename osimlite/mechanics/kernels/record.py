@@ -106,7 +106,7 @@ class Motion(NamedTuple):
 
 
 def evaluate_state(m: Motion, t: float, y: Floats, f: Floats, stage: int) -> int:
-    """Evaluate a state at a time; return the outcome.
+    """Evaluate a state at a time.
 
     Args:
         m: the run.
@@ -114,6 +114,9 @@ def evaluate_state(m: Motion, t: float, y: Floats, f: Floats, stage: int) -> int
         y: state.
         f: filled with the rates.
         stage: how far the evaluation goes, see `STAGE`.
+
+    Returns:
+        Outcome of the evaluation, see `OUTCOME`.
     """
     m.data[WORK.TIME] = t
     return call(m.model[MODEL.LAWS], m.model, m.reals, m.data, y, f, stage)

@@ -281,9 +281,8 @@ def integrate_run(m: Motion, y: Floats, is_going: bool) -> int:
 def is_evaluated(m: Motion, t1: float, y1: Floats, f1: Floats) -> bool:
     """Evaluate the end of a step unless the method has done so.
 
-    It returns whether its derivative is finite.
-
-    A method's derivative is not used where contacts or watches need the results of an evaluation.
+    The derivative of the method is not used where contacts or watches need the results of an
+    evaluation.
 
     Args:
         m: the run.

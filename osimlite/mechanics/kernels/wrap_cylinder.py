@@ -153,7 +153,8 @@ def bend_around_cylinder(
         # all heights then count as that of the first end.
         z1, z2 = pz, z2 if pz != qz else qz
     else:
-        # A height beyond that of the other end counts as that of the own end.
+        # A height that is further from the other end than the own end is replaced by that of the
+        # own end.
         z1, z2 = (
             z1 if abs(z1 - qz) < abs(pz - qz) else pz,
             z2 if abs(z2 - pz) < abs(qz - pz) else qz,

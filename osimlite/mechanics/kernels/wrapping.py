@@ -133,7 +133,9 @@ def find_tangents(point: Vector, radius: float, axis: Vector) -> tuple[Vector, V
 
 
 def nearest_pair(a1: Vector, b1: Vector, a2: Vector, b2: Vector) -> tuple[Vector, Vector]:
-    """Return the two points of a circle, of two candidates for each end, that are nearest to each other.
+    """Return the two points of a circle that are nearest to each other.
+
+    There are two candidates for each end.
 
     Args:
         a1: first candidate of the first end.

@@ -251,7 +251,7 @@ def search_section(
 def take_halley_step(
     c: Sequence[float], p: int, apart: int, u: float, rest: float
 ) -> tuple[float, bool]:
-    """Take one step of Halley's method; the arguments are those of `search_section`.
+    """Take one step of Halley's method for u, where x(u) has a requested value.
 
     Args:
         c: array that contains the coefficients of x and y.
@@ -279,7 +279,7 @@ def take_halley_step(
 
 
 def evaluate_section(c: Sequence[float], p: int, apart: int, u: float) -> tuple[float, float]:
-    """Return y and slope at u; the arguments are those of `search_section`.
+    """Return y and its slope by x at a parameter of a section.
 
     Args:
         c: array that contains the coefficients of x and y.
@@ -307,7 +307,15 @@ def evaluate_section(c: Sequence[float], p: int, apart: int, u: float) -> tuple[
 
 
 def search_residual(c: Sequence[float], p: int, apart: int, u: float, rest: float) -> float:
-    """Return x(u) less the requested x, the residual of the search."""
+    """Return x(u) less the requested x, the residual of the search.
+
+    Args:
+        c: array that contains the coefficients of x and y.
+        p: offset of the first coefficient.
+        apart: distance between coefficients.
+        u: parameter of the section.
+        rest: requested distance of x from the start of the section.
+    """
     a, b, d, e, f = c[p], c[p + apart], c[p + 2 * apart], c[p + 3 * apart], c[p + 4 * apart]
     v = u * u
     return u * ((a + u * b) + v * ((d + u * e) + v * f)) - rest

@@ -31,9 +31,8 @@ def xyz_angles(
     Returns:
         (a, b, c).
     """
-    # The four entries without sin b or one of the outer angles' mixed terms give cos b twice over:
-    # their mean keeps full precision near a right angle, where asin(R02) would lose half of the
-    # digits.
+    # cos b is a factor of R00 and R01, and of R12 and R22. It keeps full precision near a right
+    # angle, where asin(R02) would lose half of the digits.
     cosine = sqrt(0.5 * (R00 * R00 + R01 * R01 + R12 * R12 + R22 * R22))
     b = atan2(R02, cosine)
     # Gimbal lock: only the sum (or difference) of a and c is determined.

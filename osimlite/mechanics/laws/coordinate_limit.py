@@ -95,7 +95,7 @@ def limit_force(
 def limit_dissipation(q: float, u: float, qu: float, ql: float, D: float, t: float) -> float:
     """Return the power (su + sl) D u^2 that the damper dissipates (W).
 
-    The arguments are those of `limit_force`.
+    The factors su and sl are those of `limit_force`.
 
     Args:
         q: coordinate, rad (m).
@@ -112,10 +112,9 @@ def limit_dissipation(q: float, u: float, qu: float, ql: float, D: float, t: flo
 def limit_energy(q: float, Ku: float, qu: float, Kl: float, ql: float, t: float) -> float:
     """Return the potential energy of the spring (J).
 
-    It is K (delta^2 / 2 - t^2 / 7) at a distance delta >= t beyond the limit, and K delta^2 x^3 (2 - 5
-    x / 2 + 6 x^2 / 7) with x = delta / t before. Where ql > qu, both springs act between the limits,
-    but the energy is that of the upper one alone, as OpenSim reports it. The arguments are those of
-    `limit_force`.
+    It is K (delta^2 / 2 - t^2 / 7) at a distance delta >= t beyond the limit, and K delta^2 x^3 (2
+    - 5 x / 2 + 6 x^2 / 7) with x = delta / t before. Where ql > qu, both springs act between the
+    limits, but the energy is that of the upper one alone, as OpenSim reports it.
 
     Args:
         q: coordinate, rad (m).

@@ -26,7 +26,10 @@ def settled(root: float, error: float, slope: float) -> float:
 
 
 def is_nothing(number: float) -> bool:
-    """Return whether a number and all its derivatives are 0, so that multiplication by it can be skipped."""
+    """Return whether a number and all its derivatives are 0.
+
+    Multiplication by such a number can be skipped.
+    """
     # A dual number counts as nothing only if its derivatives vanish too; see the replacements.
     return number == 0.0
 

@@ -301,8 +301,6 @@ def _complete_properties(
 ) -> tuple[float, ...]:
     """Return optional properties, or their defaults if all are omitted.
 
-    `first` is the name of the first.
-
     Args:
         given: properties, None where omitted.
         usual: their defaults.

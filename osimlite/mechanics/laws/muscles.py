@@ -82,11 +82,9 @@ def cos_pennation(
 
     It is sqrt(1 - (h / l)^2), not less than the cosine of the largest angle.
 
-    The other arguments are those of `pennation_constants`.
-
     Args:
-        length: fiber length (m).
-        height: height of the fibers (m), from `pennation_constants` as all that follow.
+        length: fiber length l (m).
+        height: height h of the fibers (m), from `pennation_constants` as all that follow.
         shortest: smallest fiber length (m).
         largest_sin: sine of the largest angle.
         least_cos: cosine of the largest angle.
@@ -102,11 +100,9 @@ def fiber_length_along(along: float, height: float, shortest: float, least_cos: 
 
     It is sqrt(h^2 + along^2), not less than the smallest fiber length.
 
-    The other arguments are those of `pennation_constants`.
-
     Args:
         along: length of the fibers along the tendon (m).
-        height: height of the fibers (m), from `pennation_constants` as all that follow.
+        height: height h of the fibers (m), from `pennation_constants` as all that follow.
         shortest: smallest fiber length (m).
         least_cos: cosine of the largest angle.
     """

@@ -136,10 +136,10 @@ def degroote_passive(length: float, strain: float) -> tuple[float, float]:
 
 
 def degroote_factor(velocity: float) -> float:
-    """Return the factor of the active force at a normalized velocity v.
+    """Return De Groote's factor of the active force at a normalized velocity v.
 
-    It is d1 log(d2 v + d3 + sqrt((d2 v + d3)^2 + 1)) + d4, with d1 = -0.321..., d2 = -8.149, d3 =
-    -0.374 and d4 = 0.883....
+    It is d1 log(d2 v + d3 + sqrt((d2 v + d3)^2 + 1)) + d4 with OpenSim's constants: d1 = -0.321, d2
+    = -8.149, d3 = -0.374 and d4 = 0.8825, rounded.
     """
     x = -8.149 * velocity - 0.374
     return -0.3211346127989808 * log(x + sqrt(x * x + 1.0)) + 0.8825327733249912

@@ -118,8 +118,6 @@ def tendon_force(
 ) -> tuple[float, float]:
     """Return the tendon force and its derivative by strain.
 
-    The constants are those of `tendon_shape`.
-
     It is factor (exp(growth e) - 1) up to the strain `toe`, and 0.33 + slope (e - toe) beyond.
 
     Args:
@@ -338,8 +336,6 @@ def thelen2003_energy(m: Thelen2003, length: float, fiber_length: float, cos: fl
 
     OpenSim evaluates the passive energy at the fiber length in m instead of the normalized one, so
     that fibers below 1 m store nothing. This function does the same.
-
-    OpenSim takes the fiber length in m for a normalized one, so that fibers below 1 m store nothing.
 
     Args:
         m: muscle.

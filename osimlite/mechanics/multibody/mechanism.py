@@ -502,11 +502,21 @@ class Mechanism:
         return self._mean(MassCentres.of(self.at(q)).positions())
 
     def center_of_mass_velocity(self, q: Values, u: Values) -> Array:
-        """Return the velocity of the mass centre in ground (3,), m/s."""
+        """Return the velocity of the mass centre in ground (3,), m/s.
+
+        Args:
+            q: coordinate values.
+            u: generalized speeds.
+        """
         return self._mean(MassCentres.of(self.at(q, u)).velocities())
 
     def kinetic_energy(self, q: Values, u: Values) -> float:
-        """Return the kinetic energy of all bodies (J)."""
+        """Return the kinetic energy of all bodies (J).
+
+        Args:
+            q: coordinate values.
+            u: generalized speeds.
+        """
         return MassCentres.of(self.at(q, u)).kinetic_energy()
 
     def potential_energy(self, q: Values) -> float:

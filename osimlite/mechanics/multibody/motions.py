@@ -60,7 +60,12 @@ class JointMotion(ABC):
         return None
 
     def rate_bias(self, q: Array, u: Array) -> Array | None:
-        """Return Ndot u (k,), so that qddot = N udot + Ndot u; None if it is zero."""
+        """Return Ndot u (k,), so that qddot = N udot + Ndot u; None if it is zero.
+
+        Args:
+            q: coordinates of the joint (k,).
+            u: speeds of the joint (k,).
+        """
         return None
 
 

@@ -153,9 +153,6 @@ class FunctionWriter(ExpressionWriter):
 
         As in Python, assignments to the loop variable in the body do not affect the next round.
 
-        As in Python, what the body stores in the variable of the loop makes no difference to the
-        next round.
-
         Args:
             node: the statement.
             name: name of the loop variable.
@@ -517,7 +514,7 @@ def describe_statement(node: ast.stmt, keyword: str = "") -> str:
 
     Args:
         node: the statement.
-        keyword: what stands for `if` in it; empty for what it is.
+        keyword: replacement of `if`, such as `elif`; empty for the statement as it is.
     """
     match node:
         case ast.If(test=test):
