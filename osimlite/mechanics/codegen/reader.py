@@ -64,7 +64,7 @@ class Kernel:
     def value(self, node: ast.expr) -> Any:
         """Return the value of a global name, or of an attribute of a record or module.
 
-        It is None if the name has no value there.
+        A name without a value there, as of a local variable, gives None.
         """
         if isinstance(node, ast.Attribute):
             owner = (

@@ -1,4 +1,4 @@
-"""Semi-explicit Euler with step doubling, as Simbody's SemiExplicitEuler2Integrator takes its steps.
+"""Semi-explicit Euler steps with step doubling, as in Simbody's SemiExplicitEuler2Integrator.
 
 Speeds and auxiliary states advance by their rates at the start; then coordinates advance by the
 rates that the new speeds give at the old coordinates. The error is the difference of two half steps

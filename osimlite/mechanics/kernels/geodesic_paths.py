@@ -1,4 +1,4 @@
-"""Shortest (or at least stationary) paths around wrap surfaces, for the option `wrapping="geodesic"`.
+"""Shortest or stationary paths around wrap surfaces, for the option `wrapping="geodesic"`.
 
 Between two neighbouring points each PathWrap whose range contains both bends the path where it
 touches, independently of other segments. A surface is therefore listed once for each point at which

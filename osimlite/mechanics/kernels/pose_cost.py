@@ -1,6 +1,7 @@
-"""Cost of a pose: weighted squared deviations of markers, sensors and coordinates, with derivatives.
+"""Cost of a pose, the weighted squared deviations of its measurements, with derivatives.
 
-The cost is half the weighted sum of squared distances and angles. A marker is a point mass on its
+The cost is half the weighted sum of the squared distances of markers (m^2), squared angles of
+orientation sensors (rad^2) and squared deviations of coordinates. A marker is a point mass on its
 link and a spring that pulls at it: the gradient is the generalized force of the springs, and the
 Gauss-Newton part of the Hessian is the mass matrix of the point masses, which the
 composite-rigid-body algorithm computes. The rest of the Hessian follows from how the axes of the

@@ -1,4 +1,4 @@
-"""Reflex controllers: sums of terms ``gain * (sensor - offset)`` with a delay, gated by states of legs.
+"""Reflex controllers, sums of delayed terms ``gain * (sensor - offset)`` gated by states of legs.
 
 The integers are a head, `REFLEXES`; per term a `TERM`; per gate the sensors of a coordinate and of
 its speed; per sensor its source, `sensors.SOURCE`. The numbers of a candidate are a head, `LIMITS`,

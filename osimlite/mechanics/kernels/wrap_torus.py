@@ -1,4 +1,6 @@
-"""Wrapping of a path through the hole of a torus, as around a cylinder at the nearest part of its ring.
+"""Wrapping of a path through the hole of a torus.
+
+The path wraps as around a cylinder at the nearest part of the ring.
 
 Source: OpenSim 4.6's WrapTorus. Its objective is not exactly the distance from the ring, and it stops
 early. The position is therefore found with the same steps, those of MINPACK's lmdif (J. J. More,

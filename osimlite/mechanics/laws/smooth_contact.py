@@ -1,4 +1,4 @@
-"""Contact that is smooth everywhere: of a half space and a sphere, and of a station with the ground.
+"""Smooth contact of a half space with a sphere, and of a station with the ground.
 
 As in :mod:`osimlite.mechanics.laws.hunt_crossley` the half space is surface 1 and the sphere
 surface 2, n is the unit normal of the half space, d the depth and v the velocity of surface 1

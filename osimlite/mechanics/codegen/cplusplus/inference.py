@@ -372,7 +372,7 @@ class Specialisation(Kernel):
     def value(self, node: ast.expr) -> Any:
         """Return the value of a global name, or of an attribute of a record or module.
 
-        It is None if the name has no value there.
+        A name without a value there, as of a local variable, gives None.
 
         Args:
             node: name or attribute.

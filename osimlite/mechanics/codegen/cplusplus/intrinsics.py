@@ -139,7 +139,7 @@ def _declare_fixed_result(name: str, result: Type) -> Intrinsic:
 def _extreme(name: str) -> Intrinsic:
     """Return the rules of `min` or `max` of two numbers or more.
 
-    Python's order of comparisons decides what NaN gives, and is kept.
+    The C++ text compares in Python's order, on which the result for NaN depends.
     """
 
     def infer(reader: Reader, nodes: Nodes, kinds: Types) -> Type:
