@@ -54,7 +54,8 @@ def chain_dynamics(
         unused: any number.
 
     Returns:
-        `OUTCOME.OK`, or the outcome of the kernel that asks the other program.
+        `OUTCOME.OK`, or the outcome of the kernel that obtains the joint forces and the mass matrix
+        M of the other program.
     """
     h, right = at(model, model[MODEL.CHAIN]), at(f, model[MODEL.DOFS])
     move_joints(model, reals, data, y, f)
@@ -82,7 +83,8 @@ def chain_dynamics(
             * shares[product[PRODUCT.TWO]]
             * matrix[product[PRODUCT.ENTRY]]
         )
-    # The other program needs a least inertia for links without mass; take the excess away again.
+    # Links without mass have a small inertia in the other program, which requires one; it is
+    # subtracted here.
     for k in range(h[CHAIN.EXCESSES]):
         excess = at(model, h[CHAIN.EXCESS_AT] + EXCESS.SIZE * k)
         subtract_inertia(
@@ -101,7 +103,8 @@ def subtract_inertia(
 ) -> None:
     """Subtract an isotropic moment of inertia of a link from the equations of motion.
 
-    Its torque is proportional to the angular acceleration, whatever the velocity.
+    The gyroscopic torque of an isotropic inertia is zero, so that only the angular acceleration
+    matters.
 
     Args:
         model: integers of the model.
@@ -117,8 +120,8 @@ def subtract_inertia(
             at(columns, 6 * freedom),
             at(data, freedoms[DOF.SIZE * freedom + DOF.ROW]),
             freedom,
-            # Entries of a row are those of the degrees of freedom on the path to ground, the own
-            # one first.
+            # Entries of a row belong to the degrees of freedom on the path to ground, beginning with
+            # the degree of freedom of the row.
             0,
         )
         right[freedom] += moment * (

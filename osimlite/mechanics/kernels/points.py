@@ -99,6 +99,7 @@ def station(model: Ints, data: Floats, link: int, point: Vector) -> Vector:
     if link < 0:
         return point
     r = link_work(model, data, link)
+    # The work of a link begins with its rotation matrix to ground, by rows.
     x, y, z = point
     return (
         r[LINK_WORK.POSITION] + r[0] * x + r[1] * y + r[2] * z,
@@ -132,6 +133,7 @@ def place_frame(
         point: origin of the frame in the link (m).
         pose: filled with the rotation in ground by rows (9,), then the origin in ground (3,).
     """
+    # Columns of a rotation matrix are directions of axes.
     for k in range(3):
         pose[k], pose[3 + k], pose[6 + k] = direction(
             model, data, link, (rows[k], rows[3 + k], rows[6 + k])
@@ -187,6 +189,7 @@ def acceleration(model: Ints, reals: Floats, data: Floats, link: int, point: Vec
     v, a, g = at(here, LINK_WORK.VELOCITY), at(here, LINK_WORK.ACCELERATION), at(reals, GRAVITY_AT)
     px, py, pz = minus(point, vector(here, LINK_WORK.ORIGIN))
     wx, wy, wz = v[0], v[1], v[2]
+    # v holds the angular velocity, then that of the material point of the link at its origin.
     vx, vy, vz = v[3] + wy * pz - wz * py, v[4] + wz * px - wx * pz, v[5] + wx * py - wy * px
     # The accelerations of links are relative to free fall: add gravity.
     return (
@@ -222,7 +225,10 @@ def apply_force(model: Ints, data: Floats, link: int, point: Vector, force: Vect
     here = link_work(model, data, link)
     load = at(here, LINK_WORK.WRENCH)
     store_vector(
-        load, 0, plus(vector(load, 0), cross(minus(point, vector(here, LINK_WORK.ORIGIN)), force))
+        # Wrenches are torque, then force, about the origin of the link's work, in axes of ground.
+        load,
+        0,
+        plus(vector(load, 0), cross(minus(point, vector(here, LINK_WORK.ORIGIN)), force)),
     )
     store_vector(load, 3, plus(vector(load, 3), force))
 

@@ -119,7 +119,7 @@ def fit_frames(
         count: number of frames.
 
     Returns:
-        `OUTCOME.OK`; each frame has a status of its own.
+        `OUTCOME.OK`; whether a fit converged is the status in `results`.
     """
     m = Fit(model, reals, data, f, p, c, v)
     size, markers, sensors = model[MODEL.DOFS], p[MARKERS], p[SENSORS]

@@ -43,6 +43,7 @@ def start_inwards(m: Fit, from_pose: Floats, start: Floats, inwards: float) -> N
     for k in range(m.model[MODEL.DOFS]):
         low, high, start[k] = ranges[2 * k], ranges[2 * k + 1], from_pose[k]
         if low < high:
+            # A range narrower than twice the distance leaves its middle only.
             inner = min(inwards, 0.5 * (high - low))
             start[k] = min(max(start[k], low + inner), high - inner)
 
@@ -72,6 +73,7 @@ def start_turned(m: Fit, from_pose: Floats, start: Floats, freedom: int, angle: 
         and p[p[RESOLVED_AT] + freedom] in (VARIABLE, AT_END)
     ):
         return False
+    # The axis of the turn depends on the pose, unless it is the first of its joint.
     evaluate_pose(m, from_pose)
     down, turn = (
         vector(m.reals, GRAVITY_AT),
@@ -103,6 +105,8 @@ def is_angle(m: Fit, freedom: int) -> bool:
         m: the fit.
         freedom: degree of freedom.
     """
+    # The first half of the column is the angular velocity of the bodies per unit speed; it is 0 for
+    # a translation.
     turn, mark = (
         vector(at(m.data, m.model[MODEL.WORK_COLUMN]), 6 * freedom),
         m.p[m.p[RESOLVED_AT] + freedom],
@@ -120,6 +124,7 @@ def is_at_end(m: Fit, y: Floats, freedom: int) -> bool:
     """
     ranges = at(m.c, m.p[RANGES_AT])
     low, high = ranges[2 * freedom], ranges[2 * freedom + 1]
+    # A coordinate whose range is a single value is at both ends, and has no other start.
     return high - low < inf and (y[freedom] <= low + SAME) != (y[freedom] >= high - SAME)
 
 
@@ -199,6 +204,7 @@ def start_off_ends(m: Fit, y: Floats, start: Floats) -> bool:
     ranges, result = at(m.c, m.p[RANGES_AT]), False
     for k in range(m.model[MODEL.DOFS]):
         low, high, start[k] = ranges[2 * k], ranges[2 * k + 1], y[k]
+        # The descent marks coordinates that it stopped at an end of their range.
         if m.p[m.p[RESOLVED_AT] + k] == AT_END and low < high:
             inwards = min(INWARDS, 0.5 * (high - low))
             start[k], result = low + inwards if y[k] <= low else high - inwards, True
@@ -226,11 +232,14 @@ def remove_full_turns(m: Fit, y: Floats, first: Floats, start: Floats, value: fl
     )
     copy_numbers(size, y, start)
     for k in range(size):
+        # Rounding to the nearest integer by floor is the same in all languages of the kernels.
         turns = floor((y[k] - first[k]) / (2.0 * pi) + 0.5)
         near = y[k] - 2.0 * pi * turns
         if turns != 0.0 and ranges[2 * k] <= near <= ranges[2 * k + 1]:
             copy_numbers(size, start, trial)
             trial[k] = near
+            # Only rounding may raise the cost, by a relative amount or, if it is almost 0, an
+            # absolute one.
             if (
                 fulfil_constraints(m, trial)
                 and evaluate_cost(m, trial) <= value * (1.0 + 1e-9) + 1e-20

@@ -441,7 +441,7 @@ def run_by_reflexes(
         last: end of the runs.
 
     Returns:
-        `OUTCOME.OK`; each run has an ending of its own.
+        `OUTCOME.OK`; how each walk ended is in `progress`.
     """
     for k in range(first, last):
         m = select_run(

@@ -136,6 +136,7 @@ def constant_curvature(length: float, neutral: Sequence[float]) -> tuple[JointMo
         Factors of X_FM.
     """
     bend, swing, twist = (float(angle) for angle in neutral)
+    # The point is on the arc of the first two angles; the twist about Y turns the end only.
     slides = (
         AxisMotion("translate", np.array(axis), (0, 1), ArcPoint(component, length, (bend, swing)))
         for component, axis in enumerate((X, Y, Z))
@@ -177,8 +178,8 @@ def make_custom_motions(
     Raises:
         ModelError: an axis has no direction.
     """
-    slides = tuple(_make_translation("translate", axis) for axis in translations)
-    turns = tuple(_make_translation("rotate", axis) for axis in rotations)
+    slides = tuple(_make_axis_motion("translate", axis) for axis in translations)
+    turns = tuple(_make_axis_motion("rotate", axis) for axis in rotations)
     return (
         (*slides, SimbodyAccelerationError(turns), *turns)
         if opensim_derivatives
@@ -186,7 +187,8 @@ def make_custom_motions(
     )
 
 
-def _make_translation(kind: Literal["rotate", "translate"], axis: TransformAxis) -> AxisMotion:
+def _make_axis_motion(kind: Literal["rotate", "translate"], axis: TransformAxis) -> AxisMotion:
+    """Return the motion along or about an axis of a CustomJoint, with a unit vector."""
     direction = np.array(axis.axis, dtype=float)
     length = float(np.linalg.norm(direction))
     if not 0.0 < length < np.inf:
@@ -214,6 +216,7 @@ def motion_types(motions: Sequence[JointMotion], count: int) -> tuple[MotionType
     axes = [
         axis for motion in motions for axis in motion.elementary() if isinstance(axis, AxisMotion)
     ]
+    # "rotate" sorts before "translate"; the sort keeps the order of axes of one kind.
     for axis in sorted(axes, key=lambda axis: axis.kind):
         if axis.function.slope in (1.0, -1.0):
             types[axis.coordinates[0]] = "rotational" if axis.kind == "rotate" else "translational"
@@ -252,6 +255,7 @@ class Mobilizer:
             FixedTransform(invert_transform(self.child_frame)),
         )
         chain = [part for motion in motions for part in motion.elementary()]
+        # The inverse of a product is the product of the inverses in the opposite order.
         return tuple(part.inverse() for part in reversed(chain)) if self.reversed else tuple(chain)
 
     def rate_matrix(self, q: Array) -> Array:

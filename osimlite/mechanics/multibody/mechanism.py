@@ -192,6 +192,7 @@ class Mechanism:
             SimulationError: no pose near `q` fulfils the constraints.
         """
         values = self.values(q)
+        # Locks keep any values, and therefore need no assembly.
         if all(isinstance(item, Lock) for item in self.constraints):
             return values
         return assemble_pose(self, values, time, kept)
@@ -427,10 +428,13 @@ class Mechanism:
             q: coordinate values.
             u: generalized speeds.
         """
+        # Without gravity and accelerations, the forces that are missing are the velocity-dependent
+        # ones.
         return dynamics.missing_forces(self.at(q, u), self._still, np.zeros(3))
 
     def gravity_forces(self, q: Values) -> Array:
         """Return the generalized forces of gravity (n,)."""
+        # At rest the forces that are missing balance gravity.
         return -dynamics.missing_forces(self.at(q), self._still, self.gravity)
 
     def generalized_forces(self, q: Values, body_wrenches: Mapping[str, Wrench]) -> Array:
@@ -596,6 +600,7 @@ class Mechanism:
 
         It is zero if no body has mass.
         """
+        # A division by 1 instead of 0 leaves the sum, which is 0.
         return self.inertial[0] @ vectors / (self.total_mass or 1.0)
 
     def _station(self, frame: str, station: ArrayLike) -> tuple[int, Array]:
@@ -609,6 +614,7 @@ class Mechanism:
         total = self._array(forces, "force")
         for name, (force, torque) in wrenches.items():
             body, placed = self.placement(name)
+            # Spatial vectors have the angular part first.
             load = np.concatenate((_make_vector(torque, "torque"), _make_vector(force, "force")))
             total = total + load @ state.point_jacobian(body, placed[:3, 3])
         return total

@@ -155,6 +155,7 @@ class SimbodyAccelerationError(JointMotion):
         Returns:
             The rotations; none where Simbody makes no error.
         """
+        # A constant drives nothing, whatever its arguments.
         turned = [
             set() if isinstance(turn.function, Constant) else set(turn.coordinates)
             for turn in self.turns
@@ -247,6 +248,7 @@ class SphericalMotion(JointMotion):
 
     def _angles(self, q: Array) -> Any:
         angles = q[list(self.coordinates)].tolist()
+        # The rates of the angles contain 1 / cos b of the second angle b.
         if abs(math.cos(angles[1])) < 1e-12:
             raise SimulationError(
                 "the second of three angles stands at ±90 degrees, where their rates are not defined; "
@@ -256,6 +258,7 @@ class SphericalMotion(JointMotion):
 
 
 _FIRST: Any = (0, 1, 2)
+"""Places of the three angles in the numbers that the kernels of ball joints take them from."""
 
 
 @dataclass(frozen=True)
@@ -267,6 +270,7 @@ class EllipsoidPoint(Function):
 
     def evaluate(self, arguments: Arguments) -> Evaluated:
         """Return the value, the gradient (3,) and the Hessian (3, 3) at the three angles."""
+        # The point is r times the outgoing Z axis, (sin b, -sin a cos b, cos a cos b).
         a, b, r = float(arguments[0]), float(arguments[1]), self.radius
         sa, ca, sb, cb = math.sin(a), math.cos(a), r * math.sin(b), r * math.cos(b)
         if self.component == 0:
