@@ -204,6 +204,7 @@ def add_sample(noted: Floats, t: float, value: float) -> None:
         dt = t - noted[SAMPLE_WORK.TIME]
         noted[SAMPLE_WORK.TOTAL] += 0.5 * dt * (noted[SAMPLE_WORK.VALUE] + value)
         noted[SAMPLE_WORK.SPAN] += dt
+        # The first sample sets the extremes: its value may be negative.
         noted[SAMPLE_WORK.HIGHEST] = max(noted[SAMPLE_WORK.HIGHEST], value)
         noted[SAMPLE_WORK.LOWEST] = min(noted[SAMPLE_WORK.LOWEST], value)
     else:
@@ -253,6 +254,7 @@ def note_gait(senses: Ints, numbers: Floats, t: float, row: Floats, noted: Float
         has_touched = has_touched or (touches > 0.0 and noted[GAIT_WORK.TOUCHES + leg] == 0.0)
         noted[GAIT_WORK.TOUCHES + leg] = touches
     count = int(noted[GAIT_WORK.COUNT])
+    # A step takes two numbers, its time and its length; the first one starts at time 0.
     last = noted[GAIT_WORK.STEPS + 2 * (count - 1)] if count > 0 else 0.0
     if (
         has_touched
@@ -379,6 +381,7 @@ def metabolic_power(
         shape = 0.5 if n < 0.5 else n if n < 1.0 else 3.0 - 2.0 * n if n < 1.5 else 0.0
         shortens = -row[senses[SENSES.VELOCITIES] + k] * optimal[k]
         # Lengthening fibers take up no heat here, and their negative work is not recovered.
+        # Forces of the row are parts of the strength; active forces are in N.
         heat = max(0.0, 0.25 * row[senses[SENSES.FORCES] + k] * strengths[k] * shortens)
         work = max(0.0, row[senses[SENSES.ACTIVE] + k] * shortens)
         total += (

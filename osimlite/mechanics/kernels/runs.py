@@ -99,7 +99,7 @@ def run_several(
         last: end of the runs.
 
     Returns:
-        `OUTCOME.OK`; failures of single runs are in `endings`.
+        `OUTCOME.OK`; how each run ended is in `endings`.
     """
     for k in range(first, last):
         m = select_run(

@@ -441,7 +441,7 @@ def run_by_reflexes(
         last: end of the runs.
 
     Returns:
-        `OUTCOME.OK`; how each walk ended is in `progress`.
+        `OUTCOME.OK`; how each run ended is in `endings`.
     """
     for k in range(first, last):
         m = select_run(

@@ -116,7 +116,7 @@ def missing_forces(state: Kinematics, udot: Array, gravity: Array) -> Array:
     data, missing = _load_inertias(state, gravity, udots), make_floats([0.0] * len(udot))
     with check_finite(data):
         add_generalized_forces(model, data, missing)
-    # The kernel computes loads without `udot`, so what is missing has the opposite sign.
+    # The wrenches in `data` are those of inertia, minus what the accelerations need.
     return -np.array(missing)[program.freedoms]
 
 

@@ -152,6 +152,7 @@ def make_zero_derivatives(size: int, value: float = 0.0) -> Evaluated:
 
 
 _NOTHING = math.nan, math.nan, math.nan
+"""Value and derivatives of a function where it is not defined."""
 
 
 @dataclass(frozen=True)
@@ -189,6 +190,7 @@ class Linear(Univariate):
 
 
 IDENTITY = Linear()
+"""Function that returns its argument; a coordinate that drives an axis directly has it."""
 
 
 @dataclass(frozen=True)
@@ -235,7 +237,10 @@ class WeightedSum(Multivariate):
 
 @dataclass(frozen=True)
 class Step(Univariate):
-    """Quintic step from `start_value` to `end_value`, twice differentiable."""
+    """Quintic step from `start_value` to `end_value`, twice differentiable.
+
+    It is constant before `start` and after `end`.
+    """
 
     start: float
     end: float
@@ -244,19 +249,20 @@ class Step(Univariate):
 
     @property
     def table(self) -> Sequence[float]:
-        """Table of a step: arguments and values of both ends."""
+        """Table of a step: arguments of both ends, then the values there."""
         return STEP, 1.0, self.start, self.end, self.start_value, self.end_value
 
 
 @dataclass(frozen=True)
 class MultivariatePolynomial(Multivariate):
-    """Sum of `coefficients` times monomials of all arguments."""
+    """Sum of `coefficients` times monomials of all arguments.
+
+    OpenSim 4.6's Hessian of such a polynomial is wrong: it has the gradient in each column.
+    """
 
     coefficients: tuple[float, ...]  # of the monomials
     powers: tuple[tuple[int, ...], ...]  # of each argument in each monomial
-    opensim_derivatives: bool = (
-        False  # whether the Hessian is OpenSim 4.6's: gradient in each column
-    )
+    opensim_derivatives: bool = False  # whether the Hessian is OpenSim's
 
     @classmethod
     def complete(
