@@ -51,7 +51,7 @@ def test_a_fault_is_told(kind, tmp_path):
     study = tmp_path / "study.omoco"
     assert said_of(study) == ("", [])
     untold = []
-    for number, (sort, change) in enumerate(
+    for number, (group, change) in enumerate(
         islice(faults(whole, random.Random(SEED)), WANTED // len(STUDIES))
     ):
         file = tmp_path / change.file

@@ -46,7 +46,7 @@ def _followed():
     return study
 
 
-def _placed():
+def _locate_part():
     pair = osimlite.MocoFrameDistanceConstraintPair(
         frame1_path="/ground", frame2_path=BODIES[1], minimum_distance=0.1, maximum_distance=3.0
     )
@@ -103,7 +103,7 @@ def _pushed():
 
 def project(kind: str, folder: Path) -> Project:
     """A study with its model and its tables, which are written into a folder."""
-    study = {"followed": _followed, "placed": _placed, "pushed": _pushed}[kind]()
+    study = {"followed": _followed, "placed": _locate_part, "pushed": _pushed}[kind]()
     tables(folder)
     columns = [f"/jointset/j{k}/q{k}/{what}" for what in ("value", "speed") for k in range(2)]
     guess = folder / "guess.sto"

@@ -624,7 +624,7 @@ def test_columns_are_where_moco_looks_for_them(number, mode, tmp_path, corpus):
     entry = next(item for item in corpus if item.id == number)
     (tmp_path / "model.osim").write_bytes(gzip.decompress(entry.converted.read_bytes()))
     objective, missed = _said(tmp_path, ["-c", ANYWHERE, mode])
-    told = _told(tmp_path, ["-c", BEGUN])
+    told = _record_iteration(tmp_path, ["-c", BEGUN])
     assert json.loads(told.splitlines()[-1]) == pytest.approx(objective, rel=1e-12)
     said = re.search(r"Constraint violation\.+:\s+\S+\s+(\S+)", told)
     # Accelerations of OpenSim's custom joints are not quite those that follow from their speeds.
@@ -675,10 +675,10 @@ def test_values_of_coupled_coordinates(overwrite, tmp_path):
 
 def _said(folder, command):
     """What a program prints last."""
-    return json.loads(_told(folder, command).splitlines()[-1])
+    return json.loads(_record_iteration(folder, command).splitlines()[-1])
 
 
-def _told(folder, command):
+def _record_iteration(folder, command):
     """What a program prints."""
     done = subprocess.run(
         [sys.executable, *command],

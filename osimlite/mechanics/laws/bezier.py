@@ -61,12 +61,12 @@ def make_curve(points: Sequence[Point], curviness: Sequence[float]) -> Numbers:
 
     Args:
         points: points of the curve.
-        # zip stops at the shortest sequence: n points have n - 1 sections.
         curviness: curviness of the sections between them, each from 0 to 1.
 
     Raises:
         ValueError: the lines through two points do not meet in a corner between them.
     """
+    # zip stops at the shortest sequence: n points have n - 1 sections.
     sections = zip(points, points[1:], curviness, strict=False)
     numbers = [x for item in sections for x in _make_section(*item)]
     return (

@@ -147,6 +147,9 @@ def schutte_velocity(activation: float, active: float, borne: float, damping: fl
 def thelen_tendon_force(strain: float, strain_at_one: float) -> float:
     """Return the tendon force: an exponential toe and a line, plus 0.001 (1 + strain).
 
+    With the strain e1 at a force of 1 and the end e0 = 0.609 e1 of the toe, the toe is (exp(3 e / e0)
+    - 1) / (exp(3) - 1) / 3 for e > 0, and the line 1/3 + 1.712 (e - e0) / e1.
+
     Args:
         strain: strain of the tendon.
         strain_at_one: strain at the maximum isometric force.
@@ -203,8 +206,8 @@ def thelen_velocity(
     Args:
         activation: activation.
         active: isometric force, fully activated.
-        borne: force that depends on the velocity.
-        damping: constant that is added to the denominator.
+        borne: force f that depends on the velocity.
+        damping: constant c that is added to the denominator.
         shape: Af.
         most: Flen.
     """
@@ -230,12 +233,14 @@ def thelen_velocity(
 
 
 def thelen_shortening(borne: float, isometric: float, damping: float, shape: float) -> float:
-    """Return the fiber velocity below the isometric force, see `thelen_velocity`.
+    """Return the fiber velocity (f - i) / (i + f / Af + c) below the isometric force i.
+
+    See `thelen_velocity`.
 
     Args:
-        borne: force that depends on the velocity.
+        borne: force f that depends on the velocity.
         isometric: isometric force at the present activation.
-        damping: constant that is added to the denominator.
+        damping: constant c that is added to the denominator.
         shape: Af.
     """
     return (borne - isometric) / (isometric + borne / shape + damping)
@@ -244,12 +249,14 @@ def thelen_shortening(borne: float, isometric: float, damping: float, shape: flo
 def thelen_lengthening(
     borne: float, isometric: float, damping: float, shape: float, most: float
 ) -> float:
-    """Return the fiber velocity above the isometric force, see `thelen_velocity`.
+    """Return the fiber velocity above the isometric force i, see `thelen_velocity`.
+
+    It is (f - i) / ((2 + 2 / Af) (i Flen - f) / (Flen - 1) + c), where c is the damping.
 
     Args:
-        borne: force that depends on the velocity.
+        borne: force f that depends on the velocity.
         isometric: isometric force at the present activation.
-        damping: constant that is added to the denominator.
+        damping: constant c that is added to the denominator.
         shape: Af.
         most: Flen, the largest force of lengthening fibers over the isometric one.
     """

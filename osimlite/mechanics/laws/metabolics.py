@@ -45,6 +45,19 @@ def umberger2010(
 ) -> float:
     """Return the power by the model of B. Umberger (2010) with T. Uchida's changes (2016) (W).
 
+    With effort A, part s of slow fibers, aerobic factor S, normalized length l, velocity v (optimal
+    lengths a second), largest velocity vmax, and factor fl of the active force by length, the terms
+    per kg of muscle are
+
+    - heat of activation and maintenance: S A^0.6 (128 (1 - s) + 25), of which 60 % are multiplied by
+      fl for l > 1;
+    - heat of shortening, v <= 0: S A^2 (min(-ks v, 100) s - kf v (1 - s)), where kf = 153 / vmax
+      and ks = 250 / vmax;
+    - heat of lengthening, v > 0: 0.3 S A ks v, or 4 S A ks v if negative work is included;
+    - work: minus the active force times the fiber velocity (m/s), over the mass.
+
+    The heat of shortening or lengthening is multiplied by fl for l > 1.
+
     Args:
         activation: activation of the fibers.
         excitation: excitation.
@@ -157,6 +170,12 @@ def bhargava2004(
     m: Bhargava2004,
 ) -> float:
     """Return the power by the model of L. Bhargava et al. (2004) (W).
+
+    With the mass m, the excited parts rs and rf of slow and fast fibers (see `recruit_fibers`), the
+    constants as, af, bs and bf of activation and maintenance, the factor g of maintenance by length,
+    the active force fa and the fiber velocity v, the terms are the heats of activation m (as rs + af
+    rf), of maintenance m g (bs rs + bf rf) and of shortening -alpha v, and the work -fa v. The
+    coefficient alpha (N) depends on the forces of the fibers and on the sign of v.
 
     Args:
         activation: activation of the fibers.

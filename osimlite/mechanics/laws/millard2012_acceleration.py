@@ -2,9 +2,9 @@
 
 Source: M. Millard et al., Journal of Biomechanical Engineering 135, 2013. Forces are normalized by
 the maximum isometric force F; the curves are those of :mod:`osimlite.mechanics.laws.muscle_curves`.
-Each elastic force f is damped to f max(1 + c v, 0), where v is the normalized velocity and c a
-damping constant, so that its sign does not change. The mass m accelerates the fibers of length l
-and pennation phi:
+Each elastic force f is damped to f max(1 + c v, 0), or f max(1 - c v, 0) if it resists short or
+steep fibers, where v is the velocity over the optimal or slack length and c a damping constant (s),
+so that its sign does not change. The mass m accelerates the fibers of length l and pennation phi:
 
 l'' = (ft - (a fl fv + fp) cos(phi) + fs) F cos(phi) / m + l phi'^2
 

@@ -108,7 +108,7 @@ def smooth_contact_derivatives(
     # Deep in a gap tanh underflows to -1 and the force is exactly 0.
     if hertz <= 0.0:
         return 0.0, 0.0, 0.0, 0.0
-    # 1 - tanh^2 over (1 + tanh) / 2 is 2 (1 - tanh).
+    # The derivative of (1 + tanh(b x)) / 2 is that expression times b (1 - tanh(b x)).
     growth = 1.5 * d / (d * d + cf) + bd * (1.0 - tanh(bd * d))
     part, slope = 1.0 + 1.5 * c * vn, 1.5 * c
     if c != 0.0:

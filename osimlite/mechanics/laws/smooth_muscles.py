@@ -174,6 +174,11 @@ def degroote(
 ]:
     """Compute forces and rates of OpenSim's DeGrooteFregly2016Muscle.
 
+    The state is the normalized tendon force f. The tendon length follows from its curve, the fiber
+    length from the constant height h of the fibers: l^2 = (path - tendon)^2 + h^2. The velocity v
+    follows from the equilibrium f = (a fl(l) fv(v) + fp(l)) cos(phi), and df/dt = k (f + 0.2) times
+    the normalized lengthening speed of the tendon.
+
     As in OpenSim, the damping of the fibers is not contained in the rate of the tendon force: with an
     elastic tendon it changes only what is reported of the fibers.
 
@@ -355,6 +360,8 @@ def meyer(
     now: MuscleInputs, m: SmoothMuscle
 ) -> tuple[float, float, float, float, float, float, float, float, float, float, float]:
     """Compute forces and rates of Meyer's muscle, whose tendon is rigid.
+
+    The tension is F (a fl(l) fv(v) + fp(l) + beta v) cos(phi), where beta is the damping.
 
     OpenSim defines no energy for it.
 

@@ -118,7 +118,8 @@ def tendon_force(
 ) -> tuple[float, float]:
     """Return the tendon force and its derivative by strain.
 
-    It is factor (exp(growth e) - 1) up to the strain `toe`, and 0.33 + slope (e - toe) beyond.
+    It is 0 for e <= 0, factor (exp(growth e) - 1) up to the strain `toe`, and 0.33 + slope (e - toe)
+    beyond.
 
     Args:
         strain: strain e of the tendon.
@@ -382,7 +383,6 @@ def thelen2003_equilibrium(now: MuscleInputs, m: Thelen2003) -> tuple[bool, floa
             step = -part * before / (stiffness - of_tendon)
             # A vanishing step cannot help; OpenSim then tries a tiny step the other way.
             if not abs(step) > SIGNIFICANT:
-                # Try the opposite direction.
                 step, part = -SMALLEST if step > 0.0 else SMALLEST if step < 0.0 else 0.0, 0.0
             fibers = fibers_at(m, length, max(last + step, m.shortest))
             borne, error = fiber_balance(m, fibers, active * by_velocity)
