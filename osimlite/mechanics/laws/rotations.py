@@ -12,6 +12,7 @@ from math import cos, floor, sin
 from osimlite.mechanics.laws.vectors import Vector
 
 Axes = tuple[Vector, Vector, Vector]
+"""Three unit vectors: the columns of a rotation matrix."""
 
 X = (1.0, 0.0, 0.0)
 """Unit vector along x."""
