@@ -15,12 +15,12 @@ from mkdocs.structure.files import File, Files
 from mkdocs.structure.pages import Page
 from typer.testing import CliRunner
 
-from osimlite.cli import COMMANDS, app
+from osimlite.cli import COMMANDS, create_app
 from osimlite.lint.pages import format_group_page
 from osimlite.lint.registry import all_rules, rule_groups
 from osimlite.schema.base import Object
 from osimlite.schema.descriptions import describe_class, describe_property, describe_value
-from osimlite.schema.fields import Held, Value
+from osimlite.schema.fields import ObjectField, Value
 from osimlite.schema.registry import find_class, list_tags
 from osimlite.schema.specs import FieldSpec
 
@@ -70,7 +70,9 @@ def commands() -> str:
 
 def _help(command: str) -> str:
     environment = {"COLUMNS": str(WIDTH), "TERM": "dumb", "NO_COLOR": "1"}
-    done = CliRunner(env=environment).invoke(app(), [command, "--help"], prog_name="osimlite")
+    done = CliRunner(env=environment).invoke(
+        create_app(), [command, "--help"], prog_name="osimlite"
+    )
     return "\n".join(line.rstrip() for line in done.output.strip().splitlines())
 
 
@@ -106,7 +108,7 @@ def _component(cls: type[Object]) -> str:
 
 
 def _default(spec: FieldSpec) -> str:
-    if isinstance(spec.kind, Held) or spec.default in (None, "", ()):
+    if isinstance(spec.kind, ObjectField) or spec.default in (None, "", ()):
         return ""
     text = (
         " ".join(map(repr, spec.default)) if isinstance(spec.default, tuple) else str(spec.default)

@@ -30,9 +30,9 @@ def make_rules_page() -> str:
 
 def make_json_schema() -> str:
     """Return the JSON Schema of models as plain data."""
-    from osimlite.schema.json_schema import json_schema
+    from osimlite.schema.json_schema import make_json_schema
 
-    return json.dumps(json_schema(), indent=1) + "\n"
+    return json.dumps(make_json_schema(), indent=1) + "\n"
 
 
 def make_architecture_picture() -> str:

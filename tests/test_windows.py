@@ -20,7 +20,7 @@ from osimlite.base.files import get_relative_path, write_atomically
 from osimlite.base.pools import LocalPool
 from osimlite.cli import main
 from osimlite.cli._console import wants_colour
-from osimlite.cli.simulate import write_files
+from osimlite.cli.simulate import write_results
 from osimlite.errors import OsimliteError
 from osimlite.lint.baseline import write_baseline
 from osimlite.lint.config import Config
@@ -39,7 +39,7 @@ class Results:
 
 
 def simulated(folder: Path) -> None:
-    write_files(cast(Trajectory, Results()), folder)
+    write_results(cast(Trajectory, Results()), folder)
 
 
 @pytest.mark.usefixtures("windows_files")

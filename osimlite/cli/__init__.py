@@ -1,4 +1,4 @@
-"""The command line. One module per command, thin: parse, call the library, report."""
+"""Command line. Each command is a short module that parses options, calls the library and prints."""
 
 from __future__ import annotations
 
@@ -22,20 +22,20 @@ COMMANDS = (
     "optimize", "gait", "find-gait", "muscles", "modify", "scale", "fit", "ik", "kinematics", "inverse-dynamics",
     "static-optimization", "run", "check-trial", "scone", "lsp", "doctor", "demo",
 )  # fmt: skip
-"""Every command in the order of the help; ``osimlite.cli.<name>.<name>``, with _ for -, is its function."""
+"""Commands in the order of the help. ``osimlite.cli.<name>.<name>``, with _ for -, is the function."""
 
 ALIASES = {"run-tool": "run"}
-"""Other spellings of commands: `opensim-cmd` says it so."""
+"""Other names of commands; `run-tool` is the name in OpenSim's `opensim-cmd`."""
 
-COMPLETING = "_OSIMLITE_COMPLETE"
-"""Set by a shell that asks how a word can go on."""
+COMPLETION_VARIABLE = "_OSIMLITE_COMPLETE"
+"""Environment variable that a shell sets to request completions."""
 
-VERSION = {"--version", "--verbose", "-v"}
-"""Words that ask for the version."""
+VERSION_OPTIONS = {"--version", "--verbose", "-v"}
+"""Options that print the version."""
 
 
-def app(names: Sequence[str] = COMMANDS) -> Typer:
-    """Assemble the command line of these commands."""
+def create_app(names: Sequence[str] = COMMANDS) -> Typer:
+    """Create the typer application of the given commands."""
     import typer
 
     application = typer.Typer(
@@ -48,7 +48,7 @@ def app(names: Sequence[str] = COMMANDS) -> Typer:
     )
     for name in names:
         command = load_command(name)
-        application.command(name, help=_flowing(command.__doc__ or ""))(command)
+        application.command(name, help=_unwrap_paragraphs(command.__doc__ or ""))(command)
 
     @application.callback(invoke_without_command=True)
     def osimlite(
@@ -71,7 +71,7 @@ def load_command(name: str) -> Command:
 
 
 def _print_version(*, verbose: bool) -> None:
-    """Print the version, and if asked what runs the kernels and why."""
+    """Print the version; with `verbose` also what runs the kernels and why."""
     from osimlite import __version__
     from osimlite.cli._console import say
 
@@ -83,13 +83,13 @@ def _print_version(*, verbose: bool) -> None:
             say(sentence)
 
 
-def _flowing(text: str) -> str:
-    """The text with each paragraph in one line: terminals are not as wide as the source."""
+def _unwrap_paragraphs(text: str) -> str:
+    """Join each paragraph to one line, so that the terminal can wrap it at its own width."""
     return "\n\n".join(" ".join(paragraph.split()) for paragraph in text.split("\n\n"))
 
 
 def _suggest_built_in(error: OsimliteError, command: str) -> str:
-    """Return what to do if a file that is missing has the name of a built-in model, or nearly so."""
+    """Return advice if a missing file is named like a built-in model; otherwise an empty text."""
     from osimlite.errors import MissingFileError
 
     if not isinstance(error, MissingFileError) or error.file is None or os.path.exists(error.file):
@@ -108,6 +108,8 @@ def _suggest_built_in(error: OsimliteError, command: str) -> str:
             if find_nearest(name, [SCENARIO])
             else ""
         )
+    # The cutoff (percent of similarity) is high because file names are often similar by chance, such
+    # as arm26 and arm.
     # Names of files are often near by chance, such as arm26 and arm.
     similar = find_nearest(name, BUILT_IN, cutoff=80.0)
     if similar is None:
@@ -118,13 +120,14 @@ def _suggest_built_in(error: OsimliteError, command: str) -> str:
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line.
 
-    Exits with 0 (done), 1 (the answer is no), 2 (could not be carried out) or 130 (interrupted).
+    Exits with 0 (success), 1 (negative result, such as findings), 2 (the command could not run) or
+    130 (interrupted).
     """
     from osimlite.base.require import protect_processes
-    from osimlite.cli._console import guarded_output
+    from osimlite.cli._console import escape_output
 
     protect_processes()
-    with guarded_output():
+    with escape_output():
         _run(sys.argv[1:] if arguments is None else arguments)
 
 
@@ -134,50 +137,62 @@ def _run(words: list[str]) -> None:
     from osimlite.cli._console import complain
     from osimlite.errors import DoubtfulWarning, OsimliteError, UnitWarning
 
+    # Imports create many objects and free none. With the default threshold the garbage collector
+    # would scan them again and again.
     # What is imported makes many objects and drops none: the collector would look through them
     # again and again.
     gc.set_threshold(300_000)
+    # At exit Python collects once more, which takes a quarter of the time of a short command; frozen
+    # objects are not scanned.
     # At the end Python would look through all that was made once more, a quarter of the time of a
     # short command.
     atexit.register(gc.freeze)
+    # rich accepts every value of COLUMNS, also 0 and a million.
     # What draws tables takes any width at its word.
     width = os.environ.get("COLUMNS", "")
     if not (width.isdecimal() and len(width) < 5 and int(width)):
         os.environ.pop("COLUMNS", None)
+    # pydantic searches all installed packages for plug-ins; osimlite uses none.
     # Plug-ins of pydantic, for which it searches every installed package, have nothing to do here.
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
+    # The matrices of mechanisms are too small for several threads: those of OpenBLAS would busy-wait
+    # and occupy a core.
     # Matrices of mechanisms are small: the threads of OpenBLAS would only wait, and keep a core
     # busy with that.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     words = [ALIASES.get(words[0], words[0]), *words[1:]] if words else ["--help"]
+    # Import the module of the requested command only. The help needs all of them.
     # Only the command that is asked for is loaded; without one, all are, for the help.
     names = words[:1] if words[:1] and words[0] in COMMANDS else COMMANDS
     try:
-        if "--version" in words and {*words} <= VERSION:
+        if "--version" in words and {*words} <= VERSION_OPTIONS:
             _print_version(verbose=len({*words}) > 1)
             return
         if sys.stderr.isatty():
-            from osimlite.cli._progress import show_warnings_of_engine
+            from osimlite.cli._progress import show_engine_warnings
 
-            show_warnings_of_engine()
+            show_engine_warnings()
         with warnings.catch_warnings():
-            shown = warnings.showwarning
+            default = warnings.showwarning
             warnings.showwarning = lambda message, category, *place: (
                 complain(str(message))
                 if issubclass(category, DoubtfulWarning)
-                else shown(message, category, *place)
+                else default(message, category, *place)
             )
             warnings.simplefilter("once", DoubtfulWarning)
+            # Options report suspicious numbers themselves, as errors.
             # Options refuse such a number, or were given its unit.
             warnings.simplefilter("ignore", UnitWarning)
-            if names != COMMANDS and COMPLETING not in os.environ:
+            if names != COMMANDS and COMPLETION_VARIABLE not in os.environ:
                 command = load_command(words[0])
                 words = [words[0], *command.complete(words[1:])]
-                given = command.read(words[1:])
-                if given is not None:
-                    command(**given)
+                values = command.read(words[1:])
+                if values is not None:
+                    command(**values)
                     raise SystemExit(0)
-            raise SystemExit(app(names)(args=words, prog_name="osimlite", standalone_mode=False))
+            raise SystemExit(
+                create_app(names)(args=words, prog_name="osimlite", standalone_mode=False)
+            )
     except OsimliteError as error:
         complain(error, _suggest_built_in(error, words[0]))
         raise SystemExit(error.exit_code) from None
@@ -185,18 +200,22 @@ def _run(words: list[str]) -> None:
         if _was_interrupted(error):
             complain("interrupted")
             raise SystemExit(130) from None
-        _tell(error, words)
+        _exit_with_message(error, words)
 
 
 def _was_interrupted(error: BaseException | None) -> bool:
-    """Whether Ctrl-C is behind an error: classes that were being made, and what reads options, raise their own."""
+    """Return whether Ctrl-C caused an error, directly or as its cause or context.
+
+    Code that runs during an interrupt, such as class construction and option parsing, raises errors
+    of its own.
+    """
     while error is not None and not isinstance(error, KeyboardInterrupt):
         error = error.__cause__ or error.__context__
     return error is not None
 
 
-def _tell(error: BaseException, words: list[str]) -> NoReturn:
-    """Say in a sentence what went wrong besides our own errors, if that is known, and exit."""
+def _exit_with_message(error: BaseException, words: list[str]) -> NoReturn:
+    """Exit with a one-line message for known errors of other libraries; raise the others again."""
     from osimlite.cli._console import complain
 
     if isinstance(error, OSError):
@@ -205,6 +224,7 @@ def _tell(error: BaseException, words: list[str]) -> NoReturn:
             error.errno != errno.EINVAL or error.filename is not None
         ):
             raise error
+        # Python flushes standard output at exit and would report the closed pipe again.
         # Python would complain once more when it closes standard output.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         raise SystemExit(1) from None
@@ -218,6 +238,7 @@ def _tell(error: BaseException, words: list[str]) -> NoReturn:
             f"'{words[0]}' needs {error.name}, which is not installed; run: pip install 'osimlite[{extra}]'"
         )
         raise SystemExit(2) from None
+    # typer's copy of click does not export the class of these errors, so recognise them by a method.
     # The library that reads options does not tell under what name it can be caught.
     if not hasattr(error, "format_message"):
         raise error

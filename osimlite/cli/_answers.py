@@ -1,4 +1,4 @@
-"""Answers that take long to find and follow from a text alone: kept where the linter keeps its findings."""
+"""Cache of slow results that depend on the content of one file, in the linter's cache folder."""
 
 from __future__ import annotations
 
@@ -18,29 +18,30 @@ from osimlite.lint.cache import make_key
 from osimlite.lint.config import Config
 
 
-def answer_from_cache(
+def compute_or_load(
     question: str, file: str, data: bytes, find: Callable[[], tuple[str, bool]]
 ) -> str:
-    """What was found for a text before, by this very osimlite, or what is found now.
+    """Return a cached result for a file, or compute and cache it.
 
     Args:
-        question: what is asked.
-        file: where the text stands.
-        data: the text.
-        find: finds the answer, and whether it follows from the text alone.
+        question: name of the result.
+        file: path of the file.
+        data: its content.
+        find: computes the result, and returns it with whether it depends on the content alone.
+            Only such results are cached.
     """
     key = [question, make_key(file, Config()), blake2b(data).hexdigest()]
-    place = crc32(f"{question} {os.path.abspath(file)}".encode(errors="surrogateescape"))
+    checksum = crc32(f"{question} {os.path.abspath(file)}".encode(errors="surrogateescape"))
     folder = user_cache_folder()
     if folder is None:
         return find()[0]
-    kept = folder / __version__ / "answers" / f"{place:08x}.json"
+    path = folder / __version__ / "answers" / f"{checksum:08x}.json"
     with suppress(OsimliteError, ValueError, RecursionError):
-        match json.loads(read_file(kept)):
+        match json.loads(read_file(path)):
             case [known, str(answer)] if known == key:
-                mark_used(kept)
+                mark_used(path)
                 return answer
-    answer, lasts = find()
-    if lasts:
-        write_cached(kept, json.dumps([key, answer]))
+    answer, is_cacheable = find()
+    if is_cacheable:
+        write_cached(path, json.dumps([key, answer]))
     return answer

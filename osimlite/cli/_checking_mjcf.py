@@ -1,4 +1,4 @@
-"""``osimlite translate --check``: a file of MuJoCo's measured against the model that it was made of."""
+"""``osimlite translate --check``: compare a MuJoCo model with the OpenSim model it was made from."""
 
 from __future__ import annotations
 
@@ -6,17 +6,23 @@ from pathlib import Path
 from typing import Any
 
 from osimlite.base.text import join_words
-from osimlite.cli._console import add_row, plain_console, plain_table, say
+from osimlite.cli._console import add_row, create_console, create_table, say
 
 
-def check(file: Path, mjcf: Path, output: Path | None) -> None:
-    """Print how far a file of MuJoCo's is from a model, muscle by muscle, and write it down if there is a folder."""
+def print_mjcf_check(file: Path, mjcf: Path, output: Path | None) -> None:
+    """Compare a MuJoCo model with an OpenSim model, print a table of muscles, and save the result.
+
+    Args:
+        file: OpenSim model.
+        mjcf: MuJoCo model.
+        output: folder for check.json; None writes no file.
+    """
     from osimlite.base.files import make_folder, write_atomically
     from osimlite.io.document.reader import read
     from osimlite.translate.mjcf.check import check_mjcf
 
     result = check_mjcf(read(file), mjcf)
-    plain_console().print(_table(result, mjcf.name))
+    create_console().print(_make_table(result, mjcf.name))
     if result.missing:
         say(f"not in it: {join_words(list(result.missing), most=6)}")
     if result.coordinates:
@@ -31,13 +37,14 @@ def check(file: Path, mjcf: Path, output: Path | None) -> None:
         say(f"wrote {output / 'check.json'}")
 
 
-def _table(found: Any, name: str) -> Any:
-    """A muscle in each row, the worst first: root mean squares over random poses, of the worst of its moment arms.
+def _make_table(result: Any, name: str) -> Any:
+    """Make the table of errors, one muscle per row, sorted by the error of the moment arm.
 
-    Last come the optimal fiber length that the file implies, over the model's, and the change of
-    the tendon's.
+    Errors are root mean squares over random poses; of the moment arms, that of the worst coordinate.
+    The last columns are the ratio of the implied optimal fiber length to the model's, and the
+    difference of the tendon slack lengths.
     """
-    table = plain_table(f"{name}: root mean square errors")
+    table = create_table(f"{name}: root mean square errors")
     for column in (
         "muscle",
         "length, mm",
@@ -47,7 +54,7 @@ def _table(found: Any, name: str) -> Any:
         "slack length, mm",
     ):
         table.add_column(column, justify="left" if column == "muscle" else "right", overflow="fold")
-    for muscle in sorted(found.muscles, key=lambda each: -each.worst_arm.rms):
+    for muscle in sorted(result.muscles, key=lambda each: -each.worst_arm.rms):
         add_row(
             table,
             muscle.name,

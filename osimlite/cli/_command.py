@@ -1,7 +1,7 @@
-"""What a command takes, as its function declares it: read by typer, or here, which is quicker.
+"""Declaration and fast parsing of command options.
 
-Typer makes the help, the completion and the messages about what is wrong. Words of which nothing is
-wrong need none of it, and loading it takes longer than most commands do.
+Typer provides the help, the completion and the messages for invalid options. Importing it takes
+longer than most commands run, so valid command lines are parsed here without it.
 """
 
 from __future__ import annotations
@@ -20,52 +20,56 @@ _NUMBERS = {
     int: re.compile(r"[0-9]+", re.ASCII),
     float: re.compile(r"[0-9]*\.?[0-9]+(e[-+]?[0-9]+)?", re.ASCII),
 }
-"""Texts of numbers that mean the same to everybody."""
+"""Number formats that typer and this parser read alike; other words are left to typer."""
 
 
-class Declared:
-    """What stands in the annotation of a parameter of a command.
+class ParameterSpec:
+    """Declaration of a command's parameter, used as metadata of its annotation.
 
     Attributes:
-        maker: "Option" or "Argument" of typer.
-        names: under which an option is given; else the parameter's own.
-        told: the keyword arguments of typer's function.
-        bare_value: the value of an option that stands without one; None if it needs a value.
+        maker: "Option" or "Argument", the function of typer that is called.
+        names: spellings of an option; by default that of the parameter.
+        settings: keyword arguments of typer's function.
+        bare_value: value of an option that is given without one; None if it requires a value.
     """
 
-    __slots__ = "bare_value", "maker", "names", "told"
+    __slots__ = "bare_value", "maker", "names", "settings"
 
     def __init__(
-        self, maker: str, names: Sequence[str], told: dict[str, Any], bare_value: str | None = None
+        self,
+        maker: str,
+        names: Sequence[str],
+        settings: dict[str, Any],
+        bare_value: str | None = None,
     ) -> None:
-        self.maker, self.names, self.told, self.bare_value = maker, names, told, bare_value
+        self.maker, self.names, self.settings, self.bare_value = maker, names, settings, bare_value
 
 
-def Option(*names: str, bare_value: str | None = None, **told: Any) -> Declared:
-    """Declare an option, with what ``typer.Option`` takes.
+def Option(*names: str, bare_value: str | None = None, **settings: Any) -> ParameterSpec:
+    """Declare an option.
 
     Args:
-        names: under which it is given; the parameter's own name by default.
-        bare_value: the value if another option, or nothing, follows it; None if it needs a value.
-        told: keyword arguments of ``typer.Option``.
+        names: spellings; by default that of the parameter.
+        bare_value: value if the option is given without one; None if it requires a value.
+        settings: keyword arguments of ``typer.Option``.
     """
-    return Declared("Option", names, told, bare_value)
+    return ParameterSpec("Option", names, settings, bare_value)
 
 
-def Argument(**told: Any) -> Declared:
-    """An argument, with what ``typer.Argument`` takes."""
-    return Declared("Argument", (), told)
+def Argument(**settings: Any) -> ParameterSpec:
+    """Declare a positional argument, with the keyword arguments of ``typer.Argument``."""
+    return ParameterSpec("Argument", (), settings)
 
 
-class _Parameter(NamedTuple):
+class _BoundParameter(NamedTuple):
     name: str
     type: Any
-    declared: Declared
+    declared: ParameterSpec
     default: Any
 
     @property
     def spellings(self) -> dict[str, Any]:
-        """What may stand on the command line for it, and what that says of a switch."""
+        """Spellings on the command line, each with the value that it gives to a switch."""
         names = self.declared.names
         if not any(name.startswith("--") for name in names):
             names = (*names, f"--{self.name.replace('_', '-')}")
@@ -80,28 +84,37 @@ class _Parameter(NamedTuple):
         return result
 
     def scalar(self) -> tuple[Any, bool]:
-        """The type of one value, and whether there may be several."""
+        """Return the type of one value, and whether the parameter is a list.
+
+        Returns:
+            The type, for example float, and True for a list of such values.
+        """
         kinds = [kind for kind in get_args(self.type) if kind is not type(None)]
         kind = kinds[0] if get_origin(self.type) is UnionType else self.type
         return (get_args(kind)[0], True) if get_origin(kind) is list else (kind, False)
 
     def value(self, kind: Any, word: str) -> Any:
-        """What a word means; None where typer has to say."""
+        """Convert a word; return None if typer has to convert it or to report the error.
+
+        Args:
+            kind: type of the value.
+            word: the word of the command line.
+        """
         if kind is str or kind is Path:
             return kind(word)
         if kind not in _NUMBERS or not _NUMBERS[kind].fullmatch(word):
             return None
         value = kind(word)
-        told = self.declared.told
-        return value if told.get("min", value) <= value <= told.get("max", value) else None
+        settings = self.declared.settings
+        return value if settings.get("min", value) <= value <= settings.get("max", value) else None
 
 
 class Command:
-    """A function that is a command.
+    """Function that is a command.
 
     Args:
-        function: whose parameters have a :class:`Declared` each.
-        more: what it takes besides, as keyword arguments.
+        function: the function; each parameter is annotated with a :class:`ParameterSpec`.
+        more: returns further options, which the function takes as keyword arguments.
     """
 
     def __init__(
@@ -113,29 +126,34 @@ class Command:
             function.__doc__,
             function.__module__,
         )
-        self._parameters: list[_Parameter] | None = None
+        self._parameters: list[_BoundParameter] | None = None
 
     def __call__(self, *values: Any, **named: Any) -> None:
         self.function(*values, **{each.name: each.default for each in self._more()} | named)
 
-    def parameters(self) -> list[_Parameter]:
-        """Return what the command takes, in the order of its help."""
+    def parameters(self) -> list[_BoundParameter]:
+        """Return the parameters of the command in the order of its help."""
         if self._parameters is None:
             self._parameters = self._read_parameters()
         return self._parameters
 
-    def _read_parameters(self) -> list[_Parameter]:
+    def _read_parameters(self) -> list[_BoundParameter]:
         function: Any = self.function
         defaults = dict(
-            zip(reversed([*_names(function)]), reversed(function.__defaults__ or ()), strict=False)
+            zip(
+                reversed([*_list_argument_names(function)]),
+                reversed(function.__defaults__ or ()),
+                strict=False,
+            )
         )
         result = []
-        for name in _names(function):
+        for name in _list_argument_names(function):
             annotation = eval(function.__annotations__[name], function.__globals__)
             kind, declared = annotation.__origin__, annotation.__metadata__[0]
-            result.append(_Parameter(name, kind, declared, defaults.get(name, ...)))
+            result.append(_BoundParameter(name, kind, declared, defaults.get(name, ...)))
         return result + [
-            _Parameter(each.name, each.type, _declared(each), each.default) for each in self._more()
+            _BoundParameter(each.name, each.type, _make_spec(each), each.default)
+            for each in self._more()
         ]
 
     @property
@@ -144,16 +162,16 @@ class Command:
 
     @property
     def __signature__(self) -> Any:
-        """What typer reads."""
+        """Signature that typer inspects."""
         from inspect import Parameter, Signature
         from typing import Annotated
 
         import typer
 
-        made = []
+        parameters = []
         for name, kind, declared, default in self.parameters():
-            info = getattr(typer, declared.maker)(*declared.names, **declared.told)
-            made.append(
+            info = getattr(typer, declared.maker)(*declared.names, **declared.settings)
+            parameters.append(
                 Parameter(
                     name,
                     Parameter.POSITIONAL_OR_KEYWORD,
@@ -161,10 +179,11 @@ class Command:
                     annotation=Annotated[kind, info],
                 )
             )
-        return Signature(made)
+        return Signature(parameters)
 
     def complete(self, words: Sequence[str]) -> list[str]:
-        """Return the words of a command line, with a value after each option that may stand without one."""
+        """Return the words of a command line with the values of options that are given without one."""
+        # Most command lines need no completion, and reading the parameters imports their modules.
         # Most command lines have no option that could lack a value, and need no look at the
         # parameters here.
         if not any(
@@ -186,73 +205,79 @@ class Command:
         return result
 
     def read(self, words: Sequence[str]) -> dict[str, Any] | None:
-        """The values that words give the parameters; None if typer has to read them."""
+        """Parse the words of a command line.
+
+        Returns:
+            Values by parameter; None if typer has to parse the words, in particular if they are invalid.
+        """
         parameters = self.parameters()
-        given: dict[str, Any] = {each.name: each.default for each in parameters}
+        values: dict[str, Any] = {each.name: each.default for each in parameters}
         options = {
-            spelling: (each, says)
+            spelling: (each, flag)
             for each in parameters
             if each.declared.maker == "Option"
-            for spelling, says in each.spellings.items()
+            for spelling, flag in each.spellings.items()
         }
-        places = [each for each in parameters if each.declared.maker == "Argument"]
+        arguments = [each for each in parameters if each.declared.maker == "Argument"]
         seen: set[str] = set()
         rest = iter(words)
         for word in rest:
             if word == "-" or not word.startswith("-"):
-                if not places:
+                if not arguments:
                     return None
-                parameter, says = places[0], True
-                kind, several = parameter.scalar()
-                if not several:
-                    places.pop(0)
+                parameter, flag = arguments[0], True
+                kind, is_list = parameter.scalar()
+                if not is_list:
+                    arguments.pop(0)
             else:
                 spelling, equals, word = word.partition("=")
                 if spelling not in options or (equals and not spelling.startswith("--")):
                     return None
-                parameter, says = options[spelling]
-                kind, several = parameter.scalar()
+                parameter, flag = options[spelling]
+                kind, is_list = parameter.scalar()
                 if not equals and kind is not bool:
                     word = next(rest, "-")
                 if word.startswith("-") or (equals and kind is bool):
                     return None
-            value = says if kind is bool else parameter.value(kind, word)
-            if value is None or (parameter.name in seen and not several):
+            value = flag if kind is bool else parameter.value(kind, word)
+            if value is None or (parameter.name in seen and not is_list):
                 return None
-            if several:
-                given[parameter.name] = [
-                    *(given[parameter.name] if parameter.name in seen else ()),
+            if is_list:
+                values[parameter.name] = [
+                    *(values[parameter.name] if parameter.name in seen else ()),
                     value,
                 ]
             else:
-                given[parameter.name] = value
+                values[parameter.name] = value
             seen.add(parameter.name)
-        return None if any(value is ... for value in given.values()) else given
+        return None if any(value is ... for value in values.values()) else values
 
 
-def _names(function: Any) -> tuple[str, ...]:
+def _list_argument_names(function: Any) -> tuple[str, ...]:
     code = function.__code__
     return code.co_varnames[: code.co_argcount]
 
 
-def _declared(choice: OptionSpec) -> Declared:
-    shown: Any = choice.shown or (choice.default is not None and choice.type is not bool)
-    told = {
-        "help": choice.help,
-        "metavar": choice.unit,
-        "show_default": shown,
-        "rich_help_panel": choice.group,
+def _make_spec(option: OptionSpec) -> ParameterSpec:
+    show_default: Any = option.shown or (option.default is not None and option.type is not bool)
+    settings = {
+        "help": option.help,
+        "metavar": option.unit,
+        "show_default": show_default,
+        "rich_help_panel": option.group,
     }
-    return Option(*choice.spelled, **{word: value for word, value in told.items() if value != ""})
+    return Option(
+        *option.spelled, **{word: value for word, value in settings.items() if value != ""}
+    )
 
 
 def command(function: Callable[..., None]) -> Command:
-    """Make a command of a function."""
+    """Decorate a function as a command."""
     return Command(function)
 
 
 def command_with(
     more: Callable[[], Iterable[OptionSpec]],
 ) -> Callable[[Callable[..., None]], Command]:
-    """Make a command of a function that takes these options too, as keyword arguments."""
+    """Decorate a function as a command with further options, which it takes as keyword arguments."""
     return lambda function: Command(function, more)

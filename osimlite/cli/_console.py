@@ -1,4 +1,8 @@
-"""The one way out for what commands print: nothing that a terminal or the log of a CI job would obey gets through."""
+"""All output of commands. Control characters in names and messages are escaped before they are printed.
+
+A terminal would obey escape sequences in a file name, and CI systems obey lines such as
+``::error::``.
+"""
 
 from __future__ import annotations
 
@@ -15,8 +19,8 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 
-class Guarded:
-    """A text stream that writes out what terminals and logs obey, and what its encoding lacks."""
+class EscapingStream:
+    """Text stream that escapes control sequences and characters that its encoding lacks."""
 
     def __init__(self, stream: TextIO) -> None:
         self.stream = stream
@@ -25,7 +29,7 @@ class Guarded:
             stream.reconfigure(errors="backslashreplace")
 
     def write(self, text: str) -> int:
-        """Write text, lines or parts of them."""
+        """Write text, and return the number of its characters."""
         self.stream.write(escape_control_sequences(text, starts_line=self._starts_line))
         last = text[text.rfind("\n") + 1 :]
         self._starts_line = not last.strip() and (self._starts_line or "\n" in text)
@@ -36,40 +40,64 @@ class Guarded:
 
 
 @contextmanager
-def guarded_output() -> Iterator[None]:
-    """Let all that is written to standard output and standard error go through :class:`Guarded`."""
-    kept = sys.stdout, sys.stderr
+def escape_output() -> Iterator[None]:
+    """Replace standard output and standard error by escaping streams."""
+    streams = sys.stdout, sys.stderr
+    # A Windows program without a console has None for both.
     # A program without a console has no streams.
-    sys.stdout, sys.stderr = (stream and cast(TextIO, Guarded(stream)) for stream in kept)
+    sys.stdout, sys.stderr = (stream and cast(TextIO, EscapingStream(stream)) for stream in streams)
     try:
         yield
     finally:
-        sys.stdout, sys.stderr = kept
+        sys.stdout, sys.stderr = streams
 
 
 def say(text: object = "", *, err: bool = False) -> None:
-    """Print one line: whatever names in it hold, it stays one."""
+    """Print one line; line breaks and control characters in it are escaped.
+
+    Args:
+        text: the line.
+        err: print to standard error.
+    """
     print(escape_unprintable(str(text)), file=sys.stderr if err else sys.stdout, flush=True)
 
 
-def complain(text: object, cure: str = "") -> None:
-    """Say one sentence on standard error, as the program; of an error, with the page of the manual to read on."""
-    from osimlite.cli._manual import page_of
+def complain(text: object, advice: str = "") -> None:
+    """Print one sentence to standard error, after the name of the program.
 
-    page = f" (see {page_of(text)})" if isinstance(text, BaseException) else ""
-    say(f"osimlite: {text}{cure}{page}", err=True)
+    Args:
+        text: the message; for an exception, the page of the manual is added.
+        advice: what the user can do.
+    """
+    from osimlite.cli._manual import find_page
+
+    page = f" (see {find_page(text)})" if isinstance(text, BaseException) else ""
+    say(f"osimlite: {text}{advice}{page}", err=True)
 
 
 def show(lines: str, *, err: bool = False) -> None:
-    """Print lines whose names have gone through :func:`osimlite.base.text.escape_unprintable`."""
+    """Print lines in which :func:`osimlite.base.text.escape_unprintable` has escaped the names.
+
+    Args:
+        lines: text with line ends.
+        err: print to standard error.
+    """
     (sys.stderr if err else sys.stdout).write(lines)
 
 
 def print_diff(before: str, after: str, old: str, new: str) -> None:
-    """Print what differs between two texts, under their names, as a unified diff."""
+    """Print a unified diff of two texts.
+
+    Args:
+        before: first text.
+        after: second text.
+        old: name of the first text.
+        new: name of the second text.
+    """
     import difflib
     import io
 
+    # ``str.splitlines`` would also split at form feeds and other characters; a diff splits at \\n.
     # A text breaks its lines at \\n; what else looks like a break to Python is written out.
     first, second = (list(io.StringIO(text, newline="\n")) for text in (before, after))
     for line in difflib.unified_diff(first, second, old, new):
@@ -78,24 +106,25 @@ def print_diff(before: str, after: str, old: str, new: str) -> None:
         show("\t".join(map(escape_unprintable, body.split("\t"))) + end)
 
 
-def hand_over(text: str) -> None:
-    """Write a text for programs to standard output: as it is, in UTF-8, whatever people here read."""
+def print_for_programs(text: str) -> None:
+    """Write text for other programs to standard output, unescaped and in UTF-8."""
     sys.stdout.flush()
+    # Tests replace standard output by streams without bytes.
     # What takes the place of standard output in tests may be without bytes.
     if hasattr(sys.stdout, "buffer"):
         sys.stdout.buffer.write(text.encode())
         sys.stdout.buffer.flush()
     else:
-        raw_stream(sys.stdout).write(text)
+        get_raw_stream(sys.stdout).write(text)
 
 
-def raw_stream(stream: TextIO) -> TextIO:
-    """The stream itself: for texts of our own that move the cursor."""
-    return stream.stream if isinstance(stream, Guarded) else stream
+def get_raw_stream(stream: TextIO) -> TextIO:
+    """Return the stream below an escaping stream, for text that moves the cursor on purpose."""
+    return stream.stream if isinstance(stream, EscapingStream) else stream
 
 
 def wants_colour() -> bool:
-    """Whether what is printed on standard output is coloured."""
+    """Return whether output is coloured; NO_COLOR and FORCE_COLOR take precedence over the terminal."""
     if os.environ.get("NO_COLOR"):
         return False
     if os.environ.get("FORCE_COLOR"):
@@ -106,30 +135,36 @@ def wants_colour() -> bool:
         return True
     from rich.console import detect_legacy_windows
 
+    # Consoles of Windows before version 10 print colour codes as text.
     # An old console prints the codes of colours instead of obeying them.
     return not detect_legacy_windows()
 
 
-def columns() -> int:
-    """How many letters a line has here."""
-    told = os.environ.get("COLUMNS", "")
-    if told.isdigit():
-        return int(told)
+def count_columns() -> int:
+    """Return the width of the terminal in characters."""
+    columns = os.environ.get("COLUMNS", "")
+    if columns.isdigit():
+        return int(columns)
     for stream in range(3):
         with suppress(OSError):
             return os.get_terminal_size(stream).columns or 80
     return 80
 
 
-def plain_console(**choices: Any) -> Console:
-    """A console that prints text as it is: names of files and messages of others may look like its markup."""
+def create_console(**settings: Any) -> Console:
+    """Create a console of rich without markup, which file names and messages could contain by chance."""
     from rich.console import Console
 
-    return Console(**{"markup": False, "emoji": False, **choices})
+    return Console(**{"markup": False, "emoji": False, **settings})
 
 
-def plain_table(title: str = "", **choices: Any) -> Table:
-    """A table without lines, as all commands print theirs."""
+def create_table(title: str = "", **settings: Any) -> Table:
+    """Create a table without lines, in the style of all commands.
+
+    Args:
+        title: text above the table.
+        settings: keyword arguments of ``rich.table.Table``.
+    """
     from rich.table import Table
 
     style = {
@@ -139,35 +174,44 @@ def plain_table(title: str = "", **choices: Any) -> Table:
         "header_style": "bold",
         "title_justify": "left",
     }
-    return Table(title=escape_unprintable(title) or None, **{**style, **choices})
+    return Table(title=escape_unprintable(title) or None, **{**style, **settings})
 
 
 def add_row(table: Table, *cells: str) -> None:
-    """Add a row to a table of the console, whatever names its cells hold."""
+    """Add a row whose cells are escaped.
+
+    Args:
+        table: the table.
+        cells: texts of the row.
+    """
     table.add_row(*map(escape_unprintable, cells))
 
 
-class Facts:
-    """What came out: names, and what is said of each."""
+class FactTable:
+    """Table of two columns: names, and what is stated about each."""
 
     def __init__(self, title: str = "", rows: Iterable[tuple[str, str]] = ()) -> None:
         self.title = title
         self.rows = [*rows]
 
     def add(self, name: str, words: str) -> None:
-        """Say one thing more."""
+        """Add a row.
+
+        Args:
+            name: first column.
+            words: second column.
+        """
         self.rows.append((name, words))
 
     def show(self) -> None:
-        """Print them as a table; text that is too long for its column is wrapped between words.
+        """Print the table; text that is too long for its column is wrapped between words.
 
-        A word is never broken: a path of a file stays whole, so that it can be copied and searched
-        for.
+        Words are never broken, so that a file path can be copied and searched for.
         """
         rows = [(escape_unprintable(name), escape_unprintable(words)) for name, words in self.rows]
         width = max((len(name) for name, _ in rows), default=0)
-        room = columns() - width - 2
-        if room < 30 or not all(name.isascii() and words.isascii() for name, words in rows):
+        width_left = count_columns() - width - 2
+        if width_left < 30 or not all(name.isascii() and words.isascii() for name, words in rows):
             self._show_any(rows)
             return
         from textwrap import wrap
@@ -176,15 +220,17 @@ class Facts:
         if self.title:
             show(f"{italic}{escape_unprintable(self.title)}{end}\n")
         for name, words in rows:
-            for line in wrap(words, room, break_on_hyphens=False, break_long_words=False) or [""]:
+            for line in wrap(words, width_left, break_on_hyphens=False, break_long_words=False) or [
+                ""
+            ]:
                 show(f"{bold}{name:{width}}{end}  {line}".rstrip() + "\n")
                 name = ""
 
     def _show_any(self, rows: list[tuple[str, str]]) -> None:
-        """Print them where there is little room, or where letters are as wide as two: by a library that knows both."""
-        table = plain_table(self.title, show_header=False)
+        """Print the table with rich, which knows the width of characters and breaks words in narrow terminals."""
+        table = create_table(self.title, show_header=False)
         table.add_column(style="bold", overflow="fold")
         table.add_column(overflow="fold")
         for row in rows:
             table.add_row(*row)
-        plain_console().print(table)
+        create_console().print(table)

@@ -1,10 +1,10 @@
-"""What runs the kernels here, in sentences for people."""
+"""Description of how kernels run on this machine."""
 
 from __future__ import annotations
 
 
 def explain_kernels() -> list[str]:
-    """Return sentences that say what runs the kernels, and why: a compiled library, a compiler, numba or Python."""
+    """Return sentences on what runs the kernels and why: a compiled library, a compiler, numba or Python."""
     from osimlite.errors import MissingDependency
 
     try:

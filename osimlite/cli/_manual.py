@@ -1,4 +1,4 @@
-"""Where the manual says more about what has failed."""
+"""Pages of the manual for error messages."""
 
 from __future__ import annotations
 
@@ -102,14 +102,14 @@ PAGES = {
     "osimlite.view": "docs/viewer.md",
     "osimlite.base.writing": "docs/errors.md#files",
 }
-"""Pages and their headings, by the class of an error, or else by the module or package that could not go on.
+"""Pages and headings by the class of an error, otherwise by the module or package that raised it.
 
-A module without a page, such as one that reads numbers, is passed over for the one that called it.
+Modules without a page are skipped for the one that called them.
 """
 
 
-def page_of(error: BaseException) -> str:
-    """The page that says more about an error that was raised."""
+def find_page(error: BaseException) -> str:
+    """Return the page of the manual for an exception that was raised."""
     kinds = (f"{kind.__module__}.{kind.__qualname__}" for kind in type(error).__mro__)
     modules = (
         frame.f_globals.get("__name__", "")

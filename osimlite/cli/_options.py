@@ -1,4 +1,4 @@
-"""The arguments and options that several commands have: each has one name, one unit and one help everywhere."""
+"""Arguments and options that several commands share, each with one name, unit and help text."""
 
 from __future__ import annotations
 
@@ -199,15 +199,17 @@ Geometry = Annotated[
 Browser = Annotated[bool, Option("--browser/--no-browser", help="Open the page in the browser.")]
 
 
-def simulating(*names: str, integration: bool = False) -> Callable[[], Iterator[OptionSpec]]:
-    """Return the options of a simulation for :func:`osimlite.cli._command.command_with`.
+def list_simulation_options(
+    *names: str, integration: bool = False
+) -> Callable[[], Iterator[OptionSpec]]:
+    """Return a function that lists the simulation options for :func:`osimlite.cli._command.command_with`.
 
     Args:
-        names: options that the command takes; by default all.
-        integration: whether it takes the options of integration too.
+        names: options to list; all by default.
+        integration: whether to list the options of integration, too.
     """
 
-    def chosen() -> Iterator[OptionSpec]:
+    def list_selected() -> Iterator[OptionSpec]:
         from osimlite.base.options import list_options
         from osimlite.simulation.options import INTEGRATION_OPTIONS, Options
 
@@ -217,14 +219,18 @@ def simulating(*names: str, integration: bool = False) -> Callable[[], Iterator[
             if not names or each.name in names or (integration and each.name in INTEGRATION_OPTIONS)
         )
 
-    return chosen
+    return list_selected
 
 
-def feedback(controller: Path | None, par: Path | None) -> Feedback | None:
-    """The controller of a file, if one is given.
+def read_feedback(controller: Path | None, par: Path | None) -> Feedback | None:
+    """Read the controller of a file; None without a file.
+
+    Args:
+        controller: file of reflexes or of a scenario.
+        par: file with values of its parameters.
 
     Raises:
-        OsimliteError: it is damaged, or there are parameters without one.
+        OsimliteError: a file cannot be read, or `par` is given without a controller.
     """
     from osimlite.errors import SettingError
 
@@ -237,12 +243,22 @@ def feedback(controller: Path | None, par: Path | None) -> Feedback | None:
     return Feedback(controller, {} if par is None else par)
 
 
-def results_folder(file: Path, output: Path | None) -> Path:
-    """The folder that is asked for, else one in the current folder, named after the model's file."""
+def choose_output_folder(file: Path, output: Path | None) -> Path:
+    """Return the requested folder, by default one in the current folder, named after the model's file.
+
+    Args:
+        file: the model.
+        output: the requested folder.
+
+    Raises:
+        OsimliteError: the default folder is a link that leads elsewhere.
+    """
     from osimlite.base.writing import expect_folder_inside
 
     if output is not None:
         return output
+    # The user did not choose the default name: a link of this name in a downloaded folder must not
+    # redirect results.
     # The user did not name it: a link of this name in a stranger's folder must not decide where
     # results go.
     expect_folder_inside(Path(file.stem))
@@ -252,10 +268,18 @@ def results_folder(file: Path, output: Path | None) -> Path:
 def parse_named_words(
     words: Iterable[str] | None, option: str, form: str = "NAME=VALUE"
 ) -> dict[str, str]:
-    """Text by name from the ``NAME=VALUE`` words of an option; `form` is what the user is told to write.
+    """Parse the ``NAME=VALUE`` words of an option.
+
+    Args:
+        words: words of the command line.
+        option: the option, for messages.
+        form: expected form, for messages.
+
+    Returns:
+        Text by name.
 
     Raises:
-        SettingError: a word is not of that form, or two have one name.
+        SettingError: a word does not have this form, or two have the same name.
     """
     from osimlite.errors import SettingError
 
@@ -271,7 +295,15 @@ def parse_named_words(
 
 
 def parse_applied_loads(words: Iterable[str] | None) -> dict[str, list[list[str]]]:
-    """What ``--applied-to`` says, as :func:`osimlite.inverse_dynamics` takes it; errors as of `parse_named_words`."""
+    """Parse the words of ``--applied-to``.
+
+    Returns:
+        Loads by body, each with the prefixes of its columns, as for
+        :func:`osimlite.inverse_dynamics`.
+
+    Raises:
+        SettingError: a word does not have this form, or two have the same body.
+    """
     named = parse_named_words(words, "--applied-to", "BODY=FORCE,POINT,MOMENT")
     return {
         body: [load.strip().split(",") for load in text.split("+")] for body, text in named.items()
@@ -279,10 +311,17 @@ def parse_applied_loads(words: Iterable[str] | None) -> dict[str, list[list[str]
 
 
 def parse_named_numbers(words: Iterable[str] | None, option: str) -> dict[str, float]:
-    """Numbers by name from the ``NAME=NUMBER`` words of an option.
+    """Parse the ``NAME=NUMBER`` words of an option.
+
+    Args:
+        words: words of the command line.
+        option: the option, for messages.
+
+    Returns:
+        Numbers by name.
 
     Raises:
-        SettingError: a word is not of that form, or two have one name.
+        SettingError: a word does not have this form, or two have the same name.
     """
     from osimlite.errors import SettingError
 
@@ -295,20 +334,23 @@ def parse_named_numbers(words: Iterable[str] | None, option: str) -> dict[str, f
     return result
 
 
-def quantities(
+def parse_quantities(
     words: Iterable[str] | None, mechanism: Mechanism, option: str, states: Collection[str] = ()
 ) -> dict[str, float]:
-    """Numbers (rad, m, per second) by coordinate from the ``COORDINATE=VALUE`` words of an option.
+    """Parse the ``COORDINATE=VALUE`` words of an option.
 
     Args:
-        words: as they were typed.
-        mechanism: whose coordinates they name.
-        option: for messages.
-        states: paths of other states, which may be named too.
+        words: words of the command line.
+        mechanism: mechanism with the coordinates.
+        option: the option, for messages.
+        states: paths of other states that may be named.
+
+    Returns:
+        Numbers (rad, m, or these per second) by coordinate or state.
 
     Raises:
-        OsimliteError: a word is not of that form, there is no such coordinate, the unit does not
-            fit it, or a value of ``--set`` without a unit can hardly be meant in rad.
+        OsimliteError: a word does not have this form, the coordinate is unknown, the unit does not fit
+            it, or a value of ``--set`` without a unit is probably in degrees.
     """
     from osimlite.base.text import suggest_name
     from osimlite.errors import ModelError, OsimliteError, SettingError
@@ -322,11 +364,13 @@ def quantities(
                 result[name] = float(text)
                 continue
             result[name] = convert_value(mechanism, name, text)
+            # Only values are compared with the coordinate's range; speeds have none.
             # A speed has no range.
             info = mechanism.coordinates[mechanism.coordinate_index(name)]
             if option == "--set" and (odd := describe_suspect_value(info, name, text)):
                 raise SettingError(f"{option}: {odd} (if not, write {text.strip()}rad)")
         except ModelError as error:
+            # The command is wrong and not the model, so this must not be a ModelError.
             # The model is as it should be; it is the command that asks for what is not there.
             raise OsimliteError(f"{option}: {error.message}{suggest_name(name, states)}") from None
         except ValueError:
@@ -337,10 +381,17 @@ def quantities(
 
 
 def read_source(source: str, parameter: Iterable[str] | None) -> tuple[Model, Path | None]:
-    """Return the model that a command names, and the folder of its file, None without a file.
+    """Read or build the model that a command names.
+
+    Args:
+        source: model file, or source of ``osimlite build``.
+        parameter: ``NAME=VALUE`` words of ``-p``.
+
+    Returns:
+        The model, and the folder of its file; None without a file.
 
     Raises:
-        OsimliteError: there is none, or it does not take the parameters of ``-p``.
+        OsimliteError: the source does not exist, or does not accept the parameters.
     """
     from osimlite.errors import SettingError
     from osimlite.io.document.reader import read
@@ -356,10 +407,10 @@ def read_source(source: str, parameter: Iterable[str] | None) -> tuple[Model, Pa
 
 
 def resolve_folders(geometry: Sequence[Path] | None) -> Sequence[Path]:
-    """The folders of ``--geometry``.
+    """Return the folders of ``--geometry`` after checking that they exist.
 
     Raises:
-        MissingFolderError: one is not there.
+        MissingFolderError: a folder does not exist.
     """
     from osimlite.errors import MissingFolderError
 
@@ -371,11 +422,15 @@ def resolve_folders(geometry: Sequence[Path] | None) -> Sequence[Path]:
     return geometry or ()
 
 
-def mesh_folders(file: Path, geometry: Sequence[Path] | None) -> list[Path]:
-    """Where mesh files of a model are looked for after its own folder: those of ``--geometry``, then of the settings.
+def list_mesh_folders(file: Path, geometry: Sequence[Path] | None) -> list[Path]:
+    """Return the folders searched for meshes after the model's own: those of ``--geometry``, then of the settings.
+
+    Args:
+        file: the model.
+        geometry: folders of ``--geometry``.
 
     Raises:
-        MissingFolderError: a folder that is named on the command line is not there.
+        MissingFolderError: a folder of the command line does not exist.
         OsimliteError: the settings cannot be read.
     """
     from osimlite.lint.settings import load_settings
@@ -384,10 +439,10 @@ def mesh_folders(file: Path, geometry: Sequence[Path] | None) -> list[Path]:
 
 
 def check_number_format(numbers: str) -> NumberStyle:
-    """The choice of ``--numbers``.
+    """Return the value of ``--numbers`` after checking it.
 
     Raises:
-        SettingError: there is no such style.
+        SettingError: the value is unknown.
     """
     from osimlite.errors import SettingError
 

@@ -1,4 +1,4 @@
-"""A progress bar that long work shows on a terminal."""
+"""Progress bars for slow work on a terminal."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING
 
 from osimlite.base.text import escape_unprintable
-from osimlite.cli._console import complain, plain_console, raw_stream
+from osimlite.cli._console import complain, create_console, get_raw_stream
 
 if TYPE_CHECKING:
     from rich.progress import Progress
@@ -36,7 +36,7 @@ def progress_bar(title: str, total: float | None) -> Iterator[Callable[..., None
             return
         due = now + 0.1
         if bar is None:
-            bar = _started(title)
+            bar = _start_bar(title)
         bar.update(bar.task_ids[0], completed=done, total=total if of is None else of)
         if more is not None:
             bar.update(bar.task_ids[0], more=more(bar.tasks[0].speed or 0.0))
@@ -68,7 +68,7 @@ def progress_bars() -> Iterator[Callable[[str, float, float], None]]:
     What is yielded takes what is being done, how much of it is, and of how much.
     """
     current: str | None = None
-    advance: Callable[..., None] = _silent
+    advance: Callable[..., None] = _ignore_progress
     with ExitStack() as bars:
 
         def tell(title: str, done: float, of: float) -> None:
@@ -81,22 +81,22 @@ def progress_bars() -> Iterator[Callable[[str, float, float], None]]:
         yield tell
 
 
-def show_warnings_of_engine() -> None:
-    """Show people what the engine warns of: that kernels run as Python, or that machine code can be kept nowhere."""
+def show_engine_warnings() -> None:
+    """Print the warnings of the engine: kernels run as Python, or compiled code cannot be cached."""
     import logging
 
-    class Shown(logging.Handler):
+    class WarningPrinter(logging.Handler):
         def emit(self, record: logging.LogRecord) -> None:
             complain(record.getMessage())
 
-    logging.getLogger("osimlite.simulation.engines").addHandler(Shown())
+    logging.getLogger("osimlite.simulation.engines").addHandler(WarningPrinter())
 
 
-def _silent(*_: float) -> None:
-    """Before the first bar."""
+def _ignore_progress(*_: float) -> None:
+    """Ignore progress that is reported before the first bar exists."""
 
 
-def _started(title: str) -> Progress:
+def _start_bar(title: str) -> Progress:
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
     columns = (
@@ -108,7 +108,7 @@ def _started(title: str) -> Progress:
     )
     bar = Progress(
         *columns,
-        console=plain_console(file=raw_stream(sys.stderr)),
+        console=create_console(file=get_raw_stream(sys.stderr)),
         transient=True,
         auto_refresh=False,
     )

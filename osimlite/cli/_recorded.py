@@ -1,4 +1,4 @@
-"""What the commands on recorded motions share: writing and drawing tables."""
+"""Writing and drawing of tables for the commands on recorded motions."""
 
 from __future__ import annotations
 
@@ -17,10 +17,17 @@ if TYPE_CHECKING:
     from osimlite.schema.model import Model
 
 
-def written(
+def write_results(
     recorded: RecordedMotion, tables: Mapping[str, StoTable], folder: Path, *, trc: bool = False
 ) -> None:
-    """Write tables into a folder, that of markers as markers.trc too, and say what they are made from."""
+    """Write tables into a folder and print a summary.
+
+    Args:
+        recorded: motion from which the tables were computed.
+        tables: tables by file name.
+        folder: output folder.
+        trc: also write the table of markers as markers.trc.
+    """
     make_folder(folder)
     for name, table in tables.items():
         write_sto(
@@ -39,11 +46,16 @@ def written(
         labels = [label.removesuffix("_X") for label in markers.columns[::3]]
         write_trc(folder / "markers.trc", markers.times.tolist(), labels, markers.rows.tolist())
         names.append("markers.trc")
-    say_motion(recorded, [folder / name for name in names])
+    print_motion_summary(recorded, [folder / name for name in names])
 
 
-def say_motion(recorded: RecordedMotion, files: Iterable[Path]) -> None:
-    """Say what was made from a motion, and what of it counted."""
+def print_motion_summary(recorded: RecordedMotion, files: Iterable[Path]) -> None:
+    """Print which coordinates and times of a motion were used, and the files written.
+
+    Args:
+        recorded: the motion.
+        files: paths of the files.
+    """
     if recorded.missing:
         say(f"not in the motion, default value used: {join_words(recorded.missing)}")
     if recorded.ignored:

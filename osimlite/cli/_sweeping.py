@@ -1,4 +1,4 @@
-"""What `sweep`, `optimize` and `find-gait` have in common: the model, and what of it is varied."""
+"""Options and plans that `sweep`, `optimize` and `find-gait` share."""
 
 from __future__ import annotations
 
@@ -76,8 +76,8 @@ Cluster = Annotated[
 ]
 
 
-PASSED = "wrapping", "equilibrate", "skip_unsupported"
-"""Options of a simulation, besides those of integration, that commands for many simulations take too."""
+SWEEP_OPTIONS = "wrapping", "equilibrate", "skip_unsupported"
+"""Simulation options that sweeps accept besides those of integration."""
 
 
 def make_plan(
@@ -89,10 +89,19 @@ def make_plan(
     controls: Sequence[str] | None = None,
     **choices: Any,
 ) -> Plan:
-    """The plan that the options describe.
+    """Make the plan of a sweep from command-line options.
+
+    Args:
+        source: model file, or source of ``osimlite build``.
+        vary: ranges of the variables.
+        parameter: fixed parameters of the model function.
+        below: coordinates and values below which a run ends.
+        above: coordinates and values above which a run ends.
+        controls: controls of actuators.
+        choices: further keyword arguments of :func:`osimlite.studies.sweep.plan.plan`.
 
     Raises:
-        OsimliteError: they do not describe one.
+        OsimliteError: an option is invalid.
     """
     import warnings
 
@@ -103,11 +112,14 @@ def make_plan(
     ranges = parse_ranges(vary or [])
     if not ranges and choices.get("controller") is None:
         raise SettingError("say what to vary, as in --vary RHip_rz=0.2:0.6")
-    levels = {"below": _levels(below, "--stop-below"), "above": _levels(above, "--stop-above")}
+    levels = {
+        "below": _parse_levels(below, "--stop-below"),
+        "above": _parse_levels(above, "--stop-above"),
+    }
     with warnings.catch_warnings():
         warnings.simplefilter("error", UnitWarning)
         try:
-            return _plan(
+            return _make_plan(
                 source,
                 ranges,
                 parameter,
@@ -119,7 +131,7 @@ def make_plan(
             raise SettingError(f"{odd} (if not, write rad after the number)") from None
 
 
-def _plan(
+def _make_plan(
     source: str, ranges: Mapping[str, Any], parameter: Sequence[str] | None, **choices: Any
 ) -> Plan:
     from functools import partial
@@ -137,18 +149,23 @@ def _plan(
     if both:
         raise SettingError(f"the parameter '{both[0]}' is set and varied; do one of the two")
     known = {name: default for name, default in parameters_of(source).items() if name not in given}
+    # The nominal model needs a value for each parameter without a default; take the lower bound of its
+    # range.
     # The model as it is given needs a value of what has no default.
     needed = {
         name: str(ranges[name]).partition(":")[0]
         for name in known
         if known[name] is Parameter.empty and name in ranges
     }
-    return plan(partial(_make, source, {**needed, **given}), ranges, parameters=known, **choices)
+    return plan(
+        partial(_make_model, source, {**needed, **given}), ranges, parameters=known, **choices
+    )
 
 
-def _make(source: str, given: Mapping[str, str], parameters: Mapping[str, float]) -> Any:
+def _make_model(source: str, given: Mapping[str, str], parameters: Mapping[str, float]) -> Any:
     from osimlite.models.source import make_model
 
+    # Functions may require int parameters, so whole numbers are written without a decimal point.
     # A parameter that is a whole number is written as one.
     words = {
         name: repr(int(value) if value.is_integer() else value)
@@ -157,7 +174,7 @@ def _make(source: str, given: Mapping[str, str], parameters: Mapping[str, float]
     return make_model(source, {**given, **words})
 
 
-def _levels(words: Sequence[str] | None, option: str) -> dict[str, str]:
+def _parse_levels(words: Sequence[str] | None, option: str) -> dict[str, str]:
     from osimlite.base.quantity import parse_quantity
     from osimlite.errors import SettingError
 

@@ -1,4 +1,4 @@
-"""What ``osimlite validate`` does, apart from its options: it starts without the library that reads options."""
+"""Implementation of ``osimlite validate``, separate from its options so that it starts without typer."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from osimlite.base.files import read_standard_input, unsaved
 from osimlite.base.text import format_count, join_words
-from osimlite.cli._console import complain, hand_over, print_diff, say, show, wants_colour
+from osimlite.cli._console import complain, print_diff, print_for_programs, say, show, wants_colour
 from osimlite.cli._options import resolve_folders
 from osimlite.cli._progress import progress_bar
 from osimlite.errors import MissingFileError, OsimliteError
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from osimlite.io.document.source import Source
 
 
-def run(
+def validate_paths(
     paths: list[str],
     *,
     format: str = "full",
@@ -46,10 +46,34 @@ def run(
     stdin_filename: str | None = None,
     only_ours: bool = False,
 ) -> int:
-    """Check files and folders, write the report to standard output, and return the exit code."""
+    """Check files and folders, print the report, and return the exit code.
+
+    Args:
+        paths: files and folders; "-" is standard input.
+        format: format of the report.
+        select: rules to run.
+        ignore: rules to skip.
+        fail_on: lowest severity for which the exit code is 1.
+        fix: apply safe fixes.
+        unsafe_fixes: apply all fixes.
+        diff: print the changes of the fixes instead of writing them.
+        baseline: file with findings to leave out.
+        write_baseline: file to write the present findings to.
+        geometry: further folders with meshes.
+        classes: files with classes of plug-ins.
+        target_version: version of OpenSim that shall read the files.
+        statistics: print counts by rule instead of findings.
+        no_cache: check files again although the cache has their findings.
+        everything: print every finding instead of folding similar ones.
+        stdin_filename: path of the file whose content standard input provides.
+        only_ours: skip XML files that are not OpenSim's.
+
+    Returns:
+        0 without findings of `fail_on` or worse, 1 with some, 2 if a file could not be processed.
+    """
     folders = resolve_folders(geometry)
-    expect_known(format, fail_on)
-    given = Config(
+    check_option_values(format, fail_on)
+    config = Config(
         parse_codes(select),
         parse_codes(ignore),
         mesh_paths=tuple(str(path.resolve()) for path in folders),
@@ -59,23 +83,24 @@ def run(
     if "-" in paths and (fix or unsafe_fixes) and not diff:
         raise OsimliteError("standard input cannot be fixed in place; use --diff")
     if "-" in paths and stdin_filename is not None:
+        # The other files of the project see this content in place of the file on disk.
         # It is what this file would be, were it written now.
         unsaved[os.path.realpath(stdin_filename)] = read_standard_input()
         paths = [stdin_filename if path == "-" else path for path in paths]
-    passed: list[str] = []
-    files = find_project_files(paths, only_ours=only_ours, passed=passed)
+    skipped: list[str] = []
+    files = find_project_files(paths, only_ours=only_ours, passed=skipped)
     failed = False
     if diff:
-        shown = [_show_diff(path, given, unsafe=unsafe_fixes) for path in files]
+        shown = [_show_diff(path, config, unsafe=unsafe_fixes) for path in files]
         count, left, unread = (sum(counts[index] for counts in shown) for index in range(3))
-        say(f"Would apply {_count_fixes(count)}{_more(left)}.", err=True)
+        say(f"Would apply {_count_fixes(count)}{_describe_unsafe_fixes(left)}.", err=True)
         return 2 if unread else int(count > 0)
     if fix or unsafe_fixes:
-        count, left, failed = _fix_files(files, given, unsafe=unsafe_fixes)
-        say(f"Applied {_count_fixes(count)}{_more(left)}.", err=True)
+        count, left, failed = _fix_files(files, config, unsafe=unsafe_fixes)
+        say(f"Applied {_count_fixes(count)}{_describe_unsafe_fixes(left)}.", err=True)
     with progress_bar("checking", len(files)) as progress:
-        report = check_files(files, given, cached=not no_cache, progress=progress)
-    report.passed = passed
+        report = check_files(files, config, cached=not no_cache, progress=progress)
+    report.passed = skipped
     if write_baseline is not None:
         from osimlite.lint.baseline import write_baseline as write
 
@@ -87,20 +112,24 @@ def run(
 
         report = subtract_baseline(baseline, report)
     if statistics:
-        show(_statistics(report, everything))
+        show(_format_statistics(report, everything))
     else:
-        width = min(max(terminal_width(), 40), 120)
+        width = min(max(get_terminal_width(), 40), 120)
         text = render(report, format, colour=wants_colour(), width=width, everything=everything)
-        (show if format in FOR_PEOPLE else hand_over)(text)
-    worst = Severity(fail_on) if fail_on is not None else _fail_on_of(files)
+        (show if format in FOR_PEOPLE else print_for_programs)(text)
+    worst = Severity(fail_on) if fail_on is not None else _find_threshold(files)
     return 2 if failed else int(bool(report.at_least(worst)))
 
 
-def expect_known(format: str, fail_on: str | None) -> None:
-    """Raise an error for an unknown value of --format or --fail-on.
+def check_option_values(format: str, fail_on: str | None) -> None:
+    """Check the values of --format and --fail-on.
+
+    Args:
+        format: value of --format.
+        fail_on: value of --fail-on.
 
     Raises:
-        OsimliteError: one is not.
+        OsimliteError: a value is unknown.
     """
     for option, word, known in (
         ("--fail-on", fail_on, tuple(Severity)),
@@ -110,44 +139,52 @@ def expect_known(format: str, fail_on: str | None) -> None:
             raise OsimliteError(f"{option} must be one of {join_words(known)}, not '{word}'")
 
 
-def _source(path: str) -> Source:
+def _read_source(path: str) -> Source:
     from osimlite.io.document.source import Source
 
     if path == "-":
         return Source(read_standard_input(), "<stdin>")
-    return Source.of_file(path)
+    return Source.from_file(path)
 
 
-def _check(source: Source, given: Config) -> Report:
-    """Check one file by the settings of its folder and of the command line."""
+def _check_source(source: Source, given: Config) -> Report:
+    """Check one file with the settings of its folder and of the command line."""
     from osimlite.lint.engine import make_subject, run_rules
 
     assert source.file is not None
-    # No rule about measures has a fix.
+    # Rules that measure paths and muscles have no fixes, so measuring is not needed here.
     return run_rules(
         make_subject(source, find_settings(source.file).config_for(source.file, given)),
         measure=False,
     )
 
 
-def _fail_on_of(files: list[str]) -> Severity:
-    """The threshold that the settings of the first file ask for."""
+def _find_threshold(files: list[str]) -> Severity:
+    """Return the severity in the settings of the first file for which the exit code is 1."""
     return find_settings(files[0]).fail_on or Severity.ERROR if files else Severity.ERROR
 
 
 def _apply_fixes(
     source: Source, given: Config, unsafe: bool, put: Callable[[list[bytes | memoryview]], Source]
 ) -> tuple[Source, int, int]:
-    """Return the fixed file, the number of fixes, and the number of remaining unsafe fixes.
+    """Apply fixes until none is left.
 
-    `put` makes the source of the next round from the pieces of each round.
+    Args:
+        source: the file.
+        given: settings of the command line.
+        unsafe: apply fixes that may change the meaning, too.
+        put: makes the source of the next round from the pieces of the fixed text.
+
+    Returns:
+        The fixed file, the number of fixes, and the number of remaining unsafe fixes.
     """
     from osimlite.lint.fixes import apply_fixes_in_pieces
 
     total = left = 0
-    # A fix can reveal further findings: a misspelt set hides the errors of its members.
+    # A fix can reveal further findings: a misspelt set hides the errors of its members. Ten rounds
+    # end fixes that undo each other.
     for _ in range(10):
-        report = _check(source, given)
+        report = _check_source(source, given)
         pieces, count = apply_fixes_in_pieces(source, report, unsafe=unsafe)
         if not count:
             left = sum(finding.fix is not None for finding in report.findings)
@@ -165,7 +202,8 @@ def _fix_files(files: list[str], given: Config, unsafe: bool) -> tuple[int, int,
         try:
             count, left = _fix_file(path, given, unsafe)
         except MissingFileError:
-            continue  # The check that follows tells of it.
+            # The check that follows reports the missing file.
+            continue
         except OsimliteError as error:
             complain(error)
             failed = True
@@ -176,47 +214,49 @@ def _fix_files(files: list[str], given: Config, unsafe: bool) -> tuple[int, int,
 
 
 def _fix_file(path: str, given: Config, unsafe: bool) -> tuple[int, int]:
-    """Fix a file and return the number of fixes and of remaining unsafe fixes."""
+    """Fix a file in place; return the number of fixes and of remaining unsafe fixes."""
     from osimlite.base.files import open_atomically
 
     def put(pieces: list[bytes | memoryview]) -> Source:
         with open_atomically(path) as stream:
             stream.writelines(pieces)
         pieces.clear()
-        return _source(path)
+        return _read_source(path)
 
-    _, count, left = _apply_fixes(_source(path), given, unsafe, put)
+    _, count, left = _apply_fixes(_read_source(path), given, unsafe, put)
     return count, left
 
 
 UNREADABLE = ("OSIM001", "OSIM801")
-"""Rules for files that are not XML or not a table; nothing else of such a file is checked or fixed."""
+"""Rules for files that are not XML or not a table; such files are not checked further, nor fixed."""
 
 
 def _count_fixes(count: int) -> str:
     return f"{count} fix" if count == 1 else f"{count} fixes"
 
 
-def _more(left: int) -> str:
+def _describe_unsafe_fixes(left: int) -> str:
     return f"; --unsafe-fixes would apply {left} more" if left else ""
 
 
 def _show_diff(path: str, given: Config, unsafe: bool) -> tuple[int, int, bool]:
-    """Print the changes of the fixes and return their number, that of unsafe ones, and whether the file is unreadable."""
+    """Print what the fixes would change; return their number, that of unsafe ones, and whether the file is unreadable."""
     from osimlite.io.document.source import Source
 
-    source = _source(path)
+    source = _read_source(path)
     after, count, left = _apply_fixes(
         source, given, unsafe, lambda pieces: Source(b"".join(pieces), source.file)
     )
     print_diff(source.text, after.text, path, path)
-    unread = next((item for item in _check(after, given).findings if item.code in UNREADABLE), None)
+    unread = next(
+        (item for item in _check_source(after, given).findings if item.code in UNREADABLE), None
+    )
     if unread is not None:
         complain(f"{path}:{unread.line}:{unread.column}: {unread.message}")
     return count, left, unread is not None
 
 
-def terminal_width() -> int:
+def get_terminal_width() -> int:
     """Return the number of columns of the terminal, by default 80."""
     if not sys.stdout.isatty():
         return 80
@@ -225,7 +265,7 @@ def terminal_width() -> int:
     return shutil.get_terminal_size((80, 24)).columns
 
 
-def _statistics(report: Report, everything: bool) -> str:
+def _format_statistics(report: Report, everything: bool) -> str:
     from osimlite.lint.registry import all_rules
     from osimlite.lint.reporters.terminal import (
         describe_skipped,

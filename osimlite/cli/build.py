@@ -43,7 +43,7 @@ def build(
     Example: osimlite build dynamic-walker -p thigh_length=0.42 -o walker.osim
     """
     from osimlite.base.text import format_count
-    from osimlite.cli._console import complain, hand_over, say, show
+    from osimlite.cli._console import complain, print_for_programs, say, show
     from osimlite.errors import OsimliteError
     from osimlite.io.document.printer import to_text, write
     from osimlite.lint import validate
@@ -64,7 +64,7 @@ def build(
         complain(f"'{source}' has errors; nothing was written")
         raise SystemExit(1)
     if str(output) == "-":
-        hand_over(to_text(model, numbers=style))
+        print_for_programs(to_text(model, numbers=style))
         return
     target = output or Path(f"{model.name or 'model'}.osim")
     if target.suffix == ".omoco":

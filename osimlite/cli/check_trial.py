@@ -42,14 +42,14 @@ def check_trial(
     Example: osimlite check-trial subject01
     """
     from osimlite.base.records import replace
-    from osimlite.cli._console import hand_over, show, wants_colour
+    from osimlite.cli._console import print_for_programs, show, wants_colour
     from osimlite.cli._progress import progress_bar
-    from osimlite.cli._validating import expect_known, terminal_width
+    from osimlite.cli._validating import check_option_values, get_terminal_width
     from osimlite.lint.diagnostic import Severity
     from osimlite.lint.reporters import FOR_PEOPLE, render
     from osimlite.tools.trials.check import check_trial as check
 
-    expect_known(format, fail_on)
+    check_option_values(format, fail_on)
     with progress_bar("checking", None) as progress:
         report = check(
             *paths, select=select, ignore=ignore, progress=lambda done, of: progress(done, of)
@@ -57,29 +57,31 @@ def check_trial(
     if format == "json":
         from osimlite.base.text import format_json
 
-        hand_over(format_json(report.as_dict()))
+        print_for_programs(format_json(report.as_dict()))
     elif format not in FOR_PEOPLE:
-        hand_over(render(report, format))
+        print_for_programs(render(report, format))
     else:
         if format == "full":
             _show_verdicts(report)
-        # The table has what is okay.
-        told = report if everything else replace(report, findings=report.at_least(Severity.WARNING))
-        width = min(max(terminal_width(), 40), 120)
-        show(render(told, format, colour=wants_colour(), width=width, everything=everything))
+        # The table of verdicts above already lists what is okay.
+        visible = (
+            report if everything else replace(report, findings=report.at_least(Severity.WARNING))
+        )
+        width = min(max(get_terminal_width(), 40), 120)
+        show(render(visible, format, colour=wants_colour(), width=width, everything=everything))
         for why in report.unchecked:
-            show(f"Not looked at: {why}.\n")
+            show(f"Not checked: {why}.\n")
     raise SystemExit(int(bool(report.at_least(Severity(fail_on or Severity.WARNING)))))
 
 
 def _show_verdicts(report: TrialReport) -> None:
-    """The worst number of each kind, by files."""
+    """Print the worst value of each quantity, grouped by file."""
     from itertools import groupby
 
-    from osimlite.cli._console import add_row, plain_console, plain_table, show
+    from osimlite.cli._console import add_row, create_console, create_table, show
 
     for file, verdicts in groupby(report.worst, key=lambda verdict: verdict.file):
-        table = plain_table()
+        table = create_table()
         for column in ("", "", "limits", ""):
             table.add_column(
                 column, overflow="fold", justify="right" if column == "limits" else "left"
@@ -87,5 +89,5 @@ def _show_verdicts(report: TrialReport) -> None:
         for verdict in verdicts:
             add_row(table, verdict.verdict, verdict.shown, verdict.limits, verdict.words)
         show(f"{file}\n")
-        plain_console().print(table)
+        create_console().print(table)
         show("\n")

@@ -1,4 +1,4 @@
-"""``osimlite demo``: the whole tour, from a file that is written to four motions in the browser."""
+"""``osimlite demo``: a tour from a model file to four motions in the browser."""
 
 from __future__ import annotations
 
@@ -26,20 +26,30 @@ ACCURACY = 1e-5
 """Accuracy of the integrator in all motions of the tour."""
 
 REPORT_INTERVAL_S = 0.01
-"""Time between the rows of the motions of the tour."""
+"""Time between the rows of the motions of the tour, s."""
 
 MISSPELT = ("<geometry>RFootContact ", "<geometry>RFootContct ")
+"""Text of the walker's file, and the misspelt text that replaces it to show a finding."""
 
 
 class Motion(NamedTuple):
-    """A motion of the tour."""
+    """Motion of the tour.
 
-    model: str  # the built-in model that moves
-    to: float  # how long, s
-    title: str  # what becomes of it
-    told: Callable[[Trajectory], str]  # says what came out, from the motion
-    seen: str  # what else there is to see on its page
-    command: str  # what to try with it next; {} is the folder of the tour
+    Attributes:
+        model: built-in model that moves.
+        to: duration, s.
+        title: heading of its step and page.
+        describe: returns sentences on the result.
+        seen: what else its page shows.
+        command: what to try next; {} is the folder of the tour.
+    """
+
+    model: str
+    to: float
+    title: str
+    describe: Callable[[Trajectory], str]
+    seen: str
+    command: str
 
 
 @command
@@ -68,8 +78,8 @@ def demo(
     if pictures:
         require("matplotlib", extra="plot", purpose="drawing")
     tour = _Tour(output)
-    _check(tour)
-    pages = _move(tour, pictures)
+    _build_and_check(tour)
+    pages = _simulate_motions(tour, pictures)
     say(f"Everything is in {output}{os.sep}")
     if pages:
         say(f"Look at {pages[-1]}: choose among the four there")
@@ -82,14 +92,14 @@ def demo(
 
 @dataclass
 class _Tour:
-    """The folder of the tour, and how many steps there were."""
+    """Output folder of the tour, and the number of steps so far."""
 
     folder: Path
     steps: int = 0
 
     @contextmanager
     def step(self, title: str) -> Iterator[Callable[..., None]]:
-        """Announce a step; the caller says what came out, and the files that hold it."""
+        """Announce a step, and yield a function that prints its result and files."""
         self.steps += 1
         say(f"{self.steps}. {title}")
         start = time.perf_counter()
@@ -107,8 +117,8 @@ class _Tour:
         yield tell
 
 
-def _check(tour: _Tour) -> None:
-    """Build the walker of the exercise, validate it, and translate it."""
+def _build_and_check(tour: _Tour) -> None:
+    """Build the walker of the exercise, validate it and a misspelt copy, and translate it."""
     from osimlite.base.files import make_folder, write_atomically
     from osimlite.io.document.printer import write
     from osimlite.lint import validate
@@ -144,8 +154,8 @@ def _check(tour: _Tour) -> None:
         )
 
 
-def _move(tour: _Tour, pictures: bool) -> Sequence[Path]:
-    """Simulate the three models, and write what there is to look at; the pages of that."""
+def _simulate_motions(tour: _Tour, pictures: bool) -> Sequence[Path]:
+    """Simulate the three models, write plots and pages, and return the paths of the pages."""
     from osimlite.io.document.printer import write
     from osimlite.models.source import make_model
     from osimlite.simulation.run import Simulation
@@ -171,10 +181,10 @@ def _move(tour: _Tour, pictures: bool) -> Sequence[Path]:
                 folder = tour.folder / motion.model
                 trajectory.write(folder)
                 write(simulation.model, folder / f"{simulation.model.name}.osim")
-                tell(motion.told(trajectory), folder)
+                tell(motion.describe(trajectory), folder)
             result.append(trajectory)
     _compare_engines(tour, result[0])
-    human, states, said = _walk(tour)
+    human, states, said = _simulate_walking(tour)
     if not pictures:
         return []
     from osimlite.mechanics.multibody import build_mechanism
@@ -197,7 +207,7 @@ def _move(tour: _Tour, pictures: bool) -> Sequence[Path]:
         for motion, trajectory in zip(MOTIONS, result, strict=True):
             assert trajectory.model is not None
             shown = Shown.of(trajectory.model, trajectory.mechanism, motion=trajectory)
-            words = f"{motion.told(trajectory)} {motion.seen}"
+            words = f"{motion.describe(trajectory)} {motion.seen}"
             story = Story(words, motion.command.format(tour.folder), f"{motion.model}.html", titles)
             pages.append(shown.write_page(tour.folder / story.page, story))
         shown = Shown.of(human.model, build_mechanism(human.model), motion=states)
@@ -212,7 +222,7 @@ def _move(tour: _Tour, pictures: bool) -> Sequence[Path]:
 
 
 def _compare_engines(tour: _Tour, compiled: Trajectory) -> None:
-    """Simulate the walker by PyBullet too, if it is installed, and say how far apart the two motions are."""
+    """Simulate the walker with PyBullet as well, if installed, and print the difference of the motions."""
     from importlib.util import find_spec
 
     from osimlite.models.source import make_model
@@ -236,14 +246,19 @@ def _compare_engines(tour: _Tour, compiled: Trajectory) -> None:
         bullet.write(folder)
         tell(
             f"{simulation.engine.version}: in {motion.to:g} s no coordinate is ever farther than "
-            f"{largest_difference(compiled, bullet):.1e} rad or m from the motion of the compiled engine; "
+            f"{compute_largest_difference(compiled, bullet):.1e} rad or m from the motion of the compiled engine; "
             f"{_count_steps(compiled)} and {_count_steps(bullet)} steps",
             folder,
         )
 
 
-def largest_difference(one: Trajectory, other: Trajectory) -> float:
-    """Return the largest difference of any coordinate (rad or m) between two motions reported at the same times."""
+def compute_largest_difference(one: Trajectory, other: Trajectory) -> float:
+    """Return the largest difference of a coordinate (rad or m) between two motions with equal times.
+
+    Args:
+        one: first motion.
+        other: second motion; its coordinates may have another order.
+    """
     import numpy as np
 
     columns = [other.coordinates.index(name) for name in one.coordinates]
@@ -254,8 +269,12 @@ def _count_steps(motion: Trajectory) -> int:
     return int(motion.summary["steps"])
 
 
-def _walk(tour: _Tour) -> tuple[Scenario, Path, str]:
-    """Have the human walk by reflexes; the scenario, the file of the states, and what came out."""
+def _simulate_walking(tour: _Tour) -> tuple[Scenario, Path, str]:
+    """Simulate the human model walking by reflexes.
+
+    Returns:
+        The scenario, the file of the states, and sentences on the result.
+    """
     from osimlite.io.tables.storage import write_sto
     from osimlite.models.walking import write_scenario
     from osimlite.studies.reflexes.scenario import Scenario
@@ -279,17 +298,17 @@ def _walk(tour: _Tour) -> tuple[Scenario, Path, str]:
     return scenario, file, said
 
 
-def _falls(motion: Trajectory) -> str:
+def _describe_fall(motion: Trajectory) -> str:
     events = motion.summary["contact_events"]
     knee = next(event["time_s"] for event in events if "Knee" in event["contact"])
-    apart = distance_to_opensim(motion)
+    apart = compute_distance_to_opensim(motion)
     return (
         f"Released at rest on a slope of 10 degrees, it falls: after {knee:.2f} s a knee touches the ground. It does the same in "
         f"OpenSim: all coordinates differ from its converged motion by at most {apart:.1e} rad or m."
     )
 
 
-def _walks(motion: Trajectory) -> str:
+def _describe_walk(motion: Trajectory) -> str:
     import numpy as np
 
     events = motion.summary["contact_events"]
@@ -304,7 +323,7 @@ def _walks(motion: Trajectory) -> str:
     )
 
 
-def _jumps(motion: Trajectory) -> str:
+def _describe_jump(motion: Trajectory) -> str:
     import numpy as np
 
     heights = [motion.mechanism.center_of_mass(q)[1] for q in motion.values]
@@ -336,7 +355,7 @@ MOTIONS = (
         "dynamic-walker",
         2.0,
         "It falls",
-        _falls,
+        _describe_fall,
         "The arrows are the forces of the ground.",
         "osimlite optimize dynamic-walker --objective distance --vary RHip_rz=0:60deg --vary LHip_rz=-60deg:0",
     ),
@@ -344,7 +363,7 @@ MOTIONS = (
         "steady-walker",
         5.0,
         "It walks",
-        _walks,
+        _describe_walk,
         "The lines on the slope are half a meter apart.",
         "osimlite gait steady-walker --perturb 0.05 --starts 10",
     ),
@@ -352,7 +371,7 @@ MOTIONS = (
         "jumper",
         1.6,
         "It jumps",
-        _jumps,
+        _describe_jump,
         "Muscles are blue at rest and red when active; click on one for its length and its moment arms.",
         'osimlite muscles "{}/jumper/Jumper.osim" --coordinate knee_angle_r',
     ),
@@ -360,14 +379,17 @@ MOTIONS = (
 
 
 def _has_display() -> bool:
-    """Return whether a browser can show a page here, rather than one that runs in the terminal."""
+    """Return whether a browser can open a window here; text browsers in the terminal do not count."""
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
         return False
     return sys.platform != "linux" or any(map(os.environ.get, ("DISPLAY", "WAYLAND_DISPLAY")))
 
 
-def distance_to_opensim(trajectory: Trajectory) -> float:
-    """Largest difference of any coordinate (rad or m) to OpenSim 4.6's converged motion, every 50 ms of 0-2 s."""
+def compute_distance_to_opensim(trajectory: Trajectory) -> float:
+    """Return the largest difference of a coordinate (rad or m) from OpenSim 4.6's converged motion.
+
+    They are compared every 50 ms from 0 to 2 s.
+    """
     import csv
     from importlib.resources import files
 
@@ -377,7 +399,7 @@ def distance_to_opensim(trajectory: Trajectory) -> float:
     largest = 0.0
     times = [round(float(t), 6) for t in trajectory.times]
     for row in csv.DictReader(text.splitlines()):
-        place = times.index(round(float(row["time"]), 6))
+        index = times.index(round(float(row["time"]), 6))
         for number, name in enumerate(trajectory.coordinates):
-            largest = max(largest, abs(float(trajectory.values[place][number]) - float(row[name])))
+            largest = max(largest, abs(float(trajectory.values[index][number]) - float(row[name])))
     return largest

@@ -1,4 +1,4 @@
-"""``osimlite diff``: what changed between two models, setups or tables, in meaning."""
+"""``osimlite diff``: differences in meaning between two models, setups or tables."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def diff(
     from osimlite.schema.model import Model
 
     if git:
-        # path old-file old-hex old-mode new-file new-hex new-mode; a file that is not there is
+        # git passes: path old-file old-hex old-mode new-file new-hex new-mode. A missing file is
         # /dev/null.
         if len(files) != 7:
             raise OsimliteError(
@@ -53,9 +53,9 @@ def diff(
     else:
         raise OsimliteError("diff takes two files")
     if all(is_table(str(file)) for file in (old, new) if str(file) != "/dev/null"):
-        from osimlite.cli._table_diff import table_differences
+        from osimlite.cli._table_diff import describe_table_differences
 
-        lines = table_differences(old, new)
+        lines = describe_table_differences(old, new)
     else:
         read = [None if str(file) == "/dev/null" else read_any(file) for file in (old, new)]
         kind = next((type(top) for top in read if top is not None), Model)
@@ -71,11 +71,11 @@ def diff(
         raise SystemExit(1)
 
 
-def describe_differences(found: list[Difference]) -> list[str]:
-    """One or two lines for each difference, grouped by component."""
+def describe_differences(differences: list[Difference]) -> list[str]:
+    """Return one or two lines for each difference, grouped by component."""
     lines: list[str] = []
     last = None
-    for path, what, old, new in found:
+    for path, what, old, new in differences:
         if not what:
             lines.append(f"+ {path} ({new})" if old is None else f"- {path} ({old})")
             last = None
@@ -85,14 +85,14 @@ def describe_differences(found: list[Difference]) -> list[str]:
             last = path
         if old is None or new is None:
             lines.append(
-                f"    {'+' if old is None else '-'} {what}: {_words(new if old is None else old)}"
+                f"    {'+' if old is None else '-'} {what}: {_format_value(new if old is None else old)}"
             )
         else:
-            lines.append(f"    {what}: {_words(old)} -> {_words(new)}")
+            lines.append(f"    {what}: {_format_value(old)} -> {_format_value(new)}")
     return lines
 
 
-def _words(value: Any) -> str:
+def _format_value(value: Any) -> str:
     if isinstance(value, float):
         from osimlite.io.document.lexical import format_shortest
 
@@ -100,5 +100,5 @@ def _words(value: Any) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, tuple):
-        return " ".join(map(_words, value)) or "(empty)"
+        return " ".join(map(_format_value, value)) or "(empty)"
     return str(value) or "(empty)"

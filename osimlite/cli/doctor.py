@@ -1,4 +1,4 @@
-"""``osimlite doctor``: what is installed, what each extra adds, and where meshes are looked for."""
+"""``osimlite doctor``: installed packages, what each extra adds, and where mesh files are searched."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from typing import Annotated, NamedTuple
 from osimlite.base.cores import count_cores
 from osimlite.base.require import SAFE_PATH
 from osimlite.cli._command import Argument, command
-from osimlite.cli._console import add_row, plain_console, plain_table, say
+from osimlite.cli._console import add_row, create_console, create_table, say
 from osimlite.cli._kernels import explain_kernels
 from osimlite.cli._progress import progress_bar
 
@@ -65,7 +65,7 @@ NEEDS: dict[str, tuple[str, ...]] = {
     "the language server for editors": ("pygls",),
     "comparisons with OpenSim itself, in tests and benchmarks": ("opensim",),
 }
-"""The packages that a command, or an option of it, cannot do without, but for those of the plain installation."""
+"""Packages that a command, or one of its options, requires beyond the plain installation."""
 
 EXTRAS = (
     "",
@@ -86,18 +86,27 @@ EXTRAS = (
     "frame",
     "oracle",
 )
-"""The plain installation and what is added to it; `all` and `dev` gather these, `fast` is an older name of `sim`."""
+"""Extras in the order of the table, "" for the plain installation.
+
+`all` and `dev` combine them; `fast` is the former name of `sim`.
+"""
 
 MESHES = (".vtp", ".stl", ".obj")
-"""Endings of mesh files."""
+"""File name endings of meshes."""
 
 
 class Package(NamedTuple):
-    """A package that an extra asks for."""
+    """Package that an extra requires.
 
-    name: str  # on the package index
-    version: str  # installed; "" if it is not
-    trouble: str  # why it cannot be imported, though it is installed; else ""
+    Attributes:
+        name: name on the package index.
+        version: installed version; empty if it is not installed.
+        trouble: why the installed package cannot be imported; empty if it can.
+    """
+
+    name: str
+    version: str
+    trouble: str
 
 
 @command
@@ -129,19 +138,19 @@ def doctor(
         say(sentence)
     say()
 
-    wanted = requirements()
-    uses = purposes(wanted)
+    wanted = list_requirements()
+    uses = list_purposes(wanted)
     every = {name for names in wanted.values() for name in names}
     result = {}
     with (
         progress_bar("loading each package", len(every)) as progress,
         ThreadPoolExecutor(2 * count_cores()) as pool,
     ):
-        # Each in a process of its own, side by side.
-        for count, package in enumerate(pool.map(examine, every), 1):
+        # Each package is imported in a process of its own, several at a time.
+        for count, package in enumerate(pool.map(examine_package, every), 1):
             result[package.name] = package
             progress(count)
-    table = plain_table()
+    table = create_table()
     for heading in ("extra", "for", "packages"):
         table.add_column(heading, overflow="fold")
     for extra, names in wanted.items():
@@ -151,10 +160,10 @@ def doctor(
         add_row(table, extra or "(none)", ", ".join(uses[extra]), words)
         if extra and missing:
             table.add_row("", "", Text(f"pip install 'osimlite[{extra}]'", style="bold"))
-    plain_console().print(table)
+    create_console().print(table)
 
     say()
-    _show_places(model)
+    _print_mesh_folders(model)
     say()
     say("shell completion: osimlite --install-completion")
     broken = [package for package in result.values() if package.trouble]
@@ -164,20 +173,31 @@ def doctor(
         raise SystemExit(1)
 
 
-def requirements() -> dict[str, list[str]]:
-    """Names of the packages that each extra asks for, "" first."""
+def list_requirements() -> dict[str, list[str]]:
+    """Return the packages that each extra requires, from the metadata of the installation.
+
+    Returns:
+        Names of packages by extra, in the order of `EXTRAS`.
+    """
     wanted: dict[str, list[str]] = {extra: [] for extra in EXTRAS}
     for line in metadata.requires("osimlite") or []:
         name = re.split(r"[\s\[<>=!~;(]", line, maxsplit=1)[0]
         extra = re.search(r"extra\s*==\s*['\"]([^'\"]+)['\"]", line)
-        of = extra[1] if extra else ""
-        if of in wanted and name not in ("osimlite", *wanted[of]):
-            wanted[of].append(name)
+        group = extra[1] if extra else ""
+        if group in wanted and name not in ("osimlite", *wanted[group]):
+            wanted[group].append(name)
     return wanted
 
 
-def purposes(wanted: dict[str, list[str]]) -> dict[str, list[str]]:
-    """What each extra is for: the uses all of whose packages it brings, and no extra before it does."""
+def list_purposes(wanted: dict[str, list[str]]) -> dict[str, list[str]]:
+    """Return the uses that each extra enables: it is the first with all their packages.
+
+    Args:
+        wanted: packages by extra.
+
+    Returns:
+        Uses by extra, as in `NEEDS`.
+    """
     result: dict[str, list[str]] = {extra: [] for extra in wanted}
     for use, packages in NEEDS.items():
         extra = next((extra for extra, names in wanted.items() if {*packages} <= {*names}), None)
@@ -187,22 +207,35 @@ def purposes(wanted: dict[str, list[str]]) -> dict[str, list[str]]:
 
 
 def find_extra(module: str | None, use: str = "") -> str | None:
-    """Return the first extra with a module and all other packages of its use in `NEEDS`, or None."""
+    """Return the first extra that provides a module; None without one.
+
+    Args:
+        module: name of the missing module.
+        use: use in `NEEDS`; the extra then has all packages of it.
+    """
     name = {"PIL": "pillow", "yaml": "pyyaml"}.get(module or "", module)
     if name in NEEDS.get(use, ()):
         return next(
-            (extra for extra, uses in purposes(requirements()).items() if use in uses), None
+            (extra for extra, uses in list_purposes(list_requirements()).items() if use in uses),
+            None,
         )
-    return next((extra for extra, names in requirements().items() if extra and name in names), None)
+    return next(
+        (extra for extra, names in list_requirements().items() if extra and name in names), None
+    )
 
 
-def examine(name: str) -> Package:
-    """Look for a package and import it, in a process of its own: some print, some end the process that loads them."""
+def examine_package(name: str) -> Package:
+    """Find the version of a package, and import it in a separate process.
+
+    A separate process is needed because some packages print when imported, and some end the process.
+    """
     try:
         version = metadata.version(name)
     except metadata.PackageNotFoundError:
         return Package(name, "", "")
-    modules = _modules(tuple(sys.path)).get(name.lower(), [])
+    modules = _list_modules(tuple(sys.path)).get(name.lower(), [])
+    # The module with the package's name is the main one of several. A few packages have none: pillow
+    # provides PIL, pyyaml provides yaml.
     # Some bring more than the module that bears their name; a few have none of it (PIL of pillow,
     # yaml of pyyaml).
     named = name.lower().replace("-", "_")
@@ -211,11 +244,13 @@ def examine(name: str) -> Package:
         if named in modules
         else next(module for module in modules if not module.startswith("_"))
     )
+    # -P: do not import from the current folder.
     # -P: what lies in the current folder is not what was installed.
     done = subprocess.run(
         [sys.executable, "-P", "-c", f"import {main}"],
         capture_output=True,
         check=False,
+        # Some packages start processes or load libraries from the current folder, which may be untrusted.
         # Packages start processes and look for libraries in the current folder.
         cwd=Path(__file__).parent,
         env={**os.environ, SAFE_PATH: "1"},
@@ -229,8 +264,8 @@ def examine(name: str) -> Package:
 
 
 @cache
-def _modules(path: tuple[str, ...]) -> dict[str, list[str]]:
-    """What can be imported of each package on a path, by the package's name in small letters."""
+def _list_modules(path: tuple[str, ...]) -> dict[str, list[str]]:
+    """Return the importable modules of each package, by the package's name in lower case."""
     result: dict[str, list[str]] = {}
     for module, owners in sorted(metadata.packages_distributions().items()):
         for owner in owners:
@@ -238,8 +273,8 @@ def _modules(path: tuple[str, ...]) -> dict[str, list[str]]:
     return result
 
 
-def _show_places(model: Path | None) -> None:
-    """Settings and mesh folders, as `validate` and `translate` find them for this model, or in this folder."""
+def _print_mesh_folders(model: Path | None) -> None:
+    """Print settings and mesh folders as `validate` and `translate` find them for a model or folder."""
     from osimlite.base.files import GEOMETRY_VARIABLE
     from osimlite.io.meshes.folders import MeshFolders
     from osimlite.lint.settings import load_settings
@@ -254,12 +289,12 @@ def _show_places(model: Path | None) -> None:
     settings = load_settings(folder)
     where = (
         settings.file
-        or "none (they stand in pyproject.toml under tool.osimlite, or in osimlite.toml)"
+        or "none (write them in pyproject.toml under tool.osimlite, or in osimlite.toml)"
     )
     say(f"settings: {where}")
     say("mesh folders, in the order of the search:")
     for place in MeshFolders(folder, settings.mesh_paths).searched:
-        say(f"  {place}: {_meshes(place)}")
+        say(f"  {place}: {_count_meshes(place)}")
     if not os.environ.get(GEOMETRY_VARIABLE) and not settings.mesh_paths:
         say(
             "The bones of OpenSim's models are in the folder Geometry of its installation. Name it in the environment "
@@ -267,8 +302,8 @@ def _show_places(model: Path | None) -> None:
         )
 
 
-def _meshes(place: Path) -> str:
+def _count_meshes(place: Path) -> str:
     if not place.is_dir():
-        return "not there"
+        return "does not exist"
     count = sum(path.suffix.lower() in MESHES for path in place.iterdir())
     return f"{count} mesh files" if count else "no mesh files"

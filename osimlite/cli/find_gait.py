@@ -1,4 +1,4 @@
-"""``osimlite find-gait``: the numbers and the start with which a model keeps on walking."""
+"""``osimlite find-gait``: search for parameters and an initial state of stable walking."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Annotated
 from osimlite.cli import _options as options
 from osimlite.cli import _sweeping as sweeping
 from osimlite.cli._command import Option, command_with
-from osimlite.cli._console import Facts
+from osimlite.cli._console import FactTable
 
 if TYPE_CHECKING:
     from osimlite.studies.gait.gaits import Gait
 
 
-@command_with(options.simulating("skip_unsupported"))
+@command_with(options.list_simulation_options("skip_unsupported"))
 def find_gait(
     source: options.Source,
     vary: sweeping.Vary = None,
@@ -112,13 +112,13 @@ def find_gait(
         raise SystemExit(1)
 
 
-def _describe_result(gait: Gait) -> Facts:
+def _describe_result(gait: Gait) -> FactTable:
     from osimlite.base.text import format_count, join_words
     from osimlite.studies.gait.cycle_search import BASIN_STARTS, BASIN_STEPS
 
     cycle, walk = gait.found.cycle, gait.walk
     stable = "stable" if cycle.largest < 1.0 else "not stable"
-    facts = Facts(f"{stable}: largest multiplier {cycle.largest:.4g}")
+    facts = FactTable(f"{stable}: largest multiplier {cycle.largest:.4g}")
     for name, number in gait.found.numbers.items():
         facts.add(name, f"{number:.6g}")
     facts.add("step length", f"{cycle.length:.6g} m")

@@ -1,4 +1,4 @@
-"""``osimlite fit``: a model that fits a person, from movements."""
+"""``osimlite fit``: fit a model to a person from recorded movements."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def fit(
         frames=frames,
         mass=mass,
     )
-    folder = options.results_folder(file, output)
+    folder = options.choose_output_folder(file, output)
     texts = create_person_files(person, file, folder, mass)
     make_folder(folder)
     for name, text in texts.items():

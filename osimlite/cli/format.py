@@ -1,4 +1,4 @@
-"""``osimlite format``: canonical text that keeps people's comments."""
+"""``osimlite format``: rewrite files in a canonical layout that keeps comments."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def format(
     changed, same, worst = 0, 0, 0
     for path in find_project_files(paths, (".osim", *DOCUMENTS), only_ours=only_ours):
         try:
-            source = Source.of_file(path)
+            source = Source.from_file(path)
             after = format_document(source)
         except OsimliteError as error:
             complain(error)

@@ -1,4 +1,4 @@
-"""``osimlite gait``: how a walker walks."""
+"""``osimlite gait``: step count, gait cycle and stability of a walker."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from osimlite.base.records import dataclass, field
 from osimlite.cli import _options as options
 from osimlite.cli._command import Option, command_with
-from osimlite.cli._console import Facts
+from osimlite.cli._console import FactTable
 from osimlite.cli._progress import progress_bar
 
 if TYPE_CHECKING:
@@ -23,10 +23,10 @@ if TYPE_CHECKING:
 
 
 WALK_ACCURACY = 1e-6
-"""Of the integrator in the walk from the start; the step map takes its own."""
+"""Accuracy of the integrator in the walk from the initial state; the step map has its own option."""
 
 
-@command_with(options.simulating("skip_unsupported"))
+@command_with(options.list_simulation_options("skip_unsupported"))
 def gait(
     source: options.Source,
     start: options.Start = None,
@@ -115,8 +115,8 @@ def gait(
         )
         refuse_constraints(simulation.mechanism)
         state = simulation.initial_state(
-            options.quantities(start, simulation.mechanism, "--set"),
-            options.quantities(start_speed, simulation.mechanism, "--set-speed"),
+            options.parse_quantities(start, simulation.mechanism, "--set"),
+            options.parse_quantities(start_speed, simulation.mechanism, "--set-speed"),
         )
         engine: Any = simulation.engine
         find_basin_offsets(engine, basin_x, basin_y)
@@ -152,7 +152,11 @@ def gait(
 def _check_numbers(
     to: float, accuracy: float, reach: float, perturb: Sequence[float], seed: int
 ) -> None:
-    """Before the walk, which takes a while, stop at numbers that mean nothing."""
+    """Check numeric options before the walk, which takes a while.
+
+    Raises:
+        SettingError: a number is not positive and finite, or the seed is negative.
+    """
     from math import inf
 
     from osimlite.errors import SettingError
@@ -172,7 +176,14 @@ def _check_numbers(
 
 @dataclass
 class Nearby:
-    """Count of random starts, each within `part` of the given one, of which `walked` make `steps` steps."""
+    """Result of random starts near an initial state.
+
+    Attributes:
+        part: largest relative change of the initial state.
+        walked: number of starts that make `steps` steps.
+        starts: number of starts.
+        steps: steps that count as walking.
+    """
 
     part: float
     walked: int
@@ -182,16 +193,27 @@ class Nearby:
 
 @dataclass
 class GaitReport:
-    """What was found out about a walker."""
+    """Results of ``osimlite gait`` for one walker.
 
-    model: str  # its name
-    coordinates: list[str]  # in the order of the state
-    walk: Walk  # from the start that was given
-    cycle: Cycle | None = None  # that it settles into, if there is one
-    why_not: str = ""  # why no cycle was found, else ""
+    Attributes:
+        model: name of the model.
+        coordinates: names in the order of the state.
+        walk: walk from the initial state.
+        cycle: gait cycle near the walk; None without one.
+        why_not: why no cycle was found; empty otherwise.
+        nearby: results of random starts, one for each ``--perturb``.
+        basin: result of ``--basin``.
+        skipped: forces that the simulation leaves out.
+    """
+
+    model: str
+    coordinates: list[str]
+    walk: Walk
+    cycle: Cycle | None = None
+    why_not: str = ""
     nearby: list[Nearby] = field(default_factory=list)
     basin: Basin | None = None
-    skipped: Sequence[str] = ()  # forces that were left out
+    skipped: Sequence[str] = ()
 
 
 def simulate_walk(
@@ -202,7 +224,19 @@ def simulate_walk(
     settle: int,
     accuracy: float,
 ) -> tuple[GaitReport, StepMap | None]:
-    """The walk from a state and the cycle near it, with the step map that has it as a fixed point."""
+    """Simulate the walk from an initial state, and search for a gait cycle near it.
+
+    Args:
+        engine: engine of the model.
+        state: coordinates and speeds at the start.
+        feet: contact forces of the feet; the ends of the legs by default.
+        to: maximum duration, s.
+        settle: number of steps before the search for the cycle.
+        accuracy: accuracy of the integrator in the step map.
+
+    Returns:
+        The report, and the step map with the cycle as its fixed point; None if it cannot be built.
+    """
     from osimlite.errors import OsimliteError
     from osimlite.studies.gait.cycle import find_cycle
     from osimlite.studies.gait.foot_contacts import find_footing
@@ -211,7 +245,7 @@ def simulate_walk(
 
     footing = find_footing(engine, feet)
     (walk,) = walk_many(engine, [state], to, footing=footing, accuracy=WALK_ACCURACY)
-    names = [engine.mechanism.coordinate_names[place] for place in engine.order]
+    names = [engine.mechanism.coordinate_names[index] for index in engine.order]
     result = GaitReport(engine.mechanism.name, names, walk)
     step_map = None
     try:
@@ -222,12 +256,12 @@ def simulate_walk(
     return result, step_map
 
 
-def _describe_cycle(found: GaitReport, files: Sequence[Path]) -> Facts:
+def _describe_cycle(result: GaitReport, files: Sequence[Path]) -> FactTable:
     from osimlite.base.text import format_count
     from osimlite.simulation.elements import summarize_skipped
 
-    walk, cycle = found.walk, found.cycle
-    facts = Facts(found.model)
+    walk, cycle = result.walk, result.cycle
+    facts = FactTable(result.model)
     end = (
         f"fell on {walk.fell_on} after {walk.end:.4g} s"
         if walk.fell_on
@@ -238,7 +272,7 @@ def _describe_cycle(found: GaitReport, files: Sequence[Path]) -> Facts:
         f"{format_count(len(walk.steps), 'step')}, {format_count(len(walk.scuffs), 'scuff')}, {walk.distance:.4g} m; {end}",
     )
     if cycle is None:
-        facts.add("cycle", found.why_not)
+        facts.add("cycle", result.why_not)
     else:
         facts.add("step length", f"{cycle.length:.6g} m")
         facts.add(
@@ -258,34 +292,34 @@ def _describe_cycle(found: GaitReport, files: Sequence[Path]) -> Facts:
             "fixed point",
             f"to {cycle.residual:.2g} after {format_count(cycle.iterations, 'step')} of Newton",
         )
-    for near in found.nearby:
+    for near in result.nearby:
         facts.add(
             f"within {near.part:.0%}",
             f"{near.walked} of {near.starts} starts make {near.steps} steps",
         )
-    if found.basin is not None:
-        basin = found.basin
+    if result.basin is not None:
+        basin = result.basin
         facts.add(
             "basin",
             f"{basin.part:.0%} of {basin.steps.size} starts make {basin.target_steps} steps",
         )
-    for skipped in summarize_skipped(found.skipped):
+    for skipped in summarize_skipped(result.skipped):
         facts.add("left out", skipped)
     if files:
         facts.add("files", ", ".join(str(path) for path in files))
     return facts
 
 
-def _write(folder: Path, found: GaitReport, pictures: bool) -> list[Path]:
+def _write(folder: Path, result: GaitReport, pictures: bool) -> list[Path]:
     import json
 
     from osimlite.base.files import write_atomically
 
     written = [folder / "gait.json"]
-    write_atomically(written[0], (json.dumps(_facts(found), indent=1) + "\n").encode())
-    basin = found.basin
+    write_atomically(written[0], (json.dumps(_make_json(result), indent=1) + "\n").encode())
+    basin = result.basin
     for name in ("basin.csv", "basin.png"):
-        # Of an earlier walk, they would be taken for this one's.
+        # Files of an earlier run would be mistaken for results of this one.
         (folder / name).unlink(missing_ok=True)
     if basin is not None:
         rows = [f"{basin.x.label},{basin.y.label},steps"]
@@ -299,32 +333,32 @@ def _write(folder: Path, found: GaitReport, pictures: bool) -> list[Path]:
         if pictures:
             from osimlite.studies.gait.basin_plot import draw_basin
 
-            written.append(draw_basin(basin, folder / "basin.png", title=found.model))
+            written.append(draw_basin(basin, folder / "basin.png", title=result.model))
     return written
 
 
-def _facts(found: GaitReport) -> dict[str, Any]:
-    """What gait.json says."""
+def _make_json(result: GaitReport) -> dict[str, Any]:
+    """Return the content of gait.json."""
 
-    def touches(events: Sequence[Step | Scuff]) -> list[dict[str, Any]]:
+    def list_touches(events: Sequence[Step | Scuff]) -> list[dict[str, Any]]:
         return [
             {"time_s": each.time, "foot": each.foot, "length_m": each.length, "air_s": each.air}
             for each in events
         ]
 
-    walk, cycle, names = found.walk, found.cycle, found.coordinates
+    walk, cycle, names = result.walk, result.cycle, result.coordinates
     facts: dict[str, Any] = {
-        "model": found.model,
+        "model": result.model,
         "walk": {
-            "steps": touches(walk.steps),
-            "scuffs": touches(walk.scuffs),
+            "steps": list_touches(walk.steps),
+            "scuffs": list_touches(walk.scuffs),
             "end_s": walk.end,
             "ending": walk.ending,
             "fell_on": walk.fell_on,
         },
     }
     if cycle is None:
-        facts |= {"cycle": None, "why_no_cycle": found.why_not}
+        facts |= {"cycle": None, "why_no_cycle": result.why_not}
     else:
         n = len(names)
         facts["cycle"] = {
@@ -341,6 +375,6 @@ def _facts(found: GaitReport) -> dict[str, Any]:
         }
         facts["random_starts"] = [
             {"part": each.part, "walk": each.walked, "of": each.starts, "steps": each.steps}
-            for each in found.nearby
+            for each in result.nearby
         ]
     return facts

@@ -1,4 +1,4 @@
-"""``osimlite ik``: the motion of a model that fits measured markers or orientations."""
+"""``osimlite ik``: compute the motion that fits measured markers or orientations."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def ik(
         start=first,
         end=last,
     )
-    folder = options.results_folder(file, output)
+    folder = options.choose_output_folder(file, output)
     make_folder(folder)
     table = create_motion_table(motion)
     write_atomically(folder / "ik.mot", "".join(format_old_table(table, f"\n{UNITS}")))

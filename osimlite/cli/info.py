@@ -1,4 +1,4 @@
-"""``osimlite info``: what is in a file."""
+"""``osimlite info``: contents of a model, setup or table."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ def info(
 
     Example: osimlite info gait2392.osim
     """
-    from osimlite.cli._answers import answer_from_cache
-    from osimlite.cli._console import Facts, say
+    from osimlite.cli._answers import compute_or_load
+    from osimlite.cli._console import FactTable, say
     from osimlite.io.document.reader import read_document
     from osimlite.io.document.source import Source
     from osimlite.lint.project_files import is_table
@@ -44,9 +44,9 @@ def info(
     from osimlite.schema.tree import is_a
 
     if is_table(str(file)):
-        _table(file, everything)
+        _print_table_info(file, everything)
         return
-    source = Source.of_file(file)
+    source = Source.from_file(file)
     document = read_document(source, of=Object)
     model = document.top
     size = f"{file} ({file.stat().st_size / 1000:.0f} kB)"
@@ -56,20 +56,20 @@ def info(
             ("file", size),
             ("document version", str(document.version)),
         ]
-        rows += [*_files(model, file.parent), *_notes(len(document.notes))]
-        Facts(rows=rows).show()
-        _classes([*model.walk()], everything)
+        rows += [*_list_files(model, file.parent), *_make_note_rows(len(document.notes))]
+        FactTable(rows=rows).show()
+        _print_classes([*model.walk()], everything)
         return
     tree = model.tree()
-    # What OpenSim makes for itself stands in no file.
+    # Leave out the components that OpenSim adds itself: they are not in the file.
     components = [component for component in tree.components if not tree.is_internal(component)]
     muscles = [component for component in components if is_a(component, "Muscle")]
     wraps = [component for component in components if is_a(component, "PathWrap")]
     surfaces = sum(is_a(component, "WrapObject") for component in components)
     mass = sum(body.mass for body in model.body_set.objects)
-    simulation = partial(_simulation, model, file.parent, source.text)
+    simulation = partial(_describe_simulation, model, file.parent, source.text)
 
-    Facts(
+    FactTable(
         rows=[
             ("model", model.name),
             ("file", size),
@@ -93,63 +93,63 @@ def info(
             ("contact surfaces", str(len(model.contact_geometry_set.objects))),
             ("constraints", str(len(model.constraint_set.objects))),
             ("components", f"{len(components)} in the file"),
-            *_notes(len(document.notes)),
-            ("simulation", answer_from_cache("simulation", str(file), source.data, simulation)),
+            *_make_note_rows(len(document.notes)),
+            ("simulation", compute_or_load("simulation", str(file), source.data, simulation)),
         ]
     ).show()
 
     if any(joint.coordinates for joint in model.components(Joint)):
         say()
         say("Coordinates: default, range")
-        for line in _coordinates(model):
-            # A name is never broken, however narrow the terminal is.
+        for line in _format_coordinates(model):
+            # These lines are not wrapped, so that names stay whole in a narrow terminal.
             say(line)
 
     if muscles:
         say()
         say("Muscles: maximum isometric force, optimal fiber length, tendon slack length, path")
-        for line in _muscles(muscles):
+        for line in _format_muscles(muscles):
             say(line)
 
-    _classes(components, everything)
+    _print_classes(components, everything)
 
 
-def _table(file: Path, everything: bool) -> None:
+def _print_table_info(file: Path, everything: bool) -> None:
     from osimlite.base.files import read_file
-    from osimlite.cli._console import Facts
+    from osimlite.cli._console import FactTable
     from osimlite.io.tables.headers import StorageHeader
     from osimlite.lint.table import Table
 
     table = Table(read_file(file), str(file))
-    said = {key: entry.value.text for key, entry in table.entries.items()}
+    stated = {key: entry.value.text for key, entry in table.entries.items()}
     header = table.header
     kind = f"storage, version {header.form}" if isinstance(header, StorageHeader) else "markers"
     if isinstance(header, StorageHeader) and header.parts > 1:
         kind += f", each cell a {header.kind}"
     rows = len(table.rows.times)
-    facts = Facts()
+    facts = FactTable()
     facts.add("table", kind)
     facts.add("file", f"{file} ({len(table.data) / 1000:.0f} kB)")
     facts.add("rows", str(rows))
     facts.add("markers" if table.is_markers else "columns besides time", str(len(table.columns)))
     if table.span is not None:
         first, last = table.span
-        # Times have few digits; their mean step has more.
+        # Times are rounded in the file, so the mean step is more exact than a single one.
         rate = f", {(rows - 1) / (last - first):.4g} Hz" if last > first else ""
         facts.add("time", f"{first:g} to {last:g} s{rate}")
     unit = "Units" if table.is_markers else "inDegrees"
-    facts.add(unit, said.get(unit, "not stated"))
+    facts.add(unit, stated.get(unit, "not stated"))
     facts.show()
     _print_items("Markers" if table.is_markers else "Columns", table.columns, everything)
 
 
-def _notes(count: int) -> list[tuple[str, str]]:
+def _make_note_rows(count: int) -> list[tuple[str, str]]:
     """Return a row for the notes of the reader, if there are any."""
     return [("notes of the reader", f"{count}; see 'osimlite validate'")] if count else []
 
 
-def _files(top: Object, folder: Path) -> Iterator[tuple[str, str]]:
-    """The properties of a document that name files and folders, with what they say and whether that is there."""
+def _list_files(top: Object, folder: Path) -> Iterator[tuple[str, str]]:
+    """Yield the properties that name files and folders, with their values and whether the files are missing."""
     from osimlite.schema.specs import get_reference_specs
 
     for item in top.walk():
@@ -160,7 +160,7 @@ def _files(top: Object, folder: Path) -> Iterator[tuple[str, str]]:
             for name in value if isinstance(value, tuple) else (value,):
                 if name not in ("", None, "Unassigned"):
                     lost = spec.reference.rule == "file" and not (folder / name.strip()).is_file()
-                    fate = (
+                    status = (
                         " (missing)"
                         if lost
                         else " (written)"
@@ -169,12 +169,12 @@ def _files(top: Object, folder: Path) -> Iterator[tuple[str, str]]:
                     )
                     yield (
                         spec.name if item is top else f"{item.name or item.tag}: {spec.name}",
-                        f"{name}{fate}",
+                        f"{name}{status}",
                     )
 
 
-def _classes(objects: Sequence[Object], everything: bool) -> None:
-    """Print how many there are of each class."""
+def _print_classes(objects: Sequence[Object], everything: bool) -> None:
+    """Print the number of objects of each class."""
     from osimlite.schema.base import Unknown
 
     counts = Counter(
@@ -184,21 +184,21 @@ def _classes(objects: Sequence[Object], everything: bool) -> None:
 
 
 def _print_items(title: str, items: Sequence[str], everything: bool) -> None:
-    """Print some items, or the first of them."""
+    """Print a list of items, unless `everything` the first 15 only."""
     from osimlite.base.text import escape_unprintable
-    from osimlite.cli._console import columns, say, show
+    from osimlite.cli._console import count_columns, say, show
 
     shown = items if everything else items[:15]
-    # The words of an item stay together.
+    # NUL keeps textwrap from breaking lines within an item.
     text = f"{title}: " + ", ".join(escape_unprintable(item).replace(" ", "\0") for item in shown)
-    lines = textwrap.fill(text, columns(), subsequent_indent="  ", break_long_words=False)
+    lines = textwrap.fill(text, count_columns(), subsequent_indent="  ", break_long_words=False)
     show("\n" + lines.replace("\0", " ") + "\n")
     if len(items) > len(shown):
         say(f"and {len(items) - len(shown)} more (--all lists them)")
 
 
-def _coordinates(model: Model) -> Iterator[str]:
-    """A line for each joint and one for each coordinate below it, with units."""
+def _format_coordinates(model: Model) -> Iterator[str]:
+    """Yield a line for each joint, and one for each of its coordinates with default and range."""
     from osimlite.schema.joints import Joint
     from osimlite.schema.states import list_motions
 
@@ -221,8 +221,8 @@ def _coordinates(model: Model) -> Iterator[str]:
             )
 
 
-def _muscles(muscles: Sequence[Any]) -> Iterator[str]:
-    """A line for each muscle, by class."""
+def _format_muscles(muscles: Sequence[Any]) -> Iterator[str]:
+    """Yield a line for each muscle, grouped by class."""
     from osimlite.schema.paths import GeometryPath
 
     width = max(len(muscle.name) for muscle in muscles)
@@ -241,8 +241,17 @@ def _muscles(muscles: Sequence[Any]) -> Iterator[str]:
             yield f"    {muscle.name:{width}} {muscle.max_isometric_force:>7.5g} N {lengths}  {laid}"
 
 
-def _simulation(model: Model, folder: Path, text: str) -> tuple[str, bool]:
-    """What of a model cannot be simulated, and whether that follows from its file alone."""
+def _describe_simulation(model: Model, folder: Path, text: str) -> tuple[str, bool]:
+    """Describe which parts of a model cannot be simulated.
+
+    Args:
+        model: the model.
+        folder: folder of its file.
+        text: content of its file.
+
+    Returns:
+        The description, and whether it depends on the model file alone and may be cached.
+    """
     from osimlite.base.require import require
     from osimlite.base.text import join_words
     from osimlite.errors import OsimliteError
@@ -254,12 +263,12 @@ def _simulation(model: Model, folder: Path, text: str) -> tuple[str, bool]:
 
         mechanism = build_mechanism(model)
         forces = force_elements(model, mechanism, skip_unsupported=True, folder=folder)
-        # What moves no mass has no acceleration.
+        # The mass matrix of bodies without mass is singular, which shows only here.
         mechanism.acceleration(*mechanism.default_state())
     except OsimliteError as error:
         return f"not possible: {error}", False
     answer = "possible, nothing is left out"
     if forces.skipped:
         answer = f"not without leaving out (--skip-unsupported) {join_words(summarize_skipped(forces.skipped))}"
-    # An element with this attribute stands in a file of its own.
+    # An attribute ``file`` includes another file, which may change without this one.
     return answer, not forces.reads_files and re.search(r"\sfile\s*=", text) is None

@@ -8,7 +8,7 @@ from osimlite.cli import _options as options
 from osimlite.cli._command import Option, command_with
 
 
-@command_with(options.simulating("wrapping", "external_loads", "opensim_derivatives"))
+@command_with(options.list_simulation_options("wrapping", "external_loads", "opensim_derivatives"))
 def inverse_dynamics(
     file: options.File,
     motion: options.Motion,
@@ -37,7 +37,7 @@ def inverse_dynamics(
 
     Example: osimlite inverse-dynamics gait2392.osim walk.mot --lowpass 6 --external-loads grf.xml
     """
-    from osimlite.cli._recorded import draw_tables, require_plots, written
+    from osimlite.cli._recorded import draw_tables, require_plots, write_results
     from osimlite.io.document.reader import read
     from osimlite.simulation.inverse_dynamics import inverse_dynamics as forces_of
 
@@ -55,8 +55,8 @@ def inverse_dynamics(
         **chosen,
     )
     assert table.motion is not None
-    folder, tables = options.results_folder(file, output), {"inverse_dynamics.sto": table}
-    written(table.motion, tables, folder)
+    folder, tables = options.choose_output_folder(file, output), {"inverse_dynamics.sto": table}
+    write_results(table.motion, tables, folder)
     if plot:
         loads = chosen.get("external_loads")
         draw_tables(tables, folder, model, table.motion.mechanism, loads)

@@ -33,7 +33,7 @@ def kinematics(
 
     Example: osimlite kinematics gait2392.osim walk.mot -o results
     """
-    from osimlite.cli._recorded import draw_tables, require_plots, written
+    from osimlite.cli._recorded import draw_tables, require_plots, write_results
     from osimlite.io.document.reader import read
     from osimlite.simulation.inverse_dynamics import kinematics as followed
 
@@ -41,7 +41,7 @@ def kinematics(
     model = read(file)
     recorded = followed(model, motion, assemble=assemble, lowpass=lowpass, start=first, end=last)
     tables = {"bodies.sto": recorded.bodies(), "markers.sto": recorded.markers()}
-    folder = options.results_folder(file, output)
-    written(recorded, tables, folder, trc=trc)
+    folder = options.choose_output_folder(file, output)
+    write_results(recorded, tables, folder, trc=trc)
     if plot:
         draw_tables(tables, folder, model, recorded.mechanism)

@@ -22,6 +22,6 @@ def lsp(
     from osimlite.base.require import require
 
     require("pygls", extra="lsp", purpose="the language server")
-    from osimlite.cli.language_server.server import make_server
+    from osimlite.cli.language_server.server import create_server
 
-    make_server().start_io()
+    create_server().start_io()

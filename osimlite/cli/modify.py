@@ -58,7 +58,7 @@ def modify(
         paths=polynomial
     """
     from osimlite.base.text import format_count
-    from osimlite.cli._console import add_row, plain_console, plain_table, say
+    from osimlite.cli._console import add_row, create_console, create_table, say
     from osimlite.errors import DocumentError, SettingError
     from osimlite.fitting.modifying.operators import process_model
     from osimlite.fitting.modifying.words import find_change
@@ -100,7 +100,7 @@ def modify(
     if source == "nimble" and not rewritten:
         say("OpenSim moves this model as Nimble does; nothing was rewritten")
     if fitted:
-        table = plain_table()
+        table = create_table()
         for heading in (
             "path",
             "coordinates",
@@ -121,5 +121,5 @@ def modify(
                 str(item.order),
                 *(f"{1e3 * number:.3f}" for number in numbers),
             )
-        plain_console().print(table)
+        create_console().print(table)
     say(f"{target}: {format_count(len(list(model.components())), 'component')}")

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from osimlite.simulation.muscle_curves import MuscleCurves
 
 
-@command_with(options.simulating("wrapping"))
+@command_with(options.list_simulation_options("wrapping"))
 def muscles(
     file: options.File,
     coordinate: Annotated[
@@ -115,11 +115,11 @@ def muscles(
             + (f" that moves with {join_words(list(values))}" if values else "s")
         )
     if others:
-        first, second = _common(first, others[0])
+        first, second = _select_common_muscles(first, others[0])
         result = dict(zip(result, (first, second), strict=True))
-    _print(list(result.values()), file, compare)
+    _print_ranges(list(result.values()), file, compare)
     if output is not None:
-        _write(result, output)
+        _write_curves(result, output)
         say(f"wrote {output}")
     if plot:
         from osimlite.view.muscle_plots import plot_muscles
@@ -136,7 +136,13 @@ def muscles(
 def _sample_coordinates(
     mechanism: Mechanism, words: Sequence[str], points: int
 ) -> dict[str, list[float]]:
-    """Values of each coordinate that is swept."""
+    """Return the values of each coordinate that is varied.
+
+    Args:
+        mechanism: mechanism with the coordinates.
+        words: coordinates with an optional range, NAME or NAME=LOW:HIGH.
+        points: number of values.
+    """
     from math import isfinite
 
     from osimlite.errors import ModelError, SettingError
@@ -172,8 +178,10 @@ def _sample_coordinates(
     return result
 
 
-def _common(first: MuscleCurves, second: MuscleCurves) -> tuple[MuscleCurves, MuscleCurves]:
-    """Both with the muscles whose names both have."""
+def _select_common_muscles(
+    first: MuscleCurves, second: MuscleCurves
+) -> tuple[MuscleCurves, MuscleCurves]:
+    """Return the curves of both models for the muscles whose names occur in both."""
     from osimlite.base.text import join_words
     from osimlite.cli._console import say
     from osimlite.errors import ModelError
@@ -192,12 +200,12 @@ def _common(first: MuscleCurves, second: MuscleCurves) -> tuple[MuscleCurves, Mu
     return one, other
 
 
-def _print(curves: Sequence[MuscleCurves], file: Path, compare: Path | None) -> None:
-    """A table that fits a terminal: what is least and greatest, or the largest differences."""
+def _print_ranges(curves: Sequence[MuscleCurves], file: Path, compare: Path | None) -> None:
+    """Print a table of least and greatest values, or of the largest differences between two models."""
     import numpy as np
 
     from osimlite.base.text import format_range
-    from osimlite.cli._console import add_row, plain_console, plain_table, say
+    from osimlite.cli._console import add_row, create_console, create_table, say
 
     first, *others = curves
     arms = {f"moment_arm_{name}": f"arm {name} (mm)" for name in first.coordinates}
@@ -208,7 +216,7 @@ def _print(curves: Sequence[MuscleCurves], file: Path, compare: Path | None) -> 
         "normalized_fiber_length": "fiber / optimal",
         "tendon_force": "tendon (N)",
     }
-    table = plain_table(
+    table = create_table(
         f"Largest differences of {compare.name} from {file.name}" if compare is not None else ""
     )
     table.add_column("Muscle")
@@ -231,14 +239,14 @@ def _print(curves: Sequence[MuscleCurves], file: Path, compare: Path | None) -> 
         )
     for row in zip(*columns, strict=True):
         add_row(table, *row)
-    plain_console().print(table)
+    create_console().print(table)
     unsettled = sum(bool(np.isnan(rows.columns["tendon_force"]).any()) for rows in curves)
     if unsettled:
         say("'-' and gaps in the table: the muscle has no equilibrium there")
 
 
-def _write(found: Mapping[str, MuscleCurves], output: Path) -> None:
-    """One row for each model, pose and muscle."""
+def _write_curves(result: Mapping[str, MuscleCurves], output: Path) -> None:
+    """Write a table with one row for each model, pose and muscle."""
     import io
 
     import numpy as np
@@ -246,7 +254,7 @@ def _write(found: Mapping[str, MuscleCurves], output: Path) -> None:
     from osimlite.base.files import write_atomically
 
     columns: dict[str, list[Any]] = {}
-    for file, curves in found.items():
+    for file, curves in result.items():
         rows, numbers = curves.table
         for name, column in {
             "model": np.full(len(rows["muscle"]), file),

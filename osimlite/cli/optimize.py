@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 from osimlite.cli import _options as options
 from osimlite.cli import _sweeping as sweeping
 from osimlite.cli._command import Option, command_with
-from osimlite.cli._console import Facts
+from osimlite.cli._console import FactTable
 
 if TYPE_CHECKING:
     from osimlite.studies.sweep.optimize import Optimum
 
 
-@command_with(options.simulating(*sweeping.PASSED, integration=True))
+@command_with(options.list_simulation_options(*sweeping.SWEEP_OPTIONS, integration=True))
 def optimize(
     source: options.Source,
     objective: Annotated[
@@ -138,7 +138,7 @@ def optimize(
         interpolation=interpolation,
         is_planted=planted,
         feet=tuple(foot) if foot else None,
-        controller=options.feedback(controller, par),
+        controller=options.read_feedback(controller, par),
         **chosen,
     )
     with progress_bar("searching", budget) as progress:
@@ -163,10 +163,10 @@ def optimize(
     _describe_optimum(objective, result).show()
 
 
-def _describe_optimum(objective: str, found: Optimum) -> Facts:
+def _describe_optimum(objective: str, found: Optimum) -> FactTable:
     from osimlite.studies.sweep.optimize import BEST, HISTORY, PAR, SUMMARY
 
-    facts = Facts(f"{objective} {found.value:.6g}")
+    facts = FactTable(f"{objective} {found.value:.6g}")
     for name, value in found.values.items():
         facts.add(name, f"{value:.6g}")
     facts.add("runs", f"{found.evaluations}, the best was number {found.evaluation}")

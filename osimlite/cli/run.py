@@ -173,10 +173,10 @@ def run(
         _write_report(kept, report, err=as_json)
         for setup, outcome in kept.items() if plot else ():
             _draw_outcome(Path(setup), outcome, output, err=as_json)
-    raise SystemExit(max(_codes(trials), default=0))
+    raise SystemExit(max(_list_exit_codes(trials), default=0))
 
 
-def _codes(trials: list[RunRecord]) -> list[int]:
+def _list_exit_codes(trials: list[RunRecord]) -> list[int]:
     from osimlite.tools.many import DONE, NO
 
     return [{DONE: 0, NO: 1}.get(trial.status, 2) for trial in trials]
@@ -211,7 +211,7 @@ def _run_alone(
     except FaultySetup as fault:
         _show_findings(Report(fault.report.errors, fault.report.texts))
         raise
-    _show(setup, outcome)
+    _print_outcome(setup, outcome)
     return outcome
 
 
@@ -258,11 +258,11 @@ def _show_findings(report: Report) -> None:
     show(render(report, "concise", colour=wants_colour()), err=True)
 
 
-def _show(setup: Path, outcome: Outcome) -> None:
+def _print_outcome(setup: Path, outcome: Outcome) -> None:
     from osimlite.base.text import format_count
-    from osimlite.cli._console import Facts
+    from osimlite.cli._console import FactTable
 
-    facts = Facts(str(setup), outcome.told)
+    facts = FactTable(str(setup), outcome.told)
     unsaid = [finding for finding in outcome.warnings if finding.suggestion is None]
     for finding in unsaid[:MOST_WARNINGS]:
         facts.add("check", str(finding))
@@ -280,17 +280,20 @@ def _show_trials(trials: list[RunRecord]) -> None:
     from collections import Counter
 
     from osimlite.base.text import format_count
-    from osimlite.cli._console import add_row, plain_console, plain_table, show
+    from osimlite.cli._console import add_row, create_console, create_table, show
     from osimlite.tools.many import STATUSES
 
     shown = trials
     if len(trials) > MOST_ROWS:
         worst = sorted(
             trials,
-            key=lambda trial: (_codes([trial])[0], trial.summary.get("rms_marker_error", 0.0)),
+            key=lambda trial: (
+                _list_exit_codes([trial])[0],
+                trial.summary.get("rms_marker_error", 0.0),
+            ),
         )
         shown = worst[-MOST_ROWS:][::-1]
-    table = plain_table()
+    table = create_table()
     for column in ("setup", "", "s", ""):
         table.add_column(column, overflow="fold", justify="right" if column == "s" else "left")
     for trial in shown:
@@ -310,7 +313,7 @@ def _show_trials(trials: list[RunRecord]) -> None:
             seconds,
             words,
         )
-    plain_console().print(table)
+    create_console().print(table)
     counts = Counter(trial.status for trial in trials)
     told = ", ".join(f"{counts[status]} {status}" for status in STATUSES if counts[status])
     if warned := sum(1 for trial in trials if trial.warnings):

@@ -1,4 +1,4 @@
-"""``osimlite scale``: a generic model made as large and as heavy as a subject."""
+"""``osimlite scale``: scale a generic model to the size and mass of a subject."""
 
 from __future__ import annotations
 
@@ -65,15 +65,15 @@ def scale(
 
     measurements = {
         body: (
-            [_pair(pair, body) for pair in pairs.split(",")],
-            {body.partition(".")[0]: _axes(body)},
+            [_parse_pair(pair, body) for pair in pairs.split(",")],
+            {body.partition(".")[0]: _parse_axes(body)},
         )
         for body, pairs in options.parse_named_words(
             distance, "--distance", "BODY=MARKER:MARKER"
         ).items()
     }
     factors = {
-        body: _factors(text, body)
+        body: _parse_factors(text, body)
         for body, text in options.parse_named_words(factor, "--factor").items()
     }
     if not (measurements or factors or place or mass > 0.0):
@@ -104,7 +104,7 @@ def scale(
     say(f"wrote {path}")
 
 
-def _pair(text: str, body: str) -> tuple[str, str]:
+def _parse_pair(text: str, body: str) -> tuple[str, str]:
     from osimlite.errors import SettingError
 
     one, _, two = text.partition(":")
@@ -115,11 +115,11 @@ def _pair(text: str, body: str) -> tuple[str, str]:
     return one.strip(), two.strip()
 
 
-def _axes(body: str) -> str:
+def _parse_axes(body: str) -> str:
     return body.partition(".")[2] or "XYZ"
 
 
-def _factors(text: str, body: str) -> tuple[float, ...]:
+def _parse_factors(text: str, body: str) -> tuple[float, ...]:
     from osimlite.errors import SettingError
 
     try:

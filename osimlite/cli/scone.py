@@ -1,4 +1,4 @@
-"""``osimlite scone``: scenarios of SCONE."""
+"""``osimlite scone``: simulate or optimize a scenario of SCONE."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ UNITS = {
 """Units of the quantities that measures report."""
 
 LABELS = {"transport": "cost of transport"}
-"""Words for people, where they differ from those of the measures."""
+"""Display names of quantities, where they differ from those of the measures."""
 
 
 @command
@@ -84,7 +84,7 @@ def scone(
     Example: osimlite scone human-walks -o walk
     """
     from osimlite.base.files import make_folder
-    from osimlite.cli._console import Facts, show
+    from osimlite.cli._console import FactTable, show
     from osimlite.errors import SettingError
     from osimlite.io.tables.storage import write_sto
     from osimlite.models.walking import SCENARIO, write_scenario
@@ -124,7 +124,7 @@ def scone(
     ):
         files.append(output / f"{name}.sto")
         write_sto(files[-1], name, table.times, table.columns, table.rows)
-    facts = Facts(f"{given.model.name} {walked.times[0]:.3f} s")
+    facts = FactTable(f"{given.model.name} {walked.times[0]:.3f} s")
     facts.add("result", f"{walked.results[0]:.6g}")
     for name, term in walked.terms.items():
         facts.add(name, f"{term[0]:.6g}")

@@ -1,4 +1,4 @@
-"""``osimlite simulate``: a model in motion."""
+"""``osimlite simulate``: simulate a model forward in time."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from osimlite.cli import _options as options
 from osimlite.cli._command import Option, command_with
-from osimlite.cli._console import Facts, complain
+from osimlite.cli._console import FactTable, complain
 from osimlite.cli._progress import motion_bar, progress_bar
 
 if TYPE_CHECKING:
     from osimlite.simulation.trajectory import Trajectory
 
-LIVE_STEP = 1e-3
-"""Step of what the window shows if none is given, s."""
+LIVE_STEP_S = 1e-3
+"""Default fixed step of a simulation in PyBullet's window, s."""
 
 
-@command_with(options.simulating())
+@command_with(options.list_simulation_options())
 def simulate(
     file: options.File,
     to: options.To = 2.0,
@@ -68,10 +68,10 @@ def simulate(
         require("matplotlib", extra="plot", purpose="drawing")
     if animate:
         require("PIL", extra="view", purpose="an animation")
-    results, before = options.results_folder(file, output), chosen["resume"]
+    results, before = options.choose_output_folder(file, output), chosen["resume"]
     if before is not None and results.resolve() == Path(before).resolve():
         raise SettingError(f"'{results}' has the earlier simulation; name another folder with -o")
-    model, feedback = read(file), options.feedback(controller, par)
+    model, feedback = read(file), options.read_feedback(controller, par)
     if controls:
         from osimlite.simulation.run_controls import parse_controls
     from osimlite.simulation.run import Simulation
@@ -85,13 +85,15 @@ def simulate(
         **chosen,
     ) as simulation:
         initial = {} if states is None else simulation.read_state(states)
-        initial |= options.quantities(start, simulation.mechanism, "--set", simulation.state.paths)
-        speeds = options.quantities(start_speed, simulation.mechanism, "--set-speed")
+        initial |= options.parse_quantities(
+            start, simulation.mechanism, "--set", simulation.state.paths
+        )
+        speeds = options.parse_quantities(start_speed, simulation.mechanism, "--set-speed")
         try:
             with motion_bar("simulating", to) as progress:
                 trajectory = simulation.run(
                     to,
-                    fixed_step=LIVE_STEP
+                    fixed_step=LIVE_STEP_S
                     if gui and chosen["fixed_step"] is None
                     else chosen["fixed_step"],
                     initial=initial,
@@ -106,11 +108,11 @@ def simulate(
                 raise
             is_failure = isinstance(stopped, SimulationError)
             how = "stopped" if is_failure else "interrupted"
-            # After many steps, it takes a while to work out what is written.
+            # Print this first: preparing the files takes a while after many steps.
             complain(
                 f"{how} at {trajectory.times[-1]:.6g} s of {to:g} s; the motion up to there is saved in '{results}'"
             )
-            _describe_run(trajectory, write_files(trajectory, results)).show()
+            _describe_run(trajectory, write_results(trajectory, results)).show()
             if is_failure:
                 raise
             raise SystemExit(130) from None
@@ -118,7 +120,7 @@ def simulate(
         def film(path: Path) -> Path:
             from osimlite.view.animation import animate as draw
 
-            folders = options.mesh_folders(file, None)
+            folders = options.list_mesh_folders(file, None)
             with progress_bar("drawing", None) as bar:
                 wrapping = chosen["wrapping"]
                 return draw(
@@ -131,25 +133,25 @@ def simulate(
                     progress=bar,
                 )
 
-        files = write_files(trajectory, results, plot=plot, film=film if animate else None)
+        files = write_results(trajectory, results, plot=plot, film=film if animate else None)
         _describe_run(trajectory, files).show()
         simulation.hold()
 
 
 ENGINE_NAMES = {"bullet": "PyBullet"}
-"""Names of engines for people, where they differ from those of the option."""
+"""Display names of engines, where they differ from the option's value."""
 
 MAX_PAGES = 1000
-"""More pages than plots of a simulation can have."""
+"""Largest number of pages of a plot that is looked for."""
 
 INTEGRATOR_NAMES = {
     "RungeKuttaMerson": "Runge-Kutta-Merson",
     "SemiImplicitEuler": "semi-implicit Euler",
     "SemiExplicitEuler2": "semi-explicit Euler 2",
 }
-"""Names of integrators for people, where they differ from those in ``summary.json``."""
+"""Display names of integrators, where they differ from those in ``summary.json``."""
 
-SOME = {
+OPTIONAL_FILES = {
     *("probes.sto", "controller.sto", "animation.gif"),
     *(
         "coordinates.png",
@@ -160,13 +162,13 @@ SOME = {
         "energy.png",
     ),
 }
-"""What not every simulation writes: --plot and --animate draw pictures."""
+"""Files that only some simulations write."""
 
 
 def _list_earlier(folder: Path) -> set[str]:
     """Return the names of files that an earlier simulation may have left, with further pages."""
-    names = set(SOME)
-    for picture in (Path(name) for name in SOME if name.endswith(".png")):
+    names = set(OPTIONAL_FILES)
+    for picture in (Path(name) for name in OPTIONAL_FILES if name.endswith(".png")):
         for page in range(2, MAX_PAGES):
             name = f"{picture.stem}-{page}.png"
             if not (folder / name).is_file():
@@ -175,14 +177,29 @@ def _list_earlier(folder: Path) -> set[str]:
     return names
 
 
-def write_files(
+def write_results(
     trajectory: Trajectory,
     folder: Path,
     *,
     plot: bool = False,
     film: Callable[[Path], Path] | None = None,
 ) -> list[Path]:
-    """Write everything beside its place first, so that a failure leaves nothing behind."""
+    """Write all results of a simulation, and return their paths.
+
+    They are written into a temporary folder first, so that a failure leaves no partial results.
+
+    Args:
+        trajectory: the motion.
+        folder: output folder.
+        plot: draw plots.
+        film: draws an animation into a file.
+
+    Returns:
+        Paths of the files in `folder`.
+
+    Raises:
+        OsimliteError: the folder cannot be written.
+    """
     import shutil
     import tempfile
 
@@ -192,36 +209,36 @@ def write_files(
     is_new = not folder.exists()
     make_folder(folder)
     try:
-        beside = Path(tempfile.mkdtemp(prefix=".osimlite-", dir=folder))
+        temporary = Path(tempfile.mkdtemp(prefix=".osimlite-", dir=folder))
     except OSError as error:
         raise OsimliteError(f"cannot write here: {error.strerror}", file=str(folder)) from None
     try:
-        written = trajectory.write(beside)
+        written = trajectory.write(temporary)
         if plot:
             from osimlite.view.plots import plot_simulation
 
-            written += plot_simulation(trajectory, beside)
+            written += plot_simulation(trajectory, temporary)
         if film is not None:
-            written.append(film(beside / "animation.gif"))
+            written.append(film(temporary / "animation.gif"))
         for path in written:
             replace_with(path, folder / path.name)
-        # Files of an earlier simulation would be taken for those of this one.
+        # Files of an earlier simulation would be mistaken for results of this one.
         for name in _list_earlier(folder) - {path.name for path in written}:
             (folder / name).unlink(missing_ok=True)
     except BaseException as error:
-        shutil.rmtree(folder if is_new else beside, ignore_errors=True)
+        shutil.rmtree(folder if is_new else temporary, ignore_errors=True)
         if isinstance(error, OSError):
             raise OsimliteError(f"cannot write here: {error.strerror}", file=str(folder)) from None
         raise
-    beside.rmdir()
+    temporary.rmdir()
     return [folder / path.name for path in written]
 
 
-def _describe_run(trajectory: Trajectory, files: Sequence[Path]) -> Facts:
+def _describe_run(trajectory: Trajectory, files: Sequence[Path]) -> FactTable:
     from osimlite.simulation.elements import summarize_skipped
 
     summary = trajectory.summary
-    facts = Facts(f"{summary['model']}, {trajectory.times[-1]:g} s")
+    facts = FactTable(f"{summary['model']}, {trajectory.times[-1]:g} s")
     facts.add("engine", ENGINE_NAMES.get(summary["engine"], summary["engine"]))
     facts.add("integrator", INTEGRATOR_NAMES.get(summary["integrator"], summary["integrator"]))
     rejected = summary["attempted_steps"] - summary["steps"]
@@ -244,7 +261,7 @@ def _describe_run(trajectory: Trajectory, files: Sequence[Path]) -> Facts:
             for event in summary["contact_events"]
             if event["contact"] == name
         ]
-        # The unit follows the last time.
+        # The unit is printed once, after the last time.
         shown = (
             " ".join(times[:6]) + " s" + (f" and {len(times) - 6} more" if len(times) > 6 else "")
         )

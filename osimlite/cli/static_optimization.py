@@ -1,4 +1,4 @@
-"""``osimlite static-optimization``: the muscle forces that a recorded motion takes."""
+"""``osimlite static-optimization``: compute the muscle forces of a recorded motion."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from osimlite.cli import _options as options
 from osimlite.cli._command import Option, command_with
 
 
-@command_with(options.simulating("wrapping", "external_loads", "opensim_derivatives"))
+@command_with(options.list_simulation_options("wrapping", "external_loads", "opensim_derivatives"))
 def static_optimization(
     file: options.File,
     motion: options.Motion,
@@ -58,13 +58,13 @@ def static_optimization(
         --forces reserves.xml
     """
     from osimlite.cli._console import complain
-    from osimlite.cli._recorded import draw_tables, require_plots, say_motion
+    from osimlite.cli._recorded import draw_tables, require_plots, print_motion_summary
     from osimlite.io.document.reader import read
     from osimlite.simulation.muscle_forces import static_optimization as shared_forces
 
     require_plots(plot=plot)
     model = read(file)
-    found = shared_forces(
+    result = shared_forces(
         model,
         motion,
         applied_to=options.parse_applied_loads(applied),
@@ -78,16 +78,16 @@ def static_optimization(
         folder=file.parent,
         **chosen,
     )
-    assert found.motion is not None
-    folder = options.results_folder(file, output)
-    files = found.write(folder)
-    say_motion(found.motion, files)
+    assert result.motion is not None
+    folder = options.choose_output_folder(file, output)
+    files = result.write(folder)
+    print_motion_summary(result.motion, files)
     if plot:
         from osimlite.simulation.inverse_dynamics import add_forces
 
         add_forces(model, forces or (), replace=replace)
-        tables = {files[0].name: found, files[1].name: found.forces or found}
-        draw_tables(tables, folder, model, found.motion.mechanism, chosen.get("external_loads"))
-    if said := found.describe_unsolved():
-        complain(said)
+        tables = {files[0].name: result, files[1].name: result.forces or result}
+        draw_tables(tables, folder, model, result.motion.mechanism, chosen.get("external_loads"))
+    if message := result.describe_unsolved():
+        complain(message)
         raise SystemExit(1)

@@ -1,4 +1,4 @@
-"""``osimlite sweep``: one model, many starts and numbers."""
+"""``osimlite sweep``: simulate a model with many initial states or parameters."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 from osimlite.cli import _options as options
 from osimlite.cli import _sweeping as sweeping
 from osimlite.cli._command import Option, command_with
-from osimlite.cli._console import Facts, complain, say
+from osimlite.cli._console import FactTable, complain, say
 
 if TYPE_CHECKING:
     from osimlite.studies.sweep.plan import Plan
     from osimlite.studies.sweep.run import Outcome
 
 
-@command_with(options.simulating(*sweeping.PASSED, integration=True))
+@command_with(options.list_simulation_options(*sweeping.SWEEP_OPTIONS, integration=True))
 def sweep(
     source: options.Source,
     vary: sweeping.Vary = None,
@@ -104,7 +104,7 @@ def sweep(
         interpolation=interpolation,
         is_planted=planted,
         feet=tuple(foot) if foot else None,
-        controller=options.feedback(controller, par),
+        controller=options.read_feedback(controller, par),
         **chosen,
     )
     points = choose(plan.variables, sampler, samples, seed)
@@ -136,15 +136,15 @@ def sweep(
         raise SystemExit(1)
 
 
-def _describe_sweep(plan: Plan, outcome: Outcome) -> Facts:
+def _describe_sweep(plan: Plan, outcome: Outcome) -> FactTable:
     from osimlite.base.text import format_count
     from osimlite.studies.sweep.measures import measure_name
     from osimlite.studies.sweep.results import compute_ranges
 
-    facts = Facts(format_count(outcome.count, "run"))
+    facts = FactTable(format_count(outcome.count, "run"))
     new = sum(outcome.status.values())
     if outcome.before:
-        facts.add("there before", str(outcome.before))
+        facts.add("done before", str(outcome.before))
     if new:
         facts.add(
             "time taken", f"{outcome.seconds:.3g} s, {new / outcome.seconds:.4g} runs per second"
@@ -152,10 +152,10 @@ def _describe_sweep(plan: Plan, outcome: Outcome) -> Facts:
         facts.add(
             "ended", ", ".join(f"{count} {word}" for word, count in outcome.status.most_common())
         )
-    told = outcome.reasons.most_common(3)
-    for reason, count in told:
+    reasons = outcome.reasons.most_common(3)
+    for reason, count in reasons:
         facts.add("failed", f"{format_count(count, 'run')}: {reason}")
-    if others := outcome.status["failed"] - sum(count for _, count in told):
+    if others := outcome.status["failed"] - sum(count for _, count in reasons):
         facts.add(
             "failed",
             f"{format_count(others, 'run')} for other reasons; the column 'reason' has them all",

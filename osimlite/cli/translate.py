@@ -1,4 +1,4 @@
-"""``osimlite translate``: a model as a file of another program."""
+"""``osimlite translate``: convert a model to the format of another program."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from osimlite.base.text import join_words
 from osimlite.cli import _options as options
 from osimlite.cli._command import Option, command_with
-from osimlite.cli._console import add_row, plain_console, plain_table, say
+from osimlite.cli._console import add_row, create_console, create_table, say
 from osimlite.translate.exporters import list_exporters
 from osimlite.translate.importers import OSIM, find_format, list_importers
 
@@ -23,7 +23,7 @@ WRITTEN = "the file that is written"
 """Value of --check without a file."""
 
 
-def _choices() -> Iterator[OptionSpec]:
+def _list_format_options() -> Iterator[OptionSpec]:
     for each in (*list_exporters("translate").values(), *_list_model_importers()):
         yield from each.choices
 
@@ -39,7 +39,7 @@ def _describe_formats() -> str:
     return "The format: " + "; ".join([*words, f"'{OSIM}' converts a file of {titles} to OpenSim"])
 
 
-@command_with(_choices)
+@command_with(_list_format_options)
 def translate(
     file: options.File,
     to: Annotated[str, Option("--to", metavar="FORMAT", help=f"{_describe_formats()}.")] = "urdf",
@@ -71,7 +71,7 @@ def translate(
     from osimlite.io.document.reader import read
 
     if check is not None and str(check) != WRITTEN:
-        from osimlite.cli._checking_mjcf import check as check_mjcf
+        from osimlite.cli._checking_mjcf import print_mjcf_check as check_mjcf
 
         check_mjcf(file, check, output)
         return
@@ -108,13 +108,13 @@ def translate(
             read(file),
             folder=file.parent,
             name=file.stem,
-            geometry=options.mesh_folders(file, geometry),
+            geometry=options.list_mesh_folders(file, geometry),
             **given,
         )
-    written = made.write(options.results_folder(file, output))
+    written = made.write(options.choose_output_folder(file, output))
 
     if len(made.fidelity):
-        plain_console().print(tabulate(made.fidelity, to.upper()))
+        create_console().print(tabulate(made.fidelity, to.upper()))
     same, otherwise, lost = made.fidelity.counts()
     say(f"components: {same} exact, {otherwise} approximated or converted, {lost} left out")
     robot = getattr(made, "robot", None)
@@ -127,9 +127,9 @@ def translate(
     if getattr(made, "start_note", ""):
         say(made.start_note)
     if check is not None:
-        from osimlite.cli._checking_mjcf import check as check_mjcf
+        from osimlite.cli._checking_mjcf import print_mjcf_check as check_mjcf
 
-        check_mjcf(file, written[0], options.results_folder(file, output))
+        check_mjcf(file, written[0], options.choose_output_folder(file, output))
 
 
 def _find_importer(file: Path) -> Importer:
@@ -149,8 +149,17 @@ def _find_importer(file: Path) -> Importer:
 
 
 def tabulate(fidelity: Fidelity, target: str) -> Any:
-    """Return a table of what is lost, with one row for components that have the same record."""
-    table = plain_table(f"Lost or approximated in {target}: {fidelity.model}", padding=(0, 2, 1, 0))
+    """Return a table of what the translation lost or approximated.
+
+    Components with equal records share a row.
+
+    Args:
+        fidelity: records of the translation.
+        target: name of the format.
+    """
+    table = create_table(
+        f"Lost or approximated in {target}: {fidelity.model}", padding=(0, 2, 1, 0)
+    )
     table.add_column("what", overflow="fold", ratio=4)
     table.add_column("translation", overflow="fold", ratio=3)
     table.add_column("components", overflow="fold", ratio=3)
@@ -158,7 +167,7 @@ def tabulate(fidelity: Fidelity, target: str) -> Any:
     if measured:
         table.add_column("worst error", overflow="fold", ratio=2)
     for group in fidelity.groups():
-        # Nobody knows a path but by the name of its muscle.
+        # Users know a path by the name of its muscle.
         owners = (component.removesuffix("/path") for component in group.components)
         names = dict.fromkeys(owner.rsplit("/", 1)[1] or "the model" for owner in owners)
         worst = [f"{name} {error.max:.2g} {error.unit}" for name, error in group.worst()]

@@ -1,4 +1,4 @@
-"""``osimlite upgrade``: an old file in the current format."""
+"""``osimlite upgrade``: convert an old file to the current format."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 from osimlite.base.text import format_count
 from osimlite.cli import _options as options
 from osimlite.cli._command import Argument, Option, command
-from osimlite.cli._console import add_row, plain_console, plain_table, say
+from osimlite.cli._console import add_row, create_console, create_table, say
 
 if TYPE_CHECKING:
     from osimlite.io.document.reader import Document
@@ -47,8 +47,8 @@ def upgrade(
     from osimlite.schema.model import CURRENT_VERSION
 
     style = options.check_number_format(numbers)
-    require_stated_version(Source.of_file(file))
-    document = read_document(Source.of_file(file), of=Object)
+    require_stated_version(Source.from_file(file))
+    document = read_document(Source.from_file(file), of=Object)
     is_repaired = document.fault is not None
     if document.version >= CURRENT_VERSION and output is None and not is_repaired:
         say(f"{file}: already version {document.version}, nothing to do")
@@ -59,27 +59,27 @@ def upgrade(
             f"'{target}' exists already; name the file to write with -o", file=str(file)
         )
     write(document.top, target, numbers=style)
-    _report(document)
+    _print_changes(document)
     say(
         f"{target}: version {document.version} to {CURRENT_VERSION}, {format_count(len(document.changes), 'change')}"
     )
 
 
-def _report(document: Document) -> None:
-    """Print what was done, one line for each step, then every loss."""
+def _print_changes(document: Document) -> None:
+    """Print a table of changes, then notes of the reader, then what was lost."""
     steps: dict[str, list[Change]] = {}
     done = document.changes
     for change in done:
         steps.setdefault(change.what, []).append(change)
     if steps:
-        table = plain_table()
+        table = create_table()
         table.add_column("What changed")
         table.add_column("Places", justify="right")
         table.add_column("First line", justify="right")
         for what, changes in sorted(steps.items(), key=lambda item: item[1][0].below):
-            line = document.source.of_tag(changes[0].number).line
+            line = document.source.locate_tag(changes[0].number).line
             add_row(table, what, str(len(changes)), str(line))
-        plain_console().print(table)
+        create_console().print(table)
     for note in document.notes:
         if note.line is not None:
             meant = (
@@ -89,13 +89,15 @@ def _report(document: Document) -> None:
                 if note.value == note.word
                 else f"as '{note.value}'"
             )
-            fate = f"; {note.value}" if note.kind == "overlooked" else f" and was read {meant}"
-            say(f"line {note.line}: '{note.word}' is not XML{fate}")
+            consequence = (
+                f"; {note.value}" if note.kind == "overlooked" else f" and was read {meant}"
+            )
+            say(f"line {note.line}: '{note.word}' is not XML{consequence}")
     lost: dict[str, list[Change]] = {}
     for change in done:
         if change.lost is not None:
             lost.setdefault(change.lost, []).append(change)
     for what, changes in lost.items():
-        first = document.source.of_tag(changes[0].number).line
+        first = document.source.locate_tag(changes[0].number).line
         more = f" and {format_count(len(changes) - 1, 'more place')}" if len(changes) > 1 else ""
         say(f"lost: {what} (line {first}, {changes[0].where}{more})")

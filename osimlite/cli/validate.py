@@ -1,4 +1,4 @@
-"""``osimlite validate``: say what is wrong with model files."""
+"""``osimlite validate``: report errors in models, setups and tables."""
 
 from __future__ import annotations
 
@@ -82,8 +82,8 @@ def validate(
 
     Example: osimlite validate walker.osim --format concise
     """
-    # All of it goes on under the same names.
-    given = locals()
-    from osimlite.cli._validating import run
+    # Pass all options on under the same names.
+    options_by_name = locals()
+    from osimlite.cli._validating import validate_paths
 
-    raise SystemExit(run(**given))
+    raise SystemExit(validate_paths(**options_by_name))

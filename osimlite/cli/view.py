@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def _choices() -> Iterator[OptionSpec]:
-    yield from options.simulating("wrapping")()
+    yield from options.list_simulation_options("wrapping")()
     for name, exporter in list_exporters("view").items():
         yield OptionSpec(name, Path | None, exporter.help, unit="FILE")
         yield from exporter.choices
@@ -64,8 +64,8 @@ def view(
     from osimlite.view.shown import Shown
 
     model, mechanism, left_out = build_showable(read(file))
-    given: Mapping[str, float] = options.quantities(values, mechanism, "--set")
-    folders = options.mesh_folders(file, geometry)
+    given: Mapping[str, float] = options.parse_quantities(values, mechanism, "--set")
+    folders = options.list_mesh_folders(file, geometry)
     shown = Shown.of(
         model,
         mechanism,

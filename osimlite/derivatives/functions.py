@@ -20,7 +20,7 @@ from osimlite.mechanics.kernels.layout import CONSTRAINED, MODEL, STAGE
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.mechanics.multibody.mechanism import GROUND, Mechanism
 from osimlite.mechanics.multibody.spatial import Array
-from osimlite.schema.model import Model, expect_model
+from osimlite.schema.model import Model, check_is_model
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.probe_type import DeclaredProbe
 from osimlite.simulation.pack import PackedModel, pack
@@ -53,7 +53,7 @@ def casadi(
         UnsupportedError: a part of the model has no formula, or a number cannot stay a symbol; the
             message names it.
     """
-    expect_model(model)
+    check_is_model(model)
     return CasadiModel(model, tuple(parameters), Path(folder or "."))
 
 

@@ -24,7 +24,7 @@ from osimlite.derivatives.tangents import TangentModel, TangentSteps, tangents
 from osimlite.errors import SettingError, SimulationError
 from osimlite.io.tables.tabular import Tabular
 from osimlite.mechanics.multibody.spatial import Array
-from osimlite.schema.model import Model, expect_model
+from osimlite.schema.model import Model, check_is_model
 from osimlite.simulation.engines.protocol import Settings
 from osimlite.simulation.initial_state import resolve_initial_values
 from osimlite.simulation.options import RUN_OPTIONS
@@ -134,7 +134,7 @@ def sensitivity(
 
     Other errors are those of :func:`osimlite.tangents` and :func:`osimlite.simulate`.
     """
-    expect_model(model)
+    check_is_model(model)
     for name in choices:
         if name not in OPTIONS:
             raise SettingError(

@@ -25,7 +25,7 @@ from osimlite.mechanics.kernels.layout import (
     WORK,
 )
 from osimlite.mechanics.multibody.spatial import Array
-from osimlite.schema.model import Model, expect_model
+from osimlite.schema.model import Model, check_is_model
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.controls import Controls
 from osimlite.simulation.elements.laws import DIRECTIONS
@@ -52,7 +52,7 @@ def tangents(
         UnsupportedError: a force is computed in Python, or a number cannot be a parameter; the
             message names it.
     """
-    expect_model(model)
+    check_is_model(model)
     return TangentModel(model, tuple(parameters), Path(folder or "."))
 
 

@@ -13,7 +13,7 @@ from osimlite.base.records import dataclass
 from osimlite.errors import DocumentError
 from osimlite.fitting.measurements import Measurements
 from osimlite.io.tables.c3d import ENDING, read_c3d_markers
-from osimlite.io.tables.headers import METRES, MarkerHeader
+from osimlite.io.tables.headers import METRES_PER_UNIT, MarkerHeader
 from osimlite.io.tables.storage import read_sto
 from osimlite.mechanics.multibody.spatial import Array
 
@@ -86,9 +86,11 @@ def read_trc(path: str | Path) -> MarkerData:
             file=file,
         )
     unit = header.entries["Units"].value.text if "Units" in header.entries else ""
-    if unit not in METRES:
+    if unit not in METRES_PER_UNIT:
         raise DocumentError(
-            f"the markers are in '{unit}'; Units is one of {', '.join(METRES)}", file=file, line=3
+            f"the markers are in '{unit}'; Units is one of {', '.join(METRES_PER_UNIT)}",
+            file=file,
+            line=3,
         )
     width = 2 + 3 * len(names)
     rows = []
@@ -112,7 +114,7 @@ def read_trc(path: str | Path) -> MarkerData:
         rows[-1] += [np.nan] * (width - len(rows[-1]))
     table = np.array(rows, dtype=float).reshape(-1, width)
     return MarkerData(
-        names, table[:, 1], METRES[unit] * table[:, 2:].reshape(-1, len(names), 3), file
+        names, table[:, 1], METRES_PER_UNIT[unit] * table[:, 2:].reshape(-1, len(names), 3), file
     )
 
 
@@ -147,7 +149,7 @@ def read_sto_markers(path: str | Path) -> MarkerData:
             f"{', '.join(ends)}",
             file=str(path),
         )
-    unit = METRES.get(table.header.get("Units", "m"), 1.0)
+    unit = METRES_PER_UNIT.get(table.header.get("Units", "m"), 1.0)
     return MarkerData(names, table.times, unit * table.rows.reshape(-1, len(names), 3), str(path))
 
 

@@ -82,7 +82,7 @@ def validate(
             return report
         with pause_collector():
             return check_source(
-                model if isinstance(model, Source) else Source.of_file(model), config
+                model if isinstance(model, Source) else Source.from_file(model), config
             )
 
 

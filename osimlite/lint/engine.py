@@ -48,7 +48,7 @@ def make_subject(source: Source, config: Config | None = None) -> CheckTarget:
 def load_subject(file: str, config: Config | None = None) -> CheckTarget:
     """Return the check target of a file, chosen by its name; MissingFileError if the file is missing."""
     try:
-        return make_subject(Source.of_file(file), config)
+        return make_subject(Source.from_file(file), config)
     except SpecialFileError as fault:
         return _make_document_subject(Survey(Source(b"", file), None, [fault]), config)
 

@@ -79,7 +79,7 @@ def remove_attribute(source: Source | None, number: int, name: str) -> Fix | Non
     """Return the fix that deletes an attribute."""
     if source is None:
         return None
-    result = source.attributes_of(number).get(name)
+    result = source.get_attributes(number).get(name)
     return Fix((Edit(result.before, result.end, ""),), True) if result else None
 
 

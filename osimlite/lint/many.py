@@ -92,7 +92,7 @@ class SourceTexts(dict[str, str]):
         from osimlite.io.document.source import Source
 
         try:
-            return Source.of_file(file).text
+            return Source.from_file(file).text
         except MissingFileError:
             return ""
 

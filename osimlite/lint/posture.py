@@ -17,7 +17,7 @@ from osimlite.schema.tree import is_a
 
 def find_angles(setup: Setup) -> set[str]:
     """Return the names of the coordinates of the model that are angles."""
-    joints: Any = [] if setup.tree is None else setup.tree.of_class("Joint").values()
+    joints: Any = [] if setup.tree is None else setup.tree.find_by_class("Joint").values()
     return {
         name
         for joint in joints

@@ -261,7 +261,7 @@ class Setup(Subject):
         """Return the names of all components of a class, in the model and in added sets."""
         if self.tree is None or self.tool is None:
             return set()
-        names = {item.name for item in self.tree.of_class(target).values()}
+        names = {item.name for item in self.tree.find_by_class(target).values()}
         return names | {
             item.name for _, added in self.added_sets for item in added.walk() if is_a(item, target)
         }
@@ -269,8 +269,8 @@ class Setup(Subject):
     def is_bound(self, name: str) -> bool:
         """Return whether a coordinate of the model is locked, prescribed, or determined by others."""
         assert self.tree is not None
-        bound: Any = self.tree.of_class("CoordinateCouplerConstraint").values()
-        item = self.tree.of_class("Coordinate").get(name)
+        bound: Any = self.tree.find_by_class("CoordinateCouplerConstraint").values()
+        item = self.tree.find_by_class("Coordinate").get(name)
         held = any(getattr(item, flag, False) for flag in ("locked", "prescribed"))
         return held or name in {str(coupler.dependent_coordinate_name) for coupler in bound}
 

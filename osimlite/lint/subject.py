@@ -89,7 +89,7 @@ class Subject(CheckTarget):
         assert self.source is not None and self.sure_until is not None
         return (
             note.number < len(self.source.spans)
-            and self.source.of_tag(note.number).line < self.sure_until
+            and self.source.locate_tag(note.number).line < self.sure_until
         )
 
     def is_for(self, rule: Rule) -> bool:
@@ -285,15 +285,15 @@ class Subject(CheckTarget):
             if tag is not None:
                 inner = self.source.child(number, tag)
                 if inner is None:
-                    return self.source.of_tag(number)
-                return self.source.of_text(inner, word, nth)
+                    return self.source.locate_tag(number)
+                return self.source.locate_text(inner, word, nth)
         if number >= len(self.source.spans):
             return None
         if attribute is not None:
-            return self.source.of_attribute(number, attribute)
+            return self.source.locate_attribute(number, attribute)
         if word is not None:
-            return self.source.of_text(number, word, nth)
-        return self.source.of_tag(number)
+            return self.source.locate_text(number, word, nth)
+        return self.source.locate_tag(number)
 
     def list_outside_paths(self) -> list[str] | None:
         """Return every path outside the text that findings may depend on; None if that is unknown."""
@@ -328,15 +328,17 @@ class Subject(CheckTarget):
             return True
         if item._index is None:
             return False
-        return "name" in self.source.attributes_of(item._index)
+        return "name" in self.source.get_attributes(item._index)
 
     def attribute_name(self, number: int, name: str) -> Position | None:
         """Return the position of the name of an attribute."""
         if self.source is None:
             return None
-        result = self.source.attributes_of(number).get(name)
+        result = self.source.get_attributes(number).get(name)
         return (
-            self.source.position(result.start, len(name)) if result else self.source.of_tag(number)
+            self.source.position(result.start, len(name))
+            if result
+            else self.source.locate_tag(number)
         )
 
     def _find_element(self, item: Object | None) -> int | None:

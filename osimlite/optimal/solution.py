@@ -132,7 +132,7 @@ def build_problem(
     if isinstance(study, MocoStudy):
         return Problem(study, folder=None if folder is None else Path(folder), scaled=scaled)
     with name_file_in_errors(study):
-        top: Any = read_document(Source.of_file(Path(study)), of=MocoStudy).top
+        top: Any = read_document(Source.from_file(Path(study)), of=MocoStudy).top
         return Problem(top, Path(study), scaled=scaled)
 
 

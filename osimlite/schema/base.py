@@ -1,4 +1,4 @@
-"""Object and Component: what every class of an OpenSim document has in common."""
+"""Object and Component, the base classes of everything in an OpenSim document."""
 
 from __future__ import annotations
 
@@ -39,7 +39,10 @@ from osimlite.schema.specs import (
 
 
 def are_equal(left: Any, right: Any) -> bool:
-    """Equality of stored values; NaN equals NaN, and a component given as a reference counts by its name."""
+    """Return whether two stored values are equal; NaN equals NaN.
+
+    A component that is given as a reference is compared by its name.
+    """
     if left is right:
         return True
     if isinstance(left, dict):
@@ -70,15 +73,18 @@ _SLOTS = ("_model", "_index", "_layout")
 T = TypeVar("T", bound="Object")
 
 
-def none() -> Any:
-    """The default of a property that holds a list of objects: none yet."""
+def make_empty_list() -> Any:
+    """Return the default of a property that holds a list of objects: an empty list."""
     return Field(default_factory=ObjectList)
 
 
-def made(cls: type[Object], **values: Any) -> Any:
-    """The default of a property that holds one object: a `cls` of its own with these values.
+def make_default(cls: type[Object], **values: Any) -> Any:
+    """Return the default of a property that holds one object.
 
-    A value that is a function is called for every new object, so that no two defaults share a part.
+    Args:
+        cls: class of the object.
+        values: its properties. A function is called for every new object, so that no two defaults
+            share a part.
     """
     return Field(
         default_factory=lambda: cls.build(
@@ -87,13 +93,13 @@ def made(cls: type[Object], **values: Any) -> Any:
     )
 
 
-# A docstring of its own would stand in the place of the property. Type checkers see the arguments
-# of constructors only if the very metaclass is decorated, not one that it derives from.
+# A docstring here would hide the property `__doc__`. Type checkers see the arguments of
+# constructors only if this metaclass itself is decorated, not one of its bases.
 @dataclass_transform(kw_only_default=True, field_specifiers=(Field,))
 class ObjectType(ModelMetaclass):  # noqa: D101
     @property
     def __doc__(cls) -> str | None:  # type: ignore[override]
-        """The docstring of a class, and what its properties are."""
+        """Docstring of a class, followed by descriptions of its properties."""
         own: str | None = cls.__dict__.get("__doc__")
         if not issubclass(cls, Object) or not own:
             return own
@@ -103,11 +109,11 @@ class ObjectType(ModelMetaclass):  # noqa: D101
 
 
 class Object(BaseModel, metaclass=ObjectType):
-    """Anything with a name and properties that an OpenSim document can hold.
+    """Named object with properties that an OpenSim document can hold.
 
     A subclass is declared with its properties in the order OpenSim prints them. ``tag`` gives the
     XML element when it is not the name of the class: ``class ContactParameters(Object,
-    tag="HuntCrossleyForce::ContactParameters")``; ``abstract=True`` marks classes that never stand
+    tag="HuntCrossleyForce::ContactParameters")``; ``abstract=True`` marks classes that never occur
     in a file.
     """
 
@@ -124,15 +130,15 @@ class Object(BaseModel, metaclass=ObjectType):
     tag: ClassVar[str] = ""
     abstract: ClassVar[bool] = True
     is_component: ClassVar[bool] = False
-    """Whether objects of the class have a place, and so a path, in the component tree."""
+    """Whether objects of the class have a path in the component tree."""
     is_root: ClassVar[bool] = False
-    """Whether they are the top of such a tree."""
+    """Whether objects of the class are the root of a component tree."""
     since: ClassVar[str] = ""
-    """The version of OpenSim that has the class first, where 4.6 has it not."""
+    """Version of OpenSim that introduced the class, for classes that 4.6 does not have."""
     facts: ClassVar[Facts] = Facts()
-    """What OpenSim does with objects of this class, besides what its base and its properties say."""
+    """Behaviour of OpenSim with objects of this class that bases and properties do not declare."""
     name_reference: ClassVar[Reference | None] = None
-    """The rule by which the object's own name names a component, for the few classes where it does."""
+    """Rule by which the object's own name refers to a component; None for most classes."""
 
     name: str = ""
 
@@ -144,16 +150,16 @@ class Object(BaseModel, metaclass=ObjectType):
     def __init__(self, *positional: Any, **properties: Any) -> None:
         if positional:
             raise ModelError(describe_unnamed_value(type(self), positional[0]))
-        for given in properties.keys() - type(self).model_fields.keys():
-            spec = get_field_specs(type(self)).get(given)
+        for unknown in properties.keys() - type(self).model_fields.keys():
+            spec = get_field_specs(type(self)).get(unknown)
             if spec is None or spec.name in properties:
-                raise MissingNameError(partial(describe_unknown_property, type(self), given))
-            properties[spec.name] = properties.pop(given)
+                raise MissingNameError(partial(describe_unknown_property, type(self), unknown))
+            properties[spec.name] = properties.pop(unknown)
         values = _check_values(type(self), properties)
         if values is not None:
-            made = self.build(values, set(properties))
-            _put_state(self, made.__dict__)
-            _put_present(self, made.model_fields_set)
+            built = self.build(values, set(properties))
+            _put_state(self, built.__dict__)
+            _put_present(self, built.model_fields_set)
             _put_extra(self, None)
             _put_private(self, None)
         else:
@@ -173,12 +179,19 @@ class Object(BaseModel, metaclass=ObjectType):
         index: int | None = None,
         home: Home | None = None,
     ) -> Self:
-        """Make an instance from values already of the stored form, without validation.
+        """Make an instance from values in their stored form, without validation.
 
-        `values` may leave out properties, `present` names those the text gave; the rest take their
-        defaults. This is the reader's way in, several times faster than ``cls(...)`` and tested to
-        be equal to it.
+        The reader uses this method. It is several times faster than ``cls(...)``, and a test compares
+        the results.
+
+        Args:
+            values: values by property; properties that are left out take their defaults.
+            present: properties that the text contains.
+            index: index of the object's element in its text.
+            home: model that the object will belong to.
         """
+        # Default objects and lists are made on first access (see `__getattr__`), because most are never
+        # used.
         # Default objects and lists are made when someone asks for them, see `__getattr__`: most are
         # never asked for.
         state = get_defaults(cls)[0].copy()
@@ -195,30 +208,39 @@ class Object(BaseModel, metaclass=ObjectType):
 
     @classmethod
     def model_construct(cls, _fields_set: set[str] | None = None, **values: Any) -> Self:
-        """Pydantic's way to make an instance without validation; here it is `build`."""
+        """Make an instance without validation; pydantic's name for :meth:`build`.
+
+        Args:
+            _fields_set: properties that count as set; all of `values` by default.
+            values: values by property.
+        """
         return cls.build(values, set(values) if _fields_set is None else _fields_set)
 
     @classmethod
     def field_specs(cls) -> dict[str, FieldSpec]:
-        """The properties by XML tag, in the order OpenSim prints them."""
+        """Return the properties of the class in the order OpenSim prints them.
+
+        Returns:
+            Properties by XML tag.
+        """
         return get_field_specs(cls)
 
     @property
     def source_index(self) -> Any:
-        """Index of the element that this object was read from among all elements of its text; None without a text."""
+        """Index of the object's element among all elements of its text; None without a text."""
         return self._index
 
     @property
     def layout(self) -> Layout | None:
-        """What the file said about this object beyond its properties."""
+        """Comments, unknown elements and other content of the file that properties do not hold."""
         return cast("Layout | None", self._layout)
 
-    def objects_held(self) -> list[tuple[FieldSpec, Object]]:
-        """Every object this one owns, with the property that holds it, in printing order."""
+    def list_owned_objects(self) -> list[tuple[FieldSpec, Object]]:
+        """Return every object that this one owns, with the property that holds it, in printing order."""
         held: list[tuple[FieldSpec, Object]] = []
         state = self.__dict__
         for spec, name, is_list, _ in list_holding_properties(type(self)):
-            # A list that no one has asked for is empty.
+            # A list that was never accessed is empty; do not create it.
             value: Any = state[name] if name in state else () if is_list else getattr(self, name)
             if is_list or isinstance(value, list):
                 held += [(spec, item) for item in value]
@@ -226,8 +248,8 @@ class Object(BaseModel, metaclass=ObjectType):
                 held.append((spec, value))
         return held
 
-    def contradictions(self) -> Iterable[Contradiction]:
-        """What OpenSim refuses of properties that each have a sound value."""
+    def find_contradictions(self) -> Iterable[Contradiction]:
+        """Yield combinations of property values that OpenSim rejects although each value is valid."""
         return ()
 
     def walk(self) -> Iterator[Object]:
@@ -237,19 +259,19 @@ class Object(BaseModel, metaclass=ObjectType):
             item = pending.pop()
             yield item
             if list_holding_properties(type(item)):
-                pending += [held for _, held in item.objects_held()][::-1]
+                pending += [held for _, held in item.list_owned_objects()][::-1]
 
     def copy_deep(self) -> Self:
-        """A copy that shares nothing with the original."""
+        """Return a copy that shares nothing with the original."""
         return copy.deepcopy(self)
 
     def __getattr__(self, name: str) -> Any:
         if not name.startswith("_"):
             factory = get_defaults(type(self))[1].get(name)
             if factory is not None:
-                made = self.__dict__[name] = factory()
-                _adopt(made, self._model)
-                return made
+                default = self.__dict__[name] = factory()
+                _assign_owner(default, self._model)
+                return default
             spec = get_field_specs(type(self)).get(name)
             if spec is not None:
                 return getattr(self, spec.name)
@@ -274,14 +296,14 @@ class Object(BaseModel, metaclass=ObjectType):
             raise ModelError(describe_validation_error(type(self), error)) from None
 
     def assign(self, name: str, value: Any) -> None:
-        """Set a property to a value that is already of the stored form, without validation.
+        """Set a property to a value in its stored form, without validation.
 
         Pydantic compiles the validation of a class when a property is set for the first time, which
         takes milliseconds.
 
         Args:
-            name: of the property in Python.
-            value: of the stored form, not an object.
+            name: name of the property in Python.
+            value: the value; not an object.
         """
         note_change(self._model, numbers_only=name in get_numeric_names(type(self)))
         self.__dict__[name] = value
@@ -309,10 +331,12 @@ class Object(BaseModel, metaclass=ObjectType):
         outermost = _NAMING not in memo
         naming: list[tuple[dict[str, Any], str]] = memo.setdefault(_NAMING, [])
         home = Home() if outermost and self.is_root else None
-        clone = _clone(self, memo, naming, home)
+        clone = _copy_object(self, memo, naming, home)
         if home is not None:
             home.model = cast("Model", clone)
         if outermost:
+            # References to components outside of the copied object keep pointing to the originals; those
+            # inside point to the copies.
             # Components that are only named, not owned, are not part of the copy.
             for state, name in naming:
                 value = state[name]
@@ -342,7 +366,7 @@ class Object(BaseModel, metaclass=ObjectType):
     __str__ = BaseModel.__repr__
 
 
-# Making an object by its slots' own setters is a good third faster than through setattr.
+# The setters of the slots are a third faster than setattr.
 _new = object.__new__
 _put_state, _put_present, _put_extra, _put_private = (
     BaseModel.__dict__[name].__set__
@@ -357,30 +381,30 @@ put_model, put_index, _put_layout = (Object.__dict__[name].__set__ for name in _
 
 
 class Component(Object, abstract=True):
-    """An object with a place in the component tree, which other components can name by its path."""
+    """Object with a path in the component tree, by which other components can name it."""
 
     is_component: ClassVar[bool] = True
     internal: ClassVar[tuple[tuple[str, type[Component]], ...]] = ()
-    """Names and classes of the parts that OpenSim makes for itself: they have a path and stand in no file."""
+    """Names and classes of the parts that OpenSim adds itself: they have a path but no element in a file."""
 
-    subcomponents: Annotated[Many[Component], Tag("components")] = none()
+    subcomponents: Annotated[Many[Component], Tag("components")] = make_empty_list()
     """Further components that belong to this one; they may be of any class."""
 
     @property
     def model(self) -> Model | None:
-        """The model this component was last seen in."""
+        """Model in which this component was last seen."""
         known = self._model
         return known.model if type(known) is Home else cast("Model | None", known)
 
     @property
     def parent(self) -> Component | None:
-        """The component above in the tree; None for the model, or while the component is in no model."""
+        """Component above in the tree; None for the model, or while the component is in no model."""
         model = self.model
         return None if model is None else model.tree().parent_of(self)
 
     @property
     def path(self) -> str:
-        """The absolute path as OpenSim writes it; the name alone while the component is in no model."""
+        """Absolute path as OpenSim writes it; only the name while the component is in no model."""
         model = self.model
         path = None if model is None else model.tree().path_of(self)
         return self.name if path is None else path
@@ -391,7 +415,7 @@ class ModelComponent(Component, abstract=True):
 
 
 class Unknown(ModelComponent, abstract=True):
-    """An object of a class osimlite does not know (a plug-in, a misspelling), kept as it was written.
+    """Object of a class that osimlite does not know (a plug-in, a misspelling), preserved as text.
 
     `class_name` is its tag in the file, `content` the XML text inside.
     """
@@ -401,12 +425,12 @@ class Unknown(ModelComponent, abstract=True):
 
     @property
     def objects(self) -> ObjectList[Any]:
-        """The members, where it stands in the place of a set: none that anybody knows."""
+        """Empty list: in the place of a set, an unknown class has no known members."""
         return ObjectList()
 
 
-# Pydantic evaluates the annotations of all bases for every class, but those of their fields:
-# evaluated here once, they cost it little. What is no field it has noted for all classes below.
+# For every class pydantic evaluates all annotations of its bases again, unless they are evaluated
+# already. Annotations that are not fields it remembers, so they can be dropped.
 for _base in (Object, Component):
     _hints = get_type_hints(_base, include_extras=True)
     _base.__annotations__ = {
@@ -417,7 +441,7 @@ _set = object.__setattr__
 
 
 def _check_values(cls: type[Object], properties: dict[str, Any]) -> dict[str, Any] | None:
-    """Return properties in the form that is stored; None if pydantic has to look at them, or to say what is wrong."""
+    """Return properties in their stored form; None if pydantic has to validate or to report an error."""
     known = make_checks(cls)
     if known is None or not properties.keys() <= known.keys():
         return None
@@ -428,14 +452,15 @@ def _check_values(cls: type[Object], properties: dict[str, Any]) -> dict[str, An
 
 
 _NAMING = -1
-"""Key in the memo of a deep copy of what names components, by state and name; no object has this identity."""
+"""Key in the memo of a deep copy for references to components; no object has this identity."""
 _PLAIN = frozenset((str, float, int, bool, type(None)))
+"""Types of values that a deep copy can share."""
 
 
-def _clone(
+def _copy_object(
     item: T, memo: dict[int, Any], naming: list[tuple[dict[str, Any], str]], home: Home | None
 ) -> T:
-    """A copy of an object and of all that it owns; what names components is noted, to be seen to at the end."""
+    """Copy an object and all that it owns; append its references to `naming`, to be redirected at the end."""
     if id(item) in memo:
         return cast("T", memo[id(item)])
     state, owned = item.__dict__.copy(), _list_owned_fields(type(item))
@@ -444,9 +469,9 @@ def _clone(
         if kind in _PLAIN or (kind is tuple and _PLAIN.issuperset(map(type, value))):
             continue
         if kind is ObjectList:
-            state[name] = ObjectList(_clone(each, memo, naming, home) for each in value)
+            state[name] = ObjectList(_copy_object(each, memo, naming, home) for each in value)
         elif name in owned and isinstance(value, Object):
-            state[name] = _clone(value, memo, naming, home)
+            state[name] = _copy_object(value, memo, naming, home)
         elif isinstance(value, Component) or kind is tuple:
             naming.append((state, name))
         else:
@@ -467,21 +492,21 @@ def _list_owned_fields(cls: type[Object]) -> frozenset[str]:
     return frozenset(name for _, name, _, _ in list_holding_properties(cls))
 
 
-def _adopt(value: Any, owner: Any) -> None:
-    """Let an object or a list that was just made, and all in it, belong where its holder does."""
+def _assign_owner(value: Any, owner: Any) -> None:
+    """Set the model of a new object or list, and of all objects in it."""
     if isinstance(value, list):
         if isinstance(value, ObjectList):
             value.owner = owner
         for item in value:
-            _adopt(item, owner)
+            _assign_owner(item, owner)
     elif isinstance(value, Object):
         put_model(value, owner)
         for _, name, _, _ in list_holding_properties(type(value)):
-            _adopt(value.__dict__.get(name), owner)
+            _assign_owner(value.__dict__.get(name), owner)
 
 
 def _get_all_values(item: Object) -> dict[str, Any]:
-    """The values of an object by field name, those included that no one has asked for yet."""
+    """Return the values of an object by field, including defaults that were never accessed."""
     for name in get_defaults(type(item))[1]:
         getattr(item, name)
     return item.__dict__

@@ -1,4 +1,4 @@
-"""What is said when a component is made, or changed, wrongly."""
+"""Messages for invalid arguments and property values of components."""
 
 from __future__ import annotations
 
@@ -12,11 +12,16 @@ if TYPE_CHECKING:
 
 
 def describe_unknown_property(cls: type[Object], name: str) -> str:
-    """There is no property of this name; with the nearest ones."""
+    """Return the message for a property that a class does not have, with the nearest names.
+
+    Args:
+        cls: the class.
+        name: the unknown name.
+    """
     from osimlite.base.text import suggest_name
 
     known = [field_name for field_name in cls.model_fields]
-    # Sockets are known by the middle of their names: ``frame`` is ``socket_frame``.
+    # Users know a socket by the middle of its attribute: ``frame`` for ``socket_frame``.
     within = [field_name for field_name in known if f"_{name}_" in f"{field_name}_"]
     better = (
         f"; did you mean '{min(within, key=len)}'?"
@@ -27,7 +32,12 @@ def describe_unknown_property(cls: type[Object], name: str) -> str:
 
 
 def describe_validation_error(cls: type[Object], error: ValidationError) -> str:
-    """What pydantic found wrong with a value, in one line."""
+    """Return the message for a value that pydantic rejects, in one line.
+
+    Args:
+        cls: the class.
+        error: pydantic's error.
+    """
     first = error.errors()[0]
     place = ".".join(str(part) for part in first["loc"]) or "?"
     reason = first["msg"].removeprefix("Value error, ")
@@ -40,6 +50,11 @@ def describe_validation_error(cls: type[Object], error: ValidationError) -> str:
 
 
 def describe_unnamed_value(cls: type[Object], given: object) -> str:
-    """Properties have names."""
+    """Return the message for a positional argument.
+
+    Args:
+        cls: the class.
+        given: the argument.
+    """
     example = repr(given) if isinstance(given, str) else "..."
     return f"{cls.__name__} takes its properties by name, as in {cls.__name__}(name={example})"

@@ -2,7 +2,7 @@
 
 from typing import Annotated
 
-from osimlite.schema.base import ModelComponent, made, none
+from osimlite.schema.base import ModelComponent, make_default, make_empty_list
 from osimlite.schema.facts import Facts
 from osimlite.schema.fields import LegacyMany, Unnamed, Vec3, real, vec3
 from osimlite.schema.geometry import Appearance, SurfaceProperties
@@ -19,7 +19,7 @@ class ContactGeometry(ModelComponent, abstract=True):
     """Where the middle of the surface is, in that frame."""
     orientation: Annotated[Vec3, vec3("rad")] = (0.0, 0.0, 0.0)
     """Body-fixed X-Y-Z angles of the surface in that frame."""
-    appearance: Unnamed[Appearance] = made(
+    appearance: Unnamed[Appearance] = make_default(
         Appearance,
         color=(0.0, 1.0, 1.0),
         surface_properties=lambda: SurfaceProperties.build({"representation": 2}, set()),
@@ -73,5 +73,5 @@ class ContactMesh(ContactGeometry):
 class ContactGeometrySet(ModelComponentSet):
     """The contact surfaces of a model."""
 
-    objects: LegacyMany[ContactGeometry] = none()
+    objects: LegacyMany[ContactGeometry] = make_empty_list()
     """The surfaces; contact forces name those that touch."""

@@ -1,8 +1,8 @@
-"""Contact by other laws than that of Hunt and Crossley for any surfaces: meshes, single balls, single points."""
+"""Contact forces other than HuntCrossleyForce: elastic foundation, smooth sphere and half space, single stations."""
 
 from typing import Annotated, ClassVar
 
-from osimlite.schema.base import Object, made, none
+from osimlite.schema.base import Object, make_default, make_empty_list
 from osimlite.schema.facts import NAN, TOUCHING, Facts
 from osimlite.schema.fields import LegacyMany, Single, Value, Vec3, Vec6, maybe, real, vec3
 from osimlite.schema.forces import Force, ForceProducer
@@ -43,7 +43,7 @@ class ElasticFoundationContactParametersSet(
 ):
     """The layers of one elastic foundation force."""
 
-    objects: LegacyMany[ElasticFoundationContactParameters] = none()
+    objects: LegacyMany[ElasticFoundationContactParameters] = make_empty_list()
     """The materials, each with the surfaces that are made of it."""
 
 
@@ -53,7 +53,7 @@ class ElasticFoundationForce(Force):
     ContactParameters: ClassVar = ElasticFoundationContactParameters
     ContactParametersSet: ClassVar = ElasticFoundationContactParametersSet
 
-    contact_parameters: Single[ElasticFoundationContactParametersSet] = made(
+    contact_parameters: Single[ElasticFoundationContactParametersSet] = make_default(
         ElasticFoundationContactParametersSet, name="contact_parameters"
     )
     """The surfaces that touch each other by this force, and their materials."""
@@ -129,7 +129,7 @@ class ExponentialContactForce(Force):
     """Static coefficient at the start; it is a state that programs can change."""
     initial_mu_kinetic: Annotated[float, real(domain=">= 0")] = 0.5
     """Sliding coefficient at the start, at most the static one; also a state."""
-    station: Single[Station] = made(Station, name="station")
+    station: Single[Station] = make_default(Station, name="station")
     """The point of a body that touches the plane."""
 
 

@@ -2,7 +2,7 @@
 
 from typing import Annotated
 
-from osimlite.schema.base import Object, none
+from osimlite.schema.base import Object, make_empty_list
 from osimlite.schema.fields import LegacyFlag, LegacyMany, LegacyNumber, real
 from osimlite.schema.sets import Set
 
@@ -13,7 +13,7 @@ class Control(Object, abstract=True):
     is_model_control: LegacyFlag = True
     """Whether the model has such a control; the others do nothing."""
     extrapolate: LegacyFlag = True
-    """Whether straight lines go on before the first node and after the last."""
+    """Whether straight lines continue before the first node and after the last."""
     default_min: LegacyNumber = 0.02
     """Least value that tools choose where there are no `min_nodes`; a simulation does not clip to it."""
     default_max: LegacyNumber = 1.0
@@ -27,7 +27,7 @@ class ControlConstant(Control):
 
     is_model_control: LegacyFlag = False
     value: LegacyNumber = 0.0
-    """Of the control."""
+    """Value of the control."""
 
 
 class ControlLinearNode(Object):
@@ -36,7 +36,7 @@ class ControlLinearNode(Object):
     t: Annotated[float, real(legacy=True)] = 0.0
     """When the control has the value, in seconds."""
     value: LegacyNumber = 0.0
-    """Of the control at that time."""
+    """Value of the control at that time."""
 
 
 class ControlLinear(Control):
@@ -44,11 +44,11 @@ class ControlLinear(Control):
 
     use_steps: LegacyFlag = False
     """Whether each value holds from after the time of the node before it up to its own."""
-    x_nodes: LegacyMany[ControlLinearNode] = none()
+    x_nodes: LegacyMany[ControlLinearNode] = make_empty_list()
     """The nodes of the control."""
-    min_nodes: LegacyMany[ControlLinearNode] = none()
+    min_nodes: LegacyMany[ControlLinearNode] = make_empty_list()
     """The nodes of the least value that tools choose."""
-    max_nodes: LegacyMany[ControlLinearNode] = none()
+    max_nodes: LegacyMany[ControlLinearNode] = make_empty_list()
     """The nodes of the greatest value that tools choose."""
     kp: LegacyNumber = 100.0
     """How strongly CMC's smoothing follows the value."""
@@ -59,5 +59,5 @@ class ControlLinear(Control):
 class ControlSet(Set):
     """The controls of a model over time."""
 
-    objects: LegacyMany[Control] = none()
+    objects: LegacyMany[Control] = make_empty_list()
     """The controls, each with the name of an actuator."""

@@ -2,18 +2,18 @@
 
 from typing import Annotated
 
-from osimlite.schema.base import ModelComponent, Object, made, none
+from osimlite.schema.base import ModelComponent, Object, make_default, make_empty_list
 from osimlite.schema.facts import Facts
 from osimlite.schema.fields import Many, Single, Value, Vector, real
 from osimlite.schema.functions import FunctionSet
-from osimlite.schema.references import MaybeFileName, NumberInputs, reads
+from osimlite.schema.references import MaybeFileName, NumberInputs, make_input_file
 from osimlite.schema.sets import Controller
 
 
 class PrescribedController(Controller):
     """Controls as functions of time, one for each actuator in order, or as columns of a file."""
 
-    ControlFunctions: Single[FunctionSet] = made(FunctionSet, name="ControlFunctions")
+    ControlFunctions: Single[FunctionSet] = make_default(FunctionSet, name="ControlFunctions")
     """Controls over time, one for each actuator in the order of `socket_actuators`."""
     controls_file: MaybeFileName = None
     """File of a column for each actuator, labelled with its name or path."""
@@ -24,7 +24,9 @@ class PrescribedController(Controller):
 class ControlSetController(Controller):
     """Controls read from a file of control curves."""
 
-    controls_file: Annotated[str, reads("ControlSet or table", legacy=True)] = "Unassigned"
+    controls_file: Annotated[str, make_input_file("ControlSet or table", legacy=True)] = (
+        "Unassigned"
+    )
     """File of control curves (.xml) or of columns (.sto)."""
 
 
@@ -62,7 +64,7 @@ class SynergyVector(Object):
 class SynergyController(InputController):
     """Drives many actuators from few inputs, each spread by its synergy vector."""
 
-    synergy_vectors: Many[SynergyVector] = none()
+    synergy_vectors: Many[SynergyVector] = make_empty_list()
     """A vector for each input, in order; the controls are the sum of inputs times vectors."""
 
 

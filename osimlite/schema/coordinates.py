@@ -2,7 +2,7 @@
 
 from typing import Annotated
 
-from osimlite.schema.base import ModelComponent, none
+from osimlite.schema.base import ModelComponent, make_empty_list
 from osimlite.schema.facts import Facts
 from osimlite.schema.fields import Flag, LegacyMany, Optional, real, reals
 from osimlite.schema.functions import Function
@@ -35,5 +35,5 @@ class Coordinate(ModelComponent):
 class CoordinateSet(Set):
     """Coordinates in a document of their own."""
 
-    objects: LegacyMany[Coordinate] = none()
+    objects: LegacyMany[Coordinate] = make_empty_list()
     """The coordinates."""

@@ -1,9 +1,9 @@
-"""The joint whose motion is made of six functions of its coordinates."""
+"""CustomJoint, whose motion is given by six functions of its coordinates."""
 
 from collections.abc import Mapping
 from typing import Annotated, Any
 
-from osimlite.schema.base import Object, made
+from osimlite.schema.base import Object, make_default
 from osimlite.schema.facts import Facts
 from osimlite.schema.fields import Single, Unnamed, Vec3, vec3
 from osimlite.schema.functions import Constant, Function, LinearFunction
@@ -22,55 +22,63 @@ class TransformAxis(Object):
     """Coordinates of the joint that are the arguments of `function`, in this order."""
     axis: Annotated[Vec3, vec3()] = _X
     """Direction that the motion is about or along; its length does not matter."""
-    function: Single[Function] = made(Constant, name="function")
+    function: Single[Function] = make_default(Constant, name="function")
     """Angle (rad) or displacement (m) as a function of the coordinates."""
 
     @property
     def names(self) -> list[str]:
-        """The names of the coordinates."""
+        """Names of the coordinates."""
         return [word if isinstance(word, str) else word.name for word in self.coordinates]
 
     @classmethod
-    def in_place_of_none(cls, spec: FieldSpec, values: Mapping[str, Any]) -> Function:
-        """The function where an element ``<function>`` is there and empty: then the axis moves as its coordinate does.
+    def replace_empty_function(cls, spec: FieldSpec, values: Mapping[str, Any]) -> Function:
+        """Return the function of an axis whose element ``<function>`` is empty.
 
-        Where there is no such element, the axis does not move. (Where it names several coordinates,
-        OpenSim gives up.)
+        The axis then moves as its only coordinate does. Without the element the axis does not move. With
+        several coordinates OpenSim rejects the model.
+
+        Args:
+            spec: the property ``function``.
+            values: other properties of the axis.
         """
         if len(values.get("coordinates", ())) == 1:
             return LinearFunction(name=spec.tag, coefficients=(1.0, 0.0))
         return Constant(name=spec.tag)
 
 
-def _axis(name: str, direction: Vec3) -> Any:
-    return made(TransformAxis, name=name, axis=direction)
+def _make_axis(name: str, direction: Vec3) -> Any:
+    return make_default(TransformAxis, name=name, axis=direction)
 
 
 class SpatialTransform(Object):
     """Three body-fixed rotations in order, then three translations along axes of the parent frame."""
 
-    rotation1: Single[TransformAxis] = _axis("rotation1", _X)
+    rotation1: Single[TransformAxis] = _make_axis("rotation1", _X)
     """First rotation, about an axis of the parent frame."""
-    rotation2: Single[TransformAxis] = _axis("rotation2", _Y)
+    rotation2: Single[TransformAxis] = _make_axis("rotation2", _Y)
     """Second rotation, about an axis that the first has turned."""
-    rotation3: Single[TransformAxis] = _axis("rotation3", _Z)
+    rotation3: Single[TransformAxis] = _make_axis("rotation3", _Z)
     """Third rotation, about an axis that the first two have turned."""
-    translation1: Single[TransformAxis] = _axis("translation1", _X)
+    translation1: Single[TransformAxis] = _make_axis("translation1", _X)
     """First translation, along an axis of the parent frame that no rotation turns."""
-    translation2: Single[TransformAxis] = _axis("translation2", _Y)
+    translation2: Single[TransformAxis] = _make_axis("translation2", _Y)
     """Second translation, along an axis of the parent frame that no rotation turns."""
-    translation3: Single[TransformAxis] = _axis("translation3", _Z)
+    translation3: Single[TransformAxis] = _make_axis("translation3", _Z)
     """Third translation, along an axis of the parent frame that no rotation turns."""
 
     def axes(self) -> dict[str, TransformAxis]:
-        """The axes by the names of their places, in order."""
+        """Return the six axes in order: three rotations, then three translations.
+
+        Returns:
+            Axes by name.
+        """
         return {name: getattr(self, name) for name in _AXES}
 
 
 class CustomJoint(Joint):
-    """Any motion of up to six degrees of freedom; `spatial_transform` says how the coordinates make it."""
+    """Any motion of up to six degrees of freedom, given by functions of the coordinates in `spatial_transform`."""
 
     facts = Facts(scales={"spatial_transform": "socket_parent_frame"})
 
-    spatial_transform: Unnamed[SpatialTransform] = made(SpatialTransform)
+    spatial_transform: Unnamed[SpatialTransform] = make_default(SpatialTransform)
     """How the coordinates make the rotations and translations of the joint."""

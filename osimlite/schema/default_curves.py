@@ -1,4 +1,4 @@
-"""The splines that several muscles and ligaments have as defaults, to all digits; OpenSim prints six of them."""
+"""Default splines of muscles and ligaments with all their digits, of which OpenSim prints six."""
 
 from __future__ import annotations
 
@@ -36,26 +36,26 @@ _VELOCITY = (
 )  # fmt: skip
 
 
-def _spline(points: tuple[tuple[float, ...], tuple[float, ...]], name: str) -> SimmSpline:
+def _make_spline(points: tuple[tuple[float, ...], tuple[float, ...]], name: str) -> SimmSpline:
     values: dict[str, Any] = {"name": name, "x": points[0], "y": points[1]}
     return SimmSpline.build(values, set())
 
 
-def tendon_force_length(name: str = "") -> SimmSpline:
-    """Tendon force over tendon strain."""
-    return _spline(_TENDON, name)
+def make_tendon_force_length(name: str = "") -> SimmSpline:
+    """Return the default curve of normalized tendon force over tendon strain."""
+    return _make_spline(_TENDON, name)
 
 
-def active_force_length(name: str = "") -> SimmSpline:
-    """Active fiber force over fiber length."""
-    return _spline(_ACTIVE, name)
+def make_active_force_length(name: str = "") -> SimmSpline:
+    """Return the default curve of active over normalized fiber length."""
+    return _make_spline(_ACTIVE, name)
 
 
-def passive_force_length(name: str = "") -> SimmSpline:
-    """Passive force over length; muscle fibers and ligaments have the same."""
-    return _spline(_PASSIVE, name)
+def make_passive_force_length(name: str = "") -> SimmSpline:
+    """Return the default curve of passive force over normalized length, for muscle fibers and ligaments."""
+    return _make_spline(_PASSIVE, name)
 
 
-def force_velocity(name: str = "") -> SimmSpline:
-    """Fiber force over fiber velocity."""
-    return _spline(_VELOCITY, name)
+def make_force_velocity(name: str = "") -> SimmSpline:
+    """Return the default factor of the active force over normalized fiber velocity."""
+    return _make_spline(_VELOCITY, name)

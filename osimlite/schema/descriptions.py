@@ -1,4 +1,4 @@
-"""What classes and properties mean, in words: their docstrings, read when somebody asks."""
+"""Descriptions of classes and properties, taken from their docstrings."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from functools import cache
 from importlib import import_module
 
 from osimlite.schema.base import Object
-from osimlite.schema.fields import Held, Reference, Value
+from osimlite.schema.fields import ObjectField, Reference, Value
 from osimlite.schema.specs import FieldSpec, get_field_specs
 
 
 def describe_property(spec: FieldSpec) -> str:
-    """What a property means: the text below its declaration; "" if there is none, or no source to read it from."""
+    """Return the docstring of a property; empty without one, or if the source is not available."""
     texts = (
         _read_descriptions(cls.__module__).get((cls.__name__, spec.name)) for cls in spec.declarers
     )
@@ -22,7 +22,7 @@ def describe_property(spec: FieldSpec) -> str:
 
 
 def describe_value(spec: FieldSpec) -> str:
-    """What may stand in a property, in a few words: ``one number in N/m, > 0``."""
+    """Describe the type of a property in a few words: ``one number in N/m, > 0``."""
     kind = spec.kind
     if isinstance(kind, Value):
         words = kind.words()
@@ -33,23 +33,30 @@ def describe_value(spec: FieldSpec) -> str:
     if isinstance(kind, Reference):
         many = kind.shape == "list"
         return f"names of {kind.target} components" if many else f"the name of a {kind.target}"
-    assert isinstance(kind, Held) and spec.accepts is not None
+    assert isinstance(kind, ObjectField) and spec.accepts is not None
     tag = spec.accepts.tag or "Object"
     return f"objects of class {tag}" if kind.form == "list" else f"one {tag}"
 
 
 def describe_class(cls: type[Object]) -> str:
-    """What a class is: its docstring."""
+    """Return the docstring of a class."""
     return inspect.cleandoc(cls.__dict__.get("__doc__") or "")
 
 
 @cache
 def add_properties(cls: type[Object], own: str) -> str:
-    """A docstring with a section on the properties of the class, as ``help()`` shows it."""
+    """Return a docstring with a section on the properties of the class, for ``help()``.
+
+    Args:
+        cls: the class.
+        own: its docstring.
+    """
     rows = [inspect.cleandoc(own), "", "Properties, in the order of a file:", "    name: a text"]
     for spec in get_field_specs(cls).values():
         given = (
-            "" if isinstance(spec.kind, Held) else f"; {_format_property(spec.default)} by default"
+            ""
+            if isinstance(spec.kind, ObjectField)
+            else f"; {_format_property(spec.default)} by default"
         )
         meaning = " ".join(describe_property(spec).split())
         text = f"{spec.name}: {describe_value(spec)}{given}" + (f". {meaning}" if meaning else "")
@@ -73,7 +80,10 @@ def _format_property(value: object) -> str:
 
 @cache
 def _read_descriptions(module: str) -> dict[tuple[str, str], str]:
-    """The texts below the declarations of a module, by class and property. Python itself drops them."""
+    """Return the docstrings of properties in a module, by class and property.
+
+    Python discards strings below assignments, so they are parsed from the source.
+    """
     result: dict[tuple[str, str], str] = {}
     try:
         source = inspect.getsource(import_module(module))

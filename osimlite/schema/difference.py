@@ -1,6 +1,6 @@
-"""What differs between two models in meaning: components by path, properties by value, whatever the layout.
+"""Differences in meaning between two documents, independent of their layout.
 
-Documents that are no models are compared property by property.
+Components of models are matched by path. Other documents are compared property by property.
 """
 
 from __future__ import annotations
@@ -11,17 +11,20 @@ from itertools import zip_longest
 from typing import Any, NamedTuple
 
 from osimlite.schema.base import Component, Object, Unknown
-from osimlite.schema.fields import Held, Reference
+from osimlite.schema.fields import ObjectField, Reference
 from osimlite.schema.model import Model
 from osimlite.schema.specs import FieldSpec, get_field_specs
 from osimlite.schema.tree import Tree, Use
 
 
 class Difference(NamedTuple):
-    """One change. `what` is the property, with the way to it inside the component; empty for a whole component.
+    """One difference.
 
-    `old` is None for what was added, `new` for what was removed; a component counts as its class
-    name.
+    Attributes:
+        path: path of the component.
+        what: property, with the path to it inside the component; empty for a whole component.
+        old: previous value, of a component its class; None if it was added.
+        new: new value, of a component its class; None if it was removed.
     """
 
     path: str
@@ -31,14 +34,21 @@ class Difference(NamedTuple):
 
 
 def find_differences(old: Object, new: Object) -> list[Difference]:
-    """Every change of meaning from `old` to `new`, in tree order; what only takes or loses its default is none."""
+    """Return every difference in meaning from `old` to `new`, in tree order.
+
+    A property that is missing equals one with its default value.
+
+    Args:
+        old: first document.
+        new: second document.
+    """
     if isinstance(old, Model) and isinstance(new, Model):
         return list(_Comparison(old.tree(), new.tree()).run())
     return list(_Comparison(None, None)._object(new.name or new.tag, "", old, new))
 
 
 class _Comparison:
-    """Compares two models by their trees, or two other objects, which have none."""
+    """Comparison of two models by their trees, or of two other objects, which have no tree."""
 
     def __init__(self, old: Tree | None, new: Tree | None) -> None:
         self.old = old
@@ -46,17 +56,17 @@ class _Comparison:
 
     def run(self) -> Iterator[Difference]:
         assert self.old is not None and self.new is not None
-        for path in _describe_missing(self.old, self.new):
+        for path in _find_missing_paths(self.old, self.new):
             yield Difference(path, "", _describe_type(self.old.by_path[path]), None)
         for path, component in self.new.by_path.items():
             before = self.old.by_path.get(path)
             if before is not None:
                 yield from self._object(path, "", before, component)
-        for path in _describe_missing(self.new, self.old):
+        for path in _find_missing_paths(self.new, self.old):
             yield Difference(path, "", None, _describe_type(self.new.by_path[path]))
 
     def _object(self, path: str, way: str, old: Object, new: Object) -> Iterator[Difference]:
-        """Compare two objects that stand in the same place; `way` is the property that leads to them."""
+        """Compare two objects at the same position; `way` is the property that leads to them."""
         if _describe_type(old) != _describe_type(new):
             yield Difference(path, way or "class", _describe_type(old), _describe_type(new))
             if way:
@@ -65,7 +75,7 @@ class _Comparison:
             if isinstance(old, Unknown) and isinstance(new, Unknown) and old.content != new.content:
                 yield from _compare_contents(path, way, old.content, new.content)
             return
-        # Of components of two classes, what both have.
+        # If the classes differ, compare the properties that both have.
         for spec in [
             spec
             for tag, spec in get_field_specs(type(new)).items()
@@ -73,9 +83,9 @@ class _Comparison:
         ]:
             place = f"{way}.{spec.tag}" if way else spec.tag
             one, other = getattr(old, spec.name), getattr(new, spec.name)
-            if isinstance(spec.kind, Held):
-                yield from self._held(
-                    path, place, spec.kind.form == "list", _as_list(one), _as_list(other)
+            if isinstance(spec.kind, ObjectField):
+                yield from self._compare_owned(
+                    path, place, spec.kind.form == "list", _list_objects(one), _list_objects(other)
                 )
             elif isinstance(spec.kind, Reference):
                 names = (
@@ -87,10 +97,13 @@ class _Comparison:
             elif not _are_equal(one, other):
                 yield Difference(path, place, one, other)
 
-    def _held(
+    def _compare_owned(
         self, path: str, way: str, named: bool, old: list[Object], new: list[Object]
     ) -> Iterator[Difference]:
-        """Compare objects without a path; components are compared at their own path. `named`: their names count."""
+        """Compare objects without a path; components are compared at their own path.
+
+        `named` says whether the names of the objects count.
+        """
         before = [item for item in old if self.old is None or not isinstance(item, Component)]
         after = [item for item in new if self.new is None or not isinstance(item, Component)]
         if (
@@ -99,7 +112,7 @@ class _Comparison:
             and (old_names := _index_by_name(before))
             and (new_names := _index_by_name(after))
         ):
-            # Outside of models members have no paths: they go by their names.
+            # Outside of models members have no paths, so match them by name.
             for name in dict.fromkeys([*old_names, *new_names]):
                 yield from self._pair(
                     path, f"{way}[{name}]", old_names.get(name), new_names.get(name)
@@ -115,14 +128,14 @@ class _Comparison:
     def _pair(
         self, path: str, place: str, old: Object | None, new: Object | None
     ) -> Iterator[Difference]:
-        """Compare two objects of which one may not be there."""
+        """Compare two objects, one of which may be missing."""
         if old is not None and new is not None:
             yield from self._object(path, place, old, new)
         elif old is not None or new is not None:
             yield Difference(path, place, old and _describe_type(old), new and _describe_type(new))
 
     def _names(self, tree: Tree | None, holder: Object, spec: FieldSpec, value: Any) -> Any:
-        """What a reference says, in one spelling: the path of the component where it leads to one."""
+        """Return a reference in canonical form: the path of its component if it leads to one."""
         if isinstance(value, tuple):
             return tuple(self._names(tree, holder, spec, word) for word in value)
         if value is None:
@@ -196,7 +209,7 @@ def _flatten_content(content: str) -> dict[str, str]:
 
 
 class _Level:
-    """An element of a fragment that is being read."""
+    """Element of an XML fragment while it is parsed."""
 
     def __init__(self, place: str) -> None:
         self.place = place
@@ -220,12 +233,12 @@ def _are_same_word(one: str, other: str) -> bool:
         return False
 
 
-def _as_list(value: Any) -> list[Object]:
+def _list_objects(value: Any) -> list[Object]:
     return value if isinstance(value, list) else [] if value is None else [value]
 
 
 def _index_by_name(items: list[Object]) -> dict[str, Object]:
-    """The objects by name; none if a name is missing, or there twice."""
+    """Return objects by name; empty if a name is missing or occurs twice."""
     result = {item.name: item for item in items}
     return result if len(result) == len(items) and "" not in result else {}
 
@@ -238,19 +251,19 @@ def _are_equal(one: Any, other: Any) -> bool:
     return bool(one == other) or repr(one) == repr(other)
 
 
-def _describe_missing(tree: Tree, other: Tree) -> Iterator[str]:
-    """Paths of a tree that the other has not, and that are not below another of them, nor parts of a class."""
-    given = {path for path in tree.by_path if path not in other.by_path}
+def _find_missing_paths(tree: Tree, other: Tree) -> Iterator[str]:
+    """Yield the topmost paths of a tree that another tree lacks, without internal parts."""
+    missing = {path for path in tree.by_path if path not in other.by_path}
     for path, component in tree.by_path.items():
         if (
-            path in given
+            path in missing
             and not tree.is_internal(component)
-            and not any(above in given for above in _get_parent_path(path))
+            and not any(above in missing for above in _list_parent_paths(path))
         ):
             yield path
 
 
-def _get_parent_path(path: str) -> Iterator[str]:
+def _list_parent_paths(path: str) -> Iterator[str]:
     while "/" in path[1:]:
         path = path.rsplit("/", 1)[0]
         yield path

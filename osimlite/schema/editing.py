@@ -1,4 +1,4 @@
-"""Changes of a model that concern more than one component: renaming and removing, with references kept right."""
+"""Renaming and removing of components, with updates of all references."""
 
 from __future__ import annotations
 
@@ -9,31 +9,36 @@ from osimlite.errors import ModelError
 from osimlite.schema.base import Component, Object
 from osimlite.schema.fields import Reference
 from osimlite.schema.model import Model
-from osimlite.schema.resolution import RULES, nothing_to_resolve
+from osimlite.schema.resolution import RULES, skip_resolution
 from osimlite.schema.tree import ILLEGAL_CHARACTERS, Tree, Use
 
-_NAME_NOTHING = frozenset(
-    rule for rule, follow in RULES.items() if follow is nothing_to_resolve
-) - {"input"}
+_NAME_NOTHING = frozenset(rule for rule, follow in RULES.items() if follow is skip_resolution) - {
+    "input"
+}
 
 _OF_INPUT = Reference("socket", "Component")
-"""How the text of an input names a component, before the bar and the output."""
+"""Reference by which the text of an input names a component, before the bar and the output."""
 
 
 def rename_component(model: Model, component: Component, name: str) -> None:
-    """Give a component another name and rewrite every reference that leads to it, or through it.
+    """Rename a component, and rewrite every reference to it or to components below it.
 
     A reference keeps its form (relative stays relative) where the new text still leads to the same
     component.
+
+    Args:
+        model: the model.
+        component: the component.
+        name: its new name.
 
     Raises:
         ModelError: the component is not in the model, the name is illegal, or a sibling has it.
     """
     tree = model.tree()
-    path = _path_in(model, component)
+    path = _get_path(model, component)
     if not name or any(character in name for character in ILLEGAL_CHARACTERS):
         raise ModelError(
-            f"'{name}' is no name of a component: it is empty, or has a blank, '/', '\\', '*' or '+'"
+            f"'{name}' is not a legal name of a component: it is empty, or has a blank, '/', '\\', '*' or '+'"
         )
     parent = tree.parent_of(component)
     wanted = f"{'' if parent is None else path.rsplit('/', 1)[0]}/{name}"
@@ -51,26 +56,30 @@ def rename_component(model: Model, component: Component, name: str) -> None:
         assert isinstance(use.value, str)
         if use.reference.rule == "input":
             _, bar, output = use.value.partition("|")
-            _set_value(use, f"{tree.text_for(use.owner, _OF_INPUT, target)}{bar}{output}")
+            _set_value(use, f"{tree.format_reference(use.owner, _OF_INPUT, target)}{bar}{output}")
         else:
-            _set_value(use, tree.text_for(use.owner, use.reference, target))
+            _set_value(use, tree.format_reference(use.owner, use.reference, target))
 
 
 def remove_component(model: Model, component: Component) -> None:
-    """Take a component, and all below it, out of the model.
+    """Remove a component and everything below it from the model.
+
+    Args:
+        model: the model.
+        component: the component.
 
     Raises:
-        ModelError: it is not in the model, has a fixed place (the ground, a set), or others name
+        ModelError: the component is not in the model, is required (the ground, a set), or others name
             it; the message lists them.
     """
     tree = model.tree()
-    path = _path_in(model, component)
+    path = _get_path(model, component)
     doomed = {id(item) for item in component.walk()}
     users = sorted(
         {
             tree.path_of(use.owner) or use.owner.name
             for use in tree.uses()
-            if id(use.holder) not in doomed and _is_at_or_below(_target_path(tree, use), path)
+            if id(use.holder) not in doomed and _is_at_or_below(_find_target_path(tree, use), path)
         }
     )
     if users:
@@ -78,7 +87,7 @@ def remove_component(model: Model, component: Component) -> None:
             f"cannot remove '{path}': {join_words(users)} {'names' if len(users) == 1 else 'name'} it"
         )
     for holder in model.walk():
-        for spec, item in holder.objects_held():
+        for spec, item in holder.list_owned_objects():
             members = getattr(holder, spec.name)
             if item is component and isinstance(members, list):
                 members.remove(component)
@@ -87,7 +96,12 @@ def remove_component(model: Model, component: Component) -> None:
 
 
 def find_named_component(tree: Tree, use: Use) -> Component | None:
-    """What a reference names; of an input, the component that has the output."""
+    """Return the component that a reference names; for an input, the one that has the output.
+
+    Args:
+        tree: the tree of the model.
+        use: the reference.
+    """
     if use.reference.rule in _NAME_NOTHING:
         return None
     if use.reference.rule == "input" and isinstance(use.value, str):
@@ -96,20 +110,23 @@ def find_named_component(tree: Tree, use: Use) -> Component | None:
     return tree.resolve(use).target
 
 
-def _path_in(model: Model, component: Object) -> str:
+def _get_path(model: Model, component: Object) -> str:
     path = model.tree().path_of(component)
     if path is None:
         raise ModelError(f"'{component.name}' is not in the model")
     return path
 
 
-def _target_path(tree: Tree, use: Use) -> str | None:
+def _find_target_path(tree: Tree, use: Use) -> str | None:
     target = find_named_component(tree, use)
     return None if target is None else tree.path_of(target)
 
 
 def _is_at_or_below(path: str | None, top: str) -> bool:
-    """By path and not by walking: the parts that OpenSim makes for itself can be named, and no property holds them."""
+    """Return whether a path is `top` or below it.
+
+    Paths are compared because OpenSim's internal parts can be named, but no property holds them.
+    """
     return path is not None and (path == top or path.startswith(top + "/"))
 
 

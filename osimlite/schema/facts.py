@@ -1,4 +1,4 @@
-"""What OpenSim 4.6 does with the objects of a class that their properties do not say."""
+"""Behaviour of OpenSim 4.6 that depends on the class of an object and not on its properties' declarations."""
 
 from __future__ import annotations
 
@@ -19,51 +19,48 @@ IDLE: Final = "the actuator does nothing, whatever its control"
 FLAT: Final = "OpenSim computes with it, on a flat or mirrored surface"
 
 BELOW_QUARTER_TURN: Final = "0 to 1.5707963267948866"
-"""In radians: a little less than a quarter turn, as OpenSim asks."""
+"""Range of pennation angles in radians; OpenSim's check requires slightly less than pi / 2."""
 UP_TO_QUARTER_TURN: Final = "0 to 1.5707963267948966"
+"""Range of angles from 0 to pi / 2 in radians."""
 
 OWN, HOLDER, PATH = "own", "holder", "path"
 MEAN, ALONG, ACROSS, AXES = "mean", "along", "across", "axes"
 
 Contradiction = tuple[str | None, str]
-"""The property of an object that is best changed, None if it is not one alone, and what is wrong."""
+"""Property that should be changed (None if there are several), and what is wrong."""
 
 _NONE: Final[Mapping[str, str]] = MappingProxyType({})
 
 
 class Facts(NamedTuple):
-    """What a class declares besides its properties: the attribute `facts` of it.
+    """Behaviour of OpenSim with objects of a class; the class attribute `facts`.
 
-    What becomes of numbers was measured: each was put into a sound model, which was loaded,
-    initialised and asked for accelerations. Where nothing is said, OpenSim computes with the
-    number.
+    The consequences of numbers were measured with OpenSim 4.6: each number was put into a valid
+    model, which was loaded, initialized and asked for accelerations. Where nothing is declared,
+    OpenSim computes with the number.
 
     Attributes:
-        states: names of its state variables, in OpenSim's order; a class that names none has those
-            of its base. A component has ``name?flag`` if that property is true, ``name?!flag`` if
-            it is false.
-        outputs: what it adds to the outputs of its base, as OpenSim lists them: ``[]`` marks an
-            output with channels, and a type follows the name unless it is a number.
-        domains: by property, the numbers that OpenSim takes in this class, where they are fewer
-            than for others that share the property, or than its declaration says.
-        refused: properties for which OpenSim refuses the model where a number is outside its
-            domain.
-        outside: what else happens with a number outside its domain, with the properties of which
-            this is so.
-        zero: likewise with 0 alone; it goes before the others, and without a text OpenSim computes
-            with 0.
-        missing: likewise without a number where there is no default.
-        doubts: by property, what is doubtful about a number outside its domain that OpenSim
-            computes with.
-        mujoco: of a muscle, the properties that numbers of MuJoCo's muscle are read from, by
+        states: names of the state variables in OpenSim's order; without any, those of the base.
+            ``name?flag`` is a state if the property `flag` is true, ``name?!flag`` if it is false.
+        outputs: outputs beyond those of the base, as OpenSim lists them: ``[]`` marks an output with
+            channels, and a type follows the name unless it is a number.
+        domains: by property, the numbers that OpenSim accepts in this class, where the range is
+            narrower than the declaration of the property.
+        refused: properties for which OpenSim rejects the model if a number is outside its domain.
+        outside: other consequences of a number outside its domain, with the properties they apply to.
+        zero: consequences of the number 0, which take precedence; an empty text means that OpenSim
+            computes with 0.
+        missing: consequences of a missing number that has no default.
+        doubts: by property, why a number outside its domain is doubtful although OpenSim computes
+            with it.
+        mujoco: of a muscle, the properties from which numbers of MuJoCo's muscle are read, by
             MuJoCo's names (vmax, fvmax) or rise and fall, the time constants; a dot leads into the
-            object that a property holds. What is not named here its base has.
-        scales: by property, what it is multiplied by when the model is scaled: by the factors of a
-            body along its axes, of which the word says whose they are (OWN the frame itself, HOLDER
-            the frame that holds the object, or the socket that leads to a frame, or the coordinate
-            of whose joint it is the parent frame), and a word behind it which one (x, y, z; MEAN;
-            ALONG and ACROSS the Z axis of a surface, AXES of its three); or by how much longer the
-            path has become (PATH), or by nothing. What is not named here its base has.
+            object that a property holds. Missing entries are taken from the base.
+        scales: by property, the factor that scaling a model multiplies it by. It is the factor of a
+            body along its axes: OWN of the frame itself, HOLDER of the frame that holds the object,
+            or that of a socket or coordinate, followed by the axis (x, y, z; MEAN; ALONG and ACROSS
+            the Z axis of a surface; AXES for all three). PATH is the ratio of path lengths, and an
+            empty text is none. Missing entries are taken from the base.
     """
 
     states: str = ""

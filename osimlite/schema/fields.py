@@ -1,8 +1,8 @@
-"""Field kinds: what the text of one property may hold, written as annotation markers on the component classes.
+"""Types of properties, written as annotation markers on the component classes.
 
-A field of a component class is declared once, ``radius: Annotated[float, real("m", ">= 0")] =
-0.0``; the reader, the printer, the linter and the catalogue test all work from the marker. Markers
-hold facts only: how text becomes a value is the business of :mod:`osimlite.io.document.lexical`.
+A property is declared once, ``radius: Annotated[float, real("m", ">= 0")] = 0.0``; the reader, the
+printer, the linter and the catalogue test all use the marker. How text becomes a value is the task
+of :mod:`osimlite.io.document.lexical`.
 """
 
 from __future__ import annotations
@@ -23,19 +23,31 @@ T = TypeVar("T")
 Scalar = Literal["double", "int", "bool", "string"]
 Shape = Literal["single", "optional", "list", "vector", "Vec2", "Vec3", "Vec6", "Transform"]
 Form = Literal["single", "unnamed", "optional", "list"]
-Fate = Literal["refused", "left out", "ignored"]
+Consequence = Literal["refused", "left out", "ignored"]
 
 UNBOUNDED: Final = None
+"""Value of `Value.most` for lists of any length."""
 _FIXED_SIZE: Final = {"Vec2": 2, "Vec3": 3, "Vec6": 6, "Transform": 6}
 
 
-class Kind:
-    """Base of all markers; gives pydantic a validator that never looks into the classes of other components."""
+class FieldType:
+    """Base class of all markers.
+
+    It gives pydantic a validator that does not build those of other component classes.
+    """
 
     __slots__ = ()
 
     def check(self, value: Any, accepts: type | None) -> Any:
-        """Return `value` in the form the model stores, or raise ValueError."""
+        """Return a value in its stored form.
+
+        Args:
+            value: the value.
+            accepts: class of the objects that the property holds; None for text.
+
+        Raises:
+            ValueError: the value does not fit the property.
+        """
         raise NotImplementedError
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> core_schema.CoreSchema:
@@ -46,14 +58,21 @@ class Kind:
 
 
 @dataclass(frozen=True, slots=True)
-class Value(Kind):
-    """Words of one scalar type: a number, a switch, a text, a vector, a list.
+class Value(FieldType):
+    """Property with words of one scalar type: a number, a switch, a text, a vector, a list.
 
-    `least` and `most` bound the number of words of a list (`most` None: no bound). `domain` is a
-    condition on every number such as ``"> 0"``; it is what a sane model satisfies, not something
-    the reader enforces. `choices` lists the words or numbers that have a meaning. `legacy` marks
-    properties of OpenSim's first property system, which are printed after the others and read by
-    stricter rules. An `optional` vector may be left out.
+    Attributes:
+        scalar: type of one word.
+        shape: arrangement of the words.
+        unit: unit of the numbers.
+        domain: condition on every number such as ``"> 0"``, which lint rules check and the reader
+            does not enforce.
+        least: smallest number of words of a list.
+        most: largest number of words of a list; None without a bound.
+        legacy: whether the property belongs to OpenSim's first property system, which is printed last
+            and parsed by stricter rules.
+        choices: words or numbers that have a meaning.
+        optional: whether a vector may be left out.
     """
 
     scalar: Scalar
@@ -74,16 +93,24 @@ class Value(Kind):
         return _FIXED_SIZE.get(self.shape)
 
     def check(self, value: Any, accepts: type | None) -> Any:
-        """Return the number, switch or text, or a tuple of them; ValueError if it is none."""
+        """Return the number, switch or text, or a tuple of them.
+
+        Args:
+            value: the value.
+            accepts: not used.
+
+        Raises:
+            ValueError: the value has another type or size.
+        """
         if self.shape == "single":
-            return _scalar(self.scalar, value)
+            return _check_scalar(self.scalar, value)
         if value is None and (self.optional or self.shape == "optional"):
             return None
         if self.shape == "optional":
-            return _scalar(self.scalar, value)
+            return _check_scalar(self.scalar, value)
         if isinstance(value, str) or not isinstance(value, Iterable):
             raise ValueError(f"expected {self.words()}, got {value!r}")
-        items = tuple(_scalar(self.scalar, item) for item in value)
+        items = tuple(_check_scalar(self.scalar, item) for item in value)
         size = _FIXED_SIZE.get(self.shape)
         least, most = (size, size) if size is not None else (self.least, self.most)
         if len(items) < least or (most is not None and len(items) > most):
@@ -91,7 +118,7 @@ class Value(Kind):
         return items
 
     def words(self) -> str:
-        """What the text must hold, in words: ``"3 numbers"``, ``"true or false"``."""
+        """Describe the expected text: ``"3 numbers"``, ``"true or false"``."""
         nouns = {
             "double": "numbers",
             "int": "whole numbers",
@@ -111,14 +138,21 @@ class Value(Kind):
 
 
 @dataclass(frozen=True, slots=True)
-class Reference(Kind):
-    """A text, or a list of words, by which one component names another.
+class Reference(FieldType):
+    """Property that names other components by text.
 
-    `rule` is one of the resolution kinds of :mod:`osimlite.schema.references`, `target` the OpenSim
-    class that the named component must be; OpenSim insists on one if it is `required`. In Python
-    the component itself may be given; the printer turns it into the right text. `words` may stand
-    there besides names, of some properties in `any_case`; in a setup `fate` says what OpenSim does
-    with a name that leads to nothing: refuse it, leave it out, or ignore the property anyway.
+    In Python it also accepts the component itself, which the printer converts to text.
+
+    Attributes:
+        rule: rule of :mod:`osimlite.schema.resolution` that resolves the text.
+        target: OpenSim class that the named component must have.
+        shape: one name, an optional one, or a list.
+        required: whether OpenSim rejects an empty property.
+        legacy: whether the property belongs to OpenSim's first property system.
+        words: words that are accepted besides names.
+        consequence: what OpenSim does in a setup with a name that leads to nothing: reject it, leave
+            it out, or ignore the property.
+        any_case: whether `words` are accepted in any letter case.
     """
 
     rule: str
@@ -127,15 +161,23 @@ class Reference(Kind):
     required: bool = True
     legacy: bool = False
     words: tuple[str, ...] = ()
-    fate: Fate = "refused"
+    consequence: Consequence = "refused"
     any_case: bool = False
 
-    def takes(self, word: str) -> bool:
-        """Whether a text is one of the words that may stand there besides names."""
+    def accepts_word(self, word: str) -> bool:
+        """Return whether a text is one of the words that are accepted besides names."""
         return word in self.words or (self.any_case and word.lower() in map(str.lower, self.words))
 
     def check(self, value: Any, accepts: type | None) -> Any:
-        """Return the text or the component, or a tuple of them; ValueError if a component is of another class."""
+        """Return the text or the component, or a tuple of them.
+
+        Args:
+            value: the value.
+            accepts: not used.
+
+        Raises:
+            ValueError: a component has another class.
+        """
         if self.shape == "list":
             if isinstance(value, str) or not isinstance(value, Iterable):
                 raise ValueError(
@@ -158,43 +200,53 @@ class Reference(Kind):
 
 
 @dataclass(frozen=True, slots=True)
-class Held(Kind):
-    """One or several objects that belong to this one; `form` is how the file holds them.
+class ObjectField(FieldType):
+    """Property that holds one or several objects.
 
-    ``single`` prints ``<Class name="property">``, ``unnamed`` prints ``<Class>``, ``optional`` and
-    ``list`` print ``<property><Class/>...</property>``.
+    Attributes:
+        form: XML form. ``single`` prints ``<Class name="property">``, ``unnamed`` prints ``<Class>``,
+            ``optional`` and ``list`` print ``<property><Class/>...</property>``.
+        legacy: whether the property belongs to OpenSim's first property system.
     """
 
     form: Form
     legacy: bool = False
 
     def check(self, value: Any, accepts: type | None) -> Any:
-        """Return the object, or a list that notes its changes; ValueError if an object is of another class."""
+        """Return the object, or a list that reports its changes.
+
+        Args:
+            value: the value.
+            accepts: class of the objects.
+
+        Raises:
+            ValueError: an object has another class.
+        """
         assert accepts is not None
         if self.form == "list":
             if isinstance(value, str) or not isinstance(value, Iterable):
                 raise ValueError(f"expected a list of {accepts.__name__}, got {value!r}")
-            return ObjectList(_instance(item, accepts) for item in value)
+            return ObjectList(_check_instance(item, accepts) for item in value)
         if value is None and self.form == "optional":
             return None
         if self.form == "unnamed" and isinstance(value, accepts) and type(value) is not accepts:
-            # Its tag is what tells the property.
+            # The tag identifies the property, so the class must be exact.
             raise ValueError(
                 f"expected a {accepts.__name__} and no class derived from it, got {type(value).__name__}"
             )
-        return _instance(value, accepts)
+        return _check_instance(value, accepts)
 
 
 @dataclass(frozen=True, slots=True)
 class Tag:
-    """Gives the XML tag of a property whose tag cannot be the name of the Python attribute."""
+    """XML tag of a property whose tag is not the name of the Python attribute."""
 
     text: str
 
 
 @dataclass(frozen=True, slots=True)
 class Legacy:
-    """Marks a property of OpenSim's first property system where the kind of the field is shared with others."""
+    """Mark of a property of OpenSim's first property system whose type is shared with other properties."""
 
 
 LEGACY: Final = Legacy()
@@ -202,20 +254,23 @@ LEGACY: Final = Legacy()
 
 @dataclass(frozen=True, slots=True)
 class NamesOf:
-    """Says of what a property holds names: its words, the names of its objects, the labels of its table.
+    """What the words of a property, the names of its objects, or the labels of its table refer to.
 
-    Classes such as sets of weights are used for many things; only the property that holds them
-    tells for what.
+    Classes such as sets of weights have many uses; only the property that holds them declares what
+    they name.
     """
 
     reference: Reference
 
 
 def note_change(owner: Any, *, numbers_only: bool = False) -> None:
-    """Tell the model that an object or list was last seen in that it is about to change.
+    """Report to its model that an object or list is about to change.
 
-    What was in no index yet changes none: it came, or comes, into a model by a change of what is
-    there.
+    An object without a model changes no index: it enters a model by a change of its holder.
+
+    Args:
+        owner: model or home in which the object was last seen.
+        numbers_only: whether paths and references stay the same.
     """
     model = None if owner is None else owner.model
     if model is not None:
@@ -223,10 +278,10 @@ def note_change(owner: Any, *, numbers_only: bool = False) -> None:
 
 
 class ObjectList(list[T]):
-    """A list of objects that notes every change, so that paths and look-ups stay right.
+    """List of objects that reports every change, so that paths and look-ups stay valid.
 
-    Two objects with the same properties are equal but not the same: `index` and `remove` go by
-    identity. `owner` is the model that the list was last seen in.
+    Two objects with equal properties are equal but not the same, so `index` and `remove` compare
+    identity. `owner` is the model in which the list was last seen.
     """
 
     __slots__ = ("owner",)
@@ -238,15 +293,27 @@ class ObjectList(list[T]):
         return type(self), (list(self),)
 
     def index(self, value: T, *limits: Any) -> int:
-        """Position of this very object; ValueError if it is not here."""
+        """Return the position of this very object.
+
+        Args:
+            value: the object.
+            limits: start and end of the search, as of ``list.index``.
+
+        Raises:
+            ValueError: the object is not in the list.
+        """
         return [id(item) for item in self].index(id(value), *limits)
 
     def remove(self, value: T) -> None:
-        """Take this very object out; ValueError if it is not here."""
+        """Remove this very object.
+
+        Raises:
+            ValueError: the object is not in the list.
+        """
         del self[self.index(value)]
 
 
-def _noting(name: str) -> Callable[..., Any]:
+def _wrap_mutator(name: str) -> Callable[..., Any]:
     plain = getattr(list, name)
 
     def method(self: Any, *args: Any, **kwargs: Any) -> Any:
@@ -269,13 +336,13 @@ for _name in (
     "__setitem__",
     "__delitem__",
 ):
-    setattr(ObjectList, _name, _noting(_name))
+    setattr(ObjectList, _name, _wrap_mutator(_name))
 for _name in ("__iadd__", "__imul__"):
-    setattr(ObjectList, _name, _noting(_name))
+    setattr(ObjectList, _name, _wrap_mutator(_name))
 
 
 def find_class(annotation: Any) -> type[Object] | None:
-    """The component class inside an annotation such as ``list[Body]`` or ``Function | None``."""
+    """Return the component class in an annotation such as ``list[Body]`` or ``Function | None``."""
     if isinstance(annotation, type) and hasattr(annotation, "field_specs"):
         return annotation
     for argument in getattr(annotation, "__args__", ()):
@@ -285,7 +352,7 @@ def find_class(annotation: Any) -> type[Object] | None:
     return None
 
 
-def _instance(value: Any, accepts: type) -> Any:
+def _check_instance(value: Any, accepts: type) -> Any:
     if isinstance(value, accepts) or type(value).__name__ == "Unknown":
         return value
     if isinstance(value, list | tuple) and "objects" in getattr(accepts, "model_fields", ()):
@@ -294,7 +361,7 @@ def _instance(value: Any, accepts: type) -> Any:
     raise ValueError(f"expected a {accepts.__name__}, got {type(value).__name__}")
 
 
-def _scalar(scalar: Scalar, value: Any) -> Any:
+def _check_scalar(scalar: Scalar, value: Any) -> Any:
     if scalar == "string":
         if isinstance(value, str):
             return value
@@ -316,29 +383,57 @@ def _scalar(scalar: Scalar, value: Any) -> Any:
 
 
 def real(unit: str | None = None, domain: str = "", *, legacy: bool = False) -> Value:
-    """Marker of one number with its unit and the domain a sane model keeps to."""
+    """Return the marker of one number.
+
+    Args:
+        unit: unit of the number.
+        domain: condition that valid numbers satisfy.
+        legacy: whether it belongs to the first property system.
+    """
     return Value("double", unit=unit, domain=domain, legacy=legacy)
 
 
 def vec3(unit: str | None = None, domain: str = "") -> Value:
-    """Marker of three numbers, a station or direction in the frame that the class names."""
+    """Return the marker of three numbers, a station or direction in the frame that the class names.
+
+    Args:
+        unit: unit of the numbers.
+        domain: condition that valid numbers satisfy.
+    """
     return Value("double", "Vec3", unit=unit, domain=domain)
 
 
 def reals(
     unit: str | None = None, *, least: int = 0, most: int | None = None, legacy: bool = False
 ) -> Value:
-    """Marker of a list of numbers."""
+    """Return the marker of a list of numbers.
+
+    Args:
+        unit: unit of the numbers.
+        least: smallest length.
+        most: largest length; None without a bound.
+        legacy: whether it belongs to the first property system.
+    """
     return Value("double", "list", unit=unit, least=least, most=most, legacy=legacy)
 
 
 def maybe(unit: str | None = None, domain: str = "") -> Value:
-    """Marker of a number that may be left out."""
+    """Return the marker of a number that may be left out.
+
+    Args:
+        unit: unit of the number.
+        domain: condition that valid numbers satisfy.
+    """
     return Value("double", "optional", unit=unit, domain=domain)
 
 
 def word(*choices: str, legacy: bool = False) -> Value:
-    """Marker of a text of which only some words have a meaning."""
+    """Return the marker of a text for which only some words have a meaning.
+
+    Args:
+        choices: the words.
+        legacy: whether it belongs to the first property system.
+    """
     return Value("string", choices=choices, legacy=legacy)
 
 
@@ -359,17 +454,17 @@ LegacyInteger = Annotated[int, Value("int", legacy=True)]
 LegacyReals = Annotated[Reals, reals(legacy=True)]
 MaybeFlag = Annotated[bool | None, Value("bool", "optional")]
 
-Single = Annotated[T, Held("single")]
-Unnamed = Annotated[T, Held("unnamed")]
-Optional = Annotated[T | None, Held("optional")]
-Many = Annotated[list[T], Held("list")]
-LegacyUnnamed = Annotated[T, Held("unnamed", legacy=True)]
-LegacyMany = Annotated[list[T], Held("list", legacy=True)]
-LegacyOptional = Annotated[T | None, Held("optional", legacy=True)]
+Single = Annotated[T, ObjectField("single")]
+Unnamed = Annotated[T, ObjectField("unnamed")]
+Optional = Annotated[T | None, ObjectField("optional")]
+Many = Annotated[list[T], ObjectField("list")]
+LegacyUnnamed = Annotated[T, ObjectField("unnamed", legacy=True)]
+LegacyMany = Annotated[list[T], ObjectField("list", legacy=True)]
+LegacyOptional = Annotated[T | None, ObjectField("optional", legacy=True)]
 
 
 def make_domain_test(domain: str) -> Callable[[float], bool]:
-    """The test that a domain such as ``"> 0"``, ``">= 1"``, ``"0 to 1"`` or ``">= 0 or -1"`` stands for."""
+    """Return a test for a domain such as ``"> 0"``, ``">= 1"``, ``"0 to 1"`` or ``">= 0 or -1"``."""
     domain, _, besides = domain.partition(" or ")
     if besides:
         inside, alone = make_domain_test(domain), float(besides)

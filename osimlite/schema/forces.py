@@ -2,7 +2,7 @@
 
 from typing import Annotated, ClassVar
 
-from osimlite.schema.base import ModelComponent, Object, made, none
+from osimlite.schema.base import ModelComponent, Object, make_default, make_empty_list
 from osimlite.schema.facts import NAN, REFUSED, TOUCHING, Facts
 from osimlite.schema.fields import Flag, LegacyMany, Single, real
 from osimlite.schema.references import ContactGeometryNames, CoordinateName
@@ -46,7 +46,7 @@ class HuntCrossleyContactParameters(Object, tag="HuntCrossleyForce::ContactParam
 class HuntCrossleyContactParametersSet(Set, tag="HuntCrossleyForce::ContactParametersSet"):
     """The materials of one Hunt-Crossley force."""
 
-    objects: LegacyMany[HuntCrossleyContactParameters] = none()
+    objects: LegacyMany[HuntCrossleyContactParameters] = make_empty_list()
     """The materials, each with the surfaces that are made of it."""
 
 
@@ -58,7 +58,7 @@ class HuntCrossleyForce(Force):
     ContactParameters: ClassVar = HuntCrossleyContactParameters
     ContactParametersSet: ClassVar = HuntCrossleyContactParametersSet
 
-    contact_parameters: Single[HuntCrossleyContactParametersSet] = made(
+    contact_parameters: Single[HuntCrossleyContactParametersSet] = make_default(
         HuntCrossleyContactParametersSet, name="contact_parameters"
     )
     """The surfaces that touch each other by this force, and their materials."""
@@ -99,7 +99,7 @@ class CoordinateLimitForce(ForceProducer):
 class ForceSet(ModelComponentSet):
     """The forces, actuators and muscles of a model."""
 
-    objects: LegacyMany[Force] = none()
+    objects: LegacyMany[Force] = make_empty_list()
     """The forces; actuators and muscles are forces with controls."""
-    groups: LegacyMany[ObjectGroup] = none()
+    groups: LegacyMany[ObjectGroup] = make_empty_list()
     """Named selections of the forces, which tools can leave out; the mechanics ignore them."""

@@ -3,7 +3,7 @@
 import math
 from typing import Annotated
 
-from osimlite.schema.base import ModelComponent, made, none
+from osimlite.schema.base import ModelComponent, make_default, make_empty_list
 from osimlite.schema.facts import OWN, Facts
 from osimlite.schema.fields import (
     LegacyMany,
@@ -32,9 +32,9 @@ class Frame(ModelComponent, abstract=True):
         scales={"attached_geometry": OWN},
     )
 
-    frame_geometry: Single[FrameGeometry] = made(FrameGeometry, name="frame_geometry")
+    frame_geometry: Single[FrameGeometry] = make_default(FrameGeometry, name="frame_geometry")
     """How the frame's own axes are drawn, where a viewer shows frames."""
-    attached_geometry: Many[Geometry] = none()
+    attached_geometry: Many[Geometry] = make_empty_list()
     """Shapes drawn along the axes of this frame; they move with it and do nothing to the motion."""
 
     def attach(self, *shapes: Geometry) -> None:
@@ -48,7 +48,7 @@ class Frame(ModelComponent, abstract=True):
 class PhysicalFrame(Frame, abstract=True):
     """A frame fixed to a body or to ground."""
 
-    wrap_object_set: Unnamed[WrapObjectSet] = made(WrapObjectSet)
+    wrap_object_set: Unnamed[WrapObjectSet] = make_default(WrapObjectSet)
     """Surfaces fixed in this frame that paths can wrap around."""
 
 
@@ -115,12 +115,12 @@ class TwoFrameLinker(ModelComponent, abstract=True):
     """The frame in which the place and the turning of the second one are measured."""
     socket_frame2: PhysicalFrameSocket = ""
     """The frame whose place and turning in the first one count."""
-    frames: Many[PhysicalFrame] = none()
+    frames: Many[PhysicalFrame] = make_empty_list()
     """Offset frames that belong to this component, so that its sockets can name places on bodies."""
 
 
 class BodySet(ModelComponentSet):
     """The bodies of a model."""
 
-    objects: LegacyMany[Body] = none()
+    objects: LegacyMany[Body] = make_empty_list()
     """The bodies; joints say how they hang together."""

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from typing import Annotated
 
-from osimlite.schema.base import Object, none
+from osimlite.schema.base import Object, make_empty_list
 from osimlite.schema.facts import Contradiction, Facts
 from osimlite.schema.fields import (
     LegacyMany,
@@ -134,7 +134,7 @@ class StepFunction(Function):
     end_value: Annotated[float, real(legacy=True)] = 1.0
     """Value after the step."""
 
-    def contradictions(self) -> Iterator[Contradiction]:
+    def find_contradictions(self) -> Iterator[Contradiction]:
         """Its change takes some time, forwards or backwards."""
         if self.transition_start_time == self.transition_end_time:
             yield (
@@ -155,7 +155,7 @@ class ExpressionBasedFunction(Function):
 class FunctionSet(Set):
     """A list of functions."""
 
-    objects: LegacyMany[Function] = none()
+    objects: LegacyMany[Function] = make_empty_list()
     """The functions; whoever owns the set says what their order means."""
 
 

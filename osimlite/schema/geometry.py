@@ -2,7 +2,7 @@
 
 from typing import Annotated
 
-from osimlite.schema.base import Component, Object, made
+from osimlite.schema.base import Component, Object, make_default
 from osimlite.schema.fields import Flag, Unnamed, Value, Vec3, real, vec3
 from osimlite.schema.references import FileName, FrameSocket, TransformInput
 
@@ -25,7 +25,7 @@ class Appearance(Object):
     """0 lets everything through, 1 nothing."""
     color: Annotated[Vec3, vec3(domain="0 to 1")] = (1.0, 1.0, 1.0)
     """Red, green and blue."""
-    surface_properties: Unnamed[SurfaceProperties] = made(SurfaceProperties)
+    surface_properties: Unnamed[SurfaceProperties] = make_default(SurfaceProperties)
     """Whether points, edges or faces are drawn."""
 
 
@@ -38,7 +38,7 @@ class Geometry(Component, abstract=True):
     """An output that places the shape in ground, in the stead of a frame."""
     scale_factors: Annotated[Vec3, vec3()] = (1.0, 1.0, 1.0)
     """Factors of the size along the axes X, Y and Z of the frame."""
-    appearance: Unnamed[Appearance] = made(Appearance)
+    appearance: Unnamed[Appearance] = make_default(Appearance)
     """Colour, opacity and style of the shape."""
 
 
@@ -158,5 +158,5 @@ class ModelDisplayHints(Object):
 class ModelVisualPreferences(Object):
     """Preferences of a viewer for this model."""
 
-    model_display_hints: Unnamed[ModelDisplayHints] = made(ModelDisplayHints)
+    model_display_hints: Unnamed[ModelDisplayHints] = make_default(ModelDisplayHints)
     """Which kinds of components a viewer draws."""

@@ -10,7 +10,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 from pydantic import Field
 
 from osimlite.errors import ModelError
-from osimlite.schema.base import ModelComponent, made, none
+from osimlite.schema.base import ModelComponent, make_default, make_empty_list
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.facts import FLAT, NAN, Facts
 from osimlite.schema.fields import LegacyMany, Many, ObjectList, Unnamed, Vec3, real, reals, vec3
@@ -43,9 +43,9 @@ class Joint(ModelComponent, abstract=True):
     """The frame F in which the joint measures its motion, most often an offset frame of the joint."""
     socket_child_frame: PhysicalFrameSocket = ""
     """The frame M that the joint moves, most often an offset frame of the joint."""
-    coordinates: Many[Coordinate] = none()
+    coordinates: Many[Coordinate] = make_empty_list()
     """The generalized coordinates in the order of the class; a CustomJoint has the order of its axes."""
-    frames: Many[PhysicalOffsetFrame] = none()
+    frames: Many[PhysicalOffsetFrame] = make_empty_list()
     """Offset frames that belong to the joint, so that its sockets can name places on bodies."""
 
     def __init_subclass__(cls, **named: Any) -> None:
@@ -187,7 +187,7 @@ class EllipsoidJoint(Joint):
     coordinates: Many[Coordinate] = _coordinates(3)
     radii_x_y_z: Annotated[Vec3, vec3("m", "> 0")] = (math.nan, math.nan, math.nan)
     """Half axes of the ellipsoid along the axes of the parent frame."""
-    appearance: Unnamed[Appearance] = made(Appearance)
+    appearance: Unnamed[Appearance] = make_default(Appearance)
     """How the ellipsoid is drawn."""
 
 
@@ -238,5 +238,5 @@ class ConstantCurvatureJoint(Joint):
 class JointSet(ModelComponentSet):
     """The joints of a model."""
 
-    objects: LegacyMany[Joint] = none()
+    objects: LegacyMany[Joint] = make_empty_list()
     """The joints; each carries its own coordinates."""

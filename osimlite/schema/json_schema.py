@@ -1,9 +1,9 @@
-"""The JSON Schema of models and other documents as plain data, generated from the declarations.
+"""JSON Schema of models and other documents as plain data, generated from the declarations.
 
 ``python -m osimlite.schema.json_schema > schemas/osim-4.6.schema.json`` writes the file that
-editors use; a test keeps it current. :mod:`osimlite.io.document.data` reads what the schema
-describes. With the tag of another class, such as ``ScaleTool``, the schema is that of its
-documents.
+editors use; a test compares it with the declarations. :mod:`osimlite.io.document.data` reads such
+documents. With the tag of another class as argument, such as ``ScaleTool``, the schema is that of
+its documents.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import Any
 
 from osimlite.schema.base import Object, Unknown
 from osimlite.schema.descriptions import describe_property
-from osimlite.schema.fields import Held, Reference, Value
+from osimlite.schema.fields import ObjectField, Reference, Value
 from osimlite.schema.registry import MODULES
 from osimlite.schema.specs import FieldSpec, get_field_specs
 
@@ -31,12 +31,19 @@ _SCALARS: dict[str, dict[str, Any]] = {
 }
 
 
-def json_schema(tag: str = "Model") -> dict[str, Any]:
-    """The schema of a document that holds a `tag`: one definition per class of files, and one per kind of object."""
-    classes = _classes()
-    definitions: dict[str, Any] = {"Unknown": _unknown()}
+def make_json_schema(tag: str = "Model") -> dict[str, Any]:
+    """Return the schema of a document whose top object has a tag.
+
+    It has a definition for each concrete class, and one for each abstract class that a property
+    accepts.
+
+    Returns:
+        The schema as data for ``json.dumps``.
+    """
+    classes = _list_classes()
+    definitions: dict[str, Any] = {"Unknown": _make_unknown_definition()}
     for cls in classes:
-        definitions[cls.tag] = _definition(cls, classes)
+        definitions[cls.tag] = _make_definition(cls, classes)
     for cls in {
         spec.accepts
         for each in classes
@@ -45,10 +52,10 @@ def json_schema(tag: str = "Model") -> dict[str, Any]:
     }:
         if cls.abstract:
             held = [
-                *(_said(other) for other in classes if issubclass(other, cls)),
+                *(_make_tagged_reference(other) for other in classes if issubclass(other, cls)),
                 {"$ref": "#/$defs/Unknown"},
             ]
-            definitions[cls.tag] = {"description": _summary(cls), "anyOf": held}
+            definitions[cls.tag] = {"description": _get_summary(cls), "anyOf": held}
     return {
         "$schema": DIALECT,
         "title": f"A {tag} of OpenSim 4.6 as plain data",
@@ -57,36 +64,36 @@ def json_schema(tag: str = "Model") -> dict[str, Any]:
     }
 
 
-def _classes() -> list[type[Object]]:
+def _list_classes() -> list[type[Object]]:
     result: list[type[Object]] = [
         getattr(import_module(module), name) for name, module in MODULES.items()
     ]
     return sorted((cls for cls in result if not cls.abstract), key=lambda cls: cls.tag)
 
 
-def _definition(cls: type[Object], classes: list[type[Object]]) -> dict[str, Any]:
+def _make_definition(cls: type[Object], classes: list[type[Object]]) -> dict[str, Any]:
     properties: dict[str, Any] = {"class": {"const": cls.tag}, "name": {"type": "string"}}
     if cls.tag == "Model":
         properties["$schema"] = {"type": "string"}
     for spec in get_field_specs(cls).values():
-        properties[spec.name] = _property(spec, classes)
+        properties[spec.name] = _make_property(spec, classes)
     properties["unknown"] = {
         "description": "Elements that no class knows, as XML.",
         "type": "array",
         "items": {"type": "string"},
     }
     return {
-        "description": _summary(cls),
+        "description": _get_summary(cls),
         "type": "object",
         "properties": properties,
         "additionalProperties": False,
     }
 
 
-def _unknown() -> dict[str, Any]:
+def _make_unknown_definition() -> dict[str, Any]:
     names = ("class", "name", "class_name", "content")
     return {
-        "description": _summary(Unknown),
+        "description": _get_summary(Unknown),
         "type": "object",
         "properties": {
             name: {"const": "Unknown"} if name == "class" else {"type": "string"} for name in names
@@ -96,14 +103,14 @@ def _unknown() -> dict[str, Any]:
     }
 
 
-def _property(spec: FieldSpec, classes: list[type[Object]]) -> dict[str, Any]:
-    text = _text(spec)
-    return {**({"description": text} if text else {}), **_content(spec, classes)}
+def _make_property(spec: FieldSpec, classes: list[type[Object]]) -> dict[str, Any]:
+    text = _describe_field(spec)
+    return {**({"description": text} if text else {}), **_make_content(spec, classes)}
 
 
-def _content(spec: FieldSpec, classes: list[type[Object]]) -> dict[str, Any]:
-    if isinstance(spec.kind, Held):
-        return _held(spec, spec.kind, classes)
+def _make_content(spec: FieldSpec, classes: list[type[Object]]) -> dict[str, Any]:
+    if isinstance(spec.kind, ObjectField):
+        return _make_object_schema(spec, spec.kind, classes)
     if isinstance(spec.kind, Reference):
         return (
             {"type": "array", "items": {"type": "string"}}
@@ -111,36 +118,45 @@ def _content(spec: FieldSpec, classes: list[type[Object]]) -> dict[str, Any]:
             else {"type": "string"}
         )
     assert isinstance(spec.kind, Value)
-    result = _value(spec.kind)
+    result = _make_value_schema(spec.kind)
     return {**result, "default": spec.default} if _is_plain(spec.default) else result
 
 
-def _held(spec: FieldSpec, kind: Held, classes: list[type[Object]]) -> dict[str, Any]:
+def _make_object_schema(
+    spec: FieldSpec, kind: ObjectField, classes: list[type[Object]]
+) -> dict[str, Any]:
     assert spec.accepts is not None
-    one = _one(spec.accepts, classes)
+    one = _make_reference(spec.accepts, classes)
     if kind.form == "list":
         return {"type": "array", "items": one}
     members = get_field_specs(spec.accepts).get("objects")
     if members is None:
         return one
-    # A set that is nothing but its members may be given as the list of them.
-    return {"anyOf": [one, _content(members, classes)]}
+    # A set without further properties may be written as the list of its members.
+    return {"anyOf": [one, _make_content(members, classes)]}
 
 
-def _one(cls: type[Object], classes: list[type[Object]]) -> dict[str, Any]:
-    """An object where a property takes a `cls`; only of that very class it may leave its class unsaid."""
+def _make_reference(cls: type[Object], classes: list[type[Object]]) -> dict[str, Any]:
+    """Return the schema of an object where a property accepts `cls`.
+
+    Only an object of exactly that class may leave out its class.
+    """
     exact = {"$ref": f"#/$defs/{cls.tag}"}
     if cls.abstract:
         return exact
-    kinds = [_said(other) for other in classes if issubclass(other, cls) and other is not cls]
+    kinds = [
+        _make_tagged_reference(other)
+        for other in classes
+        if issubclass(other, cls) and other is not cls
+    ]
     return {"anyOf": [exact, *kinds]} if kinds else exact
 
 
-def _said(cls: type[Object]) -> dict[str, Any]:
+def _make_tagged_reference(cls: type[Object]) -> dict[str, Any]:
     return {"$ref": f"#/$defs/{cls.tag}", "required": ["class"]}
 
 
-def _value(kind: Value) -> dict[str, Any]:
+def _make_value_schema(kind: Value) -> dict[str, Any]:
     scalar = {"enum": list(kind.choices)} if kind.choices else _SCALARS[kind.scalar]
     if kind.shape == "single":
         return scalar
@@ -155,8 +171,8 @@ def _value(kind: Value) -> dict[str, Any]:
     return {"anyOf": [result, {"type": "null"}]} if kind.optional else result
 
 
-def _text(spec: FieldSpec) -> str:
-    """What an editor shows of a property: its meaning, and what its type leaves open."""
+def _describe_field(spec: FieldSpec) -> str:
+    """Return the text that an editor shows: the meaning of a property and what its type leaves open."""
     words = ""
     if isinstance(spec.kind, Reference):
         words = f"names a {spec.kind.target}, {spec.kind.rule}"
@@ -165,16 +181,16 @@ def _text(spec: FieldSpec) -> str:
     return " ".join(part for part in (describe_property(spec), words and f"({words})") if part)
 
 
-def _summary(cls: type[Object]) -> str:
+def _get_summary(cls: type[Object]) -> str:
     return (cls.__doc__ or "").split("\n")[0]
 
 
 def _is_plain(value: Any) -> bool:
-    """Whether JSON can say the value."""
+    """Return whether JSON can represent a value."""
     if isinstance(value, float):
         return math.isfinite(value)
     return all(map(_is_plain, value)) if isinstance(value, tuple) else value is not None
 
 
 if __name__ == "__main__":
-    print(json.dumps(json_schema(*sys.argv[1:2]), indent=1))  # noqa: T201
+    print(json.dumps(make_json_schema(*sys.argv[1:2]), indent=1))  # noqa: T201

@@ -1,4 +1,4 @@
-"""What surrounds an object beyond its properties: what its file said besides, and the model it belongs to."""
+"""Content of a file that the properties of an object do not hold, and the link to its model."""
 
 from __future__ import annotations
 
@@ -14,16 +14,22 @@ if TYPE_CHECKING:
 
 @dataclass(slots=True)
 class Layout:
-    """What a file said about one object beyond its properties, kept so that nothing is lost on writing.
+    """Content of a file about one object beyond its properties, preserved for writing.
 
-    `comments` stand before the object itself. `before` holds, per tag, the comments and unknown
-    elements that stood before that property (key None: at the end). `raw` keeps, per field, text
-    that reads only partly, together with the value it was read as: while the value is unchanged the
-    text is written back. `attributes` are unknown ones, `after` is what followed the last member of
-    a list, `version` the version of a whole document and `file` where that was read from, `prolog`
-    and `epilog` the comments before and behind its root element. `defaults` is the ``<defaults>``
-    block of a document; `inherited` names the fields whose value an object took from it. `include`
-    is there if the object was read from a file of its own.
+    Attributes:
+        comments: comments before the object.
+        before: comments and unknown elements before each property, by tag; None for the end.
+        raw: by field, a text that could be read only in part, with the value that was read. It is
+            written back as long as the value is unchanged.
+        attributes: unknown attributes.
+        after: remarks after the last member of a list.
+        version: version of a whole document.
+        file: path of the document.
+        prolog: comments before the root element.
+        epilog: comments after the root element.
+        defaults: objects of the ``<defaults>`` block of a document.
+        inherited: fields whose value was taken from that block.
+        include: file that the object was read from, if it was included.
     """
 
     comments: list[str] = field(default_factory=list)
@@ -41,36 +47,38 @@ class Layout:
 
     @property
     def unknown(self) -> list[str]:
-        """The unknown child elements, as XML text."""
+        """Unknown child elements as XML text."""
         return [
             remark.text for remarks in self.before.values() for remark in remarks if remark.element
         ]
 
 
 class Include(NamedTuple):
-    """Where an object was read from: the file as the text names it, its full path, and a copy of what was read."""
+    """File from which an object was included: its name in the text, its path, and a copy of the object read."""
 
     file: str
     path: str
     held: Object
 
     def __deepcopy__(self, memo: object) -> Include:
+        # The copy is never modified. Copying it with every object around it would make copies of deeply
+        # nested files grow without bound.
         # What was read does not change. Were it copied with each object around it, files that name
         # each other deeply would be copied without end.
         return self
 
 
 class Remark(NamedTuple):
-    """A comment, or an element that no class knows (`element` true; `text` is its XML)."""
+    """Comment, or unknown element (`element` is true; `text` is its XML)."""
 
     text: str
     element: bool
 
 
 class Home:
-    """Stands for the model that the objects of one text belong to; it keeps the model as little as they do.
+    """Weak link from the objects of one text to their model.
 
-    Were it a cycle of references, every model read would wait for the garbage collector.
+    A strong reference would be a cycle, and every model read would wait for the garbage collector.
     """
 
     __slots__ = ("_model",)
@@ -80,7 +88,7 @@ class Home:
 
     @property
     def model(self) -> Model | None:
-        """The model, once it is made and as long as it is there."""
+        """The model; None before it is built and after it is deleted."""
         return None if self._model is None else self._model()
 
     @model.setter

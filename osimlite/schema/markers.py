@@ -2,7 +2,7 @@
 
 from typing import Annotated
 
-from osimlite.schema.base import ModelComponent, none
+from osimlite.schema.base import ModelComponent, make_empty_list
 from osimlite.schema.facts import Facts
 from osimlite.schema.fields import Flag, LegacyMany, Vec3, vec3
 from osimlite.schema.references import PhysicalFrameSocket
@@ -37,7 +37,7 @@ class Marker(Station):
 class MarkerSet(ModelComponentSet):
     """The markers of a model."""
 
-    objects: LegacyMany[Marker] = none()
+    objects: LegacyMany[Marker] = make_empty_list()
     """The markers, named as the columns of measured data."""
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar, cast, overl
 
 from osimlite.base.lazy import make_notebook_repr
 from osimlite.errors import ModelError, OsimliteError
-from osimlite.schema.base import Component, ModelComponent, made
+from osimlite.schema.base import Component, ModelComponent, make_default
 from osimlite.schema.contact import ContactGeometrySet
 from osimlite.schema.facts import Facts
 from osimlite.schema.fields import Single, Text, Unnamed, Vec3, real, vec3
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 C = TypeVar("C", bound=Component)
 
 CURRENT_VERSION = 40600
-"""The document version that OpenSim 4.6 writes, and so do we."""
+"""Document version that OpenSim 4.6 and osimlite write."""
 
 
 class Model(ModelComponent):
@@ -43,7 +43,7 @@ class Model(ModelComponent):
 
     assembly_accuracy: Annotated[float, real(domain="> 0")] = 1e-9
     """How well assembly at the start of a simulation must satisfy constraints; it fails where it cannot."""
-    ground: Single[Ground] = made(
+    ground: Single[Ground] = make_default(
         Ground,
         name="ground",
         wrap_object_set=lambda: WrapObjectSet.build({"name": "wrapobjectset"}, set()),
@@ -59,27 +59,27 @@ class Model(ModelComponent):
     """Unit of all lengths, in a word; tools convert marker data to it, the mechanics assume metres."""
     force_units: Text = "N"
     """Unit of all forces, in a word for readers; the mechanics assume newtons."""
-    body_set: Unnamed[BodySet] = made(BodySet, name="bodyset")
+    body_set: Unnamed[BodySet] = make_default(BodySet, name="bodyset")
     """The rigid bodies; joints say how they hang together."""
-    joint_set: Unnamed[JointSet] = made(JointSet, name="jointset")
+    joint_set: Unnamed[JointSet] = make_default(JointSet, name="jointset")
     """The joints: every body is the child of one, or has a free joint to ground made for it."""
-    controller_set: Unnamed[ControllerSet] = made(ControllerSet, name="controllerset")
+    controller_set: Unnamed[ControllerSet] = make_default(ControllerSet, name="controllerset")
     """What sets the controls of actuators."""
-    constraint_set: Unnamed[ConstraintSet] = made(ConstraintSet, name="constraintset")
+    constraint_set: Unnamed[ConstraintSet] = make_default(ConstraintSet, name="constraintset")
     """Conditions on positions beyond the joints, which close loops and couple coordinates."""
-    force_set: Unnamed[ForceSet] = made(ForceSet, name="forceset")
+    force_set: Unnamed[ForceSet] = make_default(ForceSet, name="forceset")
     """Everything that pushes or pulls but gravity: forces, contact, actuators, muscles."""
-    marker_set: Unnamed[MarkerSet] = made(MarkerSet, name="markerset")
+    marker_set: Unnamed[MarkerSet] = make_default(MarkerSet, name="markerset")
     """Points that motion capture sees."""
-    contact_geometry_set: Unnamed[ContactGeometrySet] = made(
+    contact_geometry_set: Unnamed[ContactGeometrySet] = make_default(
         ContactGeometrySet, name="contactgeometryset"
     )
     """Surfaces that contact forces name."""
-    probe_set: Unnamed[ProbeSet] = made(ProbeSet, name="probeset")
+    probe_set: Unnamed[ProbeSet] = make_default(ProbeSet, name="probeset")
     """Quantities that a simulation reports."""
-    component_set: Unnamed[ComponentSet] = made(ComponentSet, name="componentset")
+    component_set: Unnamed[ComponentSet] = make_default(ComponentSet, name="componentset")
     """Components of any class that no other set takes, such as reporters."""
-    model_visual_preferences: Unnamed[ModelVisualPreferences] = made(
+    model_visual_preferences: Unnamed[ModelVisualPreferences] = make_default(
         ModelVisualPreferences, name="modelvisualpreferences"
     )
     """What a viewer should show of the model."""
@@ -88,22 +88,26 @@ class Model(ModelComponent):
 
     @property
     def document_version(self) -> int:
-        """The version of the document the model was read from; the current one for a model made in Python."""
+        """Version of the document that the model was read from; the current one for a model made in Python."""
         version = self.layout.version if self.layout is not None else None
         return CURRENT_VERSION if version is None else version
 
     def tree(self) -> Tree:
-        """The index of all components by path, made anew whenever the model has changed."""
+        """Return the index of all components by path, rebuilt after changes of the model."""
         from osimlite.schema.tree import Tree
 
         known = getattr(self, "_tree", None)
         if known is None or not known.is_current:
-            known = Tree(self) if known is None else known.renewed()
+            known = Tree(self) if known is None else known.renew()
             object.__setattr__(self, "_tree", known)
         return cast("Tree", known)
 
     def outdate(self, *, numbers_only: bool = False) -> None:
-        """Something of the model is about to change: its index is made anew before its next use."""
+        """Mark the index as outdated before a change of the model.
+
+        Args:
+            numbers_only: whether paths and references stay the same.
+        """
         known = getattr(self, "_tree", None)
         if known is not None:
             known.outdate(numbers_only=numbers_only)
@@ -113,10 +117,10 @@ class Model(ModelComponent):
     @overload
     def components(self, cls: type[C]) -> Iterator[C]: ...
     def components(self, cls: type[Component] = Component) -> Iterator[Component]:
-        """Yield the components of the tree in OpenSim's order, parents first, from the model itself on.
+        """Yield the components in OpenSim's order, parents first, starting with the model.
 
         Args:
-            cls: only components of this class and the classes derived from it.
+            cls: only components of this class and of classes derived from it.
         """
         return (component for component in self.tree().components if isinstance(component, cls))
 
@@ -124,15 +128,19 @@ class Model(ModelComponent):
         return self.find(path)
 
     def find(self, path: str) -> Component:
-        """The component at an absolute path, or at a path from the model.
+        """Return the component at a path, absolute or relative to the model.
 
         Raises:
-            ModelError: nothing is there; the message names the nearest path.
+            ModelError: the path does not exist; the message names the nearest one.
         """
-        return self.tree().at(path)
+        return self.tree().find(path)
 
     def rename(self, component: Component, name: str) -> None:
-        """Give a component another name; every reference to it, or to what is below it, follows.
+        """Rename a component, and update every reference to it or to components below it.
+
+        Args:
+            component: the component.
+            name: its new name.
 
         Raises:
             ModelError: the component is not in the model, the name is illegal, or a sibling has it.
@@ -142,24 +150,23 @@ class Model(ModelComponent):
         rename_component(self, component, name)
 
     def remove(self, component: Component) -> None:
-        """Take a component, and all below it, out of the model.
+        """Remove a component and everything below it from the model.
 
         Raises:
-            ModelError: it is not in the model, has a fixed place, or other components name it.
+            ModelError: the component is not in the model, is required, or other components name it.
         """
         from osimlite.schema.editing import remove_component
 
         remove_component(self, component)
 
     def add(self, *components: C) -> C:
-        """Add components to the sets they belong in, in order, and return the first of them.
+        """Add components to the sets for their classes, in order, and return the first one.
 
         Raises:
-            ModelError: the component is of a kind that no set of a model takes, or another beside
-                it has its name.
+            ModelError: no set of a model accepts the class, or a sibling has the name.
         """
         for component in components:
-            for spec, holder in self.objects_held():
+            for spec, holder in self.list_owned_objects():
                 members = type(holder).field_specs().get("objects")
                 if (
                     members is not None
@@ -173,6 +180,8 @@ class Model(ModelComponent):
                     raise ModelError(f"a model has no place for a {type(component).__name__}")
                 _append_member(self.component_set.objects, component)
             if isinstance(component, Joint) and "coordinates" not in component.model_fields_set:
+                # OpenSim's API gives new joints such coordinate names, too. Reading a file that leaves the
+                # coordinates out gives equal names in all joints instead.
                 # As in OpenSim's API: a file that leaves them out would call them all alike.
                 for number, coordinate in enumerate(component.coordinates):
                     if coordinate.name == f"_coord_{number}":
@@ -181,20 +190,21 @@ class Model(ModelComponent):
         return components[0]
 
 
-def expect_model(given: object) -> None:
-    """Refuse what is no model, in words that say how to get one.
+def check_is_model(given: object) -> None:
+    """Check that a value is a model.
 
     Raises:
-        OsimliteError: `given` is something else, most often the path of a file.
+        OsimliteError: it is something else, most often the path of a file; the message says how to get
+            a model.
     """
     if isinstance(given, Model):
         return
     if isinstance(given, str | PurePath):
         raise OsimliteError(
-            f"a Model is wanted here, not a path; read the file first: osimlite.read('{given}')"
+            f"expected a Model, found a path; read the file first: osimlite.read('{given}')"
         )
     raise OsimliteError(
-        f"a Model is wanted here, not a {type(given).__name__}; osimlite.read(path) returns one"
+        f"expected a Model, found a {type(given).__name__}; osimlite.read(path) returns a Model"
     )
 
 

@@ -1,6 +1,6 @@
 """Motions given beforehand, and forces that a program sets while it simulates."""
 
-from osimlite.schema.base import ModelComponent, made
+from osimlite.schema.base import ModelComponent, make_default
 from osimlite.schema.fields import Flag, Single
 from osimlite.schema.functions import FunctionSet
 
@@ -10,7 +10,7 @@ class PositionMotion(ModelComponent):
 
     default_enabled: Flag = True
     """Whether coordinates follow the motion from the start."""
-    functions: Single[FunctionSet] = made(FunctionSet, name="functions")
+    functions: Single[FunctionSet] = make_default(FunctionSet, name="functions")
     """A function of time for every coordinate, with the path of the coordinate as its name."""
 
 

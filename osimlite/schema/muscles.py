@@ -12,8 +12,12 @@ from typing import Annotated
 from pydantic import Field
 
 from osimlite.schema.actuators import ScalarActuator
-from osimlite.schema.base import ModelComponent, made
-from osimlite.schema.default_curves import active_force_length, force_velocity, passive_force_length
+from osimlite.schema.base import ModelComponent, make_default
+from osimlite.schema.default_curves import (
+    make_active_force_length,
+    make_force_velocity,
+    make_passive_force_length,
+)
 from osimlite.schema.facts import (
     BELOW_QUARTER_TURN,
     IDLE,
@@ -80,7 +84,7 @@ class PathActuator(ScalarActuator):
         outputs="tension", domains={"optimal_force": "!= 0"}, doubts={"optimal_force": IDLE}
     )
 
-    geometry_path: Annotated[Single[AbstractGeometryPath], Tag("path")] = made(
+    geometry_path: Annotated[Single[AbstractGeometryPath], Tag("path")] = make_default(
         GeometryPath, name="path"
     )
     """The line along which the actuator pulls."""
@@ -143,7 +147,7 @@ class Muscle(PathActuator, abstract=True):
 
     min_control: Number = 0.0
     max_control: Number = 1.0
-    geometry_path: Annotated[Single[AbstractGeometryPath], Tag("path")] = made(
+    geometry_path: Annotated[Single[AbstractGeometryPath], Tag("path")] = make_default(
         GeometryPath,
         name="path",
         appearance=lambda: Appearance.build({"color": (0.8, 0.1, 0.1)}, set()),
@@ -165,12 +169,12 @@ class Muscle(PathActuator, abstract=True):
 
     @property
     def overwritten(self) -> dict[str, float]:
-        """Properties of its curves that OpenSim computes with other numbers."""
+        """Properties of the curves in whose place OpenSim computes with other numbers, with these numbers."""
         return {}
 
 
-def whole_dynamics(muscle: Muscle) -> Iterator[Contradiction]:
-    """What OpenSim refuses of a muscle whose tendon is always elastic and whose activation never at once."""
+def check_complete_dynamics(muscle: Muscle) -> Iterator[Contradiction]:
+    """Yield the flags that OpenSim rejects in a class whose tendon is elastic and whose activation has dynamics."""
     for flag in ("ignore_tendon_compliance", "ignore_activation_dynamics"):
         if getattr(muscle, flag):
             yield flag, f"{flag} is true, which this class does not have"
@@ -223,7 +227,7 @@ class Thelen2003Muscle(ActivationFiberLengthMuscle):
     Flen: Annotated[float, real(domain="> 1")] = 1.4
     """Force that lengthening fibers approach, of the isometric one."""
     fv_linear_extrap_threshold: Annotated[float, real(domain="> 0")] = 0.95
-    """Part of `Flen` from which force over velocity goes on as a line; more than 1 / `Flen`."""
+    """Part of `Flen` from which force over velocity continues as a line; more than 1 / `Flen`."""
     maximum_pennation_angle: Annotated[float, real("rad", ">= 0")] = MAXIMUM_PENNATION
     """Angle that the fibers do not go beyond; it bounds their length from below."""
     activation_time_constant: Annotated[float, real("s", "> 0")] = 0.015
@@ -233,15 +237,15 @@ class Thelen2003Muscle(ActivationFiberLengthMuscle):
     minimum_activation: Annotated[float, real(domain="0 to 1")] = 0.01
     """Activation below which the muscle does not go; `min_control` must not be less."""
 
-    def contradictions(self) -> Iterator[Contradiction]:
-        """Its tendon is elastic, its activation never at once, and force over velocity a line near its end only."""
-        yield from whole_dynamics(self)
+    def find_contradictions(self) -> Iterator[Contradiction]:
+        """Yield combinations that OpenSim rejects: simplified dynamics, a force-velocity threshold of at most 1/Flen."""
+        yield from check_complete_dynamics(self)
         if self.fv_linear_extrap_threshold <= (least := 1 / self.Flen):
             yield (
                 "fv_linear_extrap_threshold",
                 f"its fv_linear_extrap_threshold is not above 1/Flen, {least:.4g}",
             )
-        yield from _full_activation(self.minimum_activation)
+        yield from _check_minimum_activation(self.minimum_activation)
 
 
 class Millard2012EquilibriumMuscle(Muscle):
@@ -281,39 +285,39 @@ class Millard2012EquilibriumMuscle(Muscle):
     """Activation below which the muscle does not go; below 0.01 only with fiber damping or a rigid tendon."""
     maximum_pennation_angle: Annotated[float, real("rad", ">= 0")] = MAXIMUM_PENNATION
     """Angle that the fibers do not go beyond; it bounds their length from below."""
-    active_force_length_curve: Unnamed[ActiveForceLengthCurve] = made(
+    active_force_length_curve: Unnamed[ActiveForceLengthCurve] = make_default(
         ActiveForceLengthCurve, name="ActiveForceLengthCurve"
     )
     """Active force over fiber length."""
-    force_velocity_curve: Unnamed[ForceVelocityCurve] = made(
+    force_velocity_curve: Unnamed[ForceVelocityCurve] = make_default(
         ForceVelocityCurve, name="ForceVelocityCurve"
     )
     """Factor of the active force over fiber velocity."""
-    fiber_force_length_curve: Unnamed[FiberForceLengthCurve] = made(
+    fiber_force_length_curve: Unnamed[FiberForceLengthCurve] = make_default(
         FiberForceLengthCurve, name="FiberForceLengthCurve"
     )
     """Passive force of the fiber over its length."""
-    tendon_force_length_curve: Unnamed[TendonForceLengthCurve] = made(
+    tendon_force_length_curve: Unnamed[TendonForceLengthCurve] = make_default(
         TendonForceLengthCurve, name="TendonForceLengthCurve"
     )
     """Force of the tendon over its length."""
 
     @property
     def is_classic(self) -> bool:
-        """Whether it has an elastic tendon and no damping: its equations are singular where no force is left."""
+        """Whether the tendon is elastic and fibers have no damping, so that the equations are singular without active force."""
         return not self.ignore_tendon_compliance and self.fiber_damping < 0.001
 
     @property
     def overwritten(self) -> dict[str, float]:
-        """What of its curves would make its equations singular, or would keep them from that."""
+        """Values of the curves that OpenSim sets itself to avoid singular equations, or if they cannot be singular."""
         if self.is_classic:
             return {"minimum_value": max(self.active_force_length_curve.minimum_value, 0.1)}
         return dict.fromkeys(
             ("minimum_value", "concentric_slope_at_vmax", "eccentric_slope_at_vmax"), 0.0
         )
 
-    def contradictions(self) -> Iterator[Contradiction]:
-        """Its equations need some activation where they are singular, and a curve that can be inverted."""
+    def find_contradictions(self) -> Iterator[Contradiction]:
+        """Yield combinations that OpenSim rejects: too little activation without damping, a curve without inverse."""
         if self.is_classic and self.minimum_activation < 0.01:
             yield (
                 "minimum_activation",
@@ -325,16 +329,16 @@ class Millard2012EquilibriumMuscle(Muscle):
                 None,
                 "the concentric_slope_near_vmax of its ForceVelocityCurve is not less than 1",
             )
-        yield from _full_activation(self.minimum_activation)
+        yield from _check_minimum_activation(self.minimum_activation)
 
 
-def _full_activation(least: float) -> Iterator[Contradiction]:
+def _check_minimum_activation(least: float) -> Iterator[Contradiction]:
     if least == 1:
         yield "minimum_activation", "its minimum_activation is not less than 1"
 
 
 class Millard2012AccelerationMuscle(Muscle):
-    """The muscle of Millard et al. (2013) with a mass between fiber and tendon, whose place and speed are states."""
+    """Muscle of Millard et al. (2013) with a mass between fiber and tendon, whose position and speed are states."""
 
     facts = Facts(
         states="activation fiber_length fiber_velocity",
@@ -351,31 +355,33 @@ class Millard2012AccelerationMuscle(Muscle):
     default_fiber_velocity: Number = 0.0
     """Fiber velocity at the start of a simulation; lengthening is positive."""
     muscle_first_order_activation_dynamic_model: Unnamed[MuscleFirstOrderActivationDynamicModel] = (
-        made(MuscleFirstOrderActivationDynamicModel, name="_activation", minimum_activation=0.0)
+        make_default(
+            MuscleFirstOrderActivationDynamicModel, name="_activation", minimum_activation=0.0
+        )
     )
     """How activation follows the control."""
-    active_force_length_curve: Unnamed[ActiveForceLengthCurve] = made(
+    active_force_length_curve: Unnamed[ActiveForceLengthCurve] = make_default(
         ActiveForceLengthCurve, name="ActiveForceLengthCurve", minimum_value=0.0
     )
     """Active force over fiber length."""
-    force_velocity_curve: Unnamed[ForceVelocityCurve] = made(
+    force_velocity_curve: Unnamed[ForceVelocityCurve] = make_default(
         ForceVelocityCurve, name="ForceVelocityCurve"
     )
     """Factor of the active force over fiber velocity."""
-    fiber_force_length_curve: Unnamed[FiberForceLengthCurve] = made(
+    fiber_force_length_curve: Unnamed[FiberForceLengthCurve] = make_default(
         FiberForceLengthCurve, name="FiberForceLengthCurve"
     )
     """Passive force of the fiber over its length."""
-    tendon_force_length_curve: Unnamed[TendonForceLengthCurve] = made(
+    tendon_force_length_curve: Unnamed[TendonForceLengthCurve] = make_default(
         TendonForceLengthCurve, name="TendonForceLengthCurve"
     )
     """Force of the tendon over its length."""
-    fiber_compressive_force_length_curve: Unnamed[FiberCompressiveForceLengthCurve] = made(
+    fiber_compressive_force_length_curve: Unnamed[FiberCompressiveForceLengthCurve] = make_default(
         FiberCompressiveForceLengthCurve, name="default_FiberCompressiveForceLengthCurve"
     )
     """Force along the fiber that keeps it from becoming too short."""
     fiber_compressive_force_cos_pennation_curve: Unnamed[FiberCompressiveForceCosPennationCurve] = (
-        made(
+        make_default(
             FiberCompressiveForceCosPennationCurve,
             name="default_FiberCompressiveForceCosPennationCurve",
         )
@@ -439,8 +445,8 @@ class DeGrooteFregly2016Muscle(Muscle):
     activation_dynamics_smoothing: Annotated[float, real(domain="> 0")] = 0.1
     """How sharply rising turns into falling activation; about 10 keeps the time constants true."""
 
-    def contradictions(self) -> Iterator[Contradiction]:
-        """Its strength has one name only."""
+    def find_contradictions(self) -> Iterator[Contradiction]:
+        """Yield `optimal_force` if it is set: OpenSim accepts only `max_isometric_force`."""
         if "optimal_force" in self.model_fields_set:
             yield "optimal_force", "optimal_force may not be given, only max_isometric_force"
 
@@ -471,7 +477,7 @@ class MeyerFregly2016Muscle(Muscle):
     activation_dynamics_smoothing: Annotated[float, real(domain="> 0")] = 0.1
     """How sharply rising turns into falling activation; about 10 keeps the time constants true."""
 
-    contradictions = DeGrooteFregly2016Muscle.contradictions
+    find_contradictions = DeGrooteFregly2016Muscle.find_contradictions
 
 
 class RigidTendonMuscle(Muscle):
@@ -483,14 +489,14 @@ class RigidTendonMuscle(Muscle):
     )
 
     active_force_length_curve: Single[Function] = Field(
-        default_factory=partial(active_force_length, "active_force_length_curve")
+        default_factory=partial(make_active_force_length, "active_force_length_curve")
     )
     """Active force over fiber length, both normalised."""
     passive_force_length_curve: Single[Function] = Field(
-        default_factory=partial(passive_force_length, "passive_force_length_curve")
+        default_factory=partial(make_passive_force_length, "passive_force_length_curve")
     )
     """Passive force over fiber length, both normalised; kept between 0 and 10."""
     force_velocity_curve: Single[Function] = Field(
-        default_factory=partial(force_velocity, "force_velocity_curve")
+        default_factory=partial(make_force_velocity, "force_velocity_curve")
     )
     """Factor of the active force over fiber velocity, normalised."""

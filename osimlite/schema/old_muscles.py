@@ -7,15 +7,15 @@ from typing import Annotated
 from pydantic import Field
 
 from osimlite.schema.default_curves import (
-    active_force_length,
-    force_velocity,
-    passive_force_length,
-    tendon_force_length,
+    make_active_force_length,
+    make_force_velocity,
+    make_passive_force_length,
+    make_tendon_force_length,
 )
 from osimlite.schema.facts import NAN, Contradiction, Facts
 from osimlite.schema.fields import LegacyOptional, Number, Single, real
 from osimlite.schema.functions import Function
-from osimlite.schema.muscles import Muscle, whole_dynamics
+from osimlite.schema.muscles import Muscle, check_complete_dynamics
 
 
 class ActivationFiberLengthMuscle_Deprecated(Muscle, abstract=True):
@@ -23,9 +23,9 @@ class ActivationFiberLengthMuscle_Deprecated(Muscle, abstract=True):
 
     facts = Facts(states="activation fiber_length")
 
-    def contradictions(self) -> Iterator[Contradiction]:
+    def find_contradictions(self) -> Iterator[Contradiction]:
         """Nothing of its dynamics can be left out."""
-        return whole_dynamics(self)
+        return check_complete_dynamics(self)
 
 
 class Thelen2003Muscle_Deprecated(ActivationFiberLengthMuscle_Deprecated):
@@ -76,15 +76,15 @@ class Schutte1993Muscle_Deprecated(ActivationFiberLengthMuscle_Deprecated):
     damping: Annotated[float, real(domain=">= 0")] = 0.1
     """Damping force of the fiber over `max_isometric_force`, per normalised velocity."""
     tendon_force_length_curve: Single[Function] = Field(
-        default_factory=partial(tendon_force_length, "tendon_force_length_curve")
+        default_factory=partial(make_tendon_force_length, "tendon_force_length_curve")
     )
     """Force of the tendon over its strain."""
     active_force_length_curve: Single[Function] = Field(
-        default_factory=partial(active_force_length, "active_force_length_curve")
+        default_factory=partial(make_active_force_length, "active_force_length_curve")
     )
     """Active force over fiber length, both normalised."""
     passive_force_length_curve: Single[Function] = Field(
-        default_factory=partial(passive_force_length, "passive_force_length_curve")
+        default_factory=partial(make_passive_force_length, "passive_force_length_curve")
     )
     """Passive force over fiber length, both normalised."""
 
@@ -107,13 +107,17 @@ class Delp1990Muscle_Deprecated(ActivationFiberLengthMuscle_Deprecated):
     """Rate of falling activation, per time scale; also part of the rise."""
     mass: Annotated[float, real(domain="> 0", legacy=True)] = 0.00287
     """Mass between fiber and tendon, normalised by force, time scale and optimal fiber length."""
-    tendon_force_length_curve: LegacyOptional[Function] = Field(default_factory=tendon_force_length)
+    tendon_force_length_curve: LegacyOptional[Function] = Field(
+        default_factory=make_tendon_force_length
+    )
     """Force of the tendon over its strain."""
-    active_force_length_curve: LegacyOptional[Function] = Field(default_factory=active_force_length)
+    active_force_length_curve: LegacyOptional[Function] = Field(
+        default_factory=make_active_force_length
+    )
     """Active force over fiber length, both normalised."""
     passive_force_length_curve: LegacyOptional[Function] = Field(
-        default_factory=passive_force_length
+        default_factory=make_passive_force_length
     )
     """Passive force over fiber length, both normalised."""
-    force_velocity_curve: LegacyOptional[Function] = Field(default_factory=force_velocity)
+    force_velocity_curve: LegacyOptional[Function] = Field(default_factory=make_force_velocity)
     """Factor of the active force over fiber velocity, normalised."""

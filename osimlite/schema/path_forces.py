@@ -6,8 +6,8 @@ from typing import Annotated
 
 from pydantic import Field
 
-from osimlite.schema.base import made
-from osimlite.schema.default_curves import passive_force_length
+from osimlite.schema.base import make_default
+from osimlite.schema.default_curves import make_passive_force_length
 from osimlite.schema.facts import NAN, PATH, Facts
 from osimlite.schema.fields import Flag, Single, Tag, Text, real
 from osimlite.schema.forces import ForceProducer
@@ -29,7 +29,7 @@ class PathSpring(ForceProducer):
         scales={"resting_length": PATH},
     )
 
-    geometry_path: Annotated[Single[AbstractGeometryPath], Tag("path")] = made(
+    geometry_path: Annotated[Single[AbstractGeometryPath], Tag("path")] = make_default(
         GeometryPath, name="path", appearance=_green
     )
     """The line along which the spring pulls."""
@@ -48,7 +48,7 @@ class ExpressionBasedPathForce(ForceProducer):
         outputs="length lengthening_speed stretch tension", scales={"resting_length": PATH}
     )
 
-    geometry_path: Annotated[Single[AbstractGeometryPath], Tag("path")] = made(
+    geometry_path: Annotated[Single[AbstractGeometryPath], Tag("path")] = make_default(
         GeometryPath, name="path", appearance=_green
     )
     """The line along which the force pulls."""
@@ -69,7 +69,7 @@ class Ligament(ForceProducer):
         scales={"resting_length": PATH},
     )
 
-    geometry_path: Annotated[Single[AbstractGeometryPath], Tag("path")] = made(
+    geometry_path: Annotated[Single[AbstractGeometryPath], Tag("path")] = make_default(
         GeometryPath, name="path"
     )
     """The line along which the ligament pulls."""
@@ -78,7 +78,7 @@ class Ligament(ForceProducer):
     pcsa_force: Annotated[float, real("N", ">= 0")] = 0.0
     """Factor of the curve, from the cross-section of the ligament."""
     force_length_curve: Single[Function] = Field(
-        default_factory=partial(passive_force_length, "force_length_curve")
+        default_factory=partial(make_passive_force_length, "force_length_curve")
     )
     """Tension over `pcsa_force`, as a function of length over resting length."""
 
@@ -94,7 +94,7 @@ class Blankevoort1991Ligament(ForceProducer):
         scales={"slack_length": PATH},
     )
 
-    geometry_path: Annotated[Single[AbstractGeometryPath], Tag("path")] = made(
+    geometry_path: Annotated[Single[AbstractGeometryPath], Tag("path")] = make_default(
         GeometryPath, name="path"
     )
     """The line along which the ligament pulls."""

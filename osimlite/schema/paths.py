@@ -7,7 +7,7 @@ component is made or a path is assigned.
 
 from typing import Annotated
 
-from osimlite.schema.base import ModelComponent, made, none
+from osimlite.schema.base import ModelComponent, make_default, make_empty_list
 from osimlite.schema.facts import Facts
 from osimlite.schema.fields import (
     LegacyMany,
@@ -76,18 +76,18 @@ class MovingPathPoint(AbstractPathPoint):
     """The argument of `y_location`."""
     socket_z_coordinate: CoordinateSocket = ""
     """The argument of `z_location`."""
-    x_location: Optional[Function] = made(Constant)
+    x_location: Optional[Function] = make_default(Constant)
     """x of the point in its parent frame, as a function of the coordinate."""
-    y_location: Optional[Function] = made(Constant)
+    y_location: Optional[Function] = make_default(Constant)
     """y of the point in its parent frame, as a function of the coordinate."""
-    z_location: Optional[Function] = made(Constant)
+    z_location: Optional[Function] = make_default(Constant)
     """z of the point in its parent frame, as a function of the coordinate."""
 
 
 class PathPointSet(Set):
     """The points of a path, in order."""
 
-    objects: LegacyMany[AbstractPathPoint] = none()
+    objects: LegacyMany[AbstractPathPoint] = make_empty_list()
     """The points, in the order in which the path runs through them; the ends are the attachments."""
 
 
@@ -111,7 +111,7 @@ class PathWrap(ModelComponent):
 class PathWrapSet(Set):
     """The surfaces a path wraps around."""
 
-    objects: LegacyMany[PathWrap] = none()
+    objects: LegacyMany[PathWrap] = make_empty_list()
     """The surfaces that the path may wrap around, with an entry for each."""
 
 
@@ -120,16 +120,16 @@ class AbstractGeometryPath(ModelComponent, abstract=True):
 
     facts = Facts(outputs="length lengthening_speed")
 
-    appearance: Unnamed[Appearance] = made(Appearance, color=(0.5, 0.5, 0.5))
+    appearance: Unnamed[Appearance] = make_default(Appearance, color=(0.5, 0.5, 0.5))
     """How the path is drawn."""
 
 
 class GeometryPath(AbstractGeometryPath):
     """A path through points in frames, bent around wrap surfaces."""
 
-    path_point_set: Unnamed[PathPointSet] = made(PathPointSet)
+    path_point_set: Unnamed[PathPointSet] = make_default(PathPointSet)
     """The points that the path runs through, from one attachment to the other."""
-    path_wrap_set: Unnamed[PathWrapSet] = made(PathWrapSet)
+    path_wrap_set: Unnamed[PathWrapSet] = make_default(PathWrapSet)
     """The surfaces that the path may wrap around."""
 
 
@@ -140,7 +140,7 @@ class FunctionBasedPath(AbstractGeometryPath):
     """Paths of the coordinates that are the arguments of all functions, in this order."""
     length_function: Optional[Function] = None
     """Length of the path (m) as a function of the coordinates."""
-    moment_arm_functions: Many[Function] = none()
+    moment_arm_functions: Many[Function] = make_empty_list()
     """A moment arm for each coordinate; left out, they are the derivatives of the length times -1."""
     lengthening_speed_function: Optional[Function] = None
     """Speed as a function of all values, then all speeds; left out, it follows from the length."""

@@ -2,7 +2,7 @@
 
 from typing import Annotated
 
-from osimlite.schema.base import made, none
+from osimlite.schema.base import make_default, make_empty_list
 from osimlite.schema.facts import Facts
 from osimlite.schema.fields import Flag, LegacyMany, Single
 from osimlite.schema.forces import ForceProducer
@@ -12,7 +12,7 @@ from osimlite.schema.references import (
     FrameName,
     MaybeColumnName,
     PhysicalFrameSocket,
-    reads,
+    make_input_file,
 )
 from osimlite.schema.sets import ModelComponentSet
 
@@ -28,11 +28,11 @@ class PrescribedForce(ForceProducer):
     """Whether the point is in ground rather than in the frame."""
     forceIsGlobal: Flag = True
     """Whether force and torque are along the axes of ground rather than of the frame."""
-    forceFunctions: Single[FunctionSet] = made(FunctionSet, name="forceFunctions")
+    forceFunctions: Single[FunctionSet] = make_default(FunctionSet, name="forceFunctions")
     """x, y and z of the force over time; empty for none."""
-    pointFunctions: Single[FunctionSet] = made(FunctionSet, name="pointFunctions")
+    pointFunctions: Single[FunctionSet] = make_default(FunctionSet, name="pointFunctions")
     """x, y and z over time of where the force acts; empty for the origin of the frame."""
-    torqueFunctions: Single[FunctionSet] = made(FunctionSet, name="torqueFunctions")
+    torqueFunctions: Single[FunctionSet] = make_default(FunctionSet, name="torqueFunctions")
     """x, y and z of the torque over time; empty for none."""
 
 
@@ -58,7 +58,7 @@ class ExternalForce(ForceProducer):
 class ExternalLoads(ModelComponentSet):
     """Measured forces that share a data file."""
 
-    objects: LegacyMany[ExternalForce] = none()
+    objects: LegacyMany[ExternalForce] = make_empty_list()
     """The forces, each with its columns of the file."""
-    datafile: Annotated[str, reads("table", legacy=True, required=True)] = ""
+    datafile: Annotated[str, make_input_file("table", legacy=True, required=True)] = ""
     """File of the columns (.sto, .mot); it replaces what the forces name as their source."""

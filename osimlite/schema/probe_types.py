@@ -6,7 +6,7 @@ Metabolic energy is heat and mechanical work (Umberger et al. 2003, Bhargava et 
 import math
 from typing import Annotated
 
-from osimlite.schema.base import Component, ModelComponent, Object, made, none
+from osimlite.schema.base import Component, ModelComponent, Object, make_default, make_empty_list
 from osimlite.schema.facts import Facts
 from osimlite.schema.fields import (
     Flag,
@@ -48,7 +48,9 @@ class Umberger2010MuscleMetabolicsProbe_MetabolicMuscleParameter(Object):
 class Umberger2010MuscleMetabolicsProbe_MetabolicMuscleParameterSet(Set):
     """The muscles of one probe."""
 
-    objects: LegacyMany[Umberger2010MuscleMetabolicsProbe_MetabolicMuscleParameter] = none()
+    objects: LegacyMany[Umberger2010MuscleMetabolicsProbe_MetabolicMuscleParameter] = (
+        make_empty_list()
+    )
     """What the probe must know of each muscle; muscles that are not here use no energy."""
 
 
@@ -83,7 +85,7 @@ class Umberger2010MuscleMetabolicsProbe(Probe):
     """Whether only the sum is reported, without the basal rate and each muscle."""
     metabolic_muscle_parameter_set: Unnamed[
         Umberger2010MuscleMetabolicsProbe_MetabolicMuscleParameterSet
-    ] = made(Umberger2010MuscleMetabolicsProbe_MetabolicMuscleParameterSet)
+    ] = make_default(Umberger2010MuscleMetabolicsProbe_MetabolicMuscleParameterSet)
     """The muscles that count, and what the probe must know of them."""
 
 
@@ -115,7 +117,9 @@ class Bhargava2004MuscleMetabolicsProbe_MetabolicMuscleParameter(Object):
 class Bhargava2004MuscleMetabolicsProbe_MetabolicMuscleParameterSet(Set):
     """The muscles of one probe."""
 
-    objects: LegacyMany[Bhargava2004MuscleMetabolicsProbe_MetabolicMuscleParameter] = none()
+    objects: LegacyMany[Bhargava2004MuscleMetabolicsProbe_MetabolicMuscleParameter] = (
+        make_empty_list()
+    )
     """What the probe must know of each muscle; muscles that are not here use no energy."""
 
 
@@ -134,11 +138,13 @@ class Bhargava2004MuscleMetabolicsProbe(Probe):
     """Whether the mechanical power of the fibers counts."""
     enforce_minimum_heat_rate_per_muscle: Flag = True
     """Whether the heat of a muscle is never below 1 W/kg. It needs all heat rates to be on."""
-    normalized_fiber_length_dependence_on_maintenance_rate: Single[PiecewiseLinearFunction] = made(
-        PiecewiseLinearFunction,
-        name="normalized_fiber_length_dependence_on_maintenance_rate",
-        x=(0.0, 0.5, 1.0, 1.5, 2.0),
-        y=(0.5, 0.5, 1.0, 0.0, 0.0),
+    normalized_fiber_length_dependence_on_maintenance_rate: Single[PiecewiseLinearFunction] = (
+        make_default(
+            PiecewiseLinearFunction,
+            name="normalized_fiber_length_dependence_on_maintenance_rate",
+            x=(0.0, 0.5, 1.0, 1.5, 2.0),
+            y=(0.5, 0.5, 1.0, 0.0, 0.0),
+        )
     )
     """Factor of the heat of maintenance over normalised fiber length."""
     use_force_dependent_shortening_prop_constant: Flag = False
@@ -157,7 +163,7 @@ class Bhargava2004MuscleMetabolicsProbe(Probe):
     """Whether only the sum is reported, without the basal rate and each muscle."""
     metabolic_muscle_parameter_set: Unnamed[
         Bhargava2004MuscleMetabolicsProbe_MetabolicMuscleParameterSet
-    ] = made(Bhargava2004MuscleMetabolicsProbe_MetabolicMuscleParameterSet)
+    ] = make_default(Bhargava2004MuscleMetabolicsProbe_MetabolicMuscleParameterSet)
     """The muscles that count, and what the probe must know of them."""
 
 
@@ -194,7 +200,9 @@ class Bhargava2004SmoothedMuscleMetabolics(ModelComponent):
         "total_metabolic_rate total_shortening_rate"
     )
 
-    muscle_parameters: Many[Bhargava2004SmoothedMuscleMetabolics_MuscleParameters] = none()
+    muscle_parameters: Many[Bhargava2004SmoothedMuscleMetabolics_MuscleParameters] = (
+        make_empty_list()
+    )
     """The muscles that count, and what must be known of them."""
     enforce_minimum_heat_rate_per_muscle: Flag = True
     """Whether the heat of a muscle is never below 1 W/kg."""

@@ -1,7 +1,7 @@
-"""Typed references: a field's type says what it may name and by which of OpenSim's rules the text is resolved.
+"""Typed references: the type of a property declares what it may name and by which rule of OpenSim.
 
-The rules themselves are in :mod:`osimlite.schema.resolution`. In Python every such field also takes
-the component itself.
+The rules are in :mod:`osimlite.schema.resolution`. In Python every such property also accepts the
+component itself.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Annotated
 
 from osimlite.schema.base import Component
-from osimlite.schema.fields import LEGACY, Fate, Reference
+from osimlite.schema.fields import LEGACY, Consequence, Reference
 
 Named = str | Component
 Names = tuple[Named, ...]
@@ -50,7 +50,8 @@ MaybeFrameName = Annotated[
     Named | None, Reference("frame-path-or-body-name", "PhysicalFrame", "optional")
 ]
 ExpressedInFrame = Annotated[
-    Named, Reference("frame-path-or-body-name", "PhysicalFrame", required=False, fate="left out")
+    Named,
+    Reference("frame-path-or-body-name", "PhysicalFrame", required=False, consequence="left out"),
 ]
 ContactGeometryNames = Annotated[
     Names, Reference("contactgeometry-path-or-name", "ContactGeometry", "list", required=False)
@@ -67,53 +68,74 @@ SetMemberNames = Annotated[
     Names, Reference("set-member", "Object", "list", required=False, legacy=True)
 ]
 
-# What lies outside the model: files and the columns and tables in them.
+# References out of the model: files, and columns of tables.
 FileName = Annotated[str, Reference("file", "file", required=False)]
 MaybeFileName = Annotated[str | None, Reference("file", "file", "optional", required=False)]
 ColumnName = Annotated[str, Reference("column", "column", required=False)]
 MaybeColumnName = Annotated[str | None, Reference("column", "column", "optional", required=False)]
 
 
-def reads(content: str, *, legacy: bool = False, required: bool = False) -> Reference:
-    """Marker of a file that a tool reads; `content` is the class of the object in it, or what kind of table it is."""
+def make_input_file(content: str, *, legacy: bool = False, required: bool = False) -> Reference:
+    """Return the marker of a file that a tool reads.
+
+    Args:
+        content: class of the object in the file, or kind of table.
+        legacy: whether it belongs to the first property system.
+        required: whether the tool fails without it.
+    """
     return Reference("file", f"{content} file", required=required, legacy=legacy)
 
 
-def writes(content: str, *, legacy: bool = False, required: bool = False) -> Reference:
-    """Marker of a file that a tool writes; without the name of one that is required its results are lost."""
+def make_output_file(content: str, *, legacy: bool = False, required: bool = False) -> Reference:
+    """Return the marker of a file that a tool writes.
+
+    Args:
+        content: class of the object in the file, or kind of table.
+        legacy: whether it belongs to the first property system.
+        required: whether results are lost if the name is empty.
+    """
     return Reference("output-file", f"{content} file", required=required, legacy=legacy)
 
 
-def several(
+def make_name_list(
     rule: str,
     target: str,
     *words: str,
     any_case: bool = False,
     legacy: bool = True,
-    fate: Fate = "refused",
+    consequence: Consequence = "refused",
 ) -> Reference:
-    """Marker of a list of names, or of `words`, in what a tool is told."""
-    return Reference(rule, target, "list", False, legacy, words, fate, any_case)
+    """Return the marker of a list of names, or of special words, in the settings of a tool.
+
+    Args:
+        rule: rule that resolves the names.
+        target: class of the named components.
+        words: words that are accepted besides names.
+        any_case: whether the words are accepted in any letter case.
+        legacy: whether it belongs to the first property system.
+        consequence: what OpenSim does with a name that leads to nothing.
+    """
+    return Reference(rule, target, "list", False, legacy, words, consequence, any_case)
 
 
-# What tools name in the model that they work on, and the files that they are given and write.
+# References of tools: to components of their model, and to files that they read and write.
 BodyName = Annotated[Named, Reference("body-name", "Body", required=False, legacy=True)]
 LegacyCoordinateName = Annotated[CoordinateName, LEGACY]
 LegacyJointNames = Annotated[
-    Names, several("joint-name", "Joint", "ALL", any_case=True, fate="left out")
+    Names, make_name_list("joint-name", "Joint", "ALL", any_case=True, consequence="left out")
 ]
-InputModel = Annotated[str, reads("Model", required=True)]
-LegacyInputModel = Annotated[str, reads("Model", legacy=True, required=True)]
-LegacyOutputModel = Annotated[str, writes("Model", legacy=True)]
-InputTable = Annotated[str, reads("table")]
-LegacyInputTable = Annotated[str, reads("table", legacy=True)]
-LegacyInputMotion = Annotated[str, reads("motion", legacy=True, required=True)]
-LegacyInputMarkers = Annotated[str, reads("marker data", legacy=True)]
-LegacyInputLoads = Annotated[str, reads("ExternalLoads", legacy=True)]
+InputModel = Annotated[str, make_input_file("Model", required=True)]
+LegacyInputModel = Annotated[str, make_input_file("Model", legacy=True, required=True)]
+LegacyOutputModel = Annotated[str, make_output_file("Model", legacy=True)]
+InputTable = Annotated[str, make_input_file("table")]
+LegacyInputTable = Annotated[str, make_input_file("table", legacy=True)]
+LegacyInputMotion = Annotated[str, make_input_file("motion", legacy=True, required=True)]
+LegacyInputMarkers = Annotated[str, make_input_file("marker data", legacy=True)]
+LegacyInputLoads = Annotated[str, make_input_file("ExternalLoads", legacy=True)]
 LegacyInputForceSets = Annotated[
     tuple[str, ...], Reference("file", "ForceSet file", "list", required=False, legacy=True)
 ]
-OutputTable = Annotated[str, writes("table")]
-LegacyOutputTable = Annotated[str, writes("table", legacy=True)]
+OutputTable = Annotated[str, make_output_file("table")]
+LegacyOutputTable = Annotated[str, make_output_file("table", legacy=True)]
 OutputFolder = Annotated[str, Reference("output-folder", "folder", required=False)]
 LegacyOutputFolder = Annotated[OutputFolder, LEGACY]

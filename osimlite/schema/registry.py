@@ -1,7 +1,7 @@
-"""Which class stands for which XML tag, and the module that declares it.
+"""Classes by XML tag, and the modules that declare them.
 
 Modules are imported when a tag is first met, so that reading a model costs only the areas it uses.
-A test holds this table to the classes that exist.
+A test compares this table with the classes that exist.
 """
 
 from __future__ import annotations
@@ -179,7 +179,7 @@ _TAGS = {
 MODULES = {
     name: f"osimlite.schema.{area}" for area, names in _AREAS.items() for name in names.split()
 }
-"""The module of every class, by class name."""
+"""Module of each class, by class name."""
 
 
 _further: dict[str, type[Object]] = {}
@@ -187,12 +187,12 @@ callbacks_of_changes: list[Callable[[], None]] = []
 
 
 def get_plugin_classes() -> Mapping[str, type[Object]]:
-    """The classes of plug-ins that count now, by their tags."""
+    """Return the registered classes of plug-ins, by tag."""
     return _further.copy()
 
 
 def register_plugin_classes(classes: Mapping[str, type[Object]]) -> None:
-    """Let tags stand for further classes from now on, and no more for those that counted before."""
+    """Register classes of plug-ins by tag, in place of those registered before."""
     if classes != _further:
         _further.clear()
         _further.update(classes)
@@ -200,21 +200,21 @@ def register_plugin_classes(classes: Mapping[str, type[Object]]) -> None:
             forget()
 
 
-def on_class_change(forget: Callable[[], None]) -> None:
-    """Call a function whenever other classes count than before."""
+def add_change_callback(forget: Callable[[], None]) -> None:
+    """Register a function that is called whenever the set of plug-in classes changes."""
     callbacks_of_changes.append(forget)
 
 
 def cache_by_tags(function: Callable[..., T]) -> Callable[..., T]:
-    """Keep what a function makes of tags as long as these stand for the same classes."""
-    kept = cache(function)
-    on_class_change(kept.cache_clear)
-    return kept
+    """Cache a function of tags or classes until other plug-in classes are registered."""
+    cached = cache(function)
+    add_change_callback(cached.cache_clear)
+    return cached
 
 
 @cache_by_tags
 def find_class(tag: str) -> type[Object] | None:
-    """The class that an XML element `tag` stands for, or None if no class has it."""
+    """Return the class of an XML tag; None if no class has it."""
     further = _further.get(tag)
     if further is not None:
         return None if further.abstract else further
@@ -227,7 +227,11 @@ def find_class(tag: str) -> type[Object] | None:
 
 @cache_by_tags
 def list_tags() -> tuple[str, ...]:
-    """Every tag that stands for a class in a file, sorted."""
+    """Return the tags of all concrete classes, sorted.
+
+    Returns:
+        The tags.
+    """
     renamed = {name: tag for tag, name in _TAGS.items()}
     known = (renamed.get(name, name) for name in (*MODULES, *_further))
     return tuple(sorted(tag for tag in known if find_class(tag) is not None))
@@ -235,10 +239,13 @@ def list_tags() -> tuple[str, ...]:
 
 @cache_by_tags
 def find_classes_mentioning(word: str) -> tuple[type[Object], ...]:
-    """Return the classes, abstract ones too, in whose modules a word stands, and those of plug-ins.
+    """Return the classes, also abstract ones, of modules whose source contains a word, and those of plug-ins.
 
-    A property is declared in such a module. Only these modules are imported, and only their classes
-    are built: to look into all of them takes a third of a second.
+    Only modules that can declare the property are imported and their classes built; importing all of
+    them takes a third of a second.
+
+    Returns:
+        The classes.
     """
     modules = {module for module in MODULES.values() if _mentions(module, word)}
     own = [
@@ -250,13 +257,13 @@ def find_classes_mentioning(word: str) -> tuple[type[Object], ...]:
 
 
 def _mentions(module: str, word: str) -> bool:
-    """Return whether a word stands in the text of a module; also true where there is no text."""
-    text = _text_of(module)
+    """Return whether the source of a module contains a word; true if the source is not available."""
+    text = _read_source(module)
     return text is None or word in text
 
 
 @cache
-def _text_of(module: str) -> str | None:
+def _read_source(module: str) -> str | None:
     spec = find_spec(module)
     loader = None if spec is None else spec.loader
     read_source: Callable[[str], str | None] | None = getattr(loader, "get_source", None)
@@ -265,5 +272,9 @@ def _text_of(module: str) -> str | None:
 
 @cache_by_tags
 def list_class_tags(cls: type[Object]) -> tuple[str, ...]:
-    """The tags, sorted, of a class and of those derived from it."""
+    """Return the tags of a class and of classes derived from it, sorted.
+
+    Returns:
+        The tags.
+    """
     return tuple(tag for tag in list_tags() if issubclass(find_class(tag) or type(None), cls))

@@ -2,7 +2,7 @@
 
 from typing import Annotated
 
-from osimlite.schema.base import Component, made
+from osimlite.schema.base import Component, make_default
 from osimlite.schema.facts import Facts
 from osimlite.schema.fields import Single, real
 from osimlite.schema.functions import Constant, Function
@@ -87,5 +87,5 @@ class SignalGenerator(Component):
 
     facts = Facts(outputs="signal")
 
-    function: Single[Function] = made(Constant, name="function")
+    function: Single[Function] = make_default(Constant, name="function")
     """The output as a function of time."""

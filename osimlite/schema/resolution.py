@@ -20,16 +20,19 @@ if TYPE_CHECKING:
 Failure = Literal["missing", "wrong-type", "empty", "illegal"]
 
 ILLEGAL_CHARACTERS = "\\*+ \t\n/"
-"""Characters OpenSim refuses in the name of a component."""
+"""Characters that OpenSim rejects in the name of a component."""
 
 _NEVER_IN_PATHS = frozenset(ILLEGAL_CHARACTERS) - {"/"}
 
 
 class Resolution(NamedTuple):
-    """What a reference leads to.
+    """Result of resolving a reference.
 
-    `target` is the component, or None with the `failure`: nothing there, a component of another
-    class (`found`), no text, or a text that is not a path.
+    Attributes:
+        target: the component; None on failure.
+        failure: reason: nothing at the path, a component of another class, an empty text, or a text
+            that is not a path.
+        found: the component of another class.
     """
 
     target: Component | None
@@ -38,7 +41,12 @@ class Resolution(NamedTuple):
 
 
 def is_a(component: Object, target: str) -> bool:
-    """Whether the component's class is `target` or derives from it."""
+    """Return whether the class of a component is `target` or derives from it.
+
+    Args:
+        component: the component.
+        target: name of a class.
+    """
     return _derives_from(type(component), target)
 
 
@@ -48,7 +56,7 @@ def _derives_from(cls: type[Object], target: str) -> bool:
 
 
 def normalize_path(path: str) -> str | None:
-    """An absolute path without doubled slashes, ``.`` and ``..``; None if it climbs above the root."""
+    """Return an absolute path without doubled slashes, ``.`` and ``..``; None if it climbs above the root."""
     parts: list[str] = []
     for part in path.split("/"):
         if part in ("", "."):
@@ -63,14 +71,16 @@ def normalize_path(path: str) -> str | None:
 
 
 def get_last_name(path: str) -> str:
-    """The name at the end of a path."""
+    """Return the name at the end of a path."""
     return path.rsplit("/", 1)[1] or "/"
 
 
 def _resolve_socket(tree: Tree, text: str, owner: Component, target: str) -> Resolution:
-    if _is_no_path(text):
+    if _is_illegal_path(text):
         return Resolution(None, "illegal")
     if target == "Frame":
+        # OpenSim connects each geometry of a frame to that frame, whatever path the file gives. This does
+        # not apply to geometry among the frame's subcomponents.
         # While connecting, a frame puts itself into the socket of every geometry it draws, whatever
         # path the file gives; not of one that it merely holds among its components.
         parent = tree.parent_of(owner)
@@ -86,19 +96,22 @@ def _resolve_socket(tree: Tree, text: str, owner: Component, target: str) -> Res
     return tree.walk(text, "" if base == "/" else base, target)
 
 
-def _is_no_path(text: str) -> bool:
-    """Whether OpenSim cannot even read the text as a path, which it does of every socket when it loads the file."""
+def _is_illegal_path(text: str) -> bool:
+    """Return whether OpenSim cannot parse a text as a path.
+
+    OpenSim parses the text of every socket when it loads a file, so such a model does not load.
+    """
     if not _NEVER_IN_PATHS.isdisjoint(text):
         return True
     return text.startswith("/") and normalize_path(text) is None
 
 
-def _model_path(tree: Tree, text: str, owner: Component, target: str) -> Resolution:
+def _resolve_model_path(tree: Tree, text: str, owner: Component, target: str) -> Resolution:
     return tree.walk(text, "", target) if text else Resolution(None, "empty")
 
 
-def _path_or_member(*set_paths: str) -> Callable[[Tree, str, Component, str], Resolution]:
-    """First a path from the model, then OpenSim appends the text to the paths of the sets."""
+def _make_path_or_member_rule(*set_paths: str) -> Callable[[Tree, str, Component, str], Resolution]:
+    """Return a rule that tries a path from the model, then the text appended to the paths of sets."""
 
     def rule(tree: Tree, text: str, owner: Component, target: str) -> Resolution:
         if not text:
@@ -112,10 +125,10 @@ def _path_or_member(*set_paths: str) -> Callable[[Tree, str, Component, str], Re
     return rule
 
 
-def _resolve_bare_name(
+def _make_bare_name_rule(
     members: Callable[[Tree, Component, str], dict[str, Component]],
 ) -> Callable[..., Resolution]:
-    """A bare name among `members`; a path is no name."""
+    """Return a rule that looks a name up among components; a path is not a name."""
 
     def rule(tree: Tree, text: str, owner: Component, target: str) -> Resolution:
         if not text:
@@ -130,17 +143,17 @@ def _resolve_bare_name(
 
 
 def _resolve_variable(tree: Tree, text: str, owner: Component, target: str) -> Resolution:
-    """The name of a state, a control or a generalized force."""
+    """Resolve the name of a state, a control or a generalized force."""
     result = find_variables(tree, target).get(text)
     return Resolution(result, None if result is not None else "missing" if text else "empty")
 
 
 def _resolve_pattern(tree: Tree, text: str, owner: Component, target: str) -> Resolution:
-    """A regular expression that the whole name of one at least must match."""
+    """Resolve a regular expression, which must match the complete name of at least one variable."""
     try:
         pattern = Pattern(text)
     except UnsupportedPatternError:
-        # OpenSim may match names with it: nothing can be said.
+        # OpenSim supports more syntax than this matcher, so the pattern may be valid.
         return Resolution(owner)
     except PatternError:
         return Resolution(None, "illegal")
@@ -151,60 +164,73 @@ def _resolve_pattern(tree: Tree, text: str, owner: Component, target: str) -> Re
     return Resolution(result, None if result is not None else "missing")
 
 
-def nothing_to_resolve(tree: Tree, text: str, owner: Component, target: str) -> Resolution:
-    """Files, columns and positions name nothing in the component tree."""
+def skip_resolution(tree: Tree, text: str, owner: Component, target: str) -> Resolution:
+    """Resolve a text that names nothing in the component tree: a file, a column, a position.
+
+    Args:
+        tree: the tree of the model.
+        text: the text.
+        owner: component that has the property.
+        target: class of what is named.
+    """
     return Resolution(owner)
 
 
 PATH_RULES = frozenset(("socket", "owner-path", "model-path"))
-"""The rules by which an absolute path leads to the same component from everywhere."""
+"""Rules by which an absolute path leads to the same component from everywhere."""
 
 EVERYWHERE = frozenset(
     f"{kind}-name" for kind in ("coordinate", "body", "joint", "actuator", "muscle", "wrap-object")
 )
-"""The rules by which a bare name leads to the same component from everywhere."""
+"""Rules by which a bare name leads to the same component from everywhere."""
 
 RULES: dict[str, Callable[[Tree, str, Component, str], Resolution]] = {
     "socket": _resolve_socket,
     "owner-path": _resolve_socket,
-    "model-path": _model_path,
-    "coordinate-name": _resolve_bare_name(lambda tree, owner, target: tree.of_class("Coordinate")),
-    "body-name": _resolve_bare_name(lambda tree, owner, target: tree.members("/bodyset", "Body")),
-    "body-name-or-com": _resolve_bare_name(
-        lambda tree, owner, target: tree.members("/bodyset", "Body")
+    "model-path": _resolve_model_path,
+    "coordinate-name": _make_bare_name_rule(
+        lambda tree, owner, target: tree.find_by_class("Coordinate")
     ),
-    "joint-name": _resolve_bare_name(
-        lambda tree, owner, target: tree.members("/jointset", "Joint")
+    "body-name": _make_bare_name_rule(
+        lambda tree, owner, target: tree.list_members("/bodyset", "Body")
     ),
-    "actuator-name": _resolve_bare_name(
-        lambda tree, owner, target: tree.members("/forceset", "Actuator")
+    "body-name-or-com": _make_bare_name_rule(
+        lambda tree, owner, target: tree.list_members("/bodyset", "Body")
     ),
-    "muscle-name": _resolve_bare_name(
-        lambda tree, owner, target: tree.members("/forceset", "Muscle")
+    "joint-name": _make_bare_name_rule(
+        lambda tree, owner, target: tree.list_members("/jointset", "Joint")
     ),
-    "wrap-object-name": _resolve_bare_name(lambda tree, owner, target: tree.of_class("WrapObject")),
-    "own-joint-coordinate": _resolve_bare_name(
-        lambda tree, owner, target: tree.members(tree.path_of(owner) or "/", "Coordinate")
+    "actuator-name": _make_bare_name_rule(
+        lambda tree, owner, target: tree.list_members("/forceset", "Actuator")
     ),
-    "marker-name": _resolve_bare_name(
-        lambda tree, owner, target: tree.members("/markerset", "Marker")
+    "muscle-name": _make_bare_name_rule(
+        lambda tree, owner, target: tree.list_members("/forceset", "Muscle")
     ),
-    "set-member": _resolve_bare_name(
-        lambda tree, owner, target: tree.members(tree.path_of(owner) or "/", "Component")
+    "wrap-object-name": _make_bare_name_rule(
+        lambda tree, owner, target: tree.find_by_class("WrapObject")
     ),
-    "frame-path-or-body-name": _path_or_member("/bodyset"),
-    "frame-path-or-member": _path_or_member("/bodyset", "/jointset"),
-    "contactgeometry-path-or-name": _path_or_member("/contactgeometryset"),
-    "input": nothing_to_resolve,
-    "file": nothing_to_resolve,
-    "output-file": nothing_to_resolve,
-    "input-folder": nothing_to_resolve,
-    "output-folder": nothing_to_resolve,
-    "column": nothing_to_resolve,
+    "own-joint-coordinate": _make_bare_name_rule(
+        lambda tree, owner, target: tree.list_members(tree.path_of(owner) or "/", "Coordinate")
+    ),
+    "marker-name": _make_bare_name_rule(
+        lambda tree, owner, target: tree.list_members("/markerset", "Marker")
+    ),
+    "set-member": _make_bare_name_rule(
+        lambda tree, owner, target: tree.list_members(tree.path_of(owner) or "/", "Component")
+    ),
+    "frame-path-or-body-name": _make_path_or_member_rule("/bodyset"),
+    "frame-path-or-member": _make_path_or_member_rule("/bodyset", "/jointset"),
+    "contactgeometry-path-or-name": _make_path_or_member_rule("/contactgeometryset"),
+    "input": skip_resolution,
+    "file": skip_resolution,
+    "output-file": skip_resolution,
+    "input-folder": skip_resolution,
+    "output-folder": skip_resolution,
+    "column": skip_resolution,
     "state-path": _resolve_variable,
     "pattern": _resolve_pattern,
-    "external-force-name": nothing_to_resolve,
-    "positional": nothing_to_resolve,
-    "point-index": nothing_to_resolve,
+    "external-force-name": skip_resolution,
+    "positional": skip_resolution,
+    "point-index": skip_resolution,
 }
-"""By the name of a rule, what follows a text by it: the tree, the text, its owner, the class to be found."""
+"""Functions by rule; each takes the tree, the text, its owner and the class of the target."""

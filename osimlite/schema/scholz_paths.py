@@ -3,7 +3,7 @@
 import math
 from typing import Annotated
 
-from osimlite.schema.base import Component, made, none
+from osimlite.schema.base import Component, make_default, make_empty_list
 from osimlite.schema.fields import Many, Unnamed, Vec3, vec3
 from osimlite.schema.paths import AbstractGeometryPath, PathPoint
 from osimlite.schema.references import ContactGeometrySocket
@@ -16,7 +16,7 @@ class Scholz2015GeometryPathElement(Component, abstract=True):
 class Scholz2015GeometryPathPoint(Scholz2015GeometryPathElement):
     """A point that the path runs through."""
 
-    path_point: Unnamed[PathPoint] = made(PathPoint)
+    path_point: Unnamed[PathPoint] = make_default(PathPoint)
     """The point, in a frame of its own choice."""
 
 
@@ -32,5 +32,5 @@ class Scholz2015GeometryPathObstacle(Scholz2015GeometryPathElement):
 class Scholz2015GeometryPath(AbstractGeometryPath):
     """A path through points and over obstacles, in order; it begins and ends with a point."""
 
-    path_elements: Many[Scholz2015GeometryPathElement] = none()
+    path_elements: Many[Scholz2015GeometryPathElement] = make_empty_list()
     """Points and obstacles in the order in which the path passes them; points at both ends."""

@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING, Annotated, Any
 
-from osimlite.schema.base import ModelComponent, Object, none
+from osimlite.schema.base import ModelComponent, Object, make_empty_list
 from osimlite.schema.facts import Facts
 from osimlite.schema.fields import Flag, LegacyMany, Number, Reals, reals, word
 from osimlite.schema.references import ActuatorSockets, SetMemberNames
@@ -23,9 +23,9 @@ class ObjectGroup(Object):
 class Set(Object, abstract=True):
     """Objects of one kind, each with a name of its own."""
 
-    objects: LegacyMany[Member] = none()
+    objects: LegacyMany[Member] = make_empty_list()
     """The members."""
-    groups: LegacyMany[ObjectGroup] = none()
+    groups: LegacyMany[ObjectGroup] = make_empty_list()
     """Named selections of the members; the mechanics ignore them, and so do the tools."""
 
 
@@ -36,7 +36,7 @@ class ModelComponentSet(Set, ModelComponent, abstract=True):
 class ComponentSet(ModelComponentSet):
     """Further components of a model."""
 
-    objects: LegacyMany[ModelComponent] = none()
+    objects: LegacyMany[ModelComponent] = make_empty_list()
     """Components of any class that no other set takes, such as reporters."""
 
 
@@ -50,7 +50,7 @@ class Constraint(ModelComponent, abstract=True):
 class ConstraintSet(ModelComponentSet):
     """The constraints of a model."""
 
-    objects: LegacyMany[Constraint] = none()
+    objects: LegacyMany[Constraint] = make_empty_list()
     """The constraints; one that is not enforced does nothing."""
 
 
@@ -66,7 +66,7 @@ class Controller(ModelComponent, abstract=True):
 class ControllerSet(ModelComponentSet):
     """The controllers of a model."""
 
-    objects: LegacyMany[Controller] = none()
+    objects: LegacyMany[Controller] = make_empty_list()
     """The controllers; what several want of one actuator is added up."""
 
 
@@ -90,5 +90,5 @@ class Probe(ModelComponent, abstract=True):
 class ProbeSet(ModelComponentSet):
     """The probes of a model."""
 
-    objects: LegacyMany[Probe] = none()
+    objects: LegacyMany[Probe] = make_empty_list()
     """The probes; tools write their values to a file."""

@@ -1,4 +1,4 @@
-"""What the reader, the printer and the linter ask about a class: its properties, gathered once from its declaration."""
+"""Properties of classes for the reader, the printer and the linter, collected once from the declarations."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 from osimlite.base.records import replace
 from osimlite.schema.fields import (
-    Held,
-    Kind,
+    FieldType,
     Legacy,
     NamesOf,
+    ObjectField,
     ObjectList,
     Reference,
     Tag,
@@ -24,17 +24,22 @@ if TYPE_CHECKING:
 
 
 class FieldSpec(NamedTuple):
-    """One property of a class as the reader, the printer and the linter see it.
+    """Property of a class.
 
-    `name` is the Python attribute, `tag` the XML element, `accepts` the class of the objects held
-    (None for text). `factory` makes the default value of an object property; `default` is the value
-    of the others. `names` says what the words, objects or columns in it are names of, where that is
-    not said by their class.
+    Attributes:
+        name: name of the Python attribute.
+        tag: tag of the XML element.
+        kind: type of the property.
+        accepts: class of the objects that it holds; None for text.
+        default: default value; None for properties that hold objects.
+        factory: function that makes the default object or list.
+        declarers: classes that declare the property, the most derived first.
+        names: what its words, objects or columns refer to, if their class does not declare it.
     """
 
     name: str
     tag: str
-    kind: Kind
+    kind: FieldType
     accepts: type[Object] | None
     default: Any
     factory: Any
@@ -43,7 +48,7 @@ class FieldSpec(NamedTuple):
 
     @property
     def declared_in(self) -> type[Object]:
-        """The class that has the property first; those derived from it may declare it anew."""
+        """Base class that declares the property first; derived classes may redeclare it."""
         return self.declarers[-1]
 
     @property
@@ -53,25 +58,29 @@ class FieldSpec(NamedTuple):
 
     @property
     def reference(self) -> Reference:
-        """What it names, of a property that names something."""
+        """Type of the property as a reference, for properties that name something."""
         return cast("Reference", self.kind)
 
 
 @cache
 def get_field_specs(cls: type[Object]) -> dict[str, FieldSpec]:
-    """The properties of `cls` by XML tag, in the order OpenSim prints them (first-system properties last)."""
+    """Return the properties of a class in the order OpenSim prints them, those of the first system last.
+
+    Returns:
+        Properties by XML tag.
+    """
     specs = []
     for name, info in cls.model_fields.items():
-        kind = next((item for item in info.metadata if isinstance(item, Kind)), None)
+        kind = next((item for item in info.metadata if isinstance(item, FieldType)), None)
         if kind is None:
             continue
         if any(isinstance(item, Legacy) for item in info.metadata):
             kind = replace(kind, legacy=True)
-        held = isinstance(kind, Held)
+        held = isinstance(kind, ObjectField)
         accepts = find_class(info.annotation) if held else None
         tag = (
             accepts.tag
-            if accepts is not None and isinstance(kind, Held) and kind.form == "unnamed"
+            if accepts is not None and isinstance(kind, ObjectField) and kind.form == "unnamed"
             else name
         )
         tag = next((item.text for item in info.metadata if isinstance(item, Tag)), tag)
@@ -89,13 +98,13 @@ def get_field_specs(cls: type[Object]) -> dict[str, FieldSpec]:
 
 @cache
 def make_checks(cls: type[Object]) -> dict[str, Callable[[Any], Any]] | None:
-    """Return what checks the value of each property, by attribute, as pydantic's validator of the class would.
+    """Return functions that check the values of properties as pydantic's validator of the class would.
 
-    To build that validator takes milliseconds for every class, to call these functions nothing.
-    Each returns the value in the form that is stored, or raises ValueError.
+    Building that validator takes milliseconds for every class; these functions need no preparation.
 
     Returns:
-        None for a class with validators of its own, which pydantic alone runs.
+        Functions by attribute, which return the stored form or raise ValueError. None for a class with
+        validators of its own, which only pydantic can run.
     """
     decorators = cls.__pydantic_decorators__
     own = (
@@ -126,15 +135,24 @@ def _check_text(value: Any) -> str:
 
 @cache
 def get_object_specs(cls: type[Object]) -> tuple[FieldSpec, ...]:
-    """The properties of `cls` that hold objects."""
-    return tuple(spec for spec in get_field_specs(cls).values() if isinstance(spec.kind, Held))
+    """Return the properties of a class that hold objects.
+
+    Returns:
+        Properties in printing order.
+    """
+    return tuple(
+        spec for spec in get_field_specs(cls).values() if isinstance(spec.kind, ObjectField)
+    )
 
 
-class Holding(NamedTuple):
-    """A property that holds objects, and what it holds as long as no one asks for it.
+class ObjectHolder(NamedTuple):
+    """Property that holds objects, with the state of its default until it is first accessed.
 
-    Either a list, which is empty, or an object, which is plain if nothing in it has a path or names
-    another.
+    Attributes:
+        spec: the property.
+        name: its attribute.
+        is_list: whether it is a list, which is empty by default.
+        is_plain: whether the default object contains no component and no reference.
     """
 
     spec: FieldSpec
@@ -144,24 +162,32 @@ class Holding(NamedTuple):
 
 
 @cache
-def list_holding_properties(cls: type[Object]) -> tuple[Holding, ...]:
-    """The properties of `cls` that hold objects."""
+def list_holding_properties(cls: type[Object]) -> tuple[ObjectHolder, ...]:
+    """Return the properties of a class that hold objects, with the state of their defaults.
+
+    Returns:
+        Properties in printing order.
+    """
     return tuple(
-        Holding(spec, spec.name, spec.factory is ObjectList, _is_plain(spec))
+        ObjectHolder(spec, spec.name, spec.factory is ObjectList, _is_plain(spec))
         for spec in get_object_specs(cls)
     )
 
 
 def _is_plain(spec: FieldSpec) -> bool:
-    made: Object | list[Any] | None = spec.factory() if spec.factory is not None else None
-    if made is None or isinstance(made, list):
+    default: Object | list[Any] | None = spec.factory() if spec.factory is not None else None
+    if default is None or isinstance(default, list):
         return False
-    return not any(item.is_component or get_reference_specs(type(item)) for item in made.walk())
+    return not any(item.is_component or get_reference_specs(type(item)) for item in default.walk())
 
 
 @cache
 def get_class_names(cls: type[Object]) -> tuple[str, ...]:
-    """The names of a class and of those it derives from, as far as :class:`Object`."""
+    """Return the names of a class and of its bases up to :class:`Object`.
+
+    Returns:
+        Names, the most derived first.
+    """
     from osimlite.schema.base import Object
 
     return tuple(base.__name__ for base in cls.__mro__ if issubclass(base, Object))
@@ -169,26 +195,42 @@ def get_class_names(cls: type[Object]) -> tuple[str, ...]:
 
 @cache
 def get_reference_specs(cls: type[Object]) -> tuple[FieldSpec, ...]:
-    """The properties of `cls` that name other components."""
+    """Return the properties of a class that name other components.
+
+    Returns:
+        Properties in printing order.
+    """
     return tuple(spec for spec in get_field_specs(cls).values() if isinstance(spec.kind, Reference))
 
 
 @cache
 def get_numeric_names(cls: type[Object]) -> frozenset[str]:
-    """The attributes of `cls` with numbers and switches: no path and no reference of a model depends on them."""
+    """Return the attributes with numbers and switches, on which no path and no reference depends."""
     values = (spec for spec in get_field_specs(cls).values() if isinstance(spec.kind, Value))
     return frozenset(spec.name for spec in values if cast("Value", spec.kind).scalar != "string")
 
 
 @cache
 def get_file_specs(cls: type[Object], rule: str) -> tuple[FieldSpec, ...]:
-    """The properties of `cls` that name files by a rule: ``file``, ``output-file`` or ``output-folder``."""
+    """Return the properties of a class that name files.
+
+    Args:
+        cls: the class.
+        rule: ``file``, ``output-file`` or ``output-folder``.
+
+    Returns:
+        Properties in printing order.
+    """
     return tuple(spec for spec in get_reference_specs(cls) if spec.reference.rule == rule)
 
 
 @cache
 def get_naming_specs(cls: type[Object]) -> tuple[FieldSpec, ...]:
-    """The properties of `cls` whose words are names of something, each with the reference as its kind."""
+    """Return the properties of a class whose words are names, each with the reference as its type.
+
+    Returns:
+        Properties in printing order.
+    """
     return tuple(
         spec if spec.names is None else spec._replace(kind=spec.names)
         for spec in get_field_specs(cls).values()
@@ -199,15 +241,21 @@ def get_naming_specs(cls: type[Object]) -> tuple[FieldSpec, ...]:
 
 @cache
 def get_member_specs(cls: type[Object]) -> tuple[FieldSpec, ...]:
-    """The properties of `cls` that hold objects, or a table, with the names of something."""
+    """Return the properties of a class whose objects or table columns are names of something.
+
+    Returns:
+        Properties in printing order.
+    """
     return tuple(spec for spec in get_object_specs(cls) if spec.names is not None)
 
 
 @cache
 def get_name_spec(cls: type[Object], names: Reference | None = None) -> FieldSpec:
-    """The name of an object that is the name of something else, as a property with tag ``@name``.
+    """Return the name of an object as a property with the tag ``@name``, for objects named after others.
 
-    What it names is said by its class, or by the property that holds it.
+    Args:
+        cls: class of the object.
+        names: what the name refers to, if the holding property declares it; otherwise the class does.
     """
     reference = names or cls.name_reference
     assert reference is not None
@@ -216,13 +264,21 @@ def get_name_spec(cls: type[Object], names: Reference | None = None) -> FieldSpe
 
 @cache
 def get_value_specs(cls: type[Object]) -> tuple[FieldSpec, ...]:
-    """The properties of `cls` that are numbers, switches or texts."""
+    """Return the properties of a class that are numbers, switches or texts.
+
+    Returns:
+        Properties in printing order.
+    """
     return tuple(spec for spec in get_field_specs(cls).values() if isinstance(spec.kind, Value))
 
 
 @cache
 def get_defaults(cls: type[Object]) -> tuple[dict[str, Any], dict[str, Callable[[], Any]]]:
-    """Default values by field name, and the factories of the fields whose default is an object or a list."""
+    """Return the defaults of a class.
+
+    Returns:
+        Default values by field, and factories of the fields that default to an object or a list.
+    """
     plain: dict[str, Any] = {}
     factories: dict[str, Any] = {}
     for name, info in cls.model_fields.items():

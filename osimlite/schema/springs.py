@@ -2,7 +2,7 @@
 
 from typing import Annotated, ClassVar
 
-from osimlite.schema.base import made
+from osimlite.schema.base import make_default
 from osimlite.schema.facts import Facts
 from osimlite.schema.fields import Number, Optional, Text, Value, Vec2, Vec3, maybe, real, vec3
 from osimlite.schema.forces import Force, ForceProducer
@@ -135,17 +135,17 @@ class ExpressionBasedBushingForce(TwoFrameLinker, ForceProducer):
 class FunctionBasedBushingForce(TwoFrameLinker, ForceProducer):
     """A bushing whose every moment and force is a function of its own deviation; damping stays linear."""
 
-    m_x_theta_x_function: Optional[Function] = made(Constant)
+    m_x_theta_x_function: Optional[Function] = make_default(Constant)
     """Moment against the first angle, as a function of it (rad)."""
-    m_y_theta_y_function: Optional[Function] = made(Constant)
+    m_y_theta_y_function: Optional[Function] = make_default(Constant)
     """Moment against the second angle, as a function of it (rad)."""
-    m_z_theta_z_function: Optional[Function] = made(Constant)
+    m_z_theta_z_function: Optional[Function] = make_default(Constant)
     """Moment against the third angle, as a function of it (rad)."""
-    f_x_delta_x_function: Optional[Function] = made(Constant)
+    f_x_delta_x_function: Optional[Function] = make_default(Constant)
     """Force against displacement along x of frame 1, as a function of it (m)."""
-    f_y_delta_y_function: Optional[Function] = made(Constant)
+    f_y_delta_y_function: Optional[Function] = make_default(Constant)
     """Force against displacement along y of frame 1, as a function of it (m)."""
-    f_z_delta_z_function: Optional[Function] = made(Constant)
+    f_z_delta_z_function: Optional[Function] = make_default(Constant)
     """Force against displacement along z of frame 1, as a function of it (m)."""
     rotational_damping: Annotated[Vec3, vec3(domain=">= 0")] = (0.0, 0.0, 0.0)
     """Moment against the rate of each of the three angles."""

@@ -1,4 +1,4 @@
-"""The variables of a model as tables, studies and Moco call them: states, controls, generalized forces, outputs."""
+"""Variables of a model as tables and Moco name them: states, controls, generalized forces, outputs."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 class Output(NamedTuple):
-    """The type of an output, and whether it has channels."""
+    """Type of an output, and whether it has channels."""
 
     type: str
     channels: bool
@@ -22,7 +22,11 @@ class Output(NamedTuple):
 
 @cache
 def list_outputs(cls: type[Component]) -> dict[str, Output]:
-    """The outputs of a class by name."""
+    """Return the outputs of a class.
+
+    Returns:
+        Outputs by name.
+    """
     result: dict[str, Output] = {}
     for base in cls.__mro__:
         own = base.__dict__.get("facts")
@@ -33,7 +37,7 @@ def list_outputs(cls: type[Component]) -> dict[str, Output]:
 
 
 def list_states(component: Component) -> list[str]:
-    """The names of the state variables of one component, in OpenSim's order."""
+    """Return the names of the state variables of one component, in OpenSim's order."""
     known = (
         base.__dict__["facts"].states
         for base in type(component).__mro__
@@ -48,10 +52,13 @@ def list_states(component: Component) -> list[str]:
 
 
 def list_motions(joint: Joint) -> dict[str, MotionType]:
-    """How the joint moves with each of its coordinates, by their names.
+    """Return how a joint moves with each of its coordinates.
 
     A coordinate of a CustomJoint is rotational or translational if it drives an axis with a slope
-    of 1 or -1.
+    of 1 or -1; otherwise it is coupled.
+
+    Returns:
+        Types of motion by the name of the coordinate.
     """
     names = [coordinate.name for coordinate in joint.coordinates]
     if joint.motion_types is not None:
@@ -70,14 +77,17 @@ def list_motions(joint: Joint) -> dict[str, MotionType]:
 
 
 def find_variables(tree: Tree, kind: str) -> dict[str, Component]:
-    """The components of a model by the names of their variables.
+    """Return the components of a model by the names of their variables.
 
     Args:
-        tree: that of the model.
+        tree: tree of the model.
         kind: ``state variable``, ``control``, ``state or control variable``, ``generalized force``
-            or ``output``; of a class of components their paths.
+            or ``output``; for a class of components, their paths are the names.
+
+    Returns:
+        Components by name of the variable.
     """
-    return tree.named(f"variables: {kind}", lambda: _iterate_variables(tree, kind))
+    return tree.index_by_name(f"variables: {kind}", lambda: _iterate_variables(tree, kind))
 
 
 def _iterate_variables(tree: Tree, kind: str) -> Any:

@@ -1,4 +1,4 @@
-"""The component tree of a model: its paths, its objects by class, and what its references lead to.
+"""Component tree of a model: its paths, its objects by class, and the targets of its references.
 
 The rules by which a text resolves to a component are in :mod:`osimlite.schema.resolution`.
 """
@@ -16,7 +16,7 @@ from osimlite.base.records import dataclass
 from osimlite.base.text import suggest_name
 from osimlite.errors import ModelError
 from osimlite.schema.base import Component, Object, put_model
-from osimlite.schema.fields import Held, ObjectList, Reference
+from osimlite.schema.fields import ObjectField, ObjectList, Reference
 from osimlite.schema.resolution import EVERYWHERE, PATH_RULES, RULES, get_last_name, normalize_path
 from osimlite.schema.resolution import ILLEGAL_CHARACTERS as ILLEGAL_CHARACTERS
 from osimlite.schema.resolution import Failure as Failure
@@ -24,7 +24,7 @@ from osimlite.schema.resolution import Resolution as Resolution
 from osimlite.schema.resolution import is_a as is_a
 from osimlite.schema.specs import (
     FieldSpec,
-    Holding,
+    ObjectHolder,
     get_field_specs,
     get_name_spec,
     get_reference_specs,
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class RenamedComponent:
-    """A component that OpenSim renames because a sibling has the same name."""
+    """Component that OpenSim renames because a sibling has the same name."""
 
     component: Component
     name: str
@@ -45,9 +45,14 @@ class RenamedComponent:
 
 
 class Use(NamedTuple):
-    """One reference in a model: `holder` has the property, `owner` is the component that holds `holder`.
+    """Reference in a model.
 
-    `position` is the index of the word in a list, else None.
+    Attributes:
+        holder: object that has the property.
+        owner: component that the holder belongs to.
+        spec: the property.
+        value: text, or component that is given itself.
+        position: index of the word in a list, else None.
     """
 
     holder: Object
@@ -58,18 +63,18 @@ class Use(NamedTuple):
 
     @property
     def reference(self) -> Reference:
-        """The kind of the reference."""
+        """Type of the property."""
         return self.spec.reference
 
     @property
     def text(self) -> str:
-        """The text that names something, or the name of a component that is given itself."""
+        """Text of the reference, or the name of a component that is given itself."""
         return self.value if isinstance(self.value, str) else self.value.name
 
 
 @contextmanager
 def lend_tree(tree: Tree) -> Iterator[None]:
-    """Let the model of a tree have it as its own for a while, so that it makes none."""
+    """Give a model a tree for a while, so that it builds none itself."""
     if getattr(tree.model, "_tree", None) is not None:
         yield
         return
@@ -81,18 +86,18 @@ def lend_tree(tree: Tree) -> Iterator[None]:
 
 
 class Tree:
-    """Index of one model: component by path, path by component, children, and the names each rule looks up."""
+    """Index of one model: components by path, paths by component, children, and the names each rule looks up."""
 
     def __init__(self, model: Model, previous: Tree | None = None) -> None:
         self.is_current = True
         self.snapshots: WeakSet[Snapshot] = WeakSet()
-        """Those that are to be taken before the model changes."""
-        self.kept: dict[Any, Any] = {}
-        """What was made of the model as it is, by whatever tells it apart."""
+        """Snapshots that have to copy the model before it changes."""
+        self.cached: dict[Any, Any] = {}
+        """Results derived from the model in its present state, by key; cleared when it changes."""
         self._others: WeakSet[Tree] = WeakSet()
         if previous is not None:
             self._others.update(other for other in previous._others if other.is_current)
-        # Who shares objects with another model has to claim them anew.
+        # A model that shares objects with another must claim them again after each change.
         self._is_renewable = not self._others
         self.model = model
         self.components: list[Component] = []
@@ -100,17 +105,17 @@ class Tree:
         self.by_class: dict[type[Object], list[Object]] = {}
         """Every object of the model by its exact class, in tree order.
 
-        Left out are the parts that OpenSim makes for itself, and default objects that no one has
-        asked for, unless something in them has a path or names another.
+        Left out are the parts that OpenSim adds itself, and default objects that were never
+        accessed, unless something in them has a path or names another.
         """
         self.renamed: list[RenamedComponent] = []
         self._paths: dict[int, str] = {}
         self._parents: dict[int, Component] = {}
         self._owners: dict[int, Component] = {}
-        self._naming: list[tuple[Object, Component]] = []
-        # By class: what its objects are put into, whether they can name others, and what they can
-        # hold.
-        self._shelves: dict[type[Object], tuple[list[Object], bool, tuple[Holding, ...]]] = {}
+        self._referring: list[tuple[Object, Component]] = []
+        # By class: the list of its objects, whether they can refer to others, and the properties
+        # that hold objects.
+        self._shelves: dict[type[Object], tuple[list[Object], bool, tuple[ObjectHolder, ...]]] = {}
         self._spellings: dict[tuple[str, str], list[str]] = {}
         self._of_class: dict[str, list[Component]] = {}
         self._names: dict[str, dict[str, Component]] = {}
@@ -119,29 +124,33 @@ class Tree:
         self._known_parts = previous._parts if previous is not None else {}
         self._internal: set[int] = set()
         self._below: dict[int, list[Component]] = {}
-        self._place(model, "")
+        self._register_branch(model, "")
         self._known_parts = {}
 
     def outdate(self, *, numbers_only: bool = False) -> None:
-        """Something of the model is about to change; paths and names hold if it is only a number or a switch."""
+        """Mark the index as outdated before a change of the model.
+
+        Args:
+            numbers_only: whether only a number or a switch changes, so that paths and names stay valid.
+        """
         for tree in (self, *self._others):
             if tree.is_current:
                 for snapshot in list(tree.snapshots):
                     _ = snapshot.model
                 tree.is_current = False
-                tree.kept.clear()
+                tree.cached.clear()
             tree._is_renewable &= numbers_only
 
-    def renewed(self) -> Tree:
-        """The tree of the model as it is now: with the same paths and names if only numbers have changed."""
+    def renew(self) -> Tree:
+        """Return the tree of the model in its present state; paths are reused if only numbers have changed."""
         if not self._is_renewable:
             return Tree(self.model, self)
         tree = copy(self)
-        tree.is_current, tree.snapshots, tree.kept = True, WeakSet(), {}
+        tree.is_current, tree.snapshots, tree.cached = True, WeakSet(), {}
         return tree
 
     def _claim(self, owner: Any) -> Model:
-        """The model, as the one that an object or a list was last seen in; another may have it too."""
+        """Return this model for an object last seen in `owner`, and note a model that shares the object."""
         known = None if owner is None else owner.model
         if known is not None and known is not self.model:
             other = getattr(known, "_tree", None)
@@ -152,29 +161,33 @@ class Tree:
         return self.model
 
     def path_of(self, component: Object) -> str | None:
-        """The absolute path of a component, None if it is not in this tree."""
+        """Return the absolute path of a component; None if it is not in this tree."""
         return self._paths.get(id(component))
 
     def parent_of(self, component: Component) -> Component | None:
-        """The component above, None for the model."""
+        """Return the component above another; None for the model."""
         return self._parents.get(id(component))
 
     def owner_of(self, item: Object) -> Component:
-        """The component that an object without a path belongs to; a component owns itself."""
+        """Return the component that an object without a path belongs to; a component owns itself."""
         if item.is_component:
             return cast("Component", item)
         if id(item) not in self._owners:
-            # It was made when someone asked for it.
+            # It is a default object, made by its first access after the tree was built.
             for owner in self.components:
-                self._own(owner, owner)
+                self._assign_owners(owner, owner)
         return self._owners[id(item)]
 
     def is_internal(self, component: Component) -> bool:
-        """Whether the component is a part that OpenSim makes for itself: it has a path and stands in no file."""
+        """Return whether OpenSim adds the component itself: it has a path but no element in a file."""
         return id(component) in self._internal
 
-    def at(self, path: str) -> Component:
-        """The component at `path`, absolute or from the model; ModelError with the nearest path if none is there."""
+    def find(self, path: str) -> Component:
+        """Return the component at a path, absolute or relative to the model.
+
+        Raises:
+            ModelError: the path does not exist; the message names the nearest one.
+        """
         result = self.by_path.get(
             normalize_path(path if path.startswith("/") else "/" + path) or ""
         )
@@ -187,11 +200,12 @@ class Tree:
         return result
 
     def uses(self) -> Iterator[Use]:
-        """Yield every reference of the model that has a text or a component or must have one, in tree order."""
-        for holder, owner in self._naming:
+        """Yield every reference of the model that has a value or requires one, in tree order."""
+        for holder, owner in self._referring:
             cls = type(holder)
             if cls.name_reference is not None and holder.name:
                 yield Use(holder, owner, get_name_spec(cls), holder.name)
+            # Read values from the instance dictionary; getattr takes several times as long.
             # Plain values are in the dictionary of their object; through getattr they would cost
             # several times as much.
             state = holder.__dict__
@@ -204,17 +218,25 @@ class Tree:
                     yield Use(holder, owner, spec, value)
 
     def resolve(self, use: Use) -> Resolution:
-        """Follow one reference by OpenSim's rule for its property."""
+        """Resolve one reference by OpenSim's rule for its property."""
         if isinstance(use.value, str):
             return self.lookup(use.reference, use.value, use.owner)
         known = self.path_of(use.value) is not None
-        return self._typed(use.value if known else None, use.reference.target)
+        return self._check_type(use.value if known else None, use.reference.target)
 
     def lookup(self, reference: Reference, text: str, owner: Component) -> Resolution:
-        """Follow `text` as the value of a property of `owner` with this kind of reference."""
+        """Resolve a text as the value of a reference.
+
+        Args:
+            reference: type of the property.
+            text: the text.
+            owner: component that has the property.
+        """
         text, rule, target = text.strip(" \t\n\r\f\v"), reference.rule, reference.target
         if not text.startswith("/") or rule not in PATH_RULES or target == "Frame":
             return RULES[rule](self, text, owner, target)
+        # An absolute path leads to the same component from everywhere, and often hundreds of points name
+        # one body, so cache the result.
         # An absolute path leads to the same component from everywhere, and hundreds of points name
         # one body.
         known = self._resolved.get((rule, target, text))
@@ -223,7 +245,12 @@ class Tree:
         return known
 
     def target(self, owner: Component, name: str, value: str | Component) -> Component:
-        """The component that property `name` of `owner` leads to, for code that needs it to be there.
+        """Return the component that a property leads to.
+
+        Args:
+            owner: component that has the property.
+            name: attribute of the property.
+            value: its value.
 
         Raises:
             ModelError: it leads nowhere.
@@ -240,12 +267,21 @@ class Tree:
                 )
             raise ModelError(
                 f"{type(owner).__name__} '{self.path_of(owner) or owner.name}': {name} names '{text}', "
-                f"but the model has no such {use.reference.target}{suggest_name(text, self.spellings(use))}"
+                f"but the model has no such {use.reference.target}{suggest_name(text, self.list_spellings(use))}"
             )
         return result
 
-    def text_for(self, owner: Component, reference: Reference, component: Component) -> str:
-        """The text by which a property of `owner` names `component`, as OpenSim writes it."""
+    def format_reference(self, owner: Component, reference: Reference, component: Component) -> str:
+        """Return the text by which a property names a component, as OpenSim writes it.
+
+        Args:
+            owner: component that has the property.
+            reference: type of the property.
+            component: the component.
+
+        Raises:
+            ModelError: the component is not in the model.
+        """
         path = self.path_of(component)
         if path is None:
             raise ModelError(
@@ -271,7 +307,7 @@ class Tree:
 
     @cached_property
     def by_name(self) -> dict[str, list[Component]]:
-        """By the name at the end of its path, the first component of each class."""
+        """Components by the name at the end of their path, the first one of each class."""
         result: dict[str, dict[type[Component], Component]] = {}
         for component in self.components:
             result.setdefault(get_last_name(self._paths[id(component)]), {}).setdefault(
@@ -279,20 +315,20 @@ class Tree:
             )
         return {name: list(components.values()) for name, components in result.items()}
 
-    def spellings(self, use: Use) -> list[str]:
-        """Every text that would be right in this place, the shortest form of each component."""
+    def list_spellings(self, use: Use) -> list[str]:
+        """Return every valid text for a reference, for each component its shortest form."""
         reference = use.reference
         key = reference.rule, reference.target
         if key in self._spellings:
             return self._spellings[key]
         names = set()
-        for component in self._all_of(reference.target):
+        for component in self._list_instances(reference.target):
             if (
                 reference.rule == "own-joint-coordinate"
                 and self._parents.get(id(component)) is not use.owner
             ):
                 continue
-            text = self.text_for(use.owner, reference, component)
+            text = self.format_reference(use.owner, reference, component)
             if self.lookup(reference, text, use.owner).target is component:
                 names.add(text)
         spellings = sorted(names)
@@ -300,24 +336,25 @@ class Tree:
             self._spellings[key] = spellings
         return spellings
 
-    def _place(self, component: Component, path: str) -> None:
-        """Enter a component at `path` ("" for the model), what belongs to it, and all that is below it."""
-        self._put(component, path or "/")
+    def _register_branch(self, component: Component, path: str) -> None:
+        """Register a component at `path` ("" for the model), its objects, and everything below it."""
+        self._register(component, path or "/")
         children: list[tuple[str, Component]] = []
-        self._enter(component, component, children)
+        self._register_object(component, component, children)
         if not children and not component.internal:
             return
         below = self._below[id(component)] = []
         taken: dict[str, Component] = {}
         if component.internal:
-            for part in self._internal_parts(component):
+            for part in self._get_internal_parts(component):
                 taken[part.name] = part
                 below.append(part)
                 self._parents[id(part)] = component
-                self._put(part, f"{path}/{part.name}")
+                self._register(part, f"{path}/{part.name}")
         counts: dict[str, int] = {}
         for name, child in children:
             unique = name
+            # OpenSim appends _0, _1 ... to the name of a component whose sibling has it already.
             if name in taken:
                 number = counts.get(name, 0)
                 while (unique := f"{name}_{number}") in taken:
@@ -327,18 +364,18 @@ class Tree:
             taken[unique] = child
             below.append(child)
             self._parents[id(child)] = component
-            self._place(child, f"{path}/{unique}")
+            self._register_branch(child, f"{path}/{unique}")
 
-    def _put(self, component: Component, path: str) -> None:
+    def _register(self, component: Component, path: str) -> None:
         put_model(component, self._claim(component._model))
         self.components.append(component)
         self.by_path[path] = component
         self._paths[id(component)] = path
 
-    def _enter(
+    def _register_object(
         self, holder: Object, owner: Component, children: list[tuple[str, Component]]
     ) -> None:
-        """Enter an object of the model, and those without a path in it, which add no level.
+        """Register an object of the model and objects without a path in it, which add no level.
 
         The components in it are added to `children`, with their names.
         """
@@ -346,19 +383,19 @@ class Tree:
         shelf = self._shelves.get(cls)
         if shelf is None:
             items = self.by_class[cls] = []
-            shelf = self._shelves[cls] = items, _names_others(cls), list_holding_properties(cls)
-        items, names_others, holds = shelf
+            shelf = self._shelves[cls] = items, _can_refer(cls), list_holding_properties(cls)
+        items, can_refer, holds = shelf
         items.append(holder)
         if holder is not owner:
             put_model(holder, self._claim(holder._model))
-        if names_others:
-            self._naming.append((holder, owner))
+        if can_refer:
+            self._referring.append((holder, owner))
         state = holder.__dict__
         for spec, name, is_list, is_plain in holds:
             value = state.get(name)
             if value is None:
-                # Of what no one has asked for, lists are empty and plain objects have no part in
-                # the tree.
+                # A default that was never accessed is an empty list, or a plain object without
+                # components and references: neither matters here.
                 if is_list or is_plain or name in state:
                     continue
                 value = getattr(holder, name)
@@ -366,19 +403,19 @@ class Tree:
                 value.owner = self._claim(getattr(value, "owner", None))
             for item in value if isinstance(value, list) else (value,):
                 if item.is_component:
-                    children.append((_name_in_tree(spec, item), item))
+                    children.append((_get_name_in_tree(spec, item), item))
                 else:
                     self._owners[id(item)] = owner
-                    self._enter(item, owner, children)
+                    self._register_object(item, owner, children)
 
-    def _own(self, holder: Object, owner: Component) -> None:
-        for _, item in holder.objects_held():
+    def _assign_owners(self, holder: Object, owner: Component) -> None:
+        for _, item in holder.list_owned_objects():
             if not item.is_component:
                 self._owners[id(item)] = owner
-                self._own(item, owner)
+                self._assign_owners(item, owner)
 
-    def _internal_parts(self, owner: Component) -> list[Component]:
-        """The parts that OpenSim makes for itself; the same ones for the same owner, as long as it lives."""
+    def _get_internal_parts(self, owner: Component) -> list[Component]:
+        """Return the parts that OpenSim adds itself; the same objects for the same owner."""
         known = self._known_parts.get(id(owner))
         if known is None or known[0] is not owner:
             known = owner, [part.build({"name": name}, set()) for name, part in owner.internal]
@@ -386,28 +423,42 @@ class Tree:
         self._internal.update(map(id, known[1]))
         return known[1]
 
-    def _typed(self, found: Component | None, target: str) -> Resolution:
-        if found is None:
+    def _check_type(self, component: Component | None, target: str) -> Resolution:
+        if component is None:
             return Resolution(None, "missing")
-        if not is_a(found, target) and type(found).__name__ != "Unknown":
-            return Resolution(None, "wrong-type", found)
-        return Resolution(found)
+        if not is_a(component, target) and type(component).__name__ != "Unknown":
+            return Resolution(None, "wrong-type", component)
+        return Resolution(component)
 
     def walk(self, text: str, base: str, target: str) -> Resolution:
-        """What is at a path, absolute or from the path `base`."""
+        """Return what is at a path.
+
+        Args:
+            text: absolute path, or path relative to `base`.
+            base: absolute path; "" for the model.
+            target: class that the component must have.
+        """
         path: str | None = text if text.startswith("/") else f"{base}/{text}"
         plain = self.by_path.get(path or "")
         if plain is not None:
-            return self._typed(plain, target)
+            return self._check_type(plain, target)
         path = normalize_path(path or "")
         if path is None:
             return Resolution(None, "illegal")
-        return self._typed(self.by_path.get(path), target)
+        return self._check_type(self.by_path.get(path), target)
 
-    def named(
+    def index_by_name(
         self, key: str, members: Callable[[], Iterator[tuple[str, Component]]]
     ) -> dict[str, Component]:
-        """Components by name, of equal names the first; made once for each `key`."""
+        """Return components by name, the first one of equal names; cached for each `key`.
+
+        Args:
+            key: key of the cache.
+            members: yields names and components.
+
+        Returns:
+            Components by name.
+        """
         if key not in self._names:
             names: dict[str, Component] = {}
             for name, component in members():
@@ -415,40 +466,53 @@ class Tree:
             self._names[key] = names
         return self._names[key]
 
-    def of_class(self, target: str) -> dict[str, Component]:
-        """The components of a class by name, of equal names the first."""
-        return self.named(
-            target, lambda: ((get_last_name(self._paths[id(c)]), c) for c in self._all_of(target))
+    def find_by_class(self, target: str) -> dict[str, Component]:
+        """Return the components of a class, the first one of equal names.
+
+        Returns:
+            Components by name.
+        """
+        return self.index_by_name(
+            target,
+            lambda: ((get_last_name(self._paths[id(c)]), c) for c in self._list_instances(target)),
         )
 
-    def _all_of(self, target: str) -> list[Component]:
-        """The components of a class."""
+    def _list_instances(self, target: str) -> list[Component]:
+        """Return the components of a class."""
         if target not in self._of_class:
             self._of_class[target] = [
                 component for component in self.components if is_a(component, target)
             ]
         return self._of_class[target]
 
-    def members(self, path: str, target: str) -> dict[str, Component]:
-        """The components of a class that are right below a path, by name."""
+    def list_members(self, path: str, target: str) -> dict[str, Component]:
+        """Return the components of a class directly below a path.
+
+        Args:
+            path: absolute path of a component.
+            target: name of the class.
+
+        Returns:
+            Components by name.
+        """
         holder = self.by_path.get(path)
 
-        def below() -> Iterator[tuple[str, Component]]:
+        def list_below() -> Iterator[tuple[str, Component]]:
             for component in self._below.get(id(holder), ()):
                 if is_a(component, target):
                     yield get_last_name(self._paths[id(component)]), component
 
-        return self.named(f"{path}:{target}", below)
+        return self.index_by_name(f"{path}:{target}", list_below)
 
 
 @cache
-def _names_others(cls: type[Object]) -> bool:
-    """Whether an object of this class can name a component."""
+def _can_refer(cls: type[Object]) -> bool:
+    """Return whether an object of this class can name a component."""
     return cls.name_reference is not None or bool(get_reference_specs(cls))
 
 
-def _name_in_tree(spec: FieldSpec, item: Component) -> str:
-    form = cast("Held", spec.kind).form
+def _get_name_in_tree(spec: FieldSpec, item: Component) -> str:
+    form = cast("ObjectField", spec.kind).form
     if form == "single":
         return spec.tag
     if form == "unnamed" and is_a(item, "ModelComponentSet"):
@@ -457,10 +521,10 @@ def _name_in_tree(spec: FieldSpec, item: Component) -> str:
 
 
 class Snapshot:
-    """A model as it is now. It is copied when somebody asks for it, or just before it changes.
+    """Model in its present state; it is copied on first access, or just before it changes.
 
     Args:
-        tree: of the model.
+        tree: tree of the model.
     """
 
     def __init__(self, tree: Tree) -> None:
@@ -470,7 +534,7 @@ class Snapshot:
 
     @property
     def model(self) -> Model:
-        """A copy of the model as it was; always the same one."""
+        """Copy of the model, always the same one."""
         if self._copy is None:
             assert self._tree is not None
             self._copy, self._tree = self._tree.model.copy_deep(), None

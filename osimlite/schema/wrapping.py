@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from math import inf
 from typing import Annotated
 
-from osimlite.schema.base import ModelComponent, made, none
+from osimlite.schema.base import ModelComponent, make_default, make_empty_list
 from osimlite.schema.facts import ACROSS, ALONG, AXES, HOLDER, MEAN, Contradiction, Facts
 from osimlite.schema.fields import Flag, LegacyMany, Unnamed, Vec3, real, vec3, word
 from osimlite.schema.geometry import Appearance
@@ -26,7 +26,7 @@ class WrapObject(ModelComponent, abstract=True):
         str, word("all", "x", "+x", "-x", "y", "+y", "-y", "z", "+z", "-z", "Unassigned")
     ] = "Unassigned"
     """Keeps paths to the half where this coordinate of the surface has this sign; `all` leaves both."""
-    appearance: Unnamed[Appearance] = made(Appearance, opacity=0.5, color=(0.0, 1.0, 1.0))
+    appearance: Unnamed[Appearance] = make_default(Appearance, opacity=0.5, color=(0.0, 1.0, 1.0))
     """How the surface is drawn."""
 
 
@@ -76,7 +76,7 @@ class WrapTorus(WrapObject):
     outer_radius: Annotated[float, real("m", "> 0")] = 0.05
     """Radius of the circle in the middle of the tube."""
 
-    def contradictions(self) -> Iterator[Contradiction]:
+    def find_contradictions(self) -> Iterator[Contradiction]:
         """Without a hole it is no torus."""
         inner, outer = self.inner_radius, self.outer_radius
         if outer <= inner < inf:
@@ -89,5 +89,5 @@ class WrapTorus(WrapObject):
 class WrapObjectSet(ModelComponentSet):
     """The wrap surfaces of one frame."""
 
-    objects: LegacyMany[WrapObject] = none()
+    objects: LegacyMany[WrapObject] = make_empty_list()
     """The surfaces; a path names those that it wraps around."""

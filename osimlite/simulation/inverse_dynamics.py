@@ -171,7 +171,7 @@ def add_forces(
         if isinstance(each, Force):
             model.force_set.objects.append(each.copy_deep())
             continue
-        more = read_document(Source.of_file(each), of=ForceSet).top
+        more = read_document(Source.from_file(each), of=ForceSet).top
         assert isinstance(more, ForceSet)
         for force in list(more.objects):
             model.force_set.objects.append(force)

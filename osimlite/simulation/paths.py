@@ -117,7 +117,7 @@ class Paths:
             name for name, route in routes if isinstance(route, ThroughPoints) and route.surfaces
         ]
         other = object.__new__(Paths)
-        other._build_system(builder, [builder.tree.at(name) for name in names], code)
+        other._build_system(builder, [builder.tree.find(name) for name in names], code)
         return other
 
     def lengths(self, q: Values) -> dict[str, float]:

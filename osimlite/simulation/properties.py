@@ -193,7 +193,7 @@ def _iterate_numbers(holder: Object) -> Iterator[tuple[str, tuple[tuple[Step, ..
                     yield f"{spec.tag}/{entry}", ((spec.name, entry), kind.unit or "")
             elif value is not None:
                 yield spec.tag, ((spec.name,), kind.unit or "")
-    for spec, item in holder.objects_held():
+    for spec, item in holder.list_owned_objects():
         if isinstance(item, Component) and item.is_component:
             continue
         held = getattr(holder, spec.name)

@@ -18,7 +18,7 @@ from osimlite.mechanics.multibody.constraints import Lock
 from osimlite.mechanics.multibody.dynamics import require_numbers
 from osimlite.mechanics.multibody.extremes import any_numbers
 from osimlite.mechanics.multibody.mechanism import Mechanism
-from osimlite.schema.model import Model, expect_model
+from osimlite.schema.model import Model, check_is_model
 from osimlite.schema.tree import Snapshot
 from osimlite.simulation.constrained import find_consistent_state, select_constraints
 from osimlite.simulation.elements import force_elements
@@ -116,12 +116,12 @@ def _borrow_simulation(
     While a thread uses a simulation, no other thread can take it. A simulation whose run failed is
     closed, not cached.
     """
-    expect_model(model)
+    check_is_model(model)
     tree, chosen = model.tree(), Options.parse(choices)
     engine = None if engine is None else engine_name(engine)
     key = (engine_name(engine), *(getattr(chosen, name) for name in SUMMARY_OPTIONS), chosen.route)
     is_plain = chosen.external_loads is None and not chosen.show
-    simulation = tree.kept.pop(key, None) if is_plain else None
+    simulation = tree.cached.pop(key, None) if is_plain else None
     if simulation is None:
         simulation = Simulation(
             model, engine, **{name: choices[name] for name in choices if name not in RUN_OPTIONS}
@@ -137,14 +137,14 @@ def _borrow_simulation(
     if not is_plain or simulation.forces.reads_files or not tree.is_current:
         simulation.close()
         return
-    tree.kept[key] = simulation
+    tree.cached[key] = simulation
     _RECENT_TREES[:] = [known for known in _RECENT_TREES if known() not in (None, tree)] + [
         weakref.ref(tree)
     ]
     if len(_RECENT_TREES) > CACHED_SIMULATIONS:
         longest_ago = _RECENT_TREES.pop(0)()
         if longest_ago is not None:
-            longest_ago.kept.clear()
+            longest_ago.cached.clear()
 
 
 SUMMARY_OPTIONS = (

@@ -184,7 +184,7 @@ class StaticOptimization:
             place
             for place, info in enumerate(mechanism.coordinates)
             if not (info.locked or info.prescribed is not None or place in dependent)
-            and not tree.at(info.path).is_free_to_satisfy_constraints
+            and not tree.find(info.path).is_free_to_satisfy_constraints
         ]
         self.names = tuple(item.name for item in self._actuators)
         self.coordinates = tuple(mechanism.coordinates[place].name for place in self._free)

@@ -139,7 +139,7 @@ class Motion:
         model = self.model.copy_deep()
         tree = model.tree()
         for path in muscles:
-            tree.at(path).appliesForce = False
+            tree.find(path).appliesForce = False
         # States of muscles that are off have no effect, but must be finite.
         states = np.nan_to_num(part.states)
         simulation = self.simulate(model)

@@ -69,7 +69,7 @@ def _take_out(model: Model, message: str) -> str | None:
 def _remove_component(model: Model, component: Component) -> bool:
     """Remove a component from the list that holds it, whatever else names it; return whether there is such a list."""
     for holder in model.walk():
-        for spec, item in holder.objects_held():
+        for spec, item in holder.list_owned_objects():
             members = getattr(holder, spec.name)
             if item is component and isinstance(members, list):
                 members.remove(component)

@@ -13,7 +13,7 @@ from osimlite.lint.diagnostic import Finding
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.schema.base import Component, Object, Unknown
 from osimlite.schema.coordinates import Coordinate
-from osimlite.schema.fields import Held, Reference
+from osimlite.schema.fields import ObjectField, Reference
 from osimlite.schema.joints import Joint
 from osimlite.schema.model import Model
 from osimlite.schema.paths import AbstractGeometryPath, PathPoint
@@ -70,7 +70,7 @@ def _list_properties(tree: Tree, item: Object, way: str) -> Iterator[tuple[str, 
     for spec in get_field_specs(type(item)).values():
         value = getattr(item, spec.name)
         given = spec.name in item.model_fields_set
-        if isinstance(spec.kind, Held):
+        if isinstance(spec.kind, ObjectField):
             for held in value if isinstance(value, list) else [value]:
                 if isinstance(held, Object) and not isinstance(held, Component):
                     name = (
@@ -88,7 +88,7 @@ def _list_properties(tree: Tree, item: Object, way: str) -> Iterator[tuple[str, 
 def _name_values(tree: Tree, item: Object, reference: Reference, value: Any) -> str:
     if isinstance(value, Component):
         try:
-            return tree.text_for(tree.owner_of(item), reference, value)
+            return tree.format_reference(tree.owner_of(item), reference, value)
         except OsimliteError:
             return value.name
     if isinstance(value, tuple):

@@ -90,7 +90,7 @@ def test_what_is_no_file_is_not_included(special: Path, tmp_path: Path) -> None:
 
 def test_what_is_no_file_is_not_included_in_an_editor(special: Path, tmp_path: Path) -> None:
     """The text may be that of a file that is not written yet."""
-    source = Source.of_characters(INCLUDING.format(special), str(tmp_path / "new.osim"))
+    source = Source.from_text(INCLUDING.format(special), str(tmp_path / "new.osim"))
     (result,) = (finding for finding in check_source(source) if finding.code == "OSIM702")
     assert "which is not read: this is a " in result.message and result.message.endswith(
         ": it stays empty"

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from osimlite.base.options import list_options
-from osimlite.cli import COMMANDS, app
+from osimlite.cli import COMMANDS, create_app
 from osimlite.cli._command import Command
 from osimlite.simulation.options import Options
 from tests.cli.support import loaded
@@ -28,7 +28,7 @@ def by_typer(name: str, words: list[str], monkeypatch: pytest.MonkeyPatch) -> di
     with monkeypatch.context() as patch:
         patch.setattr(Command, "__call__", lambda self, **values: seen.append(values))
         try:
-            app([name])(args=[name, *words], standalone_mode=False)
+            create_app([name])(args=[name, *words], standalone_mode=False)
         except Exception as error:
             assert hasattr(error, "format_message"), error
     return seen[0] if seen else None
@@ -114,7 +114,10 @@ def test_an_option_of_a_simulation_is_declared_once() -> None:
                 "integrator",
                 "equilibrate",
             ):
-                assert each.declared.told == same.declared.told and each.default == same.default
+                assert (
+                    each.declared.settings == same.declared.settings
+                    and each.default == same.default
+                )
 
 
 def test_python_does_not_look_through_all_objects_at_the_end() -> None:

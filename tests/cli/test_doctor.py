@@ -15,7 +15,15 @@ from typer import Typer
 from typer.testing import CliRunner
 
 from osimlite import write
-from osimlite.cli.doctor import EXTRAS, NEEDS, Package, doctor, examine, purposes, requirements
+from osimlite.cli.doctor import (
+    EXTRAS,
+    NEEDS,
+    Package,
+    doctor,
+    examine_package,
+    list_purposes,
+    list_requirements,
+)
 from osimlite.errors import MissingFileError
 from osimlite.io.document.data import write_data
 from osimlite.models.dynamic_walker import dynamic_walker
@@ -37,7 +45,7 @@ def test_every_extra_has_a_purpose() -> None:
         "optional-dependencies"
     ]
     assert {*extras, ""} - {*EXTRAS} == {"all", "dev", "fast"}
-    result = purposes(requirements())
+    result = list_purposes(list_requirements())
     assert all(result[extra] for extra in EXTRAS)
     assert sorted(use for uses in result.values() for use in uses) == sorted(NEEDS)
     assert (
@@ -54,7 +62,7 @@ def test_a_use_belongs_to_the_first_extra_that_brings_all_it_needs() -> None:
         "view": ["numpy", "pillow"],
         "more": ["numpy", "pillow"],
     }
-    result = purposes(wanted)
+    result = list_purposes(wanted)
     assert (
         "validate" in result[""]
         and "kinematics" in result["sim"]
@@ -154,12 +162,12 @@ def test_what_is_needed_is_enough_and_is_needed(work: Path, use: str) -> None:
 
 
 def test_packages_of_the_plain_installation() -> None:
-    assert {"lxml", "pydantic", "typer"} <= {*requirements()[""]}
+    assert {"lxml", "pydantic", "typer"} <= {*list_requirements()[""]}
 
 
 def test_what_is_examined() -> None:
-    assert examine("lxml") == Package("lxml", metadata.version("lxml"), "")
-    assert examine("no-such-package-of-ours") == Package("no-such-package-of-ours", "", "")
+    assert examine_package("lxml") == Package("lxml", metadata.version("lxml"), "")
+    assert examine_package("no-such-package-of-ours") == Package("no-such-package-of-ours", "", "")
 
 
 def test_what_lies_in_the_current_folder_is_not_executed(
@@ -167,7 +175,7 @@ def test_what_lies_in_the_current_folder_is_not_executed(
 ) -> None:
     (tmp_path / "lxml.py").write_text("raise SystemExit('executed')")
     monkeypatch.chdir(tmp_path)
-    assert examine("lxml") == Package("lxml", metadata.version("lxml"), "")
+    assert examine_package("lxml") == Package("lxml", metadata.version("lxml"), "")
 
 
 def test_a_package_that_cannot_be_loaded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -178,9 +186,9 @@ def test_a_package_that_cannot_be_loaded(tmp_path: Path, monkeypatch: pytest.Mon
     (info / "top_level.txt").write_text("torn\n")
     monkeypatch.syspath_prepend(str(tmp_path))
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
-    assert examine("torn") == Package("torn", "1.0", "OSError: libtorn.so: wrong ELF class")
+    assert examine_package("torn") == Package("torn", "1.0", "OSError: libtorn.so: wrong ELF class")
     monkeypatch.setattr(
-        "osimlite.cli.doctor.requirements", lambda: {"": ["torn"], "sim": ["no-such-package"]}
+        "osimlite.cli.doctor.list_requirements", lambda: {"": ["torn"], "sim": ["no-such-package"]}
     )
     code, text = run(str(tmp_path))
     assert code == 1
@@ -189,7 +197,7 @@ def test_a_package_that_cannot_be_loaded(tmp_path: Path, monkeypatch: pytest.Mon
 
 
 def test_where_meshes_are_looked_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("osimlite.cli.doctor.requirements", lambda: {"": ["lxml"]})
+    monkeypatch.setattr("osimlite.cli.doctor.list_requirements", lambda: {"": ["lxml"]})
     bones, more = tmp_path / "bones", tmp_path / "more"
     for folder, names in ((bones, ("a.vtp", "b.STL", "readme.txt")), (more, ())):
         folder.mkdir()
@@ -205,7 +213,7 @@ def test_where_meshes_are_looked_for(tmp_path: Path, monkeypatch: pytest.MonkeyP
     searched = lines[lines.index("mesh folders, in the order of the search:") + 1 :][:4]
     assert searched == [
         f"{tmp_path}: no mesh files",
-        f"{tmp_path / 'Geometry'}: not there",
+        f"{tmp_path / 'Geometry'}: does not exist",
         f"{bones}: 2 mesh files",
         f"{more}: no mesh files",
     ]

@@ -8,7 +8,7 @@ import pytest
 from typer.main import get_command
 from typer.testing import CliRunner
 
-from osimlite.cli import COMMANDS, app
+from osimlite.cli import COMMANDS, create_app
 
 MEANINGS = {
     "--to": "seconds, but the format of translate and convert",
@@ -36,7 +36,7 @@ MEANINGS = {
 
 @pytest.fixture(scope="module")
 def application():
-    return app()
+    return create_app()
 
 
 @pytest.mark.parametrize("command", COMMANDS)

@@ -11,7 +11,7 @@ import pytest
 import osimlite
 from osimlite import errors
 from osimlite.cli import COMMANDS, main
-from osimlite.cli._manual import PAGES, page_of
+from osimlite.cli._manual import PAGES, find_page
 
 ROOT = Path(__file__).resolve().parents[2]
 toc = pytest.importorskip("markdown.extensions.toc", reason="needs Markdown (extra 'dev')")
@@ -35,7 +35,7 @@ KINDS = [
 
 
 def test_the_pages_and_their_headings_are_there():
-    places = {*PAGES.values(), *(page_of(kind("of nobody")) for kind in KINDS)}
+    places = {*PAGES.values(), *(find_page(kind("of nobody")) for kind in KINDS)}
     assert not [place for place in places if missing(place)] and missing("docs/errors.md#of-nobody")
 
 

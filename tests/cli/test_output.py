@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 import pytest
 
 from osimlite.cli import main
-from osimlite.cli._console import Facts, Guarded, guarded_output
+from osimlite.cli._console import EscapingStream, FactTable, escape_output
 
 HOSTILE = "::error::##[add-mask]v1\x7f\x85\x9b31m\u202e\u2066\u2028\u00e9\u4e16"
 """What may stand in an XML attribute and still be obeyed by something."""
@@ -140,13 +140,13 @@ def test_no_path_of_a_file_is_broken_into_lines(
 ) -> None:
     monkeypatch.setenv("COLUMNS", "60")
     path = "/tmp/" + "pytest-of-somebody/" * 4 + "best.par"
-    Facts("search", [("runs", "40"), ("files", f"/tmp/best.osim, {path}")]).show()
+    FactTable("search", [("runs", "40"), ("files", f"/tmp/best.osim, {path}")]).show()
     assert path in capsys.readouterr().out.splitlines()[-1]
 
 
 def test_what_others_print_is_guarded_too(capsys: pytest.CaptureFixture[str]) -> None:
-    with guarded_output():
-        assert isinstance(sys.stdout, Guarded)
+    with escape_output():
+        assert isinstance(sys.stdout, EscapingStream)
         print("::error::x")
         print("Body", end="")
         print("::error::\x1b[2J\x1b[1mbold\x1b[0m")

@@ -42,6 +42,6 @@ def test_people_see_what_the_engine_warns_of(monkeypatch):
     monkeypatch.setattr(sys, "stderr", Terminal())
     log = logging.getLogger("osimlite.simulation.engines")
     monkeypatch.setattr(log, "handlers", [])
-    _progress.show_warnings_of_engine()
+    _progress.show_engine_warnings()
     logging.getLogger("osimlite.simulation.engines.linking").warning("kernels run as Python")
     assert sys.stderr.getvalue() == "osimlite: kernels run as Python\n"

@@ -62,13 +62,13 @@ def test_a_file_that_is_there_is_not_overwritten_unless_named(old: Path) -> None
         run(old)
     assert target.read_text() == "mine"
     run(old, "-o", target)
-    assert read_document(Source.of_file(target)).version == CURRENT_VERSION
+    assert read_document(Source.from_file(target)).version == CURRENT_VERSION
 
 
 def test_the_file_itself_is_overwritten_only_when_named(old: Path) -> None:
     old.chmod(0o640)
     run(old, "-o", old)
-    assert read_document(Source.of_file(old)).changes == []
+    assert read_document(Source.from_file(old)).changes == []
     assert stat.S_IMODE(old.stat().st_mode) == 0o640
 
 

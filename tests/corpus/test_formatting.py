@@ -19,7 +19,7 @@ from tests.conftest import CorpusModel
 def layout(corpus_model: CorpusModel) -> str:
     """The text of a real file in our layout; the test is skipped if it holds no model."""
     try:
-        return format_document(Source.of_file(corpus_model.path))
+        return format_document(Source.from_file(corpus_model.path))
     except DocumentError as fault:
         assert "file is empty" in fault.message or "not a <Model>" in fault.message
         pytest.skip("the file holds no model")
@@ -37,7 +37,7 @@ def test_the_same_is_said_and_nothing_changes_twice(corpus_model: CorpusModel) -
     text = layout(corpus_model)
     # What is included lies beside the file.
     again = Source(text.encode(), str(corpus_model.path))
-    assert words(again) == words(Source.of_file(corpus_model.path))
+    assert words(again) == words(Source.from_file(corpus_model.path))
     assert format_document(again) == text
 
 

@@ -24,7 +24,7 @@ def old(corpus_model: CorpusModel) -> Document:
     text = corpus_model.path.read_bytes()
     if b"<OpenSimDocument" not in text or b'Version="40600"' in text[:500]:
         pytest.skip("not an older version")
-    return read_document(Source.of_file(corpus_model.path))
+    return read_document(Source.from_file(corpus_model.path))
 
 
 def conversion(corpus_model: CorpusModel) -> Model:

@@ -12,7 +12,7 @@ import osimlite
 from osimlite.io.document.source import Source
 from osimlite.lint import validate
 from osimlite.lint.reporters import render
-from osimlite.schema.fields import Held
+from osimlite.schema.fields import ObjectField
 from osimlite.schema.path_forces import PathSpring
 from osimlite.schema.paths import GeometryPath, PathPoint, PathWrap
 from osimlite.schema.registry import find_class, list_tags
@@ -124,7 +124,7 @@ def renamed(source: Source, number: int, tag: str) -> str:
 @pytest.mark.parametrize("tag", ["Plugin", "Marker"])
 def test_an_object_of_another_class_anywhere_has_a_finding(path, tag):
     """A class of a plug-in, and one that belongs elsewhere, in the place of each element that a rule looks at."""
-    source = Source.of_file(path)
+    source = Source.from_file(path)
     known = {span.tag for span in Source(TEXTS[0].encode()).spans}
     for number, span in enumerate(source.spans):
         if (
@@ -158,7 +158,9 @@ SLOTS = [
     (tag, spec.tag)
     for tag in sorted(list_tags())
     for spec in get_field_specs(find_class(tag)).values()
-    if tag != "Model" and isinstance(spec.kind, Held) and spec.kind.form in ("single", "optional")
+    if tag != "Model"
+    and isinstance(spec.kind, ObjectField)
+    and spec.kind.form in ("single", "optional")
 ]
 
 

@@ -8,7 +8,7 @@ from shutil import copy
 
 import pytest
 
-from osimlite.cli._validating import run as validate_paths
+from osimlite.cli._validating import validate_paths as validate_paths
 from osimlite.lint import Config, validate
 from osimlite.lint.engine import load_subject, run_rules
 from osimlite.lint.many import check_files

@@ -73,7 +73,7 @@ def calls(text: str) -> int:
     before = sys.getprofile()
     sys.setprofile(note)
     try:
-        check_source(Source.of_characters(text))
+        check_source(Source.from_text(text))
     finally:
         sys.setprofile(before)
     return count
@@ -91,7 +91,7 @@ def test_four_times_as_much_is_four_times_the_work(kind):
 )
 def test_long_values_are_cut(value):
     report = check_source(
-        Source.of_characters(model(BODY.format("b", "", "").replace(">1<", f">{value}<")))
+        Source.from_text(model(BODY.format("b", "", "").replace(">1<", f">{value}<")))
     )
     assert report.findings
     assert all(len(finding.message) <= MAX_MESSAGE_LENGTH for finding in report.findings)

@@ -224,7 +224,7 @@ def constraints() -> list[Case]:
     return cases
 
 
-def contradictions() -> list[Case]:
+def find_contradictions() -> list[Case]:
     """Return properties that contradict each other, or their frames, each fine alone."""
     cases = []
     for name, function, code in (
@@ -723,7 +723,7 @@ def others() -> list[Case]:
 CASES = [
     *expressions(),
     *constraints(),
-    *contradictions(),
+    *find_contradictions(),
     *cables(),
     *functions(),
     *unused(),

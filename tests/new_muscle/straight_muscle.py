@@ -39,7 +39,7 @@ class StraightMuscle(Muscle):
     grip: Annotated[float, real(domain=">= 1")] = 1.5
     """Most force of lengthening fibers, of the isometric one."""
 
-    def contradictions(self) -> Iterator[Contradiction]:
+    def find_contradictions(self) -> Iterator[Contradiction]:
         """It lengthens by friction only."""
         if self.grip > 1.0 + self.width:
             yield "grip", "its grip is above 1 + width"

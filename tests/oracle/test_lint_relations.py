@@ -1,4 +1,4 @@
-"""What the rules on contradictions and missing parts report, OpenSim refuses; the sound spelling it takes."""
+"""What the rules on find_contradictions and missing parts report, OpenSim refuses; the sound spelling it takes."""
 
 from __future__ import annotations
 

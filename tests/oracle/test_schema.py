@@ -9,7 +9,7 @@ import pytest
 
 import osimlite
 from osimlite.schema.base import Component, Object
-from osimlite.schema.fields import Held, Reference, Value
+from osimlite.schema.fields import ObjectField, Reference, Value
 from osimlite.schema.model import Model
 from osimlite.schema.registry import find_class, list_tags
 from osimlite.schema.specs import get_field_specs
@@ -48,7 +48,7 @@ def filled(cls: type[Object]) -> Object:
             word = 0.0 if kind.shape == "Transform" else word
             size = kind.size or kind.most or max(kind.least, 2)
             values[spec.name] = word if kind.shape in ("single", "optional") else (word,) * size
-        elif isinstance(kind, Held) and kind.form == "list":
+        elif isinstance(kind, ObjectField) and kind.form == "list":
             values[spec.name] = []
     return cls(**values)
 

@@ -36,7 +36,7 @@ def test_states_and_motions_are_opensims(corpus, name):
     }
     motions = {
         name: motion
-        for joint in tree.of_class("Joint").values()
+        for joint in tree.find_by_class("Joint").values()
         for name, motion in list_motions(joint).items()
     }
     assert motions == {

@@ -12,7 +12,7 @@ import pytest
 
 from osimlite.io.document.lexical import make_formatter
 from osimlite.schema.base import Object
-from osimlite.schema.fields import Held, Reference, Value
+from osimlite.schema.fields import ObjectField, Reference, Value
 from osimlite.schema.registry import MODULES, find_class, list_tags
 from osimlite.schema.specs import get_field_specs
 from tests.cases import of_each
@@ -146,7 +146,7 @@ def test_class_equals_the_catalogue(name: str) -> None:
         value = getattr(plain, spec.name)
         assert spec.legacy == bool(prop.get("legacy")), prop["name"]
         if prop.get("object"):
-            assert isinstance(kind, Held), prop["name"]
+            assert isinstance(kind, ObjectField), prop["name"]
             form = "unnamed" if prop["unnamed"] or "printed_as" in prop else prop["kind"]
             assert kind.form == form, prop["name"]
             assert spec.accepts is not None and spec.accepts.tag == prop["accepts_base"], prop[
@@ -305,4 +305,4 @@ def test_words_besides_names_and_the_fate_of_a_missing_name(entry: dict) -> None
     if isinstance(kind, Reference):
         # Of tasks without a body the catalogue does not speak.
         assert set(kind.words) - {"-1"} == {words.split()[0] for words in entry["wildcards"]}
-        assert (kind.fate == "refused") is entry["on_missing"].startswith("throws")
+        assert (kind.consequence == "refused") is entry["on_missing"].startswith("throws")

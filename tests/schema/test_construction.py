@@ -15,7 +15,7 @@ from pydantic import BaseModel, field_validator
 import osimlite
 from osimlite.errors import MissingNameError, ModelError
 from osimlite.schema.base import Object, put_model
-from osimlite.schema.fields import Held, Integer, Number, Reference, Value, Vec3, vec3
+from osimlite.schema.fields import Integer, Number, ObjectField, Reference, Value, Vec3, vec3
 from osimlite.schema.model import Model
 from osimlite.schema.registry import MODULES
 from osimlite.schema.specs import get_defaults, get_field_specs
@@ -37,7 +37,7 @@ def filled(cls: type[Object]) -> Object:
             word = {"double": 0.5, "int": 7, "bool": True, "string": "word"}[kind.scalar]
             size = kind.size or kind.most or max(kind.least, 2)
             values[spec.name] = word if kind.shape in ("single", "optional") else (word,) * size
-        elif isinstance(kind, Held) and kind.form == "list":
+        elif isinstance(kind, ObjectField) and kind.form == "list":
             values[spec.name] = []
     return cls(**values)
 

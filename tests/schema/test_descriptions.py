@@ -13,7 +13,7 @@ import pytest
 import osimlite
 from osimlite.schema.base import Object
 from osimlite.schema.descriptions import describe_property
-from osimlite.schema.json_schema import json_schema
+from osimlite.schema.json_schema import make_json_schema
 from osimlite.schema.registry import MODULES
 from osimlite.schema.specs import FieldSpec
 from tests.cases import of_each
@@ -91,7 +91,7 @@ def test_help_says_it() -> None:
 
 
 def test_the_json_schema_says_it() -> None:
-    properties = json_schema()["$defs"]["Body"]["properties"]
+    properties = make_json_schema()["$defs"]["Body"]["properties"]
     mass = osimlite.Body.field_specs()["mass"]
     assert properties["mass"]["description"] == f"{describe_property(mass)} (kg, >= 0)"
     wraps = osimlite.Body.field_specs()["WrapObjectSet"]

@@ -10,7 +10,7 @@ import pytest
 
 from osimlite.io.document.data import to_data
 from osimlite.models.dynamic_walker import dynamic_walker
-from osimlite.schema.json_schema import json_schema
+from osimlite.schema.json_schema import make_json_schema
 from osimlite.schema.registry import list_tags
 
 jsonschema = pytest.importorskip("jsonschema")
@@ -18,24 +18,24 @@ jsonschema = pytest.importorskip("jsonschema")
 
 @pytest.fixture(scope="module")
 def validator() -> Any:
-    schema = json_schema()
+    schema = make_json_schema()
     jsonschema.Draft202012Validator.check_schema(schema)
     return jsonschema.Draft202012Validator(schema)
 
 
 def test_the_file_is_current(repo: Path) -> None:
     written = json.loads((repo / "schemas" / "osim-4.6.schema.json").read_text())
-    assert written == json.loads(json.dumps(json_schema())), (
+    assert written == json.loads(json.dumps(make_json_schema())), (
         "run: python -m osimlite.schema.json_schema > schemas/..."
     )
 
 
 def test_every_class_has_its_definition() -> None:
-    assert set(list_tags()) <= json_schema()["$defs"].keys()
+    assert set(list_tags()) <= make_json_schema()["$defs"].keys()
 
 
 def test_a_document_of_another_class() -> None:
-    validator = jsonschema.Draft202012Validator(json_schema("MocoStudy"))
+    validator = jsonschema.Draft202012Validator(make_json_schema("MocoStudy"))
     goal = {"class": "MocoFinalTimeGoal", "weight": 2.0}
     study = {"problem": {"phases": {"goals": [goal], "time_final_bounds": {"bounds": [1.0, 2.0]}}}}
     validator.validate(study)

@@ -100,7 +100,7 @@ def test_contact_geometry_by_path_or_name(walker: Model, text: str, expected: st
 
 def test_spellings_are_what_would_be_right(walker: Model) -> None:
     use = next(use for use in walker.tree().uses() if use.spec.tag == "coordinate")
-    assert walker.tree().spellings(use) == sorted(
+    assert walker.tree().list_spellings(use) == sorted(
         [
             "platform_rz",
             "Pelvis_rz",
@@ -115,7 +115,7 @@ def test_spellings_are_what_would_be_right(walker: Model) -> None:
     for use in walker.tree().uses():
         assert all(
             walker.tree().lookup(use.reference, text, use.owner).target is not None
-            for text in walker.tree().spellings(use)
+            for text in walker.tree().list_spellings(use)
         )
 
 

@@ -100,7 +100,7 @@ def test_what_is_ready_is_used_again_and_goes_with_the_model(repo, monkeypatch):
     assert one.summary["settings"] == three.summary["settings"] != two.summary["settings"]
     osimlite.simulate(model, to=0.1, engine="compiled", simbody_early_return=True)
     assert len(made) == 2
-    kept = [weakref.ref(simulation) for simulation in model.tree().kept.values()]
+    kept = [weakref.ref(simulation) for simulation in model.tree().cached.values()]
     assert len(kept) == 2
     del one, two, three, model
     gc.collect()
@@ -111,7 +111,7 @@ def test_few_models_stay_ready(repo):
     models = [osimlite.read(repo / WALKER) for _ in range(run.CACHED_SIMULATIONS + 2)]
     for model in models:
         osimlite.simulate(model, to=0.01, engine="compiled")
-    assert [len(model.tree().kept) for model in models] == [0, 0, *[1] * run.CACHED_SIMULATIONS]
+    assert [len(model.tree().cached) for model in models] == [0, 0, *[1] * run.CACHED_SIMULATIONS]
 
 
 def test_a_trajectory_has_the_model_as_it_was(repo):

@@ -1,4 +1,4 @@
-"""What is known of one version of an open file: its objects as far as it can be read, its findings, its names."""
+"""Analysis of one version of an open file: its objects, findings, names and what they refer to."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
 
-from osimlite.cli.language_server.cursor import Cursor, cursor_at
+from osimlite.cli.language_server.cursor import Cursor, find_cursor
 from osimlite.cli.language_server.text import Text
 from osimlite.io.document.source import Position, Source
 from osimlite.io.document.spans import Span
@@ -29,10 +29,14 @@ from osimlite.schema.tree import Tree, Use, is_a
 
 
 class Target(NamedTuple):
-    """What a name leads to: an object that stands in a document, or a file.
+    """Object or file that a name refers to.
 
-    `number` is that of its element, or of the element of what has a part that stands in no file;
-    `path` is its path in the model; `at` is the place in a file that is no document.
+    Attributes:
+        file: path of the file that defines it.
+        item: the object; None for a file, or a column of a table.
+        path: path of the object in its model.
+        number: index of its element; of an object without an element, that of the nearest owner.
+        at: position in a file that is not a document, for example of a column label.
     """
 
     file: str
@@ -41,8 +45,8 @@ class Target(NamedTuple):
     number: int | None = None
     at: Position | None = None
 
-    def is_same(self, other: Target | None) -> bool:
-        """Whether another is the same thing."""
+    def is_same_as(self, other: Target | None) -> bool:
+        """Return whether another target is the same object."""
         if (
             other is None
             or self.item is None
@@ -55,50 +59,55 @@ class Target(NamedTuple):
 
 
 class Analysis:
-    """One version of a file; everything is found out when it is first asked for.
+    """One version of a file; each result is computed when it is first used.
 
     Args:
-        text: of the file.
-        file: its path; it need not exist.
-        recalls: whether findings about paths and muscles that were measured before are among what
-            is found.
+        text: text of the file.
+        file: path of the file, which need not exist.
+        use_cached_measures: whether the report contains findings about paths and muscles that an
+            earlier check of the same text has measured and cached.
     """
 
-    def __init__(self, text: Text, file: str, *, recalls: bool = False) -> None:
+    def __init__(self, text: Text, file: str, *, use_cached_measures: bool = False) -> None:
         self.text = text
         self.file = file
-        self.recalls = recalls
+        self.use_cached_measures = use_cached_measures
         self.is_table = is_table(file)
         beginning = text.content[:BEGINNING].encode("utf-8", "replace")
         self.is_foreign = file.lower().endswith(".xml") and not is_opensim_xml(beginning)
 
     @cached_property
     def source(self) -> Source:
-        """The text as the reader takes it."""
-        return Source.of_characters(self.text.content, self.file)
+        """Return the text as a source of the reader."""
+        return Source.from_text(self.text.content, self.file)
 
     @property
     def markup(self) -> str:
-        """The text of a document; nothing is told of what stands in tables, and in XML of other programs."""
+        """Return the text if it is an OpenSim document; empty for tables and other XML files."""
         return "" if self.is_table or self.is_foreign else self.text.content
 
     @cached_property
     def config(self) -> Config:
-        """What the project asks for; raises OsimliteError if that makes no sense."""
+        """Return the settings of the linter for this file.
+
+        Raises:
+            OsimliteError: the settings of the project are invalid.
+        """
         return load_settings(Path(self.file).resolve().parent).config_for(self.file, Config())
 
     def cursor(self, offset: int) -> Cursor:
-        """What stands at an offset."""
-        # Another file may be of a project with other classes.
+        """Return what is at an offset: a tag, an attribute or text, with the elements around it."""
+        # Registered classes are global, and the file analysed before may belong to a project with
+        # other plug-ins.
         use_classes(self.config)
-        return cursor_at(self.markup, min(offset, len(self.markup)))
+        return find_cursor(self.markup, min(offset, len(self.markup)))
 
     @cached_property
     def subject(self) -> CheckTarget:
-        """What the rules look at.
+        """Return the file in the form that lint rules check.
 
         Raises:
-            OsimliteError: the settings of the project make no sense.
+            OsimliteError: the settings of the project are invalid.
         """
         return (
             CheckTarget(self.config) if self.is_foreign else make_subject(self.source, self.config)
@@ -106,17 +115,17 @@ class Analysis:
 
     @cached_property
     def report(self) -> Report:
-        """What the rules find."""
-        # Measuring paths takes too long for every change of a text.
+        """Return the findings of all rules that need no measured paths or muscles."""
+        # Measuring paths takes too long to repeat after each key press.
         return (
             Report([])
             if self.is_foreign
-            else run_rules(self.subject, measure=False, recall=self.recalls)
+            else run_rules(self.subject, measure=False, recall=self.use_cached_measures)
         )
 
     @property
-    def is_to_be_measured(self) -> bool:
-        """Whether there are paths or muscles that nobody has measured."""
+    def needs_measuring(self) -> bool:
+        """Whether some rule needs measurements of paths or muscles that are not cached."""
         subject = self.document
         if (
             subject is None
@@ -127,23 +136,23 @@ class Analysis:
             return False
         return any(known.about == MEASURES and subject.is_for(known) for known in all_rules())
 
-    def measured(self) -> Report:
-        """What the rules find once paths and muscles are measured.
+    def measure_report(self) -> Report:
+        """Measure paths and muscles, and return the findings of all rules.
 
-        For another thread: it reads the text anew, and shares nothing with who answers questions
-        meanwhile.
+        This runs in another thread. It reads the text again because model objects are not shared
+        between threads.
         """
-        source = Source.of_characters(self.text.content, self.file)
+        source = Source.from_text(self.text.content, self.file)
         return run_rules(Subject(survey_source(source, of=Model), self.config))
 
     @property
     def is_checked(self) -> bool:
-        """Whether the rules have looked at it."""
+        """Whether the rules have checked this version."""
         return "report" in self.__dict__
 
     @property
     def document(self) -> Subject | None:
-        """The subject, if its elements are numbered as in the text: it is a document, and well-formed."""
+        """Document whose elements are numbered as in the text; None if the text is malformed or a table."""
         subject = self.subject
         return (
             subject
@@ -152,62 +161,63 @@ class Analysis:
         )
 
     @property
-    def is_certain(self) -> bool:
-        """Whether there is a document that can be read."""
+    def is_readable(self) -> bool:
+        """Whether the text is a well-formed OpenSim document."""
         return self.document is not None
 
     @property
     def tree(self) -> Tree | None:
-        """The components that names lead to: those of the model, or of the model of the tool; None if there is none."""
+        """Component tree of the model, or of the model that a tool names; None without a model."""
         return None if self.document is None else self.document.tree
 
     @cached_property
     def objects(self) -> dict[int, Object]:
-        """The objects of the document by the number of their element."""
+        """Return the objects of the document by the index of their element."""
         top = None if self.document is None else self.document.top
         result: dict[int, Object] = {}
         for item in top.walk() if top is not None else ():
             if item._index is not None:
-                # What is read from another file has the number of the element that names that.
+                # Objects of an included file have the index of the element that includes it. The
+                # walk meets the including object first, so that one is kept.
                 result.setdefault(item._index, item)
         return result
 
-    def span(self, number: int) -> Span:
-        """Where an element stands."""
+    def find_span(self, number: int) -> Span:
+        """Return the offsets of an element's start tag, content and end tag."""
         return self.source.spans[number]
 
-    def offset_of(self, place: Position) -> int:
-        """The offset of a place as findings tell it."""
+    def compute_offset(self, place: Position) -> int:
+        """Convert a position of a finding (line and column from 1) to an offset in the text."""
         return min(self.source.line_start(place.line) + place.column - 1, len(self.text.content))
 
     @cached_property
-    def places(self) -> list[tuple[Use, int, int]]:
-        """Every reference that stands in the text, with the offsets of the beginning and the end of its word."""
+    def uses(self) -> list[tuple[Use, int, int]]:
+        """Return all references in the text, each with the start and end offsets of its word."""
         result = []
         for use in () if self.document is None else self.document.uses:
-            place = self._place(use)
+            place = self._find_word_range(use)
             if place is not None:
                 result.append((use, *place))
         return result
 
-    def _place(self, use: Use) -> tuple[int, int] | None:
+    def _find_word_range(self, use: Use) -> tuple[int, int] | None:
         number = use.holder._index
         if number is None or not isinstance(use.value, str) or not use.value:
             return None
         if self.objects.get(number) is not use.holder:
-            # It stands in a file that is named here.
+            # The reference is in an included file.
             return None
         if use.spec.tag == "@name":
-            return self.name_of(number)
+            return self.find_name_range(number)
         inner = self.source.child(number, use.spec.tag)
         if inner is None:
             return None
-        span = self.span(inner)
+        span = self.find_span(inner)
         content = self.source.text[span.tag_end : span.inner_end]
         if use.position is None:
             start = span.tag_end + len(content) - len(content.lstrip())
             return start, start + len(content.strip())
-        # The nth word of a list is not found by looking for it: it may stand there twice.
+        # Count words up to the index: a search for the value could find an equal word before it.
         place = span.tag_end
         for _ in range(use.position + 1):
             place = next(
@@ -219,33 +229,41 @@ class Analysis:
                 place += 1
         return (start, place) if self.source.text[start:place] == use.value else None
 
-    def name_of(self, number: int) -> tuple[int, int] | None:
-        """The offsets of the name that an element gives its object."""
-        span = self.span(number)
-        place = self.source.of_attribute(number, "name")
-        start = self.offset_of(place)
+    def find_name_range(self, number: int) -> tuple[int, int] | None:
+        """Find the value of an element's attribute `name`.
+
+        Returns:
+            Its start and end offsets; None without the attribute.
+        """
+        span = self.find_span(number)
+        place = self.source.locate_attribute(number, "name")
+        start = self.compute_offset(place)
         return (start, start + place.length) if start > span.start else None
 
-    def place_of(self, number: int) -> tuple[int, int]:
-        """The offsets of the name that an element gives its object, or of its tag."""
-        span = self.span(number)
-        return self.name_of(number) or (span.start + 1, span.start + 1 + len(span.tag))
+    def find_label_range(self, number: int) -> tuple[int, int]:
+        """Find the name of an element, or its tag if it has no name.
 
-    def target_at(self, offset: int) -> Target | None:
-        """What is named at an offset, or the component whose start tag or name stands there."""
-        for use, start, end in self.places:
+        Returns:
+            Start and end offsets.
+        """
+        span = self.find_span(number)
+        return self.find_name_range(number) or (span.start + 1, span.start + 1 + len(span.tag))
+
+    def find_target(self, offset: int) -> Target | None:
+        """Return what the name at an offset refers to, or the component whose start tag is there."""
+        for use, start, end in self.uses:
             if start <= offset <= end:
-                return self.led_to(use)
+                return self.resolve_use(use)
         for number, item in self.objects.items():
-            span = self.span(number)
+            span = self.find_span(number)
             if span.start <= offset <= span.tag_end:
                 if item.layout is not None and item.layout.include is not None:
                     return Target(item.layout.include.path)
-                return self._target(self.file, item) if isinstance(item, Component) else None
+                return self._make_target(self.file, item) if isinstance(item, Component) else None
         return None
 
-    def led_to(self, use: Use) -> Target | None:
-        """What a name in the text leads to, here or in another file; None if it leads nowhere."""
+    def resolve_use(self, use: Use) -> Target | None:
+        """Return what a reference in the text refers to, in this file or another; None without a match."""
         setup = self.document if isinstance(self.document, Setup) else None
         text = str(use.value).strip()
         if use.reference.rule in ("file", "output-file"):
@@ -271,10 +289,10 @@ class Analysis:
             return None
         result = find_named_component(self.tree, use)
         if setup is None:
-            return None if result is None else self._target(self.file, result)
+            return None if result is None else self._make_target(self.file, result)
         if result is not None and setup.tool is not None:
-            # A study may hold its model itself.
-            return self._target(setup.model_file or setup.tool[0], result)
+            # A Moco study may contain its model instead of naming a file.
+            return self._make_target(setup.model_file or setup.tool[0], result)
         named = (
             (file, item)
             for file, top in setup.added_sets
@@ -290,15 +308,19 @@ class Analysis:
             None,
         )
 
-    def _target(self, file: str, item: Component) -> Target:
+    def _make_target(self, file: str, item: Component) -> Target:
         tree = self.tree
         path = "" if tree is None else tree.path_of(item) or ""
         shown: Component | None = item
         while tree is not None and shown is not None and shown._index is None:
-            # A part that OpenSim makes stands in no file.
+            # Components that OpenSim adds itself have no element: show the owner that has one.
             shown = tree.parent_of(shown)
         return Target(file, item, path, None if shown is None else shown._index)
 
-    def references(self, target: Target) -> list[tuple[int, int]]:
-        """The offsets of every word that leads to something."""
-        return [(start, end) for use, start, end in self.places if target.is_same(self.led_to(use))]
+    def find_references(self, target: Target) -> list[tuple[int, int]]:
+        """Return the start and end offsets of all words that refer to a target."""
+        return [
+            (start, end)
+            for use, start, end in self.uses
+            if target.is_same_as(self.resolve_use(use))
+        ]

@@ -1,6 +1,6 @@
-"""What stands at a place of a text: found from the tags before it, so that it can be told of a text that is broken.
+"""Kind of text at the cursor, derived from the tags before it.
 
-A half-typed file is no XML, and what is before the cursor is nearly always right.
+A half-typed file is not valid XML, but the text before the cursor usually is.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from typing import Literal, NamedTuple
 
 from osimlite.io.document.spans import Markup, find_markup
 from osimlite.schema.base import Object
-from osimlite.schema.fields import Held
+from osimlite.schema.fields import ObjectField
 from osimlite.schema.registry import find_class
 from osimlite.schema.specs import FieldSpec, get_field_specs
 
@@ -24,60 +24,69 @@ _WORD = re.compile(r"[^\s<>]*")
 
 
 class Element(NamedTuple):
-    """An element around a place."""
+    """Element that encloses the cursor."""
 
-    tag: str  # its name
-    start: int  # offset of its `<`
-    number: int  # in document order, as the reader counts
-    given: str  # its attribute `name`
+    tag: str
+    start: int  # offset of `<`
+    number: int  # index in document order, as the reader counts
+    name: str  # attribute `name`
+    # class of the object; None for a property or an unknown tag
     # the class of the object it is; None for a property, and for what is not known
     cls: type[Object] | None
-    spec: FieldSpec | None  # the property it is, or that holds it; None for what is not known
+    spec: FieldSpec | None  # the property, or the one that holds the object; None if unknown
 
 
 class Cursor(NamedTuple):
-    """What stands at a place."""
+    """Kind of text at an offset, the word there, and the enclosing elements."""
 
-    kind: Kind  # of what
+    kind: Kind
+    # enclosing elements, outermost first; without the element itself if the cursor is in its tag
     # the elements around it, outermost first; for a tag, the element itself is not among them
     around: tuple[Element, ...]
+    # offset of the start of the word: a tag, an attribute value or a word of text
     # offset of the beginning of the word there: a tag, an attribute's value, a word of a text
     start: int
-    end: int  # and behind its end
-    word: str  # that word; of a tag only its name
-    attribute: str = ""  # the name of the attribute whose value it is
-    element: Element | None = None  # for a tag and an attribute, the element they belong to
+    end: int  # offset after the word
+    word: str  # the word; of a tag only its name
+    attribute: str = ""  # name of the attribute whose value is at the cursor
+    element: Element | None = None  # element of the tag or attribute at the cursor
 
     @property
     def inner(self) -> Element | None:
-        """The innermost element around."""
+        """Innermost enclosing element."""
         return self.around[-1] if self.around else None
 
     @property
     def subject(self) -> Element | None:
-        """The element that is spoken of: that of a tag, else the innermost around."""
+        """Element of the tag at the cursor, otherwise the innermost enclosing element."""
         return self.element or self.inner
 
 
-def cursor_at(text: str, offset: int) -> Cursor:
-    """What stands at an offset of a text."""
+def find_cursor(text: str, offset: int) -> Cursor:
+    """Return what is at an offset of a text.
+
+    Args:
+        text: the complete text.
+        offset: character offset of the cursor.
+    """
     stack: list[Element] = []
     count = behind = 0
     for piece in find_markup(text[:offset]):
         behind = piece.end
         if piece.kind == "open":
-            stack.append(_element(text, piece.tag, piece.start, piece.end, count, stack))
+            stack.append(_make_element(text, piece.tag, piece.start, piece.end, count, stack))
         elif piece.kind == "close":
-            _close(stack, piece)
+            _close_element(stack, piece)
         count += piece.kind in ("open", "empty")
     around = tuple(stack)
     special = _SPECIAL.search(text, behind, offset)
     if special is not None:
+        # Comments that are closed before the cursor are part of the markup that was scanned above.
         # What begins so and has ended is behind already.
         return Cursor("comment", around, special.start(), offset, "")
     start = text.rfind("<", behind, offset)
     if start < 0:
-        return _in_text(text, offset, behind, around)
+        return _find_word(text, offset, behind, around)
     if text.startswith("</", start):
         name = _TAG_NAME.match(text, start + 2)
         assert name is not None
@@ -91,8 +100,8 @@ def cursor_at(text: str, offset: int) -> Cursor:
         )
     name = _TAG_NAME.match(text, start + 1)
     assert name is not None
-    end = _end_of_tag(text, start)
-    element = _element(text, name[0], start, end, count, stack)
+    end = _find_tag_end(text, start)
+    element = _make_element(text, name[0], start, end, count, stack)
     if offset <= name.end():
         return Cursor("tag", around, start + 1, name.end(), name[0], element=element)
     value = _ATTRIBUTE_VALUE.search(text, start, offset)
@@ -106,7 +115,7 @@ def cursor_at(text: str, offset: int) -> Cursor:
     )
 
 
-def _in_text(text: str, offset: int, behind: int, around: tuple[Element, ...]) -> Cursor:
+def _find_word(text: str, offset: int, behind: int, around: tuple[Element, ...]) -> Cursor:
     start = offset
     while start > behind and not text[start - 1].isspace():
         start -= 1
@@ -115,58 +124,73 @@ def _in_text(text: str, offset: int, behind: int, around: tuple[Element, ...]) -
     return Cursor("text", around, start, word.end(), word[0])
 
 
-def _end_of_tag(text: str, start: int) -> int:
-    """Behind a tag, or where the next markup begins if it has no end."""
+def _find_tag_end(text: str, start: int) -> int:
+    """Return the offset after a tag; of an unclosed tag, that of the next markup."""
     result = re.compile(r"[<>]").search(text, start + 1)
     return len(text) if result is None else result.end() if result[0] == ">" else result.start()
 
 
-def _close(stack: list[Element], piece: Markup) -> None:
-    """Leave the element; a closing tag of something that is not open closes nothing."""
+def _close_element(stack: list[Element], piece: Markup) -> None:
+    """Close the innermost open element of a tag; ignore a closing tag without one."""
     for depth in range(len(stack) - 1, -1, -1):
         if stack[depth].tag == piece.tag:
             del stack[depth:]
             return
 
 
-def _element(
+def _make_element(
     text: str, tag: str, start: int, end: int, number: int, stack: list[Element]
 ) -> Element:
     given = _NAME_GIVEN.search(text, start, end)
     name = given[2] if given else ""
-    cls, spec = _meaning(stack[-1] if stack else None, tag, name)
+    cls, spec = _identify_element(stack[-1] if stack else None, tag, name)
     return Element(tag, start, number, name, cls, spec)
 
 
-def _meaning(
+def _identify_element(
     around: Element | None, tag: str, name: str
 ) -> tuple[type[Object] | None, FieldSpec | None]:
-    """The class of the object that an element `tag` is, and the property that it is or that holds it."""
+    """Identify what an element stands for.
+
+    Args:
+        around: enclosing element; None at the top.
+        tag: its tag.
+        name: its attribute `name`.
+
+    Returns:
+        Class of the object, and the property that it is or that holds it; None where unknown.
+    """
     if around is None or (around.tag == "OpenSimDocument" and around.cls is None):
         return find_class(tag), None
     if around.cls is None:
+        # The enclosing element is a property that holds objects, or an unknown tag.
         # A property that holds objects, or what is not known.
         return find_class(tag), around.spec
     spec = get_field_specs(around.cls).get(tag)
     if spec is None:
         result = find_class(tag)
-        return result, None if result is None else _holder(around.cls, result, name)
-    if isinstance(spec.kind, Held) and spec.kind.form == "unnamed":
+        return result, None if result is None else _find_holding_property(around.cls, result, name)
+    if isinstance(spec.kind, ObjectField) and spec.kind.form == "unnamed":
         return spec.accepts, spec
     return None, spec
 
 
-def _holder(owner: type[Object], held: type[Object], name: str) -> FieldSpec | None:
-    """The property that holds one object of a class directly: the tag is the class, the name the property."""
+def _find_holding_property(owner: type[Object], held: type[Object], name: str) -> FieldSpec | None:
+    """Return the property of `owner` that holds one object of a class directly.
+
+    The tag of such an element is the class; its attribute `name` is the property.
+    """
     fitting = [
         spec
-        for spec in single_objects(owner)
+        for spec in list_single_object_properties(owner)
         if spec.accepts is not None and issubclass(held, spec.accepts)
     ]
     return next((spec for spec in fitting if spec.tag == name), fitting[0] if fitting else None)
 
 
-def single_objects(owner: type[Object]) -> list[FieldSpec]:
-    """The properties that hold one object each without a tag of their own."""
+def list_single_object_properties(owner: type[Object]) -> list[FieldSpec]:
+    """Return the properties that hold one object each without a tag of their own."""
     specs = get_field_specs(owner).values()
-    return [spec for spec in specs if isinstance(spec.kind, Held) and spec.kind.form == "single"]
+    return [
+        spec for spec in specs if isinstance(spec.kind, ObjectField) and spec.kind.form == "single"
+    ]

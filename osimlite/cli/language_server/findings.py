@@ -1,4 +1,4 @@
-"""Findings of the linter as an editor shows them, with their fixes."""
+"""Diagnostics and code actions of an editor for the linter's findings."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from osimlite.lint.fixes import select_edits
 _ENDS_HEADER = re.compile(r"(\r?\n)([ \t]*endheader)")
 
 SOURCE = "osimlite"
-"""What an editor names as the origin of a diagnostic."""
+"""Origin that an editor shows for a diagnostic."""
 
 _SEVERITIES = {
     Severity.ERROR: types.DiagnosticSeverity.Error,
@@ -25,15 +25,15 @@ _SEVERITIES = {
 }
 
 
-def diagnostics(analysis: Analysis) -> list[types.Diagnostic]:
-    """Every finding."""
-    return [_diagnostic(analysis, finding) for finding in analysis.report]
+def list_diagnostics(analysis: Analysis) -> list[types.Diagnostic]:
+    """Return all findings of a file as diagnostics."""
+    return [_make_diagnostic(analysis, finding) for finding in analysis.report]
 
 
-def _diagnostic(analysis: Analysis, finding: Finding) -> types.Diagnostic:
+def _make_diagnostic(analysis: Analysis, finding: Finding) -> types.Diagnostic:
     hint = f"; did you mean '{finding.suggestion}'?" if finding.suggestion is not None else ""
     return types.Diagnostic(
-        analysis.text.range(*_offsets(analysis, finding)),
+        analysis.text.range(*_find_offsets(analysis, finding)),
         escape_unprintable(f"{finding.message}{hint}"),
         severity=_SEVERITIES[finding.severity],
         code=finding.code,
@@ -41,37 +41,44 @@ def _diagnostic(analysis: Analysis, finding: Finding) -> types.Diagnostic:
     )
 
 
-def _offsets(analysis: Analysis, finding: Finding) -> tuple[int, int]:
+def _find_offsets(analysis: Analysis, finding: Finding) -> tuple[int, int]:
     if finding.line is None or finding.column is None:
         return 0, 0
-    start = analysis.offset_of(Position(finding.line, finding.column))
+    start = analysis.compute_offset(Position(finding.line, finding.column))
     return start, min(start + finding.length, len(analysis.text.content))
 
 
-def actions(analysis: Analysis, uri: str, wanted: types.Range) -> list[types.CodeAction]:
-    """Return the actions for the findings in a range: fix them, ignore them, or fix everything in the file."""
+def list_code_actions(analysis: Analysis, uri: str, wanted: types.Range) -> list[types.CodeAction]:
+    """Return the actions for the findings in a range: fix them, ignore them, or fix everything in the file.
+
+    Args:
+        analysis: the file.
+        uri: URI of the file.
+        wanted: range that the editor asks about.
+    """
     result: list[types.CodeAction] = []
     if not analysis.is_checked:
+        # Do not run the rules here: the editor requests actions again after diagnostics arrive.
         # The editor asks again when it is told of the findings.
         return result
     first, last = analysis.text.offset(wanted.start), analysis.text.offset(wanted.end)
     for finding in analysis.report:
-        start, end = _offsets(analysis, finding)
+        start, end = _find_offsets(analysis, finding)
         if start > last or end < first:
             continue
-        concerned = [_diagnostic(analysis, finding)]
+        concerned = [_make_diagnostic(analysis, finding)]
         if finding.fix is not None:
-            edits = _edits(analysis, finding.fix.edits)
+            edits = _convert_edits(analysis, finding.fix.edits)
             result.append(
                 types.CodeAction(
-                    _title(finding),
+                    _describe_fix(finding),
                     kind=types.CodeActionKind.QuickFix,
                     diagnostics=concerned,
                     is_preferred=finding.fix.safe,
                     edit=types.WorkspaceEdit({uri: edits}),
                 )
             )
-        ignoring = _ignoring(analysis, finding) if finding.code[4] != "0" else None
+        ignoring = _make_ignore_edit(analysis, finding) if finding.code[4] != "0" else None
         if ignoring is not None:
             where = "in this table" if analysis.is_table else "on this line"
             result.append(
@@ -82,11 +89,11 @@ def actions(analysis: Analysis, uri: str, wanted: types.Range) -> list[types.Cod
                     edit=types.WorkspaceEdit({uri: [ignoring]}),
                 )
             )
-    safe = _edits(analysis, select_edits(analysis.report)[0])
+    safe = _convert_edits(analysis, select_edits(analysis.report)[0])
     if safe:
         result.append(
             types.CodeAction(
-                "Mend everything that is certain",
+                "Apply all safe fixes",
                 kind=types.CodeActionKind.SourceFixAll,
                 edit=types.WorkspaceEdit({uri: safe}),
             )
@@ -94,30 +101,33 @@ def actions(analysis: Analysis, uri: str, wanted: types.Range) -> list[types.Cod
     return result
 
 
-def _title(finding: Finding) -> str:
+def _describe_fix(finding: Finding) -> str:
     assert finding.fix is not None
-    doubt = "" if finding.fix.safe else " (look at the result)"
+    caution = "" if finding.fix.safe else " (look at the result)"
     if finding.suggestion is not None:
-        return escape_unprintable(f"Change to '{finding.suggestion}'{doubt}")
-    return f"Mend {finding.code} ({finding.name}){doubt}"
+        return escape_unprintable(f"Change to '{finding.suggestion}'{caution}")
+    return f"Fix {finding.code} ({finding.name}){caution}"
 
 
-def _edits(analysis: Analysis, edits: Iterable[Edit]) -> list[types.TextEdit]:
+def _convert_edits(analysis: Analysis, edits: Iterable[Edit]) -> list[types.TextEdit]:
     result = []
     data, is_table = analysis.source.data, analysis.is_table and not analysis.text.content.isascii()
     seen = characters = 0
     for edit in sorted(edits, key=lambda edit: edit.start):
         start, end = edit.start, edit.end
         if is_table:
-            # Mends of tables count bytes.
+            # Fixes of tables count bytes, editors count characters.
             characters += len(data[seen:start].decode())
             seen, start, end = start, characters, characters + len(data[start:end].decode())
         result.append(types.TextEdit(analysis.text.range(start, end), edit.text))
     return result
 
 
-def _ignoring(analysis: Analysis, finding: Finding) -> types.TextEdit | None:
-    """What makes the linter pass over a finding: a comment at the end of its line, a line in the header of a table."""
+def _make_ignore_edit(analysis: Analysis, finding: Finding) -> types.TextEdit | None:
+    """Return the edit that makes the linter ignore a finding; None if there is no place for it.
+
+    In XML it is a comment at the end of the line, in a table a line of the header.
+    """
     if finding.line is None:
         return None
     if analysis.is_table:

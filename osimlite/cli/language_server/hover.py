@@ -1,4 +1,4 @@
-"""What an editor shows of the thing under the pointer."""
+"""Hover texts: what an editor shows about the word under the pointer."""
 
 from __future__ import annotations
 
@@ -9,34 +9,39 @@ from lsprotocol import types
 from osimlite.base.files import get_relative_path
 from osimlite.cli.language_server.analysis import Analysis
 from osimlite.cli.language_server.cursor import Element
-from osimlite.cli.language_server.names import measured
+from osimlite.cli.language_server.names import find_marker_labels
 from osimlite.io.document.lexical import make_formatter
 from osimlite.lint.setup import Setup
 from osimlite.schema.base import Object
 from osimlite.schema.descriptions import describe_class, describe_property, describe_value
-from osimlite.schema.fields import Held, Value
+from osimlite.schema.fields import ObjectField, Value
 from osimlite.schema.specs import FieldSpec
 from osimlite.schema.tree import is_a
 
 
-def hover(analysis: Analysis, offset: int) -> types.Hover | None:
-    """What stands at an offset: a class, a property with its type, unit and default, or what a name leads to."""
+def describe_cursor(analysis: Analysis, offset: int) -> types.Hover | None:
+    """Describe the class, the property, or the target of the reference at an offset.
+
+    Args:
+        analysis: the file.
+        offset: character offset in its text.
+    """
     cursor = analysis.cursor(offset)
     element = cursor.subject
     if cursor.kind == "comment" or element is None:
         return None
     parts = []
     if cursor.kind == "text" or cursor.attribute == "name":
-        parts.append(_led_to(analysis, offset))
+        parts.append(_describe_target(analysis, offset))
     if element.cls is not None:
-        parts.append(_class(element.cls))
+        parts.append(_describe_class(element.cls))
         if cursor.kind in ("tag", "closing tag"):
-            parts.insert(0, _path(analysis, element))
+            parts.insert(0, _find_path(analysis, element))
     elif element.spec is not None:
         around = (
             cursor.around[-2:] if cursor.kind in ("text", "closing tag") else cursor.around[-1:]
         )
-        parts.append(_property(element.spec, around[0].cls if around else None))
+        parts.append(_describe_property(element.spec, around[0].cls if around else None))
     text = "\n\n".join(part for part in parts if part)
     if not text:
         return None
@@ -46,26 +51,26 @@ def hover(analysis: Analysis, offset: int) -> types.Hover | None:
     )
 
 
-def _class(cls: type[Object]) -> str:
+def _describe_class(cls: type[Object]) -> str:
     return f"**{cls.tag}**\n\n{describe_class(cls)}"
 
 
-def _property(spec: FieldSpec, owner: type[Object] | None) -> str:
+def _describe_property(spec: FieldSpec, owner: type[Object] | None) -> str:
     head = f"**{spec.tag}**: {describe_value(spec)}"
     of = "" if owner is None else f"Property of {owner.tag}."
     return "\n\n".join(
-        part for part in (f"{head}{_default(spec)}", describe_property(spec), of) if part
+        part for part in (f"{head}{_describe_default(spec)}", describe_property(spec), of) if part
     )
 
 
-def _default(spec: FieldSpec) -> str:
+def _describe_default(spec: FieldSpec) -> str:
     if not isinstance(spec.kind, Value) or spec.default in (None, "", ()):
         return ""
     return f"; by default `{make_formatter(spec.kind, 'shortest')(spec.default)}`"
 
 
-def _led_to(analysis: Analysis, offset: int) -> str:
-    target = analysis.target_at(offset)
+def _describe_target(analysis: Analysis, offset: int) -> str:
+    target = analysis.find_target(offset)
     if target is None:
         return ""
     file = get_relative_path(target.file, os.path.dirname(analysis.file) or ".")
@@ -77,7 +82,7 @@ def _led_to(analysis: Analysis, offset: int) -> str:
     if target.file == analysis.file:
         return said
     data = (
-        measured(analysis.document)
+        find_marker_labels(analysis.document)
         if isinstance(analysis.document, Setup) and is_a(target.item, "Marker")
         else None
     )
@@ -89,8 +94,8 @@ def _led_to(analysis: Analysis, offset: int) -> str:
     return f"{said} of `{file}`{also}"
 
 
-def _path(analysis: Analysis, element: Element) -> str:
-    """The path of the component that an element is, if the text can be read."""
+def _find_path(analysis: Analysis, element: Element) -> str:
+    """Return the path of the component of an element, as markup; empty if the text is malformed."""
     if analysis.tree is None:
         return ""
     item = analysis.objects.get(element.number)
@@ -98,6 +103,6 @@ def _path(analysis: Analysis, element: Element) -> str:
     return f"`{path}`" if path else ""
 
 
-def is_list(spec: FieldSpec) -> bool:
-    """Whether a property is an element around other objects."""
-    return isinstance(spec.kind, Held) and spec.kind.form in ("list", "optional")
+def is_list_property(spec: FieldSpec) -> bool:
+    """Return whether a property is an element that encloses objects."""
+    return isinstance(spec.kind, ObjectField) and spec.kind.form in ("list", "optional")

@@ -1,4 +1,4 @@
-"""The names that may stand at a place: of components, files, columns, states; with what each of them is."""
+"""Candidate names for a reference: components, files, columns and states, each with a description."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ _OPAQUE = (
     "output-folder",
     "pattern",
 )
-"""Rules of references whose texts are no names of what is there."""
+"""Rules of references for whose values there are no candidates."""
 _NAMED_AFTER = {
     "Control": Reference("actuator-name", "Actuator"),
     "MarkerWeight": Reference("marker-name", "Marker"),
 }
-"""What objects of a class are called after, although nothing says that they must be."""
+"""What objects of a class are usually named after, although OpenSim does not require it."""
 _TABLE = (".sto", ".mot")
 _SUFFIXES = {
     "Model": (".osim",),
@@ -40,22 +40,30 @@ _SUFFIXES = {
     "table": _TABLE,
     "motion": _TABLE,
 }
-"""How files of a content are called; others are documents."""
+"""File name endings by content; all other contents are XML documents."""
 
 
 class Name(NamedTuple):
-    """A text that would be right, what it leads to, and whether it is what is looked for more likely than others."""
+    """Candidate text for a reference.
+
+    Attributes:
+        text: the text.
+        detail: what it refers to, for display.
+        likely: whether it is listed before candidates that are possible but unlikely.
+    """
 
     text: str
     detail: str = ""
     likely: bool = True
 
 
-def reference_of(cursor: Cursor) -> Reference | None:
-    """What the name of the object whose tag is at a place leads to."""
+def find_name_reference(cursor: Cursor) -> Reference | None:
+    """Return what the name of the object at the cursor refers to; None if it is a free name."""
     cls = None if cursor.element is None else cursor.element.cls
     if cls is None:
         return None
+    # For some classes the property that holds them, or the set they are in, declares what their
+    # name refers to.
     # Of some classes only the property says so that holds them, or the set that they are in.
     held = (
         element.spec.names for element in reversed(cursor.around[-2:]) if element.spec is not None
@@ -65,20 +73,20 @@ def reference_of(cursor: Cursor) -> Reference | None:
     return said or cls.name_reference or next(after, None)
 
 
-def names(
+def list_names(
     analysis: Analysis, cursor: Cursor, reference: Reference, holder: Element | None
 ) -> Iterator[Name]:
-    """The texts that a reference may take in a place.
+    """Yield the candidate texts for a reference.
 
     Args:
-        analysis: of the last version of the document that could be read.
-        cursor: the place.
-        reference: that stands there.
-        holder: the element that has it.
+        analysis: last version of the document that could be read.
+        cursor: position of the reference.
+        reference: what is named.
+        holder: element that has the reference.
     """
     setup = analysis.document if isinstance(analysis.document, Setup) else None
     if reference.rule == "file":
-        yield from _files(
+        yield from _list_files(
             os.path.dirname(analysis.file),
             reference.target.removesuffix(" file").partition(" or ")[0],
         )
@@ -89,43 +97,48 @@ def names(
             yield Name(prefix, " ".join(column for column in columns if column.startswith(prefix)))
     elif analysis.tree is not None and reference.rule not in _OPAQUE:
         if setup is None:
-            yield from _components(
-                analysis.tree, reference, _owner(analysis, analysis.tree, holder)
+            yield from _list_components(
+                analysis.tree, reference, _find_owner(analysis, analysis.tree, holder)
             )
         elif reference.rule == "state-path":
             for text, component in find_variables(analysis.tree, reference.target).items():
                 yield Name(text, type(component).tag)
         else:
             yield from map(Name, sorted(reference.words))
-            yield from _in_tool(setup, analysis.tree, reference)
+            yield from _list_names_in_setup(setup, analysis.tree, reference)
 
 
-def _owner(analysis: Analysis, tree: Tree, holder: Element | None) -> Component:
-    """The component of a model from which names are looked up."""
+def _find_owner(analysis: Analysis, tree: Tree, holder: Element | None) -> Component:
+    """Return the component from which relative paths of a reference start."""
     if holder is None:
         return tree.model
     item = analysis.objects.get(holder.number)
-    if (item is None or type(item) is not holder.cls) and holder.given:
+    if (item is None or type(item) is not holder.cls) and holder.name:
+        # The readable version is older than the text, so indices of elements may have shifted; look
+        # for an object of the same name and class.
         # Elements before it may have come and gone since; its name tells which it is.
         item = next(
-            (c for c in tree.components if c.name == holder.given and type(c) is holder.cls), None
+            (c for c in tree.components if c.name == holder.name and type(c) is holder.cls), None
         )
     return tree.model if item is None else tree.owner_of(item)
 
 
-def _components(tree: Tree, reference: Reference, owner: Component) -> Iterator[Name]:
+def _list_components(tree: Tree, reference: Reference, owner: Component) -> Iterator[Name]:
     spec = FieldSpec("", "", reference, None, None, None, (type(owner),))
-    for text in tree.spellings(Use(owner, owner, spec, "")):
+    for text in tree.list_spellings(Use(owner, owner, spec, "")):
         target = tree.lookup(reference, text, owner).target
         yield Name(text, "" if target is None else f"{type(target).tag} {tree.path_of(target)}")
 
 
-def _in_tool(setup: Setup, tree: Tree, reference: Reference) -> Iterator[Name]:
-    """Names in the model of the tool and in what the tool adds to it; those that were measured are the likely ones."""
+def _list_names_in_setup(setup: Setup, tree: Tree, reference: Reference) -> Iterator[Name]:
+    """Yield names in the tool's model and in the sets that the setup adds to it.
+
+    Markers that the marker file contains come first.
+    """
     if reference.rule == "set-member":
         known = [Name(text) for text in sorted(setup.list_names(reference.target))]
     else:
-        known = list(_components(tree, reference, tree.model))
+        known = list(_list_components(tree, reference, tree.model))
         added = (
             setup.list_names(reference.target) - {name.text for name in known}
             if setup.added_sets
@@ -137,7 +150,9 @@ def _in_tool(setup: Setup, tree: Tree, reference: Reference) -> Iterator[Name]:
             if not reference.rule.endswith("path")
         ]
     table = (
-        measured(setup) if reference.target in ("Marker", "PhysicalFrame", "Coordinate") else None
+        find_marker_labels(setup)
+        if reference.target in ("Marker", "PhysicalFrame", "Coordinate")
+        else None
     )
     for name in known:
         if table is None or reference.target != "Marker":
@@ -147,8 +162,12 @@ def _in_tool(setup: Setup, tree: Tree, reference: Reference) -> Iterator[Name]:
             yield Name(name.text, f"{name.detail}, {'in' if has else 'not in'} {table[0]}", has)
 
 
-def measured(setup: Setup) -> tuple[str, list[str]] | None:
-    """The file of the markers that the tool is given, and their labels; None if there is none."""
+def find_marker_labels(setup: Setup) -> tuple[str, list[str]] | None:
+    """Find the marker file of a tool.
+
+    Returns:
+        Its name as the setup spells it, and its labels; None without such a file.
+    """
     for item in setup.tool[1].walk() if setup.tool is not None else ():
         name = str(getattr(item, "marker_file", "")).strip()
         table = setup.read_tool_table(name)
@@ -157,8 +176,8 @@ def measured(setup: Setup) -> tuple[str, list[str]] | None:
     return None
 
 
-def _files(folder: str, content: str) -> Iterator[Name]:
-    """The files in a folder and in those below it that may hold something."""
+def _list_files(folder: str, content: str) -> Iterator[Name]:
+    """Yield files in a folder and the folders directly in it that may have a content."""
     suffixes = _SUFFIXES.get(content, (".xml",))
     for place in (folder, *map(str, list_folders(Path(folder))[:50])):
         for path in _list_entries(place, suffixes):

@@ -1,4 +1,4 @@
-"""Ways through a file: outline and folding."""
+"""Outline and folding ranges of a document."""
 
 from __future__ import annotations
 
@@ -21,25 +21,25 @@ _SYMBOLS = {
     "Constraint": types.SymbolKind.Key,
     "Point": types.SymbolKind.Constant,
 }
-"""What stands for a class and those derived from it in an outline; a field for all else."""
+"""Symbol kinds by base class, the first match counts; other classes are shown as fields."""
 
 
-def outline(analysis: Analysis) -> list[types.DocumentSymbol]:
-    """The objects of a document as a tree; empty while the text is broken."""
+def list_symbols(analysis: Analysis) -> list[types.DocumentSymbol]:
+    """Return the objects of a document as a tree of symbols; empty while the text is malformed."""
     top = None if analysis.document is None else analysis.document.top
-    return [] if top is None else _symbols(analysis, top)
+    return [] if top is None else _make_symbols(analysis, top)
 
 
-def _symbols(analysis: Analysis, item: Object) -> list[types.DocumentSymbol]:
-    """The symbol of an object, or those of its parts if the text does not give it."""
+def _make_symbols(analysis: Analysis, item: Object) -> list[types.DocumentSymbol]:
+    """Return the symbol of an object, or those of its parts if the object has no element."""
     inner: list[types.DocumentSymbol] = []
     if get_object_specs(type(item)):
-        for _, held in item.objects_held():
-            inner += _symbols(analysis, held)
+        for _, held in item.list_owned_objects():
+            inner += _make_symbols(analysis, held)
     if item._index is None:
         return inner
-    span = analysis.span(item._index)
-    name = analysis.name_of(item._index)
+    span = analysis.find_span(item._index)
+    name = analysis.find_name_range(item._index)
     start, end = name or (span.start + 1, span.start + 1 + len(span.tag))
     cls = type(item)
     kind = next(
@@ -57,8 +57,8 @@ def _symbols(analysis: Analysis, item: Object) -> list[types.DocumentSymbol]:
     ]
 
 
-def folds(analysis: Analysis) -> list[types.FoldingRange]:
-    """Elements and comments of more than one line."""
+def list_folding_ranges(analysis: Analysis) -> list[types.FoldingRange]:
+    """Return the elements and comments that span several lines."""
     result, open_lines = [], []
     for piece in find_markup(analysis.markup):
         line = analysis.text.position(piece.start).line
@@ -68,6 +68,7 @@ def folds(analysis: Analysis) -> list[types.FoldingRange]:
             last = analysis.text.position(piece.end).line
             if last > line:
                 result.append(types.FoldingRange(line, last, kind=types.FoldingRangeKind.Comment))
+        # A closing tag without an opening one is ignored; elements that are never closed do not fold.
         elif piece.kind == "close" and any(tag == piece.tag for tag, _ in open_lines):
             tag, first = open_lines.pop()
             while tag != piece.tag:

@@ -1,4 +1,4 @@
-"""The documents that an editor has open, and those on the disk beside them: where things stand, who names them."""
+"""Documents that an editor has open and those in the folders around them: locations, references, renaming."""
 
 from __future__ import annotations
 
@@ -22,41 +22,46 @@ from osimlite.schema.resolution import ILLEGAL_CHARACTERS, get_last_name
 
 
 class Project:
-    """The documents around those that are open.
+    """Open documents, and those on disk that belong to the same project.
 
     Attributes:
-        open: the analysis of each open file as it is now, by URI.
-        known: of each, the last one that could be read.
-        unit: how the editor counts characters.
+        open: current analysis of each open file, by URI.
+        last_readable: last analysis of each open file that could be read, by URI.
+        unit: encoding in which the editor counts characters.
     """
 
     def __init__(self) -> None:
         self.open: dict[str, Analysis] = {}
-        self.known: dict[str, Analysis] = {}
+        self.last_readable: dict[str, Analysis] = {}
         self.unit: str = types.PositionEncodingKind.Utf16
 
-    def uri(self, path: str) -> str:
-        """The URI of a file, as the editor writes it."""
+    def find_uri(self, path: str) -> str:
+        """Return the URI of a file in the spelling of the editor if the file is open."""
         real = os.path.realpath(path)
         opened = (
             uri for uri, analysis in self.open.items() if os.path.realpath(analysis.file) == real
         )
         return next(opened, None) or from_fs_path(path) or path
 
-    def analysis(self, path: str) -> Analysis | None:
-        """A document as it is in the editor, or on the disk; None if it cannot be read."""
-        known = self.open.get(self.uri(path))
+    def get_analysis(self, path: str) -> Analysis | None:
+        """Return the analysis of a document, open or on disk; None if it cannot be read."""
+        known = self.open.get(self.find_uri(path))
         if known is not None:
             return known
         try:
-            return Analysis(Text(Source.of_file(path).text, self.unit), path)
+            return Analysis(Text(Source.from_file(path).text, self.unit), path)
         except OsimliteError:
             return None
 
-    def hold(self, analysis: Analysis) -> bool:
-        """Let others see a document that can be read as it is in the editor; whether it is another one to them."""
+    def publish_unsaved(self, analysis: Analysis) -> bool:
+        """Make the unsaved text of a document visible to all readers of that file.
+
+        Returns:
+            Whether the text differs from what readers saw before.
+        """
         path = os.path.realpath(analysis.file)
-        # The mark counts for more than what the text says of its encoding.
+        # The byte order mark overrides the encoding that the XML declaration names. The editor has
+        # decoded the text already.
         held = codecs.BOM_UTF8 + analysis.source.data
         before = unsaved.get(path)
         if before is None:
@@ -68,15 +73,19 @@ class Project:
         return before != held
 
     def close(self, uri: str) -> Analysis | None:
-        """Forget a file, which is from now on as it is on the disk."""
+        """Remove a file from the open ones, so that readers see it as it is on disk.
+
+        Returns:
+            The last analysis of the file; None if it was not open.
+        """
         analysis = self.open.pop(uri, None)
-        self.known.pop(uri, None)
+        self.last_readable.pop(uri, None)
         if analysis is not None:
             unsaved.pop(os.path.realpath(analysis.file), None)
         return analysis
 
-    def depending_on(self, analysis: Analysis) -> list[str]:
-        """The URIs of other open files that are checked together with a document."""
+    def list_dependents(self, analysis: Analysis) -> list[str]:
+        """Return the URIs of the other open files whose findings depend on a document."""
         path = os.path.realpath(analysis.file)
         result = []
         for uri, other in self.open.items():
@@ -86,24 +95,29 @@ class Project:
                     result.append(uri)
         return result
 
-    def location(self, target: Target) -> types.Location | None:
-        """Where something stands."""
+    def find_location(self, target: Target) -> types.Location | None:
+        """Return where a target is defined; None if no file contains it."""
         if target.item is None:
             line, column = (
                 (0, 0) if target.at is None else (target.at.line - 1, target.at.column - 1)
             )
             start = types.Position(line, column)
-            return types.Location(self.uri(target.file), types.Range(start, start))
-        analysis = self.analysis(target.file)
+            return types.Location(self.find_uri(target.file), types.Range(start, start))
+        analysis = self.get_analysis(target.file)
         if analysis is None or target.number not in analysis.objects:
             return None
         return types.Location(
-            self.uri(target.file), analysis.text.range(*analysis.place_of(target.number))
+            self.find_uri(target.file),
+            analysis.text.range(*analysis.find_label_range(target.number)),
         )
 
-    def naming(self, target: Target) -> Iterator[Analysis]:
-        """Every document that may name something, first the one that it is in."""
-        own = self.analysis(target.file)
+    def find_documents_naming(self, target: Target) -> Iterator[Analysis]:
+        """Yield the documents that may refer to a target, first the one that defines it.
+
+        It searches the folder of the target, its parent folder, and the folders directly in both, and
+        skips documents whose text does not contain the name.
+        """
+        own = self.get_analysis(target.file)
         if own is None or target.item is None:
             return
         yield own
@@ -112,28 +126,37 @@ class Project:
         folders = [here, here.parent, *list_folders(here), *list_folders(here.parent)]
         for folder in dict.fromkeys(map(os.path.realpath, folders)):
             for path in list_documents(folder) or ():
-                other = self.analysis(path) if os.path.realpath(path) != real else None
+                other = self.get_analysis(path) if os.path.realpath(path) != real else None
                 if other is not None and target.item.name in other.text.content:
                     yield other
 
-    def references(self, target: Target) -> list[types.Location]:
-        """Every word that leads to something."""
+    def find_references(self, target: Target) -> list[types.Location]:
+        """Return the locations of all names that refer to a target."""
         return [
-            types.Location(self.uri(analysis.file), analysis.text.range(*place))
-            for analysis in self.naming(target)
-            for place in analysis.references(target)
+            types.Location(self.find_uri(analysis.file), analysis.text.range(*place))
+            for analysis in self.find_documents_naming(target)
+            for place in analysis.find_references(target)
         ]
 
-    def renaming(self, target: Target, name: str) -> dict[str, list[types.TextEdit]]:
-        """The changes that give something another name, everywhere, by URI.
+    def compute_rename(self, target: Target, name: str) -> dict[str, list[types.TextEdit]]:
+        """Compute the edits that rename a component and update all references to it.
+
+        Args:
+            target: the component.
+            name: its new name.
+
+        Returns:
+            The edits of each document, by URI.
 
         Raises:
-            ModelError: the name is illegal or taken, or the text gives it no name.
+            ModelError: the name is illegal or in use, or the component has no name in the text.
         """
-        own = self.analysis(target.file)
+        own = self.get_analysis(target.file)
         item = None if own is None or target.number is None else own.objects.get(target.number)
         place = (
-            None if own is None or item is None or item._index is None else own.name_of(item._index)
+            None
+            if own is None or item is None or item._index is None
+            else own.find_name_range(item._index)
         )
         if (
             own is None
@@ -147,31 +170,40 @@ class Project:
             )
         path, changes = f"/{name}", {}
         if own.document is not None and own.document.model is not None:
-            path, edits = _rename_in_model(own, item, name)
+            path, edits = _compute_model_edits(own, item, name)
         else:
             if not name or any(character in name for character in ILLEGAL_CHARACTERS):
-                raise ModelError(f"'{name}' is no name")
-            edits = _rename_in_setup(own, target, path)
+                raise ModelError(f"'{name}' is not a legal name")
+            edits = _compute_setup_edits(own, target, path)
         edits.insert(0, types.TextEdit(own.text.range(*place), name))
-        changes[self.uri(own.file)] = edits
-        for other in self.naming(target):
-            edits = _rename_in_setup(other, target, path) if other is not own else []
+        changes[self.find_uri(own.file)] = edits
+        for other in self.find_documents_naming(target):
+            edits = _compute_setup_edits(other, target, path) if other is not own else []
             if edits:
-                changes[self.uri(other.file)] = edits
+                changes[self.find_uri(other.file)] = edits
         return changes
 
 
-def _rename_in_model(
+def _compute_model_edits(
     analysis: Analysis, item: object, name: str
 ) -> tuple[str, list[types.TextEdit]]:
-    """The new path of a component, and the changes of the references in its model."""
+    """Compute the edits of the references in the model that contains a component.
+
+    Args:
+        analysis: the document.
+        item: the component.
+        name: its new name.
+
+    Returns:
+        The new path of the component, and the edits.
+    """
     assert isinstance(item, Component) and item._index is not None
-    # Renaming changes a model, so it is done to another one of the same text.
+    # Renaming changes the model, so a second one is read from the same text.
     twin = Analysis(analysis.text, analysis.file)
     assert twin.document is not None and twin.document.model is not None
     target, model = twin.objects[item._index], twin.document.model
     assert isinstance(target, Component)
-    own, uses = twin.name_of(item._index), twin.places
+    own, uses = twin.find_name_range(item._index), twin.uses
     rename_component(model, target, name)
     edits = []
     for use, start, end in uses:
@@ -182,18 +214,24 @@ def _rename_in_model(
     return model.tree().path_of(target) or f"/{name}", edits
 
 
-def _rename_in_setup(analysis: Analysis, target: Target, path: str) -> list[types.TextEdit]:
-    """The changes of the names in a setup that lead to something, or through it, once that has another path."""
+def _compute_setup_edits(analysis: Analysis, target: Target, path: str) -> list[types.TextEdit]:
+    """Compute the edits of the names in a setup that refer to a component or pass through it.
+
+    Args:
+        analysis: the setup.
+        target: the component.
+        path: its new path.
+    """
     edits = []
-    for use, start, end in analysis.places:
+    for use, start, end in analysis.uses:
         text = str(use.value)
-        led = analysis.led_to(use)
+        led = analysis.resolve_use(use)
         if led is None or os.path.realpath(led.file) != os.path.realpath(target.file):
             continue
         if text.startswith("/") and target.path and f"{text}/".startswith(f"{target.path}/"):
             edits.append(
                 types.TextEdit(analysis.text.range(start, end), path + text[len(target.path) :])
             )
-        elif target.is_same(led) and not text.startswith("/"):
+        elif target.is_same_as(led) and not text.startswith("/"):
             edits.append(types.TextEdit(analysis.text.range(start, end), get_last_name(path)))
     return edits

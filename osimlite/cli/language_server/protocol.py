@@ -1,4 +1,4 @@
-"""Every question gets an answer: one that is not what the protocol says gets an error, where pygls says nothing."""
+"""JSON-RPC layer that answers malformed requests with an error, where pygls sends nothing."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from pygls.protocol import LanguageServerProtocol, default_converter
 
 VERSION = LanguageServerProtocol.VERSION
 
-NO_JSON = ValueError | RecursionError
-"""How JSON that is none, or is too deep, shows itself."""
+JSON_ERRORS = ValueError | RecursionError
+"""Exceptions that the JSON parser raises for malformed or too deeply nested text."""
 
 
 class Protocol(LanguageServerProtocol):
-    """The Language Server Protocol for editors that may not keep to it."""
+    """Language Server Protocol that tolerates editors which violate it."""
 
     def structure_message(self, data: dict[str, Any]) -> Any:
-        """A message of what a JSON object says; the object itself if that is no message."""
+        """Convert a JSON object to a message; return the object itself if it is not a message."""
         if not isinstance(data.get("method", ""), str):
             return data
         try:
@@ -28,26 +28,31 @@ class Protocol(LanguageServerProtocol):
             return data
 
     def handle_message(self, message: Any) -> None:
-        """Do what a message asks for, and answer what is none."""
+        """Handle a message; answer a malformed request with an error."""
         if getattr(message, "jsonrpc", None) == VERSION:
             super().handle_message(message)
             return
-        said = message if isinstance(message, dict) else {}
-        number, method = said.get("id", getattr(message, "id", None)), said.get("method")
-        if said.get("jsonrpc") == VERSION and isinstance(method, str):
+        fields = message if isinstance(message, dict) else {}
+        number, method = fields.get("id", getattr(message, "id", None)), fields.get("method")
+        if fields.get("jsonrpc") == VERSION and isinstance(method, str):
             error: JsonRpcException = JsonRpcInvalidParams(
-                f"the parameters of {method} are not what the protocol says"
+                f"the parameters of {method} do not follow the protocol"
             )
-            if "id" not in said:
-                # Nobody waits for an answer.
+            if "id" not in fields:
+                # A notification has no answer; only the log mentions the error.
                 self._server.report_server_error(error, JsonRpcException)
                 return
         else:
-            error = JsonRpcInvalidRequest(f"this is no message of JSON-RPC {VERSION}")
-        self.refuse(error, number)
+            error = JsonRpcInvalidRequest(f"the message does not follow JSON-RPC {VERSION}")
+        self.send_error(error, number)
 
-    def refuse(self, error: JsonRpcException, number: object = None) -> None:
-        """Answer a question, of which the number may be unknown, by an error."""
+    def send_error(self, error: JsonRpcException, number: object = None) -> None:
+        """Send an error as the answer to a request.
+
+        Args:
+            error: the error.
+            number: `id` of the request; null is sent if it is unknown or not an id.
+        """
         # Without a number the type of pygls leaves out the `id`, which has to be there and null.
         body = {"code": error.code, "message": error.message}
         self._send_data(
@@ -59,11 +64,14 @@ class Protocol(LanguageServerProtocol):
         )
 
 
-def keep_log_plain() -> None:
-    """What an editor asks wrongly is told to the editor; in the log it is a line, and no failure of the program."""
+def shorten_protocol_errors_in_log() -> None:
+    """Log malformed requests as one line without a traceback.
+
+    The editor gets an error as an answer. The request is not a failure of the server.
+    """
 
     def plain(record: logging.LogRecord) -> bool:
-        if record.exc_info and isinstance(record.exc_info[1], NO_JSON | JsonRpcException):
+        if record.exc_info and isinstance(record.exc_info[1], JSON_ERRORS | JsonRpcException):
             record.exc_info = None
         return not record.getMessage().startswith("Unable to deserialize message")
 
@@ -71,12 +79,15 @@ def keep_log_plain() -> None:
         logging.getLogger(name).addFilter(plain)
 
 
-def strict_converter() -> Converter:
-    """What makes messages of JSON, but no text of what is none: of null, cattrs makes the word None."""
+def create_strict_converter() -> Converter:
+    """Create a converter from JSON that rejects other types where a string is required.
+
+    cattrs alone converts null to the string "None".
+    """
 
     def text(value: Any, _: type) -> str:
         if not isinstance(value, str):
-            raise ValueError(f"{value!r} is no text")
+            raise ValueError(f"expected a string, found {value!r}")
         return value
 
     converter: Converter = default_converter()  # type: ignore[no-untyped-call]

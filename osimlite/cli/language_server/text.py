@@ -1,4 +1,4 @@
-"""The text of an open file, and places in it as editors count them."""
+"""Text of an open file, with conversion between offsets and the positions of editors."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ _LINE_END = re.compile(r"\r\n?|\n")
 
 
 class Text:
-    """An unchanging text. A change makes another.
+    """Immutable text of an open file.
 
-    Editors count lines and characters from 0, a character beyond U+FFFF twice unless they agreed on
-    something else; offsets are ours, in characters of Python.
+    Editors count lines and characters from 0. By default a character beyond U+FFFF counts twice
+    (UTF-16). Offsets count characters of Python.
 
     Args:
         content: the characters.
-        unit: how the editor counts.
+        unit: encoding in which the editor counts characters.
     """
 
     def __init__(self, content: str, unit: str = types.PositionEncodingKind.Utf16) -> None:
@@ -35,7 +35,7 @@ class Text:
         return self.content.isascii() or self.unit == types.PositionEncodingKind.Utf32
 
     def offset(self, position: types.Position) -> int:
-        """The offset of a place; one behind the end of a line or of the text is at that end."""
+        """Convert a position to an offset; positions beyond a line or the text are clipped to its end."""
         if position.line >= len(self._starts):
             return len(self.content)
         start = self._starts[position.line]
@@ -50,7 +50,7 @@ class Text:
         return start + len(line)
 
     def position(self, offset: int) -> types.Position:
-        """The place of an offset."""
+        """Convert an offset to a position."""
         line = bisect_right(self._starts, offset) - 1
         before = self.content[self._starts[line] : offset]
         if self._is_plain or before.isascii():
@@ -58,18 +58,23 @@ class Text:
         return types.Position(line, sum(map(self._width, before)))
 
     def range(self, start: int, end: int) -> types.Range:
-        """The range between two offsets."""
+        """Convert two offsets to a range.
+
+        Args:
+            start: offset of the first character.
+            end: offset after the last character.
+        """
         return types.Range(self.position(start), self.position(end))
 
     def apply_change(self, change: types.TextDocumentContentChangeEvent) -> Text:
-        """The text after a change of a part of it, or of the whole."""
+        """Return the text after one change event, of a range or of everything."""
         if not isinstance(change, types.TextDocumentContentChangePartial):
             return Text(change.text, self.unit)
         start, end = self.offset(change.range.start), self.offset(change.range.end)
         return Text(self.content[:start] + change.text + self.content[end:], self.unit)
 
     def _line(self, number: int) -> str:
-        """A line without its end."""
+        """Return a line without its line ending."""
         end = self._starts[number + 1] if number + 1 < len(self._starts) else len(self.content)
         return self.content[self._starts[number] : end].rstrip("\r\n")
 

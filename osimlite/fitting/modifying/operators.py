@@ -240,7 +240,7 @@ def _find_driven_coordinates(model: Model) -> list[Any]:
 
 def _is_on_ground(model: Model, path: str) -> bool:
     """Return whether a coordinate belongs to a joint to ground."""
-    joint = model.tree().at(path.rpartition("/")[0])
+    joint = model.tree().find(path.rpartition("/")[0])
     return isinstance(_find_base(model, joint, "socket_parent_frame"), Ground)
 
 
@@ -291,7 +291,7 @@ def _replace_with_function_paths(
 ) -> None:
     """Replace paths by the function-based paths of a file."""
     given = read_document(
-        Source.of_file(folder / operator.paths_file.strip()), of=p.FunctionBasedPathSet
+        Source.from_file(folder / operator.paths_file.strip()), of=p.FunctionBasedPathSet
     ).top
     replace_paths(model, given.objects)
 
@@ -322,7 +322,7 @@ def replace_paths(model: Model, paths: Any) -> None:
 def _add_external_loads(model: Model, operator: p.ModOpAddExternalLoads, folder: Path) -> None:
     """Add external loads of a file to the model."""
     file = folder / operator.filepath.strip()
-    loads = read_document(Source.of_file(file), of=ExternalLoads).top
+    loads = read_document(Source.from_file(file), of=ExternalLoads).top
     assert isinstance(loads, ExternalLoads)
     loads.name = "externalloads"  # OpenSim drops the name in the file.
     loads.datafile = str((file.parent / loads.datafile.strip()).absolute())

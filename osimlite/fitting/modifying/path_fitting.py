@@ -73,7 +73,7 @@ def fit_paths(
     tree = model.tree()
     result = []
     for index, name in enumerate(known.names):
-        if isinstance(getattr(tree.at(name), "geometry_path", None), FunctionBasedPath):
+        if isinstance(getattr(tree.find(name), "geometry_path", None), FunctionBasedPath):
             continue
         result.append(
             _fit_path(known, mechanism, name, q, free, lengths[:, index], arms[:, index], tolerance)

@@ -11,7 +11,7 @@ from osimlite.errors import SettingError
 from osimlite.fitting.modifying.contact import smooth_contacts
 from osimlite.fitting.modifying.operators import apply_operators, replace_paths
 from osimlite.fitting.modifying.path_fitting import PathFit, fit_paths
-from osimlite.schema.model import Model, expect_model
+from osimlite.schema.model import Model, check_is_model
 from osimlite.schema.tools import processors as p
 
 Change = Callable[[Model, Path], "list[PathFit] | None"]
@@ -146,7 +146,7 @@ def modify(
         ModelError: the model lacks a named part.
         UnsupportedError: a part of the model has no replacement.
     """
-    expect_model(model)
+    check_is_model(model)
     result = model.copy_deep()
     apply_operators(result, operators, folder)
     for name, value in [*replace, *words.items()]:

@@ -14,7 +14,7 @@ from osimlite.io.document.objects import get_layout
 from osimlite.io.document.reader import read_document
 from osimlite.io.document.source import Source
 from osimlite.schema.base import Object
-from osimlite.schema.registry import on_class_change
+from osimlite.schema.registry import add_change_callback
 from osimlite.schema.specs import get_field_specs
 
 T = TypeVar("T")
@@ -24,13 +24,17 @@ Top = TypeVar("Top", bound=Object)
 class FileCache(Generic[T]):
     """Cache of the results of a function of a file, for the last `size` files.
 
-    A result is valid until the file changes or other plug-in classes count.
+    A result is valid until the file changes or other plug-in classes are registered.
+
+    Args:
+        make: function of a path.
+        size: number of files.
     """
 
     def __init__(self, make: Callable[[str], T], size: int) -> None:
         self._make, self._size = make, size
         self._cached: dict[str, tuple[int, T]] = {}
-        on_class_change(self._cached.clear)
+        add_change_callback(self._cached.clear)
 
     def __call__(self, path: str) -> T | None:
         """Return the result for a file; None if the file does not exist."""
@@ -53,7 +57,12 @@ class FileCache(Generic[T]):
         return known is not None and known[0] == get_file_stamp(path)
 
     def keep(self, path: str, result: T) -> None:
-        """Store a result that was computed elsewhere for the present file."""
+        """Store a result that was computed elsewhere for the present file.
+
+        Args:
+            path: the file.
+            result: the result.
+        """
         stamp = get_file_stamp(path)
         key = os.path.abspath(path)
         if stamp is None:
@@ -73,7 +82,7 @@ def cache_by_file(size: int) -> Callable[[Callable[[str], T]], FileCache[T]]:
 def get_object(path: str) -> Object | None:
     """Return the object of a document; None if it cannot be read."""
     try:
-        return read_document(Source.of_file(path), of=Object).top
+        return read_document(Source.from_file(path), of=Object).top
     except (OsimliteError, ValueError, RecursionError):
         return None
 
@@ -103,7 +112,7 @@ def read_copy(path: str | Path, of: type[Top]) -> Top:
     with classes_in_use(()):
         top = get_object(file) if get_object.has(file) and _has_no_include(file) else None
         if not isinstance(top, of):
-            document = read_document(Source.of_file(path), of=of)
+            document = read_document(Source.from_file(path), of=of)
             assert isinstance(document.top, of)
             return document.top
         copied = top.copy_deep()
@@ -127,7 +136,7 @@ def read_object(path: str | Path, cls: type[AnyObject]) -> AnyObject:
         DocumentError: the file is missing, has an object of another class, or has a misspelt
             property; with line and column.
     """
-    document = read_document(Source.of_file(path), of=cls)
+    document = read_document(Source.from_file(path), of=cls)
     for note in document.notes:
         # Many files have properties of old versions; a name similar to a present one is a
         # spelling mistake.
@@ -137,6 +146,8 @@ def read_object(path: str | Path, cls: type[AnyObject]) -> AnyObject:
             and (near := find_nearest(note.word, get_field_specs(type(note.owner))))
         ):
             message = f"<{note.word}> is unknown in this document; did you mean <{near}>?"
-            raise document.source.fault(DocumentError, message, document.source.of_tag(note.number))
+            raise document.source.fault(
+                DocumentError, message, document.source.locate_tag(note.number)
+            )
     assert isinstance(document.top, cls)
     return document.top

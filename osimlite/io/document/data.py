@@ -1,8 +1,8 @@
-"""Models as plain data: the form of YAML and JSON files.
+"""Models as plain data: the content of YAML and JSON files.
 
 An object is a mapping from its properties, under their Python names or their XML tags, to values.
-``class`` says which class it is; it may be left out where a property takes only that class. A set
-that is nothing but its members may be given as the list of them. Numbers that JSON cannot say are
+``class`` is its class; it may be left out where a property accepts only that class. A set without
+further properties may be written as the list of its members. Numbers that JSON cannot represent are
 the words NaN, Inf and -Inf. Comments of a file are not part of its data.
 """
 
@@ -22,26 +22,30 @@ from osimlite.io.document.lexical import UncleanText, parse_real
 from osimlite.io.document.objects import get_layout
 from osimlite.io.document.printer import has_content
 from osimlite.schema.base import Component, Object, Unknown
-from osimlite.schema.fields import Held, ObjectList, Reference, Value
+from osimlite.schema.fields import ObjectField, ObjectList, Reference, Value
 from osimlite.schema.layout import Remark
 from osimlite.schema.model import Model
 from osimlite.schema.registry import find_class, list_class_tags, list_tags
 from osimlite.schema.specs import FieldSpec, get_field_specs
 
 SUFFIXES = (".json", ".yaml", ".yml")
-"""How the names of data files end."""
+"""File name endings of data files."""
 
 MAX_NUMBERS = 2_000_000
-"""More than any real model has, an object counted as ten; the aliases of a short YAML text can make it endless."""
+"""Largest number of values in a data file, with an object counted as ten.
+
+No real model has as many. Without a limit the aliases of a short YAML text could expand to an
+endless one.
+"""
 
 
 def read_data(path: str | Path) -> Model:
     """Read a model from a YAML or JSON file.
 
     Raises:
-        DocumentError: the file is missing, or its text is no YAML or JSON; with line and column.
+        DocumentError: the file is missing, or is not YAML or JSON; with line and column.
         MissingDependency: the file is YAML and PyYAML is not installed.
-        ModelError: the data is no model; the message says where and why.
+        ModelError: the data does not describe a model; with the position in the data.
     """
     place = Path(path)
     try:
@@ -57,7 +61,13 @@ def read_data(path: str | Path) -> Model:
 
 
 def write_data(model: Model, path: str | Path) -> None:
-    """Write a model as JSON if the suffix of `path` is ``.json``, else as YAML; it appears whole or not at all.
+    """Write a model as JSON if the suffix of `path` is ``.json``, else as YAML.
+
+    A failure leaves no partial file.
+
+    Args:
+        model: the model.
+        path: the file.
 
     Raises:
         ModelError: a reference leads to a component outside the model.
@@ -69,37 +79,46 @@ def write_data(model: Model, path: str | Path) -> None:
 
 
 def to_json(model: Model) -> str:
-    """The model as JSON, a list of numbers on one line."""
+    """Return a model as JSON, with each list of numbers on one line."""
     return "".join(_format_json(to_data(model), "")) + "\n"
 
 
 def to_yaml(model: Model) -> str:
-    """The model as YAML; MissingDependency if PyYAML is not installed."""
+    """Return a model as YAML.
+
+    Raises:
+        MissingDependency: PyYAML is not installed.
+    """
     return _import_yaml().safe_dump(
         to_data(model), sort_keys=False, default_flow_style=None, allow_unicode=True, width=120
     )
 
 
 def to_data(model: Model) -> dict[str, Any]:
-    """The model as dicts, lists, texts and numbers; `from_data` makes an equal one of it.
+    """Return a model as dicts, lists, strings and numbers.
+
+    Returns:
+        Data from which `from_data` makes an equal model.
 
     Raises:
         ModelError: a reference leads to a component outside the model.
     """
-    return _Writer(model).object(model, None)
+    return _Writer(model).convert_object(model, None)
 
 
 def from_data(data: Mapping[str, Any]) -> Model:
-    """The model that plain data describes.
+    """Return the model that plain data describes.
 
     Raises:
-        ModelError: it describes none; the message says where and why.
+        ModelError: the data does not describe a model; with the position in the data.
     """
     if not isinstance(data, Mapping):
-        raise ModelError(f"a model is a mapping from properties to values, not {_find_class(data)}")
+        raise ModelError(
+            f"a model is a mapping from properties to values, not {_describe_type(data)}"
+        )
     data = {key: value for key, value in data.items() if key != "$schema"}
     try:
-        model = _Reader().object(data, Model, "model")
+        model = _Reader().convert_object(data, Model, "model")
     except RecursionError:
         raise ModelError("the data is nested too deeply to be a model") from None
     assert isinstance(model, Model)
@@ -110,7 +129,7 @@ class _Writer:
     def __init__(self, model: Model) -> None:
         self.tree = model.tree()
 
-    def object(self, item: Object, accepts: type[Object] | None) -> dict[str, Any]:
+    def convert_object(self, item: Object, accepts: type[Object] | None) -> dict[str, Any]:
         data: dict[str, Any] = {}
         if type(item) is not accepts:
             data["class"] = type(item).tag
@@ -124,64 +143,66 @@ class _Writer:
             if (
                 spec.name in item.model_fields_set
                 or spec.name in inherited
-                or (isinstance(spec.kind, Held) and has_content(value, spec))
+                or (isinstance(spec.kind, ObjectField) and has_content(value, spec))
             ):
-                data[spec.name] = self._value(item, spec, value)
+                data[spec.name] = self._convert_value(item, spec, value)
         if item.layout is not None and item.layout.unknown:
             data["unknown"] = item.layout.unknown
         return data
 
-    def _value(self, item: Object, spec: FieldSpec, value: Any) -> Any:
-        if isinstance(spec.kind, Held):
+    def _convert_value(self, item: Object, spec: FieldSpec, value: Any) -> Any:
+        if isinstance(spec.kind, ObjectField):
             if isinstance(value, list):
-                return [self.object(member, spec.accepts) for member in value]
-            return None if value is None else self._owned(spec, value)
+                return [self.convert_object(member, spec.accepts) for member in value]
+            return None if value is None else self._convert_object(spec, value)
         if isinstance(spec.kind, Reference):
-            return self._named(item, spec.kind, value)
+            return self._convert_reference(item, spec.kind, value)
         return (
             [_format_number(word) for word in value]
             if isinstance(value, tuple)
             else _format_number(value)
         )
 
-    def _owned(self, spec: FieldSpec, value: Object) -> Any:
-        data = self.object(value, spec.accepts)
+    def _convert_object(self, spec: FieldSpec, value: Object) -> Any:
+        data = self.convert_object(value, spec.accepts)
         default_name = (
-            spec.tag if isinstance(spec.kind, Held) and spec.kind.form == "single" else ""
+            spec.tag if isinstance(spec.kind, ObjectField) and spec.kind.form == "single" else ""
         )
         if spec.factory is not None and not default_name:
-            made = spec.factory()
-            default_name = made.name if isinstance(made, Object) else ""
+            default = spec.factory()
+            default_name = default.name if isinstance(default, Object) else ""
         if data.get("name") == default_name:
             del data["name"]
         return data["objects"] if data.keys() == {"objects"} else data
 
-    def _named(self, item: Object, reference: Reference, value: Any) -> Any:
+    def _convert_reference(self, item: Object, reference: Reference, value: Any) -> Any:
         if isinstance(value, Component):
-            return self.tree.text_for(self.tree.owner_of(item), reference, value)
+            return self.tree.format_reference(self.tree.owner_of(item), reference, value)
         return (
-            [self._named(item, reference, word) for word in value]
+            [self._convert_reference(item, reference, word) for word in value]
             if isinstance(value, tuple)
             else value
         )
 
 
 class _Reader:
-    """Makes objects of data; `count` is how much of it there was."""
+    """Converter of data to objects; `count` is the number of values converted so far."""
 
     def __init__(self) -> None:
         self.count = 0
 
-    def object(self, data: Any, accepts: type[Object], where: str, name: str = "") -> Object:
-        """The object that `data` describes, where a property takes an `accepts`."""
-        self._counted(10)
+    def convert_object(
+        self, data: Any, accepts: type[Object], where: str, name: str = ""
+    ) -> Object:
+        """Return the object that `data` describes, where a property accepts the class `accepts`."""
+        self._count_values(10)
         if isinstance(data, list) and "objects" in get_field_specs(accepts):
             data = {"objects": data}
         if not isinstance(data, Mapping):
             raise ModelError(
-                f"{where}: expected a mapping that describes a {accepts.tag}, not {_find_class(data)}"
+                f"{where}: expected a mapping that describes a {accepts.tag}, not {_describe_type(data)}"
             )
-        cls = self._class(data, accepts, where)
+        cls = self._find_class(data, accepts, where)
         specs = get_field_specs(cls)
         by_name = {spec.name: spec for spec in specs.values()}
         values: dict[str, Any] = {}
@@ -192,7 +213,7 @@ class _Reader:
             if key == "name" or (cls is Unknown and key in ("class_name", "content")):
                 if not isinstance(value, str):
                     raise ModelError(
-                        f"{place}: expected a text, not {_find_class(value)}; put it in quotation marks"
+                        f"{place}: expected a text, not {_describe_type(value)}; put it in quotation marks"
                     )
                 values[key] = value
                 continue
@@ -203,7 +224,7 @@ class _Reader:
                 )
             if spec.name in values:
                 raise ModelError(f"{where}: '{spec.name}' is given twice, also as '{spec.tag}'")
-            values[spec.name] = self._value(value, spec, place)
+            values[spec.name] = self._convert_value(value, spec, place)
         present = set(values)
         if name and "name" not in values:
             values["name"] = name
@@ -215,7 +236,9 @@ class _Reader:
             get_layout(item).before[None] = [Remark(text, True) for text in remarks]
         return item
 
-    def _class(self, data: Mapping[str, Any], accepts: type[Object], where: str) -> type[Object]:
+    def _find_class(
+        self, data: Mapping[str, Any], accepts: type[Object], where: str
+    ) -> type[Object]:
         tag = data.get("class")
         if tag is None:
             if accepts.abstract:
@@ -234,40 +257,43 @@ class _Reader:
             raise ModelError(f"{where}.class: a {tag} cannot stand here, only a {accepts.tag}")
         return cls
 
-    def _value(self, data: Any, spec: FieldSpec, where: str) -> Any:
+    def _convert_value(self, data: Any, spec: FieldSpec, where: str) -> Any:
         kind = spec.kind
-        if isinstance(kind, Held):
+        if isinstance(kind, ObjectField):
             assert spec.accepts is not None
             if kind.form == "list":
                 if not isinstance(data, list):
                     raise ModelError(
-                        f"{where}: expected a list of {spec.accepts.tag}, not {_find_class(data)}"
+                        f"{where}: expected a list of {spec.accepts.tag}, not {_describe_type(data)}"
                     )
                 members = (
-                    self.object(item, spec.accepts, f"{where}[{i}]") for i, item in enumerate(data)
+                    self.convert_object(item, spec.accepts, f"{where}[{i}]")
+                    for i, item in enumerate(data)
                 )
                 return ObjectList(members)
             if data is None and kind.form == "optional":
                 return None
-            made = spec.factory() if spec.factory is not None else None
-            return self.object(
+            default = spec.factory() if spec.factory is not None else None
+            return self.convert_object(
                 data,
                 spec.accepts,
                 where,
-                spec.tag if kind.form == "single" else getattr(made, "name", ""),
+                spec.tag if kind.form == "single" else getattr(default, "name", ""),
             )
         if isinstance(kind, Value) and kind.scalar == "double":
             data = (
-                [self._real(word) for word in data] if isinstance(data, list) else self._real(data)
+                [self._parse_number(word) for word in data]
+                if isinstance(data, list)
+                else self._parse_number(data)
             )
         try:
             return kind.check(data, None)
         except (ValueError, OverflowError) as error:
             raise ModelError(f"{where}: {error}") from None
 
-    def _real(self, data: Any) -> Any:
-        """A number that JSON cannot say, or that YAML takes for a text (1e-9), else `data` itself."""
-        self._counted()
+    def _parse_number(self, data: Any) -> Any:
+        """Parse a number that JSON cannot represent or that YAML reads as text (1e-9); return others unchanged."""
+        self._count_values()
         if isinstance(data, str):
             try:
                 return parse_real(data.strip())
@@ -275,7 +301,7 @@ class _Reader:
                 return data
         return data
 
-    def _counted(self, weight: int = 1) -> None:
+    def _count_values(self, weight: int = 1) -> None:
         self.count += weight
         if self.count > MAX_NUMBERS:
             raise ModelError(
@@ -289,7 +315,7 @@ def _format_number(value: Any) -> Any:
     return value
 
 
-def _find_class(data: Any) -> str:
+def _describe_type(data: Any) -> str:
     names = {
         dict: "a mapping",
         list: "a list",
@@ -303,16 +329,16 @@ def _find_class(data: Any) -> str:
 
 
 def _format_json(data: Any, indent: str) -> Iterator[str]:
-    """JSON with one property a line, and what holds no further objects on one line."""
+    """Yield JSON with one property per line; data without nested data is on one line."""
     if not isinstance(data, (dict, list)) or not any(
-        isinstance(part, (dict, list)) for part in _format_parts(data)
+        isinstance(part, (dict, list)) for part in _list_parts(data)
     ):
         yield json.dumps(data, ensure_ascii=False, allow_nan=False)
         return
     inner = indent + "  "
     opening, closing = "{}" if isinstance(data, dict) else "[]"
     yield opening
-    for number, part in enumerate(_format_parts(data)):
+    for number, part in enumerate(_list_parts(data)):
         yield ("," if number else "") + "\n" + inner
         if isinstance(data, dict):
             yield json.dumps(list(data)[number], ensure_ascii=False) + ": "
@@ -320,7 +346,7 @@ def _format_json(data: Any, indent: str) -> Iterator[str]:
     yield "\n" + indent + closing
 
 
-def _format_parts(data: dict[str, Any] | list[Any]) -> list[Any]:
+def _list_parts(data: dict[str, Any] | list[Any]) -> list[Any]:
     return list(data.values()) if isinstance(data, dict) else data
 
 
@@ -338,10 +364,15 @@ def _parse_json(text: str, file: str) -> Any:
 
 
 def parse_yaml(text: str, file: str, *, with_lines: bool = False) -> Any:
-    """The data of a YAML text, or PyYAML's nodes, which know their lines.
+    """Parse a YAML text.
+
+    Args:
+        text: the text.
+        file: path of the file, for messages.
+        with_lines: return PyYAML's nodes, which know their lines, instead of data.
 
     Raises:
-        DocumentError: it is none; with line and column in the file.
+        DocumentError: the text is not YAML; with line and column in the file.
         MissingDependency: PyYAML is not installed.
     """
     yaml = _import_yaml()
@@ -352,8 +383,8 @@ def parse_yaml(text: str, file: str, *, with_lines: bool = False) -> Any:
         line, column = (mark.line + 1, mark.column + 1) if mark is not None else (1, 1)
         reason = getattr(error, "problem", None) or "it cannot be read"
         raise DocumentError(f"not YAML: {reason}", file=file, line=line, column=column) from None
-    # A date of a year beyond 9999, or a number beyond those of Python, raises whatever its
-    # constructor does.
+    # A date after the year 9999, or a number that is too large for Python, raises an error of the
+    # class's constructor.
     except (RecursionError, ValueError, ArithmeticError, LookupError, TypeError, AttributeError):
         raise DocumentError("the YAML text cannot be read as a model", file=file, line=1) from None
 

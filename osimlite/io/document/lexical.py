@@ -1,8 +1,8 @@
-"""Text to value and back, by the lexical rules of OpenSim 4.6's reader and printer.
+"""Conversion between text and values by the lexical rules of OpenSim 4.6's reader and printer.
 
-OpenSim takes the longest part of a text that is a number (``1,5`` is 1) and drops what it cannot
-read without failing. The functions here read the same value, and raise :class:`UncleanText` with it, so
-that the reader can note what was lost.
+OpenSim reads the longest prefix of a text that is a number (``1,5`` is 1) and ignores what it cannot
+read, without an error. The functions here read the same value, and raise :class:`UncleanText` with
+it, so that the reader can note what was lost.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ from functools import cache
 from math import isfinite
 from typing import Any, Literal
 
-from osimlite.schema.fields import Kind, Reference, Value
+from osimlite.schema.fields import FieldType, Reference, Value
 
 Trouble = Literal["unreadable", "cut", "too-many", "too-few", "empty", "ignored"]
 
 ABSENT: Any = object()
-"""Stands for "OpenSim keeps the default"."""
+"""Value of a text for which OpenSim keeps the default."""
 
 _PLAIN_FLAGS = {"true": True, "false": False, "0": False}
 
@@ -35,12 +35,12 @@ _SPECIAL |= {"-inf": -math.inf, "-infinity": -math.inf}
 
 
 class UncleanText(Exception):
-    """The text does not say what was meant, or says it in a way OpenSim cuts.
+    """Text that is ambiguous or that OpenSim reads only in part.
 
     Attributes:
         value: what OpenSim reads; ABSENT if it keeps the default.
-        trouble: what is wrong.
-        word: the part of the text concerned.
+        trouble: kind of the problem.
+        word: part of the text with the problem.
     """
 
     def __init__(self, trouble: Trouble, word: str, value: Any = ABSENT) -> None:
@@ -51,9 +51,14 @@ class UncleanText(Exception):
 
 
 def parse_real(word: str) -> float:
-    """One number as OpenSim reads it; Unclean if only a part of the word, or nothing, is a number."""
+    """Parse one number as OpenSim reads it.
+
+    Raises:
+        UncleanText: only a part of the word, or nothing of it, is a number.
+    """
     try:
         value = float(word)
+        # Python also accepts underscores between digits and the digits of other scripts.
         # Python also takes an underscore between digits, and the digits of other scripts.
         if -math.inf < value < math.inf and "_" not in word and word.isascii():
             return value
@@ -63,6 +68,7 @@ def parse_real(word: str) -> float:
     if special is not None:
         return special
     prefix = _PREFIX.match(word)
+    # OpenSim does not read a number with an exponent without digits, such as 1e.
     # Of an exponent without digits OpenSim makes nothing.
     if (
         prefix is None
@@ -74,14 +80,22 @@ def parse_real(word: str) -> float:
 
 
 def parse_integer(word: str) -> int:
-    """One whole number; nothing may follow it."""
+    """Parse one whole number; unlike in a real number, nothing may follow it.
+
+    Raises:
+        UncleanText: the word is not a whole number.
+    """
     if re.fullmatch(r"[+-]?[0-9]+", word) is None:
         raise UncleanText("unreadable", word)
     return int(word)
 
 
 def parse_flag(word: str) -> bool:
-    """A switch: true or false in any case, 1 or 0."""
+    """Parse a switch: true or false in any case, 1 or 0.
+
+    Raises:
+        UncleanText: the word is something else.
+    """
     lowered = word.lower()
     if lowered in ("true", "1"):
         return True
@@ -91,7 +105,11 @@ def parse_flag(word: str) -> bool:
 
 
 def parse_legacy_flag(word: str) -> bool:
-    """A switch of the first property system, where everything but ``true`` is false, ``1`` too."""
+    """Parse a switch of the first property system, where everything but ``true`` is false, also ``1``.
+
+    Raises:
+        UncleanText: the word is not ``true``, ``false`` or ``0``.
+    """
     lowered = word.lower()
     if lowered not in _PLAIN_FLAGS:
         raise UncleanText("ignored", word, False)
@@ -99,14 +117,14 @@ def parse_legacy_flag(word: str) -> bool:
 
 
 def _parse_exact_flag(word: str) -> bool:
-    """A switch in a list of the first property system, where everything but ``true`` in these letters is false."""
+    """Parse a switch in a list of the first property system, where everything but lower-case ``true`` is false."""
     if word not in _PLAIN_FLAGS:
         raise UncleanText("ignored", word, False)
     return _PLAIN_FLAGS[word]
 
 
 def _parse_complete_real(word: str) -> float:
-    """A number in a list of the first property system: where anything is left over, OpenSim refuses the file."""
+    """Parse a number in a list of the first property system, where OpenSim rejects a number with a rest."""
     try:
         return parse_real(word)
     except UncleanText:
@@ -114,12 +132,12 @@ def _parse_complete_real(word: str) -> float:
 
 
 def parse_text(raw: str) -> str:
-    """A text: white space trimmed, inner runs of it collapsed to one space."""
+    """Return a text with trimmed white space, and inner runs of it collapsed to one space."""
     return " ".join(split_words(raw))
 
 
 def split_words(raw: str) -> list[str]:
-    """The words of a text. What separates them is ASCII white space: a no-break space is a letter for OpenSim."""
+    """Split a text at ASCII white space; for OpenSim a no-break space is a letter."""
     return raw.split() if raw.isascii() else _OTHER.findall(raw)
 
 
@@ -133,8 +151,11 @@ _WORDS: dict[str, Callable[[str], Any]] = {
 
 
 @cache
-def make_converter(kind: Kind) -> Callable[[str], Any]:
-    """The function that reads the text of a property of this kind; it raises Unclean where OpenSim would not object."""
+def make_converter(kind: FieldType) -> Callable[[str], Any]:
+    """Return the function that reads the text of a property.
+
+    The function raises :class:`UncleanText` where OpenSim reads something else without an error.
+    """
     if isinstance(kind, Reference):
         return _make_list_converter(str, 0, None) if kind.shape == "list" else parse_text
     assert isinstance(kind, Value)
@@ -148,7 +169,7 @@ def make_converter(kind: Kind) -> Callable[[str], Any]:
     if kind.size is not None:
         return _make_vector_converter(kind.size)
     if kind.shape == "vector":
-        # OpenSim keeps the default of a vector whose element is empty.
+        # At least one word: OpenSim keeps the default of a vector whose element is empty.
         return _make_list_converter(word, 1, None)
     if kind.legacy and kind.scalar != "string":
         return _make_legacy_converter(
@@ -159,8 +180,14 @@ def make_converter(kind: Kind) -> Callable[[str], Any]:
     return _make_list_converter(word, kind.least, kind.most)
 
 
-def reads_as(raw: str, kind: Kind, value: Any) -> bool:
-    """Return whether the text of a property of this kind is plainly a value."""
+def reads_as(raw: str, kind: FieldType, value: Any) -> bool:
+    """Return whether the text of a property reads as a value without any doubt.
+
+    Args:
+        raw: the text.
+        kind: type of the property.
+        value: the value.
+    """
     try:
         return bool(make_converter(kind)(raw) == value)
     except UncleanText:
@@ -171,7 +198,7 @@ def _make_single_converter(
     read: Callable[[str], Any], optional: bool, legacy: bool
 ) -> Callable[[str], Any]:
     def convert(raw: str) -> Any:
-        # Almost every text is one clean number or switch; what follows this is for the rest.
+        # Fast path: almost every text is one clean number or switch.
         if read is parse_real:
             try:
                 value = float(raw)
@@ -186,14 +213,14 @@ def _make_single_converter(
             if optional:
                 return None
             if read is parse_legacy_flag:
-                # OpenSim's first property system takes nothing for no.
+                # OpenSim's first property system reads an empty switch as false.
                 raise UncleanText("empty", "", False)
             raise UncleanText("empty", "")
         if len(words) == 1:
             return read(words[0])
         if not legacy:
-            # OpenSim reads them all before it takes the first, and takes none if it cannot read
-            # one.
+            # OpenSim reads all words before it uses the first, and keeps the default if it cannot
+            # read one of them.
             _parse_words(words[1:], read)
         raise UncleanText("too-many", raw.strip(), read(words[0]))
 
@@ -203,7 +230,11 @@ def _make_single_converter(
 def _parse_words(
     words: list[str], read: Callable[[str], Any]
 ) -> tuple[list[Any], UncleanText | None]:
-    """What OpenSim reads of words, and the first that it cuts; Unclean if it can make nothing of one."""
+    """Parse words; return the values, and the error of the first word that OpenSim cuts.
+
+    Raises:
+        UncleanText: OpenSim cannot read a word at all.
+    """
     values, first = [], None
     for word in words:
         try:
@@ -270,7 +301,10 @@ def _make_list_converter(
 
 
 def _make_legacy_converter(read: Callable[[str], Any]) -> Callable[[str], Any]:
-    """Lists of the first property system: blanks or commas between all words, one pair of brackets may surround."""
+    """Return a converter for lists of the first property system.
+
+    Words are separated by blanks or by commas, and a pair of brackets may surround them.
+    """
     plain = _make_list_converter(read, 0, None)
 
     def convert(raw: str) -> Any:
@@ -295,25 +329,30 @@ def format_shortest(value: float) -> str:
 
 
 def format_17_digits(value: float) -> str:
-    """Seventeen significant digits, as OpenSim prints every number outside lists of the first property system."""
+    """Format a number with 17 significant digits, as OpenSim does outside lists of the first property system."""
     if value == value and value not in (math.inf, -math.inf):
         return f"{value:.17g}"
     return format_shortest(value)
 
 
 def format_6_digits(value: float) -> str:
-    """OpenSim's six digits where they read back equal, all digits where they would not."""
+    """Format a number with OpenSim's six digits if they read back equal, otherwise with 17."""
     words = f"{value:g}"
     return words if float(words) == value else format_17_digits(value)
 
 
-def make_formatter(kind: Kind, numbers: str) -> Callable[[Any], str]:
-    """The function that prints a value of this kind; `numbers` is ``"shortest"`` or ``"opensim"``."""
+def make_formatter(kind: FieldType, numbers: str) -> Callable[[Any], str]:
+    """Return the function that formats values of a property.
+
+    Args:
+        kind: type of the property.
+        numbers: ``"shortest"`` or ``"opensim"``.
+    """
     return _build_formatter(kind, numbers == "opensim")
 
 
 @cache
-def _build_formatter(kind: Kind, like_opensim: bool) -> Callable[[Any], str]:
+def _build_formatter(kind: FieldType, like_opensim: bool) -> Callable[[Any], str]:
     if isinstance(kind, Reference):
         if kind.shape == "list":
             lead = " " if kind.legacy else ""

@@ -1,8 +1,8 @@
-"""Colons in the names of elements and attributes, which mean nothing to OpenSim.
+"""Colons in the names of elements and attributes.
 
-For OpenSim a colon is a letter: ``HuntCrossleyForce::ContactParameters`` is the name of a class,
-and an ``xmlns`` is an attribute like any other. For lxml it sets off a namespace. While a text is
-parsed, other characters stand in for it.
+For OpenSim a colon is a letter: ``HuntCrossleyForce::ContactParameters`` is the name of a class, and
+``xmlns`` is an attribute like any other. For lxml it separates a namespace. Therefore colons are
+replaced by other characters while a text is parsed.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ _XMLNS = "xml\u0274s"
 _STAND_INS = {b":": _COLON.encode(), b"xmlns": _XMLNS.encode()}
 
 ATTRIBUTE = re.compile(r"(?<=\s)(?P<name>[^\s=\"'<>/]++)\s*+=\s*+(?P<quoted>\"[^\"]*+\"|'[^']*+')")
-"""An attribute in a start tag, and its value with the quotation marks."""
+"""Attribute in a start tag, and its value with quotation marks."""
 _COLONS = re.compile(b":")
 _NAMESPACE = re.compile(rb"(?<=\s)xmlns(?=\s*=)")
 _TAG_SO_FAR = re.compile(
@@ -23,18 +23,18 @@ _TAG_SO_FAR = re.compile(
     rb"(?:\s+[^\s<>=\"'/]+\s*=\s*(?:\"[^\"]*\"|'[^']*'))*"
     rb"(?:\s+[^\s<>=\"'/]+)?"
 )
-_WINDOW = 4096
-"""How far before a colon its tag is looked for."""
+_MAX_TAG_LENGTH = 4096
+"""Number of bytes before a colon that are searched for the start of its tag."""
 _HIDING = ((b"<!--", b"-->"), (b"<![CDATA[", b"]]>"))
 
 
-def as_parsed(name: str) -> str:
-    """Return a name as it is in the element tree."""
+def encode_name(name: str) -> str:
+    """Return a name as it appears in the element tree."""
     return name.replace(":", _COLON)
 
 
-def as_written(name: str) -> str:
-    """Return a name of the element tree, or a message of the parser with one, as it is in the text."""
+def decode_name(name: str) -> str:
+    """Restore the colons in a name of the element tree, or in a message of the parser."""
     return name.replace(_COLON, ":").replace(_XMLNS, "xmlns")
 
 
@@ -46,7 +46,7 @@ def replace_colons(data: bytes) -> bytes:
     if b"xmlns" in data:
         result = sorted([*result, *(match.span() for match in _NAMESPACE.finditer(data))])
     for place, end in result:
-        tag = data.rfind(b"<", max(0, place - _WINDOW), place)
+        tag = data.rfind(b"<", max(0, place - _MAX_TAG_LENGTH), place)
         so_far = data[tag:place] if end - place == 1 else data[tag:place].rstrip()
         if tag < 0 or _TAG_SO_FAR.fullmatch(so_far) is None:
             continue

@@ -1,4 +1,4 @@
-"""Classes of plug-ins: files in the form of ``schemas/opensim-4.6.json`` that declare what OpenSim itself has not."""
+"""Classes of plug-ins, declared in files of the form of ``schemas/opensim-4.6.json``."""
 
 from __future__ import annotations
 
@@ -15,14 +15,16 @@ from osimlite.base.files import get_file_stamp, read_file
 from osimlite.base.text import join_words, suggest_name, suggest_or_list
 from osimlite.errors import OsimliteError
 from osimlite.io.document.lexical import UncleanText, make_converter
-from osimlite.schema.base import Component, Object, made, none
+from osimlite.schema.base import Component, Object, make_default, make_empty_list
 from osimlite.schema.facts import Facts
-from osimlite.schema.fields import Held, Kind, Reference, Tag, Value
+from osimlite.schema.fields import FieldType, ObjectField, Reference, Tag, Value
 from osimlite.schema.registry import MODULES, get_plugin_classes, register_plugin_classes
 from osimlite.schema.resolution import RULES
 
 Paths = str | PathLike[str] | Iterable[str | PathLike[str]]
 
+# Keys that the parts of a file may have. Unknown keys are errors, because a misspelt one would be
+# ignored silently.
 _TOP = ("meta", "classes", "references")
 _OF_A_CLASS = (
     "bases", "properties", "own_properties", "sockets", "own_sockets", "inputs", "own_inputs", "outputs", "own_outputs",
@@ -60,11 +62,11 @@ _ZEROS = {
 
 
 def use_classes(paths: Paths) -> None:
-    """Let the classes that files declare count from now on, and no others besides OpenSim's own.
+    """Register the plug-in classes that files declare, in place of those registered before.
 
     Raises:
-        OsimliteError: a file declares what makes no sense; with file and line.
-        MissingFileError: a file is not there.
+        OsimliteError: a declaration is wrong; with file and line.
+        MissingFileError: a file does not exist.
     """
     names = [paths] if isinstance(paths, str | PathLike) else paths
     register_plugin_classes(classes_in(*names))
@@ -72,7 +74,12 @@ def use_classes(paths: Paths) -> None:
 
 @contextmanager
 def classes_in_use(paths: Paths) -> Iterator[None]:
-    """Let the classes that files declare count for a while, and no others; raises as `use_classes` does."""
+    """Register the plug-in classes of files for the duration of a context.
+
+    Raises:
+        OsimliteError: a declaration is wrong; with file and line.
+        MissingFileError: a file does not exist.
+    """
     before = get_plugin_classes()
     use_classes(paths)
     try:
@@ -82,11 +89,14 @@ def classes_in_use(paths: Paths) -> Iterator[None]:
 
 
 def classes_in(*paths: str | PathLike[str]) -> dict[str, type[Object]]:
-    """The classes that files declare, by name: to make objects of them in Python.
+    """Read the plug-in classes that files declare, to make objects of them in Python.
+
+    Returns:
+        Classes by name.
 
     Raises:
-        OsimliteError: a file declares what makes no sense; with file and line.
-        MissingFileError: a file is not there.
+        OsimliteError: a declaration is wrong; with file and line.
+        MissingFileError: a file does not exist.
     """
     return dict(
         _load_declarations(
@@ -109,21 +119,21 @@ def _load_declarations(files: tuple[tuple[str, int | None], ...]) -> Mapping[str
             AttributeError,
             RecursionError,
         ) as error:
-            # The file holds data of kinds that no declaration has; those that people mix up have
-            # messages of their own.
+            # The file has data of unexpected types; the types that are often confused have messages
+            # of their own.
             raise OsimliteError(f"its classes cannot be made: {error}", file=path) from None
     return result
 
 
-MAX_LINEAGE = 50
-"""Classes of a file that derive from each other; OpenSim's own have eight."""
+MAX_INHERITANCE_DEPTH = 50
+"""Largest depth of inheritance among the classes of a file; OpenSim's own classes have eight levels."""
 
 MAX_VALUES = 1_000_000
-"""Values of a list for which a declaration asks."""
+"""Largest bound of a list's length that a declaration may have."""
 
 
 class _Declarations:
-    """One file: its classes are added to those found before."""
+    """Declarations of one file; its classes are added to those of earlier files."""
 
     def __init__(self, path: str, found: dict[str, type[Object]]) -> None:
         self.path = path
@@ -134,109 +144,117 @@ class _Declarations:
         except (ValueError, RecursionError) as error:
             line = getattr(error, "lineno", None)
             raise OsimliteError(
-                f"this is no JSON: {getattr(error, 'msg', error)}", file=path, line=line
+                f"not JSON: {getattr(error, 'msg', error)}", file=path, line=line
             ) from None
-        self.top: dict[str, Any] = self.mapping(top, _TOP, "the file")
-        self.entries: dict[str, Any] = self.mapping(self.top.get("classes"), None, "'classes'")
+        self.top: dict[str, Any] = self.check_mapping(top, _TOP, "the file")
+        self.entries: dict[str, Any] = self.check_mapping(
+            self.top.get("classes"), None, "'classes'"
+        )
         self.pending: list[str] = []
         self.references: dict[tuple[str, str], Any] = {}
 
     def build(self) -> None:
-        for entry in self.rows(self.top, "references"):
-            self.mapping(entry, _OF_A_REFERENCE, "a reference", "references")
+        for entry in self.list_rows(self.top, "references"):
+            self.check_mapping(entry, _OF_A_REFERENCE, "a reference", "references")
             rule = entry.get("resolution")
             if not isinstance(rule, str) or rule not in RULES:
-                raise self.error(
+                raise self.make_error(
                     f"there is no resolution '{rule}'{suggest_or_list(str(rule), RULES)}",
                     "references",
                     str(rule),
                 )
             self.references[str(entry.get("cls")), str(entry.get("property"))] = entry
         for name in self.entries:
-            self.cls(name, name)
+            self.find_class(name, name)
         for owner, name in self.references:
             if owner not in self.entries or not any(
-                row["name"] == name for row in self.properties(owner)
+                row["name"] == name for row in self.list_properties(owner)
             ):
-                raise self.error(
+                raise self.make_error(
                     f"no class of this file has a property '{owner}.{name}'", "references", name
                 )
 
-    def cls(self, name: str, *words: str) -> type[Object]:
-        """The class of a name: OpenSim's, one of another file, or one of this, which is made when it is needed."""
+    def find_class(self, name: str, *words: str) -> type[Object]:
+        """Return a class by name: OpenSim's, one of an earlier file, or one of this file, made when needed."""
         if name in MODULES and name not in self.entries:
             return cast("type[Object]", getattr(import_module(MODULES[name]), name))
         if name not in self.found:
             if name not in self.entries:
                 near = suggest_name(name, [*MODULES, *self.entries, *self.found])
-                raise self.error(f"there is no class '{name}'{near}", *words)
+                raise self.make_error(f"there is no class '{name}'{near}", *words)
             if name in MODULES:
-                raise self.error(f"'{name}' is a class of OpenSim itself", name)
-            if len(self.pending) > MAX_LINEAGE:
-                raise self.error(f"more than {MAX_LINEAGE} classes derive from each other", name)
+                raise self.make_error(f"'{name}' is a class of OpenSim itself", name)
+            if len(self.pending) > MAX_INHERITANCE_DEPTH:
+                raise self.make_error(
+                    f"more than {MAX_INHERITANCE_DEPTH} classes derive from each other", name
+                )
             if name in self.pending:
-                raise self.error(
+                raise self.make_error(
                     f"{join_words(self.pending)} derive from each other, or hold each other", name
                 )
             self.pending.append(name)
-            self.found[name] = self.made(name)
+            self.found[name] = self.make_class(name)
             self.pending.pop()
         return self.found[name]
 
-    def made(self, name: str) -> type[Object]:
-        entry = self.mapping(self.entries[name], _OF_A_CLASS, f"class '{name}'", name)
+    def make_class(self, name: str) -> type[Object]:
+        entry = self.check_mapping(self.entries[name], _OF_A_CLASS, f"class '{name}'", name)
         if not name.isidentifier():
-            raise self.error(f"'{name}' is no name of a class", name)
+            raise self.make_error(f"'{name}' is not a legal name of a class", name)
         bases = entry.get("bases")
         if (
             not isinstance(bases, list)
             or not bases
             or not all(isinstance(base, str) for base in bases)
         ):
-            raise self.error(
+            raise self.make_error(
                 f"'bases' of '{name}' must list the class that it derives from, the nearest first",
                 name,
             )
-        base = self.cls(
+        base = self.find_class(
             next((word for word in bases if "<" not in word), "Object"), name, "bases", bases[0]
         )
         inside: dict[str, Any] = {
             "__module__": __name__,
             "__doc__": f"A class of a plug-in, as declared in {self.path}.",
             "__annotations__": {"facts": ClassVar[Facts]},
-            "facts": Facts(outputs=" ".join(map(self.output, self.rows(entry, "outputs", name)))),
+            "facts": Facts(
+                outputs=" ".join(map(self.format_output, self.list_rows(entry, "outputs", name)))
+            ),
         }
         known = base.field_specs()
-        sockets = {row["tag"] for row in self.sockets(entry, name)}
-        for row in self.sockets(entry, name):
+        sockets = {row["tag"] for row in self.list_sockets(entry, name)}
+        for row in self.list_sockets(entry, name):
             if row["tag"] not in known:
-                self.add(inside, base, row["tag"], *self.socket(row))
-        for row in self.properties(name):
+                self.add_field(inside, base, row["tag"], *self.parse_socket(row))
+        for row in self.list_properties(name):
             spec = known.get(row["name"])
             if spec is None and row["name"] not in sockets:
-                self.add(inside, base, row["name"], *self.property(name, row))
+                self.add_field(inside, base, row["name"], *self.parse_property(name, row))
             elif (
                 spec is not None and isinstance(spec.kind, Value) and row.get("default") is not None
             ):
-                # A class may give what it has from its base another default.
+                # A class may change the default of an inherited property.
                 inside["__annotations__"][spec.name] = Annotated[Any, spec.kind, Tag(spec.tag)]
-                inside[spec.name] = self.default(name, row, spec.kind, _expect_text(row["default"]))
+                inside[spec.name] = self.parse_default(
+                    name, row, spec.kind, _format_default(row["default"])
+                )
         metaclass: Any = type(base)
         return cast(
             "type[Object]",
             metaclass(name, (base,), inside, tag=name, abstract=bool(entry.get("abstract"))),
         )
 
-    def add(
+    def add_field(
         self,
         inside: dict[str, Any],
         base: type[Object],
         tag: str,
         held: Any,
-        kind: Kind,
+        kind: FieldType,
         default: Any,
     ) -> None:
-        """Put a field into the body of a class that is to be; not in the way of what all objects have."""
+        """Add a property to the namespace of a new class; attributes of all objects are not overridden."""
         taken = hasattr(base, tag) or iskeyword(tag) or not tag.isidentifier()
         field = (
             "".join(letter if letter.isalnum() else "_" for letter in tag) + "_" if taken else tag
@@ -246,8 +264,12 @@ class _Declarations:
         )
         inside[field] = default
 
-    def socket(self, row: Any) -> tuple[Any, Kind, Any]:
-        """Type, kind and default of a socket or an input."""
+    def parse_socket(self, row: Any) -> tuple[Any, FieldType, Any]:
+        """Return annotation, type and default of a socket or an input.
+
+        Returns:
+            Annotation of the attribute, type of the property, default.
+        """
         rule, target = (
             ("socket", row.get("connectee_type"))
             if "connectee_type" in row
@@ -263,11 +285,15 @@ class _Declarations:
         held = str | Component
         return (tuple[held, ...], kind, ()) if many else (held, kind, "")
 
-    def property(self, owner: str, row: Any) -> tuple[Any, Kind, Any]:
-        """Type, kind and default of a property."""
+    def parse_property(self, owner: str, row: Any) -> tuple[Any, FieldType, Any]:
+        """Return annotation, type and default of a property.
+
+        Returns:
+            Annotation of the attribute, type of the property, default.
+        """
         name, typed, shape = row["name"], str(row.get("type")), row.get("kind", "single")
         if shape not in _KINDS:
-            raise self.error(
+            raise self.make_error(
                 f"there is no kind '{shape}'{suggest_or_list(str(shape), _KINDS)}",
                 owner,
                 name,
@@ -275,12 +301,14 @@ class _Declarations:
             )
         legacy = bool(row.get("legacy"))
         if row.get("object") or typed not in (*_SCALARS, *_VECTORS):
-            return self.holding(owner, row, shape, legacy)
-        kind: Kind
+            return self.parse_object_property(owner, row, shape, legacy)
+        kind: FieldType
         reference = self.references.get((owner, name))
         if typed in _VECTORS:
             if shape == "list":
-                raise self.error(f"a list of {typed} is read by no class of OpenSim", owner, name)
+                raise self.make_error(
+                    f"a list of {typed} is read by no class of OpenSim", owner, name
+                )
             vector = cast("Any", typed.replace("Vector", "vector"))
             kind = Value(
                 "double", vector, row.get("unit"), legacy=legacy, optional=shape == "optional"
@@ -300,14 +328,14 @@ class _Declarations:
                     or not isinstance(count, int)
                     or not 0 <= count <= MAX_VALUES
                 ):
-                    raise self.error(
+                    raise self.make_error(
                         f"'{key}' of '{name}' must be a number of values, not '{count}'",
                         owner,
                         name,
                         key,
                     )
             if not isinstance(row.get("unit") or "", str):
-                raise self.error(f"'unit' of '{name}' must be a text", owner, name, "unit")
+                raise self.make_error(f"'unit' of '{name}' must be a text", owner, name, "unit")
             kind = Value(cast("Any", typed), shape, row.get("unit"), "", least, most, legacy)
             held = _SCALARS[typed]
         if shape == "list":
@@ -320,48 +348,61 @@ class _Declarations:
         text = (
             _ZEROS.get(typed, "")
             if default is None and shape == "single"
-            else _expect_text(default)
+            else _format_default(default)
         )
-        return held, kind, self.default(owner, row, kind, text)
+        return held, kind, self.parse_default(owner, row, kind, text)
 
-    def default(self, owner: str, row: Any, kind: Kind, text: str) -> Any:
-        """The value that the text of a default stands for."""
+    def parse_default(self, owner: str, row: Any, kind: FieldType, text: str) -> Any:
+        """Return the value of a default's text.
+
+        Args:
+            owner: name of the class.
+            row: declaration of the property.
+            kind: type of the property.
+            text: the text.
+        """
         name = row["name"]
         try:
             return make_converter(kind)(text)
         except UncleanText:
             words = kind.words() if isinstance(kind, Value) else "a text"
-            raise self.error(
+            raise self.make_error(
                 f"the default of '{name}' must be {words}, not '{text}'", owner, name, "default"
             ) from None
 
-    def holding(self, owner: str, row: Any, shape: str, legacy: bool) -> tuple[Any, Kind, Any]:
-        """Type, kind and default of a property that holds objects."""
+    def parse_object_property(
+        self, owner: str, row: Any, shape: str, legacy: bool
+    ) -> tuple[Any, FieldType, Any]:
+        """Return annotation, type and default of a property that holds objects.
+
+        Returns:
+            Annotation of the attribute, type of the property, default.
+        """
         name = row["name"]
         typed = str(row.get("accepts_base") or row.get("type"))
-        accepts: Any = self.cls(typed, owner, name, typed)
+        accepts: Any = self.find_class(typed, owner, name, typed)
         if shape == "list":
-            return list[accepts], Held("list", legacy), none()
+            return list[accepts], ObjectField("list", legacy), make_empty_list()
         default = row.get("default")
         if shape == "optional" and not default:
-            return accepts | None, Held("optional", legacy), None
+            return accepts | None, ObjectField("optional", legacy), None
         word = default.get("class") if isinstance(default, dict) else typed
-        starts = self.cls(str(word), owner, name, "default", str(word))
+        starts = self.find_class(str(word), owner, name, "default", str(word))
         if starts.abstract or not issubclass(starts, accepts):
-            raise self.error(
+            raise self.make_error(
                 f"the default of '{name}' must be an object: {{\"class\": ...}} of {typed}",
                 owner,
                 name,
             )
         form = "optional" if shape == "optional" else "unnamed" if row.get("unnamed") else "single"
         named = {"name": name} if form == "single" else {}
-        return accepts, Held(cast("Any", form), legacy), made(starts, **named)
+        return accepts, ObjectField(cast("Any", form), legacy), make_default(starts, **named)
 
-    def properties(self, name: str) -> list[Any]:
-        rows = self.rows(self.entries[name], "properties", name)
+    def list_properties(self, name: str) -> list[Any]:
+        rows = self.list_rows(self.entries[name], "properties", name)
         for row in rows:
             where = f"a property of '{name}'"
-            self.mapping(
+            self.check_mapping(
                 row,
                 _OF_A_PROPERTY,
                 where,
@@ -369,62 +410,85 @@ class _Declarations:
                 str(row.get("name") if isinstance(row, dict) else ""),
             )
             if not isinstance(row.get("name"), str):
-                raise self.error(f"{where} has no name", name)
+                raise self.make_error(f"{where} has no name", name)
             if "type" not in row:
-                raise self.error(f"'{row['name']}' of '{name}' has no type", name, row["name"])
+                raise self.make_error(f"'{row['name']}' of '{name}' has no type", name, row["name"])
         return rows
 
-    def sockets(self, entry: dict[str, Any], name: str) -> list[Any]:
-        rows = [*self.rows(entry, "sockets", name), *self.rows(entry, "inputs", name)]
+    def list_sockets(self, entry: dict[str, Any], name: str) -> list[Any]:
+        rows = [*self.list_rows(entry, "sockets", name), *self.list_rows(entry, "inputs", name)]
         for row in rows:
-            self.mapping(row, _OF_A_SOCKET, f"a socket of '{name}'", name)
+            self.check_mapping(row, _OF_A_SOCKET, f"a socket of '{name}'", name)
             if not isinstance(row.get("tag"), str) or not (
                 "connectee_type" in row or "type" in row
             ):
-                raise self.error(
+                raise self.make_error(
                     f"a socket of '{name}' needs 'tag' and 'connectee_type', an input 'tag' and 'type'",
                     name,
                 )
         return rows
 
-    def output(self, row: Any) -> str:
-        """An output as a word of :mod:`osimlite.schema.facts`."""
-        self.mapping(row, _OF_AN_OUTPUT, "an output", "outputs")
+    def format_output(self, row: Any) -> str:
+        """Return an output in the notation of :mod:`osimlite.schema.facts`."""
+        self.check_mapping(row, _OF_AN_OUTPUT, "an output", "outputs")
         kind = row.get("type", "double")
         return f"{row.get('name')}{'[]' if row.get('list') else ''}{'' if kind == 'double' else f':{kind}'}"
 
-    def rows(self, entry: dict[str, Any], key: str, *words: str) -> list[Any]:
-        """What a key lists; of abstract classes the catalogue lists their own."""
+    def list_rows(self, entry: dict[str, Any], key: str, *words: str) -> list[Any]:
+        """Return the list under a key; for abstract classes the catalogue has the key ``own_...`` instead.
+
+        Args:
+            entry: declaration of a class.
+            key: the key.
+            words: words of the file that lead to the declaration, for the line of an error.
+        """
         result = entry.get(key, entry.get(f"own_{key}", []))
         if not isinstance(result, list):
-            raise self.error(f"'{key}' must be a list", *words, key)
+            raise self.make_error(f"'{key}' must be a list", *words, key)
         return result
 
-    def mapping(
+    def check_mapping(
         self, value: Any, known: tuple[str, ...] | None, what: str, *words: str
     ) -> dict[str, Any]:
-        """A value that must be an object of JSON with keys that are known."""
+        """Return a value that must be a JSON object with known keys.
+
+        Args:
+            value: the value.
+            known: the keys; None for any.
+            what: what it describes, for messages.
+            words: words of the file that lead to it, for the line of an error.
+
+        Returns:
+            The value.
+        """
         if not isinstance(value, dict):
-            raise self.error(f"{what} must be an object of JSON, in braces", *words)
+            raise self.make_error(f"{what} must be an object of JSON, in braces", *words)
         for key in value:
             if known is not None and key not in known:
-                raise self.error(f"{what} has no '{key}'{suggest_or_list(key, known)}", *words, key)
+                raise self.make_error(
+                    f"{what} has no '{key}'{suggest_or_list(key, known)}", *words, key
+                )
         return value
 
-    def error(self, message: str, *words: str) -> OsimliteError:
-        """The error at the last of some words, each of which is looked for behind the one before."""
+    def make_error(self, message: str, *words: str) -> OsimliteError:
+        """Return an error at the last of some words, each of which is searched after the one before.
+
+        Args:
+            message: the message.
+            words: the words, as strings of JSON.
+        """
         place = max(0, self.text.find('"classes"'))
         for word in words:
             place = max(place, self.text.find(json.dumps(word, ensure_ascii=False), place))
         return OsimliteError(message, file=self.path, line=self.text.count("\n", 0, place) + 1)
 
 
-def _expect_text(value: Any) -> str:
-    """A default as a document has it; in the file it may be written as JSON has it, too."""
+def _format_default(value: Any) -> str:
+    """Return a default as the text of a document; the file may also contain it as JSON."""
     if isinstance(value, bool):
         return str(value).lower()
     return (
-        " ".join(map(_expect_text, value))
+        " ".join(map(_format_default, value))
         if isinstance(value, list)
         else ""
         if value is None

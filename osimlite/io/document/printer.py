@@ -1,4 +1,7 @@
-"""Objects to text, in OpenSim's layout: one tab a level, properties in catalogue order, only what has been set."""
+"""Conversion of objects to text in OpenSim's layout.
+
+One tab per level, properties in the order of the catalogue, and only those that were set.
+"""
 
 from __future__ import annotations
 
@@ -16,24 +19,24 @@ from osimlite.io.document.reader import parse_source, read_tree, read_version
 from osimlite.io.document.source import Source
 from osimlite.io.document.xml_text import escape_text, format_xml, list_lines, quote_attribute
 from osimlite.schema.base import Component, Object, Unknown
-from osimlite.schema.fields import Held, Reference, Value
+from osimlite.schema.fields import ObjectField, Reference, Value
 from osimlite.schema.layout import Include, Layout, Remark
-from osimlite.schema.model import CURRENT_VERSION, Model, expect_model
+from osimlite.schema.model import CURRENT_VERSION, Model, check_is_model
 from osimlite.schema.specs import FieldSpec, get_defaults, get_field_specs
 
 Numbers = Literal["shortest", "opensim"]
 DECLARATION = '<?xml version="1.0" encoding="UTF-8" ?>'
-"""What every document begins with."""
+"""First line of every document."""
 
 
 def to_text(top: Object, *, numbers: Numbers = "shortest", comments: bool = True) -> str:
-    """The document of a model, or of another object that has one of its own, such as the setup of a tool.
+    """Return the document of a model, or of another object that has its own documents, such as a setup.
 
     Args:
-        top: what to print; components given as references must be part of it, if it is a model.
+        top: object to print. References of a model must lead to components of the model.
         numbers: ``"shortest"`` prints the shortest decimal that reads back equal, ``"opensim"`` 17
             significant digits.
-        comments: whether to print the comments the model was read with.
+        comments: whether to print the comments of the file that the object was read from.
 
     Raises:
         ModelError: a reference leads to a component outside the model.
@@ -42,10 +45,19 @@ def to_text(top: Object, *, numbers: Numbers = "shortest", comments: bool = True
 
 
 def write(top: Object, path: str | Path, *, numbers: Numbers = "shortest") -> None:
-    """Write the file of a model or of another object; it appears whole or not at all.
+    """Write the file of a model or of another object; a failure leaves no partial file.
 
-    What was read from a file of its own and is unchanged stays a reference to that file. Arguments
-    and errors as `to_text`.
+    An object that was included from another file and is unchanged is written as a reference to that
+    file.
+
+    Args:
+        top: object to write, as for `to_text`.
+        path: the file.
+        numbers: format of the numbers, as for `to_text`.
+
+    Raises:
+        ModelError: a reference leads to a component outside the model.
+        OsimliteError: the file cannot be written.
     """
     write_atomically(
         path, _format_document(_Printer(top, numbers, True, Path(path).resolve().parent))
@@ -57,22 +69,22 @@ def _format_document(printer: _Printer) -> str:
     layout = top.layout or Layout()
     lines = printer.lines
     lines.append(DECLARATION)
-    printer.comment(layout.prolog, 0)
+    printer.print_comments(layout.prolog, 0)
     lines.append(f'<OpenSimDocument Version="{CURRENT_VERSION}">')
-    printer.object(top, top.name, 1)
+    printer.print_object(top, top.name, 1)
     lines.append("</OpenSimDocument>")
-    printer.comment(layout.epilog, 0)
+    printer.print_comments(layout.epilog, 0)
     return "\n".join(lines) + "\n"
 
 
 class _Printer:
-    """Collects the lines of one document; `folder` is where it will stand, if that is known."""
+    """Printer of one document; `folder` is where the document will be, if known."""
 
     def __init__(
         self, top: Object, numbers: str, comments: bool, folder: Path | None = None
     ) -> None:
         if not isinstance(top, Object) or type(top).abstract:
-            expect_model(top)
+            check_is_model(top)
         self.top = top
         self.tree = top.tree() if isinstance(top, Model) else None
         self.numbers = numbers
@@ -82,17 +94,23 @@ class _Printer:
         block = top.layout.defaults if top.layout is not None else []
         self.defaults = {type(item): item for item in reversed(block)}
 
-    def object(self, item: Object, name: str, depth: int) -> None:
-        """Print one object as an element with this name attribute."""
+    def print_object(self, item: Object, name: str, depth: int) -> None:
+        """Print one object as an element.
+
+        Args:
+            item: the object.
+            name: its attribute `name`.
+            depth: number of tabs before the element.
+        """
         indent = "\t" * depth
         layout = item.layout
         if layout is not None:
-            self.comment(layout.comments, depth)
+            self.print_comments(layout.comments, depth)
         if isinstance(item, Unknown):
-            self._unknown(item, depth)
+            self._print_unknown(item, depth)
         elif layout is not None and layout.include is not None and layout.include.held == item:
             self.lines.append(
-                f"{indent}<{item.tag} file={quote_attribute(self._place_of(layout.include))} />"
+                f"{indent}<{item.tag} file={quote_attribute(self._get_include_path(layout.include))} />"
             )
         else:
             head = f"{indent}<{item.tag}" + (f" name={quote_attribute(name)}" if name else "")
@@ -102,22 +120,22 @@ class _Printer:
                 )
             self.lines.append(head + ">")
             if item is self.top and layout is not None and layout.defaults:
-                self._block(layout.defaults, depth + 1)
+                self._print_defaults(layout.defaults, depth + 1)
             present = item.model_fields_set
             default = self.defaults.get(type(item))
-            # What nobody has asked for is no part of the object yet, and need not become one to say
-            # nothing.
-            silent = (
+            # Defaults that were never accessed do not exist yet, and need not be created if they
+            # print nothing.
+            unprinted = (
                 get_defaults(type(item))[1].keys() - item.__dict__.keys() - present
                 if default is None
                 else set()
             )
-            if silent:
-                silent &= _find_silent_properties(type(item))
+            if unprinted:
+                unprinted &= _list_unprinted_defaults(type(item))
             for spec in get_field_specs(type(item)).values():
                 if layout is not None and layout.before and spec.tag in layout.before:
-                    self._remarks(layout.before[spec.tag], depth + 1)
-                if spec.name in silent and (layout is None or spec.name not in layout.inherited):
+                    self._print_remarks(layout.before[spec.tag], depth + 1)
+                if spec.name in unprinted and (layout is None or spec.name not in layout.inherited):
                     continue
                 value = getattr(item, spec.name)
                 if (
@@ -125,39 +143,41 @@ class _Printer:
                     or (default is not None and value != getattr(default, spec.name))
                     or (default is None and layout is not None and spec.name in layout.inherited)
                     or (
-                        default is None and isinstance(spec.kind, Held) and has_content(value, spec)
+                        default is None
+                        and isinstance(spec.kind, ObjectField)
+                        and has_content(value, spec)
                     )
-                    # A part may start with a value that its class does not have elsewhere, as the
-                    # axes of a transform.
+                    # A default object may have values other than the defaults of its class, such as
+                    # the axes of a SpatialTransform. (`x != y == y` is false for NaN.)
                     or (
                         default is None
-                        and not isinstance(spec.kind, Held)
+                        and not isinstance(spec.kind, ObjectField)
                         and value != spec.default == spec.default
                     )
                 ):
-                    self._property(item, spec, value, depth + 1)
+                    self._print_property(item, spec, value, depth + 1)
             if layout is not None and None in layout.before:
-                self._remarks(layout.before[None], depth + 1)
+                self._print_remarks(layout.before[None], depth + 1)
             self.lines.append(f"{indent}</{item.tag}>")
         if layout is not None and layout.after:
-            self._remarks(layout.after, depth)
+            self._print_remarks(layout.after, depth)
 
-    def _block(self, block: list[Object], depth: int) -> None:
-        """Print a ``<defaults>`` block; what is equal to it is not printed on the objects themselves."""
+    def _print_defaults(self, block: list[Object], depth: int) -> None:
+        """Print a ``<defaults>`` block; values equal to it are not printed for the objects themselves."""
         defaults, self.defaults = self.defaults, {}
         self.lines.append("\t" * depth + "<defaults>")
         for item in block:
             if self.numbers == "opensim":
-                # Here OpenSim writes out all that a class has in its first property system.
+                # In this block OpenSim prints all properties of the first system.
                 item = copy(item)
                 item.model_fields_set.update(
                     spec.name for spec in get_field_specs(type(item)).values() if spec.legacy
                 )
-            self.object(item, item.name, depth + 1)
+            self.print_object(item, item.name, depth + 1)
         self.lines.append("\t" * depth + "</defaults>")
         self.defaults = defaults
 
-    def _unknown(self, item: Unknown, depth: int) -> None:
+    def _print_unknown(self, item: Unknown, depth: int) -> None:
         if item.content:
             self.lines.extend(
                 format_xml(item.content, depth, comments=self.comments, name=item.name)
@@ -166,20 +186,21 @@ class _Printer:
             name = f" name={quote_attribute(item.name)}" if item.name else ""
             self.lines.append("\t" * depth + f"<{item.class_name}{name} />")
 
-    def _place_of(self, include: Include) -> str:
-        """The file of an included object as it is found from where the document will stand."""
+    def _get_include_path(self, include: Include) -> str:
+        """Return the path of an included file relative to the folder of the document."""
         if self.folder is None or Path(self.folder, include.file).resolve() == Path(include.path):
             return include.file
         return get_relative_path(include.path, self.folder)
 
-    def _property(self, item: Object, spec: FieldSpec, value: Any, depth: int) -> None:
+    def _print_property(self, item: Object, spec: FieldSpec, value: Any, depth: int) -> None:
         kind = spec.kind
         indent = "\t" * depth
-        if not isinstance(kind, Held):
+        if not isinstance(kind, ObjectField):
             if value is None and not (isinstance(kind, Value) and kind.scalar != "string"):
-                return  # An empty element would be an empty text.
-            text = self._text(item, spec, value)
-            # OpenSim closes what is empty in its first property system like this, and all else with
+                # An empty element would be read as an empty text.
+                return
+            text = self._format_value(item, spec, value)
+            # OpenSim prints an empty value of the first property system as one tag, and others with
             # an end tag.
             short = not text and spec.legacy
             self.lines.append(
@@ -188,9 +209,9 @@ class _Printer:
         elif kind.form == "single" and not (
             isinstance(value, Unknown) and value.class_name in get_field_specs(type(item))
         ):
-            self.object(value, spec.tag, depth)
+            self.print_object(value, spec.tag, depth)
         elif kind.form == "unnamed":
-            self.object(value, value.name, depth)
+            self.print_object(value, value.name, depth)
         else:
             members = value if isinstance(value, list) else [] if value is None else [value]
             if not members:
@@ -198,12 +219,12 @@ class _Printer:
                 return
             self.lines.append(f"{indent}<{spec.tag}>")
             for member in members:
-                self.object(member, member.name, depth + 1)
+                self.print_object(member, member.name, depth + 1)
             self.lines.append(f"{indent}</{spec.tag}>")
 
-    def _text(self, item: Object, spec: FieldSpec, value: Any) -> str:
+    def _format_value(self, item: Object, spec: FieldSpec, value: Any) -> str:
         if isinstance(spec.kind, Reference):
-            value = self._named(item, spec.kind, value)
+            value = self._convert_reference(item, spec.kind, value)
         layout: Layout | None = item.layout
         if layout is not None and spec.name in layout.raw:
             read_as, raw = layout.raw[spec.name]
@@ -211,7 +232,7 @@ class _Printer:
                 return escape_text(raw)
         return escape_text(make_formatter(spec.kind, self.numbers)(value))
 
-    def _named(self, item: Object, reference: Reference, value: Any) -> Any:
+    def _convert_reference(self, item: Object, reference: Reference, value: Any) -> Any:
         if isinstance(value, Component):
             if self.tree is None:
                 return (
@@ -219,58 +240,68 @@ class _Printer:
                     if reference.rule == "socket" or "path" in reference.rule
                     else value.name
                 )
-            return self.tree.text_for(self.tree.owner_of(item), reference, value)
+            return self.tree.format_reference(self.tree.owner_of(item), reference, value)
         if isinstance(value, tuple):
-            return tuple(self._named(item, reference, word) for word in value)
+            return tuple(self._convert_reference(item, reference, word) for word in value)
         return "" if value is None else value
 
-    def _remarks(self, remarks: list[Remark], depth: int) -> None:
+    def _print_remarks(self, remarks: list[Remark], depth: int) -> None:
         for remark in remarks:
             if remark.element:
                 self.lines.extend(format_xml(remark.text, depth, comments=self.comments))
             else:
-                self.comment([remark.text], depth)
+                self.print_comments([remark.text], depth)
 
-    def comment(self, texts: list[str], depth: int) -> None:
-        """Print comments, one a line."""
+    def print_comments(self, texts: list[str], depth: int) -> None:
+        """Print comments, one per line.
+
+        Args:
+            texts: the comments.
+            depth: number of tabs before each.
+        """
         if self.comments:
             indent = "\t" * depth
             self.lines.extend(f"{indent}<!--{text}-->" for text in texts)
 
 
 @cache
-def _find_silent_properties(cls: type[Object]) -> frozenset[str]:
-    """The properties of a class whose objects and lists, as they are made for it, are not printed."""
-    made = get_defaults(cls)[1]
+def _list_unprinted_defaults(cls: type[Object]) -> frozenset[str]:
+    """Return the properties of a class whose default objects and lists print nothing."""
+    factories = get_defaults(cls)[1]
     held = (
         spec
         for spec in get_field_specs(cls).values()
-        if spec.name in made and isinstance(spec.kind, Held)
+        if spec.name in factories and isinstance(spec.kind, ObjectField)
     )
-    return frozenset(spec.name for spec in held if not has_content(made[spec.name](), spec))
+    return frozenset(spec.name for spec in held if not has_content(factories[spec.name](), spec))
 
 
 def has_content(value: Any, spec: FieldSpec | None = None) -> bool:
-    """Return whether an object or list that was not assigned has content to print."""
+    """Return whether an object or list that was not assigned has content to print.
+
+    Args:
+        value: the object or list.
+        spec: its property.
+    """
     if isinstance(value, list):
         return bool(value)
     if not isinstance(value, Object):
         return False
-    form = spec.kind.form if spec is not None and isinstance(spec.kind, Held) else ""
+    form = spec.kind.form if spec is not None and isinstance(spec.kind, ObjectField) else ""
     if form == "list" or (form == "optional" and spec is not None and spec.factory is None):
-        # What nothing puts there is content even if nothing in it was set: a marker at the origin
-        # in a set of one.
+        # A member is content even if nothing in it was set, for example a marker at the origin: it
+        # is not there by default.
         return True
     if value.model_fields_set - {"name"} or value.layout is not None:
         return True
-    return any(has_content(held, inner) for inner, held in value.objects_held())
+    return any(has_content(held, inner) for inner, held in value.list_owned_objects())
 
 
 def format_document(source: Source) -> str:
-    """The text of a document in the layout in which it would be printed.
+    """Return the text of a document in canonical layout.
 
-    A document of the current version is read and printed. One of another keeps its version and its
-    words: only white space changes, and the comments that OpenSim prints by itself are dropped.
+    A document of the current version is read and printed. A document of another version keeps its
+    version and its words: only white space changes, and comments that OpenSim generates are removed.
 
     Raises:
         DocumentError: the text is not an OpenSim document; with line and column.

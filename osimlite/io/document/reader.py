@@ -1,4 +1,4 @@
-"""Text to objects: lxml parses, :mod:`osimlite.io.document.objects` makes objects of the elements."""
+"""Reading of documents: lxml parses the text, :mod:`osimlite.io.document.objects` makes the objects."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ from osimlite.errors import (
     SpecialFileError,
     VersionError,
 )
-from osimlite.io.document.names import as_written, replace_colons
+from osimlite.io.document.names import decode_name, replace_colons
 from osimlite.io.document.notes import Note
 from osimlite.io.document.objects import (
     Included,
     ObjectReader,
     add_comment,
-    estimate_size,
+    count_elements,
     get_layout,
 )
 from osimlite.io.document.source import Source
-from osimlite.io.document.syntax import expect_plain_doctype, locate_error, rephrase_message
+from osimlite.io.document.syntax import check_doctype, locate_error, rephrase_message
 from osimlite.io.document.xml_text import has_only_generated_comments, is_element
 from osimlite.schema.base import Object, put_index
 from osimlite.schema.layout import Include, Remark
@@ -46,38 +46,45 @@ if TYPE_CHECKING:
     from osimlite.io.document.upgrade import Change, Refusal, UpgradeResult
 
 ROOT = "OpenSimDocument"
+"""Tag of the root element."""
 
-OLDEST = 10500
-"""The version of documents from before documents said their version."""
+OLDEST_VERSION = 10500
+"""Version that is assumed for old documents that do not state one."""
 
-OLDEST_KNOWN = 10901
-"""The oldest version whose every word is known; of an older document nothing may be left over."""
+FIRST_COMPLETE_VERSION = 10901
+"""First version of which every property is known; older documents must not contain unknown ones."""
 
 _COUNT = etree.XPath("count(descendant-or-self::*)")
 
 _MIXED = etree.XPath("/descendant::*[*][text()]")
-"""Elements in which there is text beside an element; blank text the parser leaves out."""
+"""Elements that contain both elements and text; the parser removes blank text."""
 
 _ATTRIBUTES = etree.XPath(
     "boolean(//@*[name() != 'name' and name() != 'file' and name() != 'Version'])"
 )
-"""Whether there is an attribute besides those that mean something."""
+"""Whether there is an attribute besides those with a meaning."""
 
-_LEAST_COUNTED = 100_000
-"""Bytes that a file counts for at least when those that are included are added up: a small one costs time as well."""
+_MIN_INCLUDED_BYTES = 100_000
+"""Bytes that an included file counts at least in the sum of included files, because small files take time, too."""
 
-_DEEPEST = 20
-"""How many files that are included may be around each other."""
-_TOO_DEEP = "is not read: files name each other too deeply"
+_MAX_INCLUDE_DEPTH = 20
+"""Largest depth of files that include each other."""
+_TOO_DEEP_MESSAGE = "is not read: files name each other too deeply"
 
-_NOT_KNOWN = frozenset(("unknown-tag", "unknown-class", "wrong-class"))
+_UNKNOWN_KINDS = frozenset(("unknown-tag", "unknown-class", "wrong-class"))
 
 
 @dataclass(slots=True)
 class Document:
-    """The object at the top of a document, with the text it came from and what the reader noticed in it.
+    """Object at the top of a document, with its text and the notes of the reader.
 
-    `fault` is the syntax error of a text that was repaired for reading.
+    Attributes:
+        top: the object.
+        source: the text.
+        version: version of the document.
+        notes: notes about content that OpenSim ignores.
+        upgraded: result of the upgrade of an old document; None for a current one.
+        fault: syntax error of a text that was repaired for reading.
     """
 
     top: Object
@@ -124,7 +131,7 @@ def read(path: str | Path, *, classes: Paths = ()) -> Model:
     from osimlite.io.document.plugins import classes_in_use
 
     with classes_in_use(classes):
-        return read_document(Source.of_file(path)).model
+        return read_document(Source.from_file(path)).model
 
 
 def read_any(path: str | Path, *, classes: Paths = ()) -> Object:
@@ -141,27 +148,39 @@ def read_any(path: str | Path, *, classes: Paths = ()) -> Object:
     from osimlite.io.document.plugins import classes_in_use
 
     with classes_in_use(classes):
-        return read_document(Source.of_file(path), of=Object).top
+        return read_document(Source.from_file(path), of=Object).top
 
 
 def read_text(text: str | bytes, *, classes: Paths = ()) -> Model:
-    """Read a model from the text of a document, with `classes` as for `read`; DocumentError if it is none."""
+    """Read a model from the text of a document.
+
+    Args:
+        text: the text.
+        classes: files that declare the classes of plug-ins.
+
+    Raises:
+        DocumentError: the text is not an OpenSim model; with line and column.
+        OsimliteError: a declaration of a class is wrong; with file and line.
+    """
     from osimlite.io.document.plugins import classes_in_use
 
     with classes_in_use(classes):
         return read_document(
-            Source(text) if isinstance(text, bytes) else Source.of_characters(text)
+            Source(text) if isinstance(text, bytes) else Source.from_text(text)
         ).model
 
 
 def read_document(source: Source, *, of: type[Object] = Model, to_check: bool = False) -> Document:
-    """Read a document whose top object is of a class or derived from it, and keep its text and the notes.
+    """Read a document with its text and notes.
 
-    A text that is `to_check` is also asked whether there is anything between its elements.
+    Args:
+        source: the text.
+        of: class of the object at the top, or one of its bases.
+        to_check: also find text between elements and attributes without meaning, for the linter.
 
     Raises:
-        DocumentError: the text is not an OpenSim document, or holds something else; with line and
-            column.
+        DocumentError: the text is not an OpenSim document, or has an object of another class; with
+            line and column.
     """
     try:
         root = parse_source(source)
@@ -187,16 +206,23 @@ def read_document(source: Source, *, of: type[Object] = Model, to_check: bool = 
 def read_tree(
     source: Source, root: etree._Element, version: int, of: type[Object] = Model
 ) -> Document:
-    """The document that an element tree stands for.
+    """Convert an element tree to a document.
+
+    Args:
+        source: the text of the tree.
+        root: root element.
+        version: version of the document.
+        of: class of the object at the top, or one of its bases.
 
     Raises:
-        DocumentError: there is no such object in it, or something that no rule carries over from an
-            older version.
+        DocumentError: the document has no such object, or content of an older version that cannot be
+            upgraded.
     """
     with pause_collector():
         if version < CURRENT_VERSION:
             if root.tag != ROOT and has_newer_content(root, version):
-                # A model that OpenSim dumps has no <OpenSimDocument> around it, and no version.
+                # A current model that OpenSim dumps has no <OpenSimDocument> around it, and therefore
+                # no version.
                 wrapped = _upgrade_tree(source, root, CURRENT_VERSION)
                 return _build_document(source, root, version, of, wrapped, is_known=True)
             return _build_document(source, root, version, of, _upgrade_tree(source, root, version))
@@ -205,7 +231,7 @@ def read_tree(
             if _find_class(_find_first_element(root)) is None
             else _build_document(source, root, version, of, None)
         )
-        if document is None or any(note.kind in _NOT_KNOWN for note in document.notes):
+        if document is None or any(note.kind in _UNKNOWN_KINDS for note in document.notes):
             from osimlite.io.document.upgrade import rename_old_classes
 
             upgraded = rename_old_classes(root)
@@ -215,18 +241,23 @@ def read_tree(
 
 
 def has_newer_content(root: etree._Element, version: int) -> bool:
-    """Return whether a document has properties that came after a version."""
+    """Return whether a document contains properties that are newer than its version.
+
+    Args:
+        root: root element.
+        version: the version.
+    """
     from osimlite.io.document.upgrade.newer import find_newer_content
 
     return find_newer_content(root, version) is not None
 
 
 def require_stated_version(source: Source) -> None:
-    """Check that a document has nothing newer than the version that it states.
+    """Check that a document contains nothing newer than the version that it states.
 
     Raises:
-        DocumentError: it is no OpenSim document.
-        VersionError: it has something newer, so that its version is wrong.
+        DocumentError: the text is not an OpenSim document.
+        VersionError: it has newer content, so its version is wrong.
     """
     from osimlite.io.document.upgrade.newer import find_newer_content
 
@@ -244,7 +275,7 @@ def require_stated_version(source: Source) -> None:
         return
     number = [*root.iter(etree.Element)].index(newer.element)
     message = (
-        f"the document says version {version} and holds <{as_written(newer.element.tag)}> in "
+        f"the document says version {version} and holds <{decode_name(newer.element.tag)}> in "
         f"<{newer.parent}>, which came with version {newer.since}: one of them is wrong; write "
         f'Version="{CURRENT_VERSION}" if the model is in the current format'
     )
@@ -264,14 +295,18 @@ def _build_document(
     get_layout(top).version, get_layout(top).file = version, source.file
     notes = reader.notes
     if upgraded is not None:
-        notes = _renumber(source, top, notes, upgraded)
+        notes = _map_to_old_text(source, top, notes, upgraded)
         if isinstance(top, Model) and not is_known:
-            _refuse_leftovers(source, version, notes)
+            _check_leftovers(source, version, notes)
     return Document(top, source, version, notes, upgraded)
 
 
 def _upgrade_tree(source: Source, root: etree._Element, version: int) -> UpgradeResult:
-    """The tree in the current format; VersionError if something cannot be carried over."""
+    """Return the tree in the current format.
+
+    Raises:
+        VersionError: some content cannot be upgraded.
+    """
     from osimlite.io.document.upgrade import UpgradeError, upgrade
 
     try:
@@ -280,15 +315,15 @@ def _upgrade_tree(source: Source, root: etree._Element, version: int) -> Upgrade
         raise _make_version_error(source, version, error.message, error.number) from None
 
 
-def _renumber(
+def _map_to_old_text(
     source: Source, top: Object, notes: list[Note], upgraded: UpgradeResult
 ) -> list[Note]:
-    """Give everything read from an upgraded tree the place it has in the old text."""
+    """Replace indices of elements in the upgraded tree by those in the old text."""
     source.moved = upgraded.moved
     numbers = upgraded.numbers
     if numbers is None:
         return notes
-    # What no one has asked for yet has no place; to ask for it here would make it.
+    # Read instance dictionaries instead of attributes: accessing a default would create it.
     items: list[Object] = [top, *get_layout(top).defaults]
     for item in items:
         if item._index is not None:
@@ -299,14 +334,14 @@ def _renumber(
     return [note._replace(number=numbers[note.number]) for note in notes]
 
 
-def _refuse_leftovers(source: Source, version: int, notes: list[Note]) -> None:
-    """Refuse a document from before every word is known, if there is a word in it that no rule knows."""
-    left = [note for note in notes if note.kind in _NOT_KNOWN]
-    if version >= OLDEST_KNOWN or not left:
+def _check_leftovers(source: Source, version: int, notes: list[Note]) -> None:
+    """Reject a very old document with unknown elements, which the upgrade would lose."""
+    left = [note for note in notes if note.kind in _UNKNOWN_KINDS]
+    if version >= FIRST_COMPLETE_VERSION or not left:
         return
     tags = ", ".join(f"<{tag}>" for tag in sorted({note.word for note in left})[:8])
     message = (
-        f"document version {version} is older than {OLDEST_KNOWN}, and no rule says what becomes of {tags}: that would "
+        f"document version {version} is older than {FIRST_COMPLETE_VERSION}, and no rule says what becomes of {tags}: that would "
         "be lost; take it out, or open and save the model with OpenSim 2"
     )
     raise _make_version_error(source, version, message, left[0].number)
@@ -315,16 +350,18 @@ def _refuse_leftovers(source: Source, version: int, notes: list[Note]) -> None:
 def _make_version_error(
     source: Source, version: int, message: str, number: int = 0
 ) -> VersionError:
-    """The error that an element of a document of a version cannot be read."""
-    fault = source.fault(VersionError, message, source.of_tag(number))
+    """Return the error that a document of a version cannot be read, at one of its elements."""
+    fault = source.fault(VersionError, message, source.locate_tag(number))
     fault.version = version
     return fault
 
 
 def parse_source(source: Source, *, recover: bool = False) -> etree._Element:
-    """The element tree of a text, without namespaces: see :mod:`osimlite.io.document.names`.
+    """Parse a text to an element tree without namespaces (see :mod:`osimlite.io.document.names`).
 
-    With `recover` the parser goes on after what is not well-formed; the tree is then a guess.
+    Args:
+        source: the text.
+        recover: continue after syntax errors; the tree is then a guess.
 
     Raises:
         NotWellFormedError: the text is not well-formed (without `recover`), or declares entities.
@@ -364,10 +401,10 @@ def parse_source(source: Source, *, recover: bool = False) -> etree._Element:
             "not well-formed XML: no element", file=source.file, line=1, column=1
         )
     if root.getroottree().docinfo.internalDTD is not None:
-        expect_plain_doctype(source)
+        check_doctype(source)
         for remark in parser.error_log.filter_types(etree.ErrorTypes.WAR_UNDECLARED_ENTITY):
-            # With a DOCTYPE the parser takes it that the entity is declared elsewhere, and leaves
-            # it out.
+            # With a DOCTYPE, lxml assumes that an unknown entity is declared elsewhere, and drops
+            # it without an error.
             raise _make_syntax_error(source, remark.line + blank, remark.column, remark.message)
     if not recover:
         source.elements = int(cast("float", _COUNT(root)))
@@ -376,7 +413,7 @@ def parse_source(source: Source, *, recover: bool = False) -> etree._Element:
 
 
 def _make_syntax_error(source: Source, line: int, column: int, message: str) -> NotWellFormedError:
-    """The error for what the parser says of a place in the text that it was given."""
+    """Return the error for a message of the parser, at the right position and in plain words."""
     line, column, _ = locate_error(source, line, column, message)
     words = rephrase_message(message) if "<" in source.text else "there is no element in it"
     if source.file is not None and source.file.lower().endswith(TABLE_SUFFIXES):
@@ -387,29 +424,29 @@ def _make_syntax_error(source: Source, line: int, column: int, message: str) -> 
 
 
 def read_version(source: Source, root: etree._Element) -> int:
-    """The version of the document.
+    """Return the version of a document.
 
     Raises:
-        DocumentError: it is no OpenSim document.
-        VersionError: the version is missing, no whole number, or too old to be read.
+        DocumentError: the text is not an OpenSim document.
+        VersionError: the version is missing, not a whole number, or too old.
     """
     text = root.get("Version")
-    # OpenSim reads an int of 32 bits, and nothing may follow it but blanks.
+    # OpenSim reads a 32-bit integer, which only blanks may follow.
     digits = None if text is None else re.fullmatch(r"[ \t\r\n]*\+?0*([0-9]{1,10})[ \t\r\n]*", text)
     number = int(digits[1]) if digits is not None and int(digits[1]) < 2**31 else None
-    if root.tag == ROOT and number is not None and number >= OLDEST:
+    if root.tag == ROOT and number is not None and number >= OLDEST_VERSION:
         return number
     if text is None and root.tag != ROOT:
         from osimlite.io.document.upgrade.class_names import RENAMED
 
         if _find_class(root) is not None or root.tag in RENAMED:
-            return OLDEST
-    # Places cost a pass over the text, so they are computed for errors only.
-    place = source.of_tag(0)
+            return OLDEST_VERSION
+    # Computing a position takes a pass over the text, so it is done for errors only.
+    place = source.locate_tag(0)
     if root.tag != ROOT:
-        tag = as_written(root.tag)
+        tag = decode_name(root.tag)
         message = f"the root element is <{tag}>, not <OpenSimDocument>: this is no OpenSim document"
-        raise _with_suggestion(source.fault(DocumentError, message, place), _guess_root(tag, root))
+        raise _add_suggestion(source.fault(DocumentError, message, place), _guess_root(tag, root))
     if number is None:
         result = (
             "has no Version"
@@ -420,14 +457,14 @@ def read_version(source: Source, root: etree._Element) -> int:
             VersionError, f'<OpenSimDocument> {result}; write Version="{CURRENT_VERSION}"', place
         )
     message = (
-        f"document version {number} is none that OpenSim ever wrote (they begin at {OLDEST}); "
+        f"document version {number} is none that OpenSim ever wrote (they begin at {OLDEST_VERSION}); "
         f'write Version="{CURRENT_VERSION}" if the model is in the current format'
     )
     raise _make_version_error(source, number, message)
 
 
-def _with_suggestion(fault: DocumentError, meant: str | None) -> DocumentError:
-    """A fault with the tag that was meant, if that is known."""
+def _add_suggestion(fault: DocumentError, meant: str | None) -> DocumentError:
+    """Add the tag that was probably meant to an error, if known."""
     if meant is not None:
         fault.meant = meant
         fault.message += f"; did you mean '{meant}'?"
@@ -440,7 +477,7 @@ def _guess_root(tag: str, root: etree._Element) -> str | None:
     first = _find_first_element(root)
     held = (
         first is not None
-        and find_nearest(as_written(first.tag), list_tags(), cutoff=85) is not None
+        and find_nearest(decode_name(first.tag), list_tags(), cutoff=85) is not None
     )
     return (
         ROOT
@@ -450,18 +487,18 @@ def _guess_root(tag: str, root: etree._Element) -> str | None:
 
 
 def _find_first_element(root: etree._Element) -> etree._Element | None:
-    """The element of the one object of a document."""
+    """Return the element of the document's object."""
     return next((child for child in root if is_element(child)), None)
 
 
 def _find_class(element: etree._Element | None) -> type[Object] | None:
-    return None if element is None else find_class(as_written(element.tag))
+    return None if element is None else find_class(decode_name(element.tag))
 
 
 def _read_top(
     source: Source, root: etree._Element, reader: ObjectReader, of: type[Object]
 ) -> Object:
-    """Read the one object of a document, with the comments around it."""
+    """Read the object of a document, with the comments around it."""
     first = _find_first_element(root)
     cls = _find_class(first)
     if first is None or cls is None or not issubclass(cls, of):
@@ -469,23 +506,23 @@ def _read_top(
         if first is None:
             what = "no object" if of is Object else f"no <{of.tag}>"
         elif of is Object:
-            tag = as_written(first.tag)
+            tag = decode_name(first.tag)
             what = f"a <{tag}>, which is no class of OpenSim 4.6"
         else:
-            tag = as_written(first.tag)
+            tag = decode_name(first.tag)
             what = f"a <{tag}>, not a <{of.tag}>"
-        at = source.of_tag(0 if first is None else 1)
+        at = source.locate_tag(0 if first is None else 1)
         meant = (
             None
             if first is None or cls is not None
             else find_nearest(tag, list_tags() if of is Object else [of.tag])
         )
-        raise _with_suggestion(source.fault(DocumentError, f"the document holds {what}", at), meant)
+        raise _add_suggestion(source.fault(DocumentError, f"the document holds {what}", at), meant)
     reader.count = 1
-    top = reader.top(first, cls)
+    top = reader.read_top(first, cls)
     for second in first.itersiblings(etree.Element):
-        reader.notes.append(Note("second-object", reader.count, as_written(second.tag)))
-        reader.count += estimate_size(second)
+        reader.notes.append(Note("second-object", reader.count, decode_name(second.tag)))
+        reader.count += count_elements(second)
     for place, nodes in (
         ("comments", [*first.itersiblings(preceding=True)][::-1]),
         ("after", first.itersiblings()),
@@ -505,28 +542,31 @@ def _read_top(
 def _make_include_reader(
     source: Source, around: tuple[str, ...] = (), read: list[int] | None = None
 ) -> Included | None:
-    """What reads the objects that ``file`` attributes of a text name, from files beside it.
+    """Return a function that reads objects named by ``file`` attributes, from files relative to the text's.
 
-    A text without a file has none beside it. Like OpenSim, a file that cannot be read, or holds
-    something else, or is being read already, leaves the object as it is. `around` are the files
-    that are being read, `read` is how many bytes have been read of files so far: a few that name
-    each other often enough would never end.
+    A text without a file includes nothing. As in OpenSim, a file that cannot be read, has another
+    object, or is being read already, leaves the object unchanged.
+
+    Args:
+        source: the text.
+        around: paths of the files that are being read.
+        read: number of bytes of included files so far; limits files that include each other many times.
     """
     around_it = source.file
     if around_it is None:
         return None
     total = [0] if read is None else read
 
-    def included(file: str, cls: type[Object]) -> tuple[Object, Include, list[Note]] | str:
+    def read_include(file: str, cls: type[Object]) -> tuple[Object, Include, list[Note]] | str:
         place = Path(around_it).parent / file
         path = os.path.realpath(place)
         if path in around:
             return "is being read already"
-        if len(around) == _DEEPEST:
-            return _TOO_DEEP
+        if len(around) == _MAX_INCLUDE_DEPTH:
+            return _TOO_DEEP_MESSAGE
         try:
-            inner = Source.of_file(place)
-            total[0] += max(_LEAST_COUNTED, len(inner.data))
+            inner = Source.from_file(place)
+            total[0] += max(_MIN_INCLUDED_BYTES, len(inner.data))
             expect_size(total[0], place)
             root = parse_source(inner)
             version = read_version(inner, root)
@@ -537,7 +577,7 @@ def _make_include_reader(
                 return "holds none"
             reader = ObjectReader(_make_include_reader(inner, (*around, path), total))
             reader.count = 1
-            item = reader.top(top, cls)
+            item = reader.read_top(top, cls)
         except SpecialFileError as fault:
             return f"is not read: {fault.message.partition(': ')[2]}"
         except MissingFileError:
@@ -545,15 +585,18 @@ def _make_include_reader(
         except DocumentError:
             return "holds none"
         except RecursionError:
-            return _TOO_DEEP
+            return _TOO_DEEP_MESSAGE
         return item, Include(file, path, item.copy_deep()), reader.notes
 
-    return included
+    return read_include
 
 
 @contextmanager
 def pause_collector() -> Iterator[None]:
-    """Thousands of objects are made and none dropped: the garbage collector would look at them in vain."""
+    """Pause the garbage collector in a context.
+
+    Reading makes thousands of objects and frees none, which the collector would scan in vain.
+    """
     enabled = gc.isenabled()
     gc.disable()
     try:

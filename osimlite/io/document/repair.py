@@ -1,8 +1,8 @@
-"""Text that is not quite XML, read where its meaning is certain.
+"""Reading of text that is almost XML, where its meaning is certain.
 
-No repair adds or removes a line or an element, so that every position stays what it was: each puts
-something else in place of characters of one line, or spaces in place of what stands in no element.
-What could mean two things is refused.
+No repair adds or removes a line or an element, so that all positions stay valid: each replaces
+characters within one line, or replaces text outside of elements by blanks. Ambiguous text is an
+error.
 """
 
 from __future__ import annotations
@@ -15,15 +15,15 @@ from typing import NamedTuple
 from lxml import etree
 
 from osimlite.errors import NotWellFormedError
-from osimlite.io.document.names import ATTRIBUTE, as_written
+from osimlite.io.document.names import ATTRIBUTE, decode_name
 from osimlite.io.document.notes import Note, NoteKind
 from osimlite.io.document.source import Source
 from osimlite.io.document.spans import find_markup
-from osimlite.io.document.syntax import expect_plain_doctype
+from osimlite.io.document.syntax import check_doctype
 
 _MARK = re.compile(r"^(?:<{7}|>{7})(?=[ \r]|$).*", re.MULTILINE)
 _HYPHENS = re.compile(r"-{2,}|-\Z")
-# OpenSim too refuses a number without its end.
+# OpenSim also rejects a character number without a semicolon.
 _AMPERSAND = re.compile(r"&(?!#(?!x?;))(?:([A-Za-z][A-Za-z0-9]{0,31});)?")
 _OWN_ENTITIES = frozenset(("amp", "lt", "gt", "quot", "apos"))
 _NO_CHARACTER = re.compile("[\x01-\x08\x0e-\x1f\ufffe\uffff]")
@@ -50,7 +50,14 @@ _EN_DASH = "\u2013"
 
 
 class Repair(NamedTuple):
-    """One thing read as what it must have meant: where it stands in the text, the word there, what it counts as."""
+    """Repair of one piece of text.
+
+    Attributes:
+        kind: type of the note about it.
+        offset: character offset in the text.
+        word: original text.
+        meant: what it was read as.
+    """
 
     kind: NoteKind
     offset: int
@@ -61,22 +68,32 @@ class Repair(NamedTuple):
 def read_repaired(
     source: Source, fault: NotWellFormedError, parse: Callable[[Source], etree._Element]
 ) -> tuple[etree._Element, list[Note]]:
-    """Parse a text that the parser has refused with `fault`, and note what had to be read as something else.
+    """Parse a text after repairing its syntax errors.
+
+    Args:
+        source: the text.
+        fault: error of the parser.
+        parse: function that parses the repaired text.
+
+    Returns:
+        The root element, and notes about the repairs.
 
     Raises:
-        NotWellFormedError: nothing certain can be done; with the line and column of what is wrong.
+        NotWellFormedError: the meaning is not certain; with line and column of the error.
     """
     mark = _MARK.search(source.text)
     if mark is not None:
-        said = f"'{mark[0].rstrip()[:40]}' is a mark it left; keep one side and take the marks out"
-        raise source.fault(
-            NotWellFormedError, f"an unfinished merge: {said}", source.position(mark.start())
+        advice = (
+            f"'{mark[0].rstrip()[:40]}' is a mark it left; keep one side and take the marks out"
         )
-    unended = _find_unended(source.text)
+        raise source.fault(
+            NotWellFormedError, f"an unfinished merge: {advice}", source.position(mark.start())
+        )
+    unended = _find_unclosed(source.text)
     if unended is not None:
         message = "not well-formed XML: what begins here with '<!' has no end"
         raise source.fault(NotWellFormedError, message, source.position(unended))
-    expect_plain_doctype(source)
+    check_doctype(source)
     text, repairs = repair_text(source.text)
     if not repairs or not source.spans:
         raise fault
@@ -84,7 +101,7 @@ def read_repaired(
     spans = source.spans
     tags = [element.tag for element in root.iter(etree.Element)]
     if len(tags) != len(spans) or any(
-        span.tag != as_written(tag) for span, tag in zip(spans, tags, strict=True)
+        span.tag != decode_name(tag) for span, tag in zip(spans, tags, strict=True)
     ):
         raise fault
     notes = []
@@ -98,11 +115,11 @@ def read_repaired(
 
 
 def find_elements_at(source: Source, offsets: Sequence[int]) -> Iterator[int]:
-    """Yield the number of the innermost element around each of some characters; 0, the root, outside all.
+    """Yield the index of the innermost element around each of some characters; 0, the root, outside all.
 
     Args:
         source: the text.
-        offsets: of the characters, rising.
+        offsets: character offsets in ascending order.
     """
     spans, count, following = source.spans, len(source.spans), 0
     around: list[int] = []
@@ -170,7 +187,7 @@ def repair_text(text: str) -> tuple[str, list[Repair]]:
     return "".join(pieces), repairs
 
 
-def _find_unended(text: str) -> int | None:
+def _find_unclosed(text: str) -> int | None:
     """Return the offset of a comment, CDATA section or instruction without an end."""
     place = 0
     for _, _, end, _ in find_markup(text, as_opensim=True):
@@ -256,7 +273,7 @@ def _quote_attributes(piece: str, offset: int, repairs: list[Repair]) -> str:
         repairs.append(Repair("overlooked", offset + match.start(), match[0], meant))
         return f'{match["name"]}="{match["bare"] or ""}"'
 
-    def part(match: re.Match[str]) -> str:
+    def add_blank(match: re.Match[str]) -> str:
         repairs.append(
             Repair(
                 "overlooked", offset + match.start(), match[0], "OpenSim needs no blank behind it"
@@ -264,7 +281,7 @@ def _quote_attributes(piece: str, offset: int, repairs: list[Repair]) -> str:
         )
         return f"{match[0]} "
 
-    return _VALUE.sub(quote, _TOUCHING.sub(part, piece)) if "=" in piece else piece
+    return _VALUE.sub(quote, _TOUCHING.sub(add_blank, piece)) if "=" in piece else piece
 
 
 def _escape_ampersands(text: str, offset: int, repairs: list[Repair]) -> str:
@@ -282,7 +299,7 @@ def _escape_ampersands(text: str, offset: int, repairs: list[Repair]) -> str:
     if "&" not in text:
         return text
 
-    def number(match: re.Match[str]) -> str:
+    def replace_invalid_number(match: re.Match[str]) -> str:
         value = int(match[1], 16) if match[1] else int(match[2])
         if (
             value in (9, 10, 13)
@@ -296,7 +313,7 @@ def _escape_ampersands(text: str, offset: int, repairs: list[Repair]) -> str:
         )
         return _REPLACEMENT
 
-    def mend(match: re.Match[str]) -> str:
+    def escape_ampersand(match: re.Match[str]) -> str:
         name = match[1]
         if name in _OWN_ENTITIES:
             return match[0]
@@ -308,4 +325,4 @@ def _escape_ampersands(text: str, offset: int, repairs: list[Repair]) -> str:
             return "&amp;" + match[0][1:]
         return meant.replace("\n", " ").replace("&", "&amp;").replace("<", "&lt;")
 
-    return _AMPERSAND.sub(mend, _NUMBERED.sub(number, text))
+    return _AMPERSAND.sub(escape_ampersand, _NUMBERED.sub(replace_invalid_number, text))

@@ -1,4 +1,4 @@
-"""The text of a document: its bytes, its encoding, and the line and column of every element."""
+"""Text of a document with its encoding, and positions of its elements."""
 
 from __future__ import annotations
 
@@ -18,12 +18,19 @@ from osimlite.io.document.spans import PlainSpans, Span, find_spans
 
 Fault = TypeVar("Fault", bound=OsimliteError)
 
-_BLOCK = 4096
-"""Characters between the places whose line is known at once."""
+_BLOCK_SIZE = 4096
+"""Characters between positions whose line number is precomputed."""
 
 
 class Attribute(NamedTuple):
-    """An attribute in the text: where the blanks before it begin, where it does, its end, and its value as written."""
+    """Attribute in the text.
+
+    Attributes:
+        before: offset of the blanks before it.
+        start: offset of its name.
+        end: offset after its value.
+        value: its value as written.
+    """
 
     before: int
     start: int
@@ -32,7 +39,7 @@ class Attribute(NamedTuple):
 
 
 class Position(NamedTuple):
-    """A place in a text: 1-based line and column (in characters), and how many characters it covers."""
+    """Line and column in a text, both from 1 and in characters, and the number of characters covered."""
 
     line: int
     column: int
@@ -40,57 +47,66 @@ class Position(NamedTuple):
 
 
 class Source:
-    """The text of one document. Elements are numbered in document order from 0, the root."""
+    """Text of one document; its elements have indices in document order, 0 is the root.
+
+    Args:
+        data: bytes of the text.
+        file: path of the file, for messages.
+    """
 
     def __init__(self, data: bytes, file: str | None = None) -> None:
         self.file = file
         self.data = data
         self.elements: int | None = None
-        """The number of elements, once the parser has found the text well-formed."""
+        """Number of elements; None until the parser has found the text well-formed."""
         self.remarks = True
         """Whether there may be comments other than OpenSim's own."""
         self.mixed: Sequence[int] | None = None
-        """Elements in which there is text beside elements, where they have been looked for in a well-formed text."""
+        """Elements with both text and elements in them; None if a well-formed text was not searched for them."""
         self.attributes: bool | None = None
-        """Whether there are attributes without a meaning, where they have been looked for in a well-formed text."""
+        """Whether there are attributes without a meaning; None if a well-formed text was not searched for them."""
         self._attributes: dict[int, dict[str, Attribute]] = {}
         self.moved: dict[tuple[int, str], int] = {}
-        """Elements that an upgrade to the current format has moved, by the number of their owner and their new tag."""
+        """Elements that an upgrade has moved, by the index of their owner and their new tag."""
 
     @cached_property
     def encoding(self) -> str:
-        """The encoding of the bytes."""
+        """Return the encoding of the bytes."""
         return _detect_encoding(self.data)
 
     @cached_property
     def text(self) -> str:
-        """The characters."""
+        """Return the decoded text."""
         return _decode_text(self.data, self.encoding)
 
     @classmethod
-    def of_file(cls, path: str | Path) -> Source:
+    def from_file(cls, path: str | Path) -> Source:
         """Read a file.
 
         Raises:
-            MissingFileError: it is missing or cannot be read.
-            SpecialFileError: it is a pipe, a device or the like, or larger than the settings allow.
+            MissingFileError: the file does not exist or cannot be read.
+            SpecialFileError: it is a pipe or a device, or larger than the settings allow.
         """
         return cls(read_file(path), str(path))
 
     @classmethod
-    def of_characters(cls, text: str, file: str | None = None) -> Source:
-        """The source of characters that somebody has decoded already, whatever encoding they declare.
+    def from_text(cls, text: str, file: str | None = None) -> Source:
+        """Make a source of decoded text; an encoding that the text declares is ignored.
 
         Args:
-            text: the characters.
-            file: where they are kept, if anywhere.
+            text: the text.
+            file: path of the file, if any.
         """
         source = cls(text.encode("utf-8", "replace"), file)
         source.encoding, source.text = "utf-8", text
         return source
 
-    def attributes_of(self, number: int) -> dict[str, Attribute]:
-        """The attributes of an element by name."""
+    def get_attributes(self, number: int) -> dict[str, Attribute]:
+        """Return the attributes of an element.
+
+        Returns:
+            Attributes by name.
+        """
         if number not in self._attributes:
             span = self.spans[number]
             result = self._attributes[number] = {}
@@ -104,7 +120,7 @@ class Source:
 
     @cached_property
     def spans(self) -> Sequence[Span]:
-        """Every element in document order; of a text that is not well-formed, as far as its tags go."""
+        """Return the spans of all elements in document order; of malformed text, as far as tags can be paired."""
         if self.elements is not None:
             plain = PlainSpans(self.text, self.elements)
             if len(plain) == self.elements:
@@ -113,7 +129,7 @@ class Source:
 
     @property
     def well_formed(self) -> bool:
-        """True if the text is known to be well-formed."""
+        """Whether the parser has found the text well-formed."""
         return self.elements is not None
 
     @cached_property
@@ -127,24 +143,32 @@ class Source:
 
     def children(self, number: int) -> list[int]:
         """Return the indices of the child elements of element `number`."""
-        return list(self._inside(number))
+        return list(self._iterate_children(number))
 
-    def _inside(self, number: int) -> Iterator[int]:
+    def _iterate_children(self, number: int) -> Iterator[int]:
         if isinstance(self.spans, PlainSpans):
             yield from self.spans.inside(number)
             return
         if number >= len(self.spans):
-            return  # The text ends within its tag.
+            # The text ends within the tag of the element.
+            return
         inner, end = number + 1, self.spans[number].end
         while inner < len(self._starts) and self._starts[inner] < end:
             yield inner
-            # Elements are numbered as they begin: the next beside this one is the first that begins
-            # behind its end.
+            # Indices follow the order of start tags, so the next sibling is the first element that
+            # starts after the end of this one.
             inner = bisect_left(self._starts, self.spans[inner].end, inner + 1)
 
     def child(self, number: int, tag: str) -> int | None:
-        """The number of the first element `tag` directly inside element `number`, or of what it was made from."""
-        result = next((child for child in self._inside(number) if self._tag(child) == tag), None)
+        """Return the index of an element's first child with a tag, or of the element that it was upgraded from.
+
+        Args:
+            number: index of the element.
+            tag: the tag.
+        """
+        result = next(
+            (child for child in self._iterate_children(number) if self._tag(child) == tag), None
+        )
         return self.moved.get((number, tag)) if result is None else result
 
     @cached_property
@@ -152,25 +176,28 @@ class Source:
         return [0, *(match.end() for match in re.finditer(r"\n|\r\n?", self.text))]
 
     @cached_property
-    def _lines_before(self) -> list[int] | None:
-        """How many lines end before each block of the text; None if a carriage return alone ends some of them.
+    def _line_counts(self) -> list[int] | None:
+        """Return the number of lines that end before each block; None if some lines end with a carriage return alone.
 
-        Few places are asked for, and characters are counted much faster than all lines are listed.
+        Only a few positions are needed, and counting line ends is much faster than listing them.
         """
         text = self.text
         if "\r" in text and text.count("\r") != text.count("\r\n"):
             return None
-        counts = (text.count("\n", start, start + _BLOCK) for start in range(0, len(text), _BLOCK))
+        counts = (
+            text.count("\n", start, start + _BLOCK_SIZE)
+            for start in range(0, len(text), _BLOCK_SIZE)
+        )
         return [*accumulate(counts, initial=0)]
 
     def line_start(self, line: int) -> int:
-        """The character offset at which a line begins."""
-        before = self._lines_before
+        """Return the character offset of the start of a line."""
+        before = self._line_counts
         if before is None:
             return self._line_starts[line - 1]
-        # The block in which the line before ends; the first line begins at the beginning.
+        # Start from the block in which the preceding line ends.
         block = max(0, bisect_left(before, line - 1) - 1)
-        start = block * _BLOCK
+        start = block * _BLOCK_SIZE
         for _ in range(line - 1 - before[block]):
             start = self.text.index("\n", start) + 1
         return start
@@ -181,31 +208,48 @@ class Source:
         return re.split(r"\n|\r\n?", self.text)
 
     def position(self, offset: int, length: int = 1) -> Position:
-        """Return line and column of a character offset."""
-        before = self._lines_before
+        """Return line and column of a character offset.
+
+        Args:
+            offset: the offset.
+            length: number of characters that the position covers.
+        """
+        before = self._line_counts
         if before is None:
             line = bisect_right(self._line_starts, offset) - 1
             return Position(line + 1, offset - self._line_starts[line] + 1, length)
-        block = min(offset // _BLOCK, len(before) - 1)
-        line = before[block] + self.text.count("\n", block * _BLOCK, offset)
+        block = min(offset // _BLOCK_SIZE, len(before) - 1)
+        line = before[block] + self.text.count("\n", block * _BLOCK_SIZE, offset)
         return Position(line + 1, offset - self.text.rfind("\n", 0, offset), length)
 
     def fault(self, kind: type[Fault], message: str, place: Position) -> Fault:
-        """Return an error with a position in the text."""
+        """Return an error with a position in the text.
+
+        Args:
+            kind: class of the error.
+            message: the message.
+            place: the position.
+        """
         return kind(message, file=self.file, line=place.line, column=place.column)
 
-    def of_tag(self, number: int) -> Position:
-        """Where the start tag of element `number` is: the ``<`` and the name.
+    def locate_tag(self, number: int) -> Position:
+        """Return the position of an element's start tag: its ``<`` and name.
 
-        Of a text that breaks off in a tag, the last tag before stands for what comes after it.
+        If the text ends within a tag, later indices have the position of the last tag.
         """
         if not self.spans:
             return self.position(0)
         number = min(number, len(self.spans) - 1)
         return self.position(self._starts[number], len(self._tag(number)) + 1)
 
-    def of_text(self, number: int, word: str | None = None, nth: int = 0) -> Position:
-        """Return the position of the text of element `number`, or of a word in it; without text that of the tag."""
+    def locate_text(self, number: int, word: str | None = None, nth: int = 0) -> Position:
+        """Return the position of an element's text or of a word in it; without text, that of the tag.
+
+        Args:
+            number: index of the element.
+            word: the word; the complete text by default.
+            nth: which occurrence of the word, from 0.
+        """
         span = self.spans[number]
         inner = self.text[span.tag_end : span.inner_end]
         if word:
@@ -215,14 +259,19 @@ class Source:
                 return self.position(span.tag_end + places[min(nth, len(places) - 1)], len(word))
         stripped = inner.strip()
         if not stripped or "<" in stripped:
-            return self.of_tag(number)
+            return self.locate_tag(number)
         return self.position(span.tag_end + inner.index(stripped), len(stripped.splitlines()[0]))
 
-    def of_attribute(self, number: int, name: str) -> Position:
-        """Return the position of the value of an attribute; without the attribute that of the tag."""
-        result = self.attributes_of(number).get(name)
+    def locate_attribute(self, number: int, name: str) -> Position:
+        """Return the position of the value of an attribute; without the attribute, that of the tag.
+
+        Args:
+            number: index of the element.
+            name: name of the attribute.
+        """
+        result = self.get_attributes(number).get(name)
         if result is None:
-            return self.of_tag(number)
+            return self.locate_tag(number)
         return self.position(result.end - 1 - len(result.value), max(1, len(result.value)))
 
 
@@ -241,13 +290,13 @@ _BYTEWISE = re.compile(
 
 
 def _detect_encoding(data: bytes) -> str:
-    """The encoding of the bytes: what the mark or the declaration says, UTF-8, or cp1252 where that fails."""
+    """Return the encoding by the byte order mark, then the declaration, then UTF-8; cp1252 if that fails."""
     name = next((name for mark, name in _MARKS.items() if data.startswith(mark)), None)
     if name is not None and name != "utf-8-sig":
         return name
     declared = _DECLARED.match(data)
     if name is None and declared is not None:
-        # A declaration that can be read byte by byte is in no encoding of two bytes a character.
+        # A declaration that was found byte by byte cannot be in an encoding of two bytes.
         word = declared[1].decode().lower().replace("cp125", "windows-125")
         name = word if _BYTEWISE.match(word) else None
     try:
@@ -258,7 +307,7 @@ def _detect_encoding(data: bytes) -> str:
 
 
 def _decode_text(data: bytes, encoding: str) -> str:
-    """The text: cp1252 byte by byte where the rest is UTF-8, and a replacement character for half a character."""
+    """Decode bytes; with cp1252, bytes that are not valid UTF-8 are decoded one by one."""
     if encoding != "cp1252":
         return data.decode(encoding, "replace")
     codecs.register_error("osimlite.cp1252", _decode_windows)

@@ -1,4 +1,4 @@
-"""Where the elements of a text stand."""
+"""Positions of markup and elements in a text, found without a parser."""
 
 from __future__ import annotations
 
@@ -9,10 +9,14 @@ from typing import NamedTuple, overload
 
 
 class Span(NamedTuple):
-    """Where one element stands, as character offsets into the text.
+    """Character offsets of one element.
 
-    `start` is at ``<``, `tag_end` behind the ``>`` of the start tag, `inner_end` at ``</``, `end`
-    behind the element; for an empty element all of the last three are equal.
+    Attributes:
+        tag: its tag.
+        start: offset of ``<``.
+        tag_end: offset after the start tag.
+        inner_end: offset of ``</``.
+        end: offset after the element; for an empty element all three ends are equal.
     """
 
     tag: str
@@ -23,10 +27,14 @@ class Span(NamedTuple):
 
 
 class Markup(NamedTuple):
-    """One piece of markup in a text: characters `start` to `end`.
+    """Piece of markup in a text.
 
-    `kind` is ``open``, ``empty`` or ``close`` for tags, else ``comment``, ``cdata``,
-    ``instruction`` or ``doctype``.
+    Attributes:
+        kind: ``open``, ``empty`` or ``close`` for tags, else ``comment``, ``cdata``, ``instruction`` or
+            ``doctype``.
+        start: offset of its first character.
+        end: offset after it.
+        tag: tag, for tags.
     """
 
     kind: str
@@ -35,8 +43,8 @@ class Markup(NamedTuple):
     tag: str = ""
 
 
-# No part of a tag may be given back once matched, and none goes past the next "<": the time is
-# linear in the length of any text, also of one that is no XML.
+# Possessive quantifiers, and no match beyond the next "<": the time is linear in the length of any
+# text, also of one that is not XML.
 _MARKUP = re.compile(
     r"<(?:(?P<special>!--|!\[CDATA\[|\?|!DOCTYPE)|/(?P<close>[^\s<>]++)\s*+>|"
     r"(?P<open>[^\s/<>!?\"']++)(?:[^<>\"'/]++|/(?!>)|\"[^\"<]*+\"|'[^'<]*+')*+(?P<empty>/?)>)"
@@ -51,16 +59,15 @@ _SPECIAL = {
 
 
 _INSTRUCTION_END = {False: "?>", True: ">"}
-"""What ends an instruction, by whether the text is read as OpenSim reads it."""
+"""End of a processing instruction, by whether the text is read as OpenSim does."""
 
 
 def find_markup(text: str, *, as_opensim: bool = False) -> Iterator[Markup]:
-    """Yield the markup of a text in order; it ends where a comment or its like has no end.
+    """Yield the markup of a text in order; stop at a comment, section or instruction without an end.
 
     Args:
         text: the text.
-        as_opensim: whether an instruction ends at its first ``>``, as it does for OpenSim, and not
-            at ``?>``, as it does for XML.
+        as_opensim: end instructions at the first ``>`` as OpenSim does, and not at ``?>`` as in XML.
     """
     place = 0
     while (match := _MARKUP.search(text, place)) is not None:
@@ -85,11 +92,14 @@ _REMARK = re.compile(r"<(?P<special>!--|!\[CDATA\[|\?|!DOCTYPE)")
 
 
 def blank_comments(text: str, character: str = " ") -> str:
-    """Return a text in which each comment, CDATA section, instruction and DOCTYPE is one character as often.
+    """Replace every character of comments, CDATA sections, instructions and DOCTYPEs by another.
 
-    One that has no end stays as it is. An ending that was not found once is not looked for again,
-    so that the time is linear in the length of any text: a pattern such as `<!--.*?-->` looks for
-    the end of each of many open comments through all that follows.
+    Those without an end stay. An ending that was not found once is not searched again, so the time is
+    linear; a pattern such as ``<!--.*?-->`` would search the rest of the text for each open comment.
+
+    Args:
+        text: the text.
+        character: the replacement.
     """
     pieces: list[str] = []
     missing: set[str] = set()
@@ -99,11 +109,11 @@ def blank_comments(text: str, character: str = " ") -> str:
         ending = _SPECIAL[match["special"]][1]
         if start < place or ending in missing:
             continue
-        found = text.find(ending, match.end())
-        if found < 0:
+        closing = text.find(ending, match.end())
+        if closing < 0:
             missing.add(ending)
             continue
-        end = found + len(ending)
+        end = closing + len(ending)
         pieces += [text[place:start], character * (end - start)]
         place = end
     pieces.append(text[place:])
@@ -111,13 +121,13 @@ def blank_comments(text: str, character: str = " ") -> str:
 
 
 def find_spans(text: str, *, as_opensim: bool = False) -> list[Span]:
-    """Every element of a text in document order, found by the rules of :func:`find_markup`.
+    """Return the spans of all elements of a text in document order, by the rules of :func:`find_markup`.
 
-    An element that nothing ends is taken to be empty; an end that nothing began is passed over.
+    An element without a closing tag is treated as empty; a closing tag without an element is ignored.
 
     Args:
         text: the text.
-        as_opensim: whether an instruction ends at its first ``>``.
+        as_opensim: end instructions at the first ``>``.
     """
     tags: list[str] = []
     starts: list[int] = []
@@ -129,8 +139,8 @@ def find_spans(text: str, *, as_opensim: bool = False) -> list[Span]:
     for match in _MARKUP.finditer(text):
         start, end = match.span()
         if start < behind:
-            # Inside a comment or its like; the match holds no second "<", and so hides nothing
-            # behind its end.
+            # Inside a comment, section or instruction. The match has no second "<", so it hides
+            # nothing after its end.
             continue
         if match["close"] is not None:
             if open_numbers:
@@ -159,14 +169,18 @@ def find_spans(text: str, *, as_opensim: bool = False) -> list[Span]:
 
 _BEGIN = re.compile(r"<[^/!?]")
 
-# The same where comments and their like may hold what looks like a tag.
+# Slower pattern for texts whose comments or sections contain what looks like a tag.
 _BEGIN_OR_HIDDEN = re.compile(r"<[^/!?]|<!--.*?-->|<!\[CDATA\[.*?\]\]>|<\?.*?\?>", re.DOTALL)
 
 
 class PlainSpans(Sequence[Span]):
-    """The spans of a well-formed text; made as they are asked for.
+    """Spans of a well-formed text, each computed on first access.
 
-    Whoever wants to know of one place in a long text need not wait for all the others.
+    A single position in a long text then does not need the spans of all elements.
+
+    Args:
+        text: the text.
+        elements: number of its elements, from the parser.
     """
 
     def __init__(self, text: str, elements: int) -> None:
@@ -189,46 +203,46 @@ class PlainSpans(Sequence[Span]):
             return [self[index] for index in range(*number.indices(len(self)))]
         known = self._known.get(number)
         if known is None:
-            known = self._known[number] = self._span(number)
+            known = self._known[number] = self._find_span(number)
         return known
 
     def tag(self, number: int) -> str:
-        """The tag of an element; its end, which may be far away, is not looked for."""
+        """Return the tag of an element without searching its end, which may be far away."""
         name = _NAME.match(self.text, self.starts[number] + 1)
         assert name is not None
         return name[0]
 
     def inside(self, number: int) -> Iterator[int]:
-        """Yield the numbers of the elements directly inside an element; its own end is not looked for."""
+        """Yield the indices of the child elements without searching the element's own end."""
         inner = number + 1
-        opening = self._opening(number)
+        opening = self._match_start_tag(number)
         place = opening.end()
         while not opening["empty"]:
-            place = self._next_tag(place)
+            place = self._find_next_tag(place)
             if self.text[place + 1] == "/":
                 return
             yield inner
-            place, inner = self._behind(inner)
+            place, inner = self._find_end(inner)
 
-    def _behind(self, number: int) -> tuple[int, int]:
-        """The place behind an element, and the number of the first element that begins there or later."""
-        opening = self._opening(number)
+    def _find_end(self, number: int) -> tuple[int, int]:
+        """Return the offset after an element, and the index of the first element that starts there or later."""
+        opening = self._match_start_tag(number)
         end = opening.end()
         if opening["empty"]:
             return end, number + 1
-        tag = self._next_tag(end)
+        tag = self._find_next_tag(end)
         if self.text[tag + 1] == "/":
             return self.text.index(">", tag) + 1, number + 1
         end = self[number].end
         return end, bisect_left(self.starts, end, number + 1)
 
-    def _opening(self, number: int) -> re.Match[str]:
+    def _match_start_tag(self, number: int) -> re.Match[str]:
         match = _MARKUP.match(self.text, self.starts[number])
         assert match is not None
         return match
 
-    def _next_tag(self, place: int) -> int:
-        """Return the offset of the next tag, behind comments, CDATA sections and instructions."""
+    def _find_next_tag(self, place: int) -> int:
+        """Return the offset of the next tag after comments, CDATA sections and instructions."""
         text = self.text
         place = text.index("<", place)
         while text[place + 1] in "!?":
@@ -242,22 +256,22 @@ class PlainSpans(Sequence[Span]):
             place = text.index("<", text.index(ending, place + 2))
         return place
 
-    def _span(self, number: int) -> Span:
-        match = self._opening(number)
+    def _find_span(self, number: int) -> Span:
+        match = self._match_start_tag(number)
         start, tag, tag_end = match.start(), match["open"], match.end()
         if match["empty"]:
             return Span(tag, start, tag_end, tag_end, tag_end)
         close = self.text.rfind(f"</{tag}") if number == 0 else -1
-        # Behind the root there is rarely anything, which could be a comment with what looks like
-        # its end.
+        # Usually the closing tag of the root is the last in the text. A comment after it could
+        # contain what looks like one.
         if close < 0 or "".join(self.text[close:].split()) != f"</{tag}>":
-            close = self._close(tag, tag_end)
+            close = self._find_closing_tag(tag, tag_end)
         return Span(tag, start, tag_end, close, self.text.index(">", close) + 1)
 
-    def _is_in_sight(self, place: int, start: int) -> bool:
-        """Return whether an offset is certainly in no comment or CDATA section that begins at `start` or later."""
+    def _is_outside_comments(self, place: int, start: int) -> bool:
+        """Return whether an offset is certainly not in a comment or section that starts at `start` or later."""
         text = self.text
-        # What begins with a rare character is found many times faster than what begins with "<".
+        # Searching a rare character is many times faster than searching "<".
         if text.find("![", start, place) >= 0 or text.find("?", start, place) >= 0:
             return False
         if text.find("!", start, place) < 0:
@@ -265,8 +279,8 @@ class PlainSpans(Sequence[Span]):
         comment = text.rfind("<!--", start, place)
         return comment < 0 or text.find("-->", comment, place) >= 0
 
-    def _close(self, tag: str, place: int) -> int:
-        """Return the position of the closing tag of an element whose content begins at `place`."""
+    def _find_closing_tag(self, tag: str, place: int) -> int:
+        """Return the offset of the closing tag of an element whose content starts at `place`."""
         close = self.text.find("<", place)
         if self.text[close + 1] == "/":
             return close
@@ -275,9 +289,9 @@ class PlainSpans(Sequence[Span]):
         if (
             is_its
             and self.text.find(f"<{tag}", close, first) < 0
-            and self._is_in_sight(first, close)
+            and self._is_outside_comments(first, close)
         ):
-            # As good as always: what stands before it neither nests nor hides one.
+            # The usual case: nothing before the first closing tag nests or hides one.
             return first
         depth = 1
         name = re.escape(tag)

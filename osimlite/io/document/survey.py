@@ -8,7 +8,7 @@ from lxml import etree
 
 from osimlite.base.records import dataclass, field
 from osimlite.errors import DocumentError, NotWellFormedError, VersionError
-from osimlite.io.document.names import as_written
+from osimlite.io.document.names import decode_name
 from osimlite.io.document.reader import (
     ROOT,
     Document,
@@ -86,24 +86,24 @@ def _survey_damaged(source: Source, fault: NotWellFormedError, of: type[Object])
     return _add_document(result, root, of)
 
 
-def _add_document(found: Survey, root: etree._Element, of: type[Object]) -> Survey:
+def _add_document(survey: Survey, root: etree._Element, of: type[Object]) -> Survey:
     try:
-        version = read_version(found.source, root)
+        version = read_version(survey.source, root)
     except DocumentError:
         version = CURRENT_VERSION
     try:
-        found.document = read_tree(found.source, root, version, of)
+        survey.document = read_tree(survey.source, root, version, of)
     except DocumentError as fault:
-        found.faults.append(fault)
-    return found
+        survey.faults.append(fault)
+    return survey
 
 
 def _has_same_elements(source: Source, root: etree._Element, sure_until: int | None) -> bool:
     """Return whether the recovered tree has the elements of the text up to line `sure_until`."""
     numbered = zip(source.spans, root.iter(etree.Element), strict=False)
     for number, (span, element) in enumerate(numbered):
-        if sure_until is not None and source.of_tag(number).line >= sure_until:
+        if sure_until is not None and source.locate_tag(number).line >= sure_until:
             return True
-        if span.tag != as_written(element.tag):
+        if span.tag != decode_name(element.tag):
             return False
     return True

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 from osimlite.errors import NotWellFormedError
-from osimlite.io.document.names import as_written
+from osimlite.io.document.names import decode_name
 from osimlite.io.document.source import Position, Source
 from osimlite.io.document.spans import find_markup
 
@@ -20,7 +20,7 @@ _PLAIN = (
     ),
     (r"Couldn't find end of Start Tag (\S+)(?: line \d+)?", r"the tag <\1 has no '>'"),
     (r"EndTag: '</' not found", "the file ends before its elements are closed"),
-    (r"Failed to parse QName '(.*)'", r"'\1' is no name of an element or attribute"),
+    (r"Failed to parse QName '(.*)'", r"'\1' is not a legal name of an element or attribute"),
     (
         r"StartTag: invalid element name",
         "no tag begins with this '<'; write &lt; for the character itself",
@@ -45,14 +45,14 @@ _PLAIN = (
 
 
 _PLAIN_DOCTYPE = re.compile(r"<!DOCTYPE(?:[^\[>\"']|\"[^\">]*\"|'[^'>]*'|\[[^\]<>\"']*\])*+>")
-"""A DOCTYPE that ends at its first ``>``, so that it declares nothing."""
+"""DOCTYPE that ends at its first ``>``, so that it declares nothing."""
 
 
-def expect_plain_doctype(source: Source) -> None:
-    """Refuse a DOCTYPE that declares something, or for another reason does not end at its first ``>``.
+def check_doctype(source: Source) -> None:
+    """Reject a DOCTYPE that does not end at its first ``>``, for example because it declares entities.
 
     Raises:
-        NotWellFormedError: there is one; with its place.
+        NotWellFormedError: there is such a DOCTYPE; with its position.
     """
     start = next(
         (piece.start for piece in find_markup(source.text) if piece.kind == "doctype"), None
@@ -64,7 +64,7 @@ def expect_plain_doctype(source: Source) -> None:
 
 def rephrase_message(message: str) -> str:
     """Return the parser's message in plain words, without its position."""
-    message = " ".join(as_written(re.sub(r", line \d+, column \d+$", "", message)).split())
+    message = " ".join(decode_name(re.sub(r", line \d+, column \d+$", "", message)).split())
     for pattern, words in _PLAIN:
         match = re.fullmatch(pattern, message)
         if match is not None:
@@ -78,7 +78,7 @@ def locate_error(source: Source, line: int, column: int, message: str) -> Positi
     Args:
         source: the text.
         line: line of the parser's message.
-        column: column of the parser's message, which is behind a wrong closing tag.
+        column: column of the parser's message, which is after a wrong closing tag.
         message: the parser's message.
     """
     lines = source.lines

@@ -14,7 +14,7 @@ from pathlib import Path
 from lxml import etree
 
 from osimlite.errors import ModelError
-from osimlite.io.document.names import as_written, replace_colons
+from osimlite.io.document.names import decode_name, replace_colons
 
 DIGEST_SIZE = 6
 
@@ -97,7 +97,7 @@ def format_xml(
         xml: text of one element.
         depth: number of tabs before the element.
         comments: whether to keep comments.
-        name: new value of the attribute `name`; None leaves it.
+        name: new value of the attribute `name`; None keeps it.
 
     Raises:
         ModelError: the text is not an XML element, or has a DOCTYPE.
@@ -129,7 +129,7 @@ def list_lines(element: etree._Element, depth: int, *, comments: bool = True) ->
         ):
             return []
         return [indent + etree.tostring(element, encoding="unicode", with_tail=False)]
-    tag = as_written(element.tag)
+    tag = decode_name(element.tag)
     head = f"{indent}<{tag}" + "".join(
         f" {key}={quote_attribute(text)}" for key, text in _list_attributes(element)
     )
@@ -149,4 +149,4 @@ def list_lines(element: etree._Element, depth: int, *, comments: bool = True) ->
 
 
 def _list_attributes(element: etree._Element) -> list[tuple[str, str]]:
-    return [(as_written(str(key)), str(text)) for key, text in element.items()]
+    return [(decode_name(str(key)), str(text)) for key, text in element.items()]

@@ -41,17 +41,16 @@ class MeshFolders:
         return (*map(Path, self.named), *list_mesh_folders())
 
     def find(self, name: str) -> Path | None:
-        """The first file of this name; failing that, one spelled with other capitals or slashes; None without any.
+        """Return the first file with a name, otherwise one that differs in letter case or slashes; None without any.
 
-        A model is not to be trusted with what else is on the machine: wherever an absolute name,
-        ``..`` or a link leads, the file itself is in the model's folder or in one that the user
-        names.
+        A downloaded model must not reveal other files of the machine: wherever an absolute name, ``..`` or
+        a link leads, the file itself must be in the model's folder or in one that the user names.
 
         Args:
-            name: relative to a folder, or absolute.
+            name: path relative to a folder, or absolute.
 
         Raises:
-            OutsideError: there is such a file, but it is elsewhere.
+            OutsideError: the file exists, but elsewhere.
         """
         elsewhere = None
         for path in _list_candidates(name, self.searched):
@@ -87,12 +86,12 @@ def _is_file(path: Path) -> bool:
     try:
         return path.is_file()
     except (OSError, ValueError):
-        # A name that is too long, or has a character that no file name has.
+        # The name is too long, or has a character that file names cannot have.
         return False
 
 
 def _find_any_case(folder: Path, parts: Sequence[str]) -> Iterator[Path]:
-    """The files below a folder whose path has these parts, in any capitals."""
+    """Yield the files below a folder whose path has these parts, in any letter case."""
     if not parts:
         if _is_file(folder):
             yield folder

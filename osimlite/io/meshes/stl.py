@@ -46,11 +46,7 @@ def read_stl_corners(content: bytes, name: str) -> Array:
 
 
 def is_binary(content: bytes) -> bool:
-    """Whether a file has the binary form.
-
-    Some programs begin binary files with the word that text files begin with, so the length
-    decides.
-    """
+    """Return whether a file has the binary form."""
     return 84 < 84 + 50 * _count(content) <= len(content)
 
 

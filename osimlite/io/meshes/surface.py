@@ -1,4 +1,4 @@
-"""Surfaces of triangles: polygons cut into triangles, and the text of a Wavefront OBJ file."""
+"""Triangle surfaces: triangulation of polygons, and Wavefront OBJ text."""
 
 from __future__ import annotations
 
@@ -15,12 +15,19 @@ Indices = NDArray[np.int64]
 
 
 class Polygons(NamedTuple):
-    """Polygons of any number of corners."""
+    """Polygons with any number of corners.
+
+    Attributes:
+        points: positions (n, 3).
+        corners: indices of points of all polygons, one after the other, counter-clockwise seen from
+            outside.
+        ends: end of each polygon in `corners`, increasing.
+    """
 
     points: Array  # (n, 3)
-    # of all polygons, one after the other (places of points), counter-clockwise seen from outside
+    # indices of points, polygon after polygon, counter-clockwise seen from outside
     corners: Indices
-    ends: Indices  # where each polygon ends in `corners`, increasing
+    ends: Indices  # end of each polygon in `corners`, increasing
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,25 +35,31 @@ class Surface:
     """A surface of triangles."""
 
     points: Array  # (n, 3)
-    triangles: Indices  # (t, 3) places of points, counter-clockwise seen from outside
+    triangles: Indices  # (t, 3) indices of points, counter-clockwise seen from outside
     normals: Array | None = None  # outward unit vectors at the points (n, 3), or None
-    is_closed: bool = False  # whether it is known that nobody sees its inside
+    is_closed: bool = False  # whether it is known to be closed, so that its inside is never visible
 
-    def stretched(self, factors: Sequence[float]) -> Surface:
-        """The surface with its coordinates multiplied by `factors` (3,), and its outside still outside."""
+    def stretch(self, factors: Sequence[float]) -> Surface:
+        """Return the surface with its coordinates multiplied by factors.
+
+        Triangles are reversed if the factors mirror the surface, so that the outside stays outside.
+
+        Args:
+            factors: factors along X, Y and Z.
+        """
         a, b, c = factors
         turned = a * b * c < 0.0
         triangles, normals = self.triangles[:, ::-1] if turned else self.triangles, self.normals
         if normals is not None:
-            # They are stretched the other way, by 1/a, 1/b, 1/c; these products serve what is flat
-            # too.
+            # Normals scale by 1/a, 1/b, 1/c. The products differ from these by the factor abc, and
+            # also work if a factor is 0.
             normals = normals * np.array((b * c, c * a, a * b)) * (-1.0 if turned else 1.0)
             lengths = np.linalg.norm(normals, axis=1, keepdims=True)
             normals = normals / np.where(lengths > 0.0, lengths, 1.0)
         return Surface(self.points * np.array(factors), triangles, normals, self.is_closed)
 
     def obj(self) -> str:
-        """The text of an OBJ file."""
+        """Return the surface as the text of an OBJ file."""
         lines = [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in self.points.tolist()]
         corners = (self.triangles + 1).tolist()
         if self.normals is None:
@@ -58,20 +71,20 @@ class Surface:
 
 
 MAX_EAR_WORK = 250_000
-"""Sum of the squares of the corners of polygons that are cut at their ears, which takes ten seconds at most.
+"""Largest sum of squared corner counts of polygons that are triangulated by ear clipping, ten seconds of work.
 
-Polygons beyond that are cut from one corner, which is right of convex ones. Meshes of bones have
-triangles; a polygon of a million corners would take years.
+Further polygons are triangulated from one corner, which is correct for convex ones. Meshes of bones
+have triangles; ear clipping of a polygon with a million corners would take years.
 """
 
 
 def triangulate(points: Array, corners: Indices, ends: Indices) -> Indices:
-    """Triangles (t, 3) that cover polygons, turning the same way.
+    """Return triangles (t, 3) that cover polygons, with the same orientation.
 
     Args:
-        points: (n, 3).
-        corners: of all polygons, one after the other (places of points).
-        ends: where each polygon ends in `corners`, increasing; polygons of fewer than three corners
+        points: positions (n, 3).
+        corners: indices of points of all polygons, one after the other.
+        ends: end of each polygon in `corners`, increasing; polygons of fewer than three corners
             are left out.
     """
     starts = np.concatenate(([0], ends[:-1])).astype(np.int64)
@@ -89,15 +102,15 @@ def triangulate(points: Array, corners: Indices, ends: Indices) -> Indices:
     return np.concatenate(parts).reshape(-1, 3)
 
 
-def split_strips(strip: Indices) -> Indices:
-    """Triangles (k - 2, 3) of a strip of k points, of which every second is turned the other way."""
+def split_strip(strip: Indices) -> Indices:
+    """Return the triangles (k - 2, 3) of a strip of k points; every second one is reversed to face outwards."""
     triangles = np.lib.stride_tricks.sliding_window_view(strip, 3).copy()
     triangles[1::2, :2] = triangles[1::2, 1::-1]
     return triangles
 
 
 def _split_quadrilaterals(points: Array, quads: Indices) -> Indices:
-    """Two triangles for each of k quadrilaterals (2 k, 3): cut where both halves turn the same way."""
+    """Return two triangles for each of k quadrilaterals (2 k, 3), cut so that both have the same orientation."""
     a, b, c, d = (points[quads[:, index]] for index in range(4))
     agreement = np.einsum("ij,ij->i", np.cross(b - a, c - a), np.cross(c - a, d - a))
     cut = np.where((agreement < 0.0)[:, None], (1, 2, 3, 1, 3, 0), (0, 1, 2, 0, 2, 3))
@@ -111,14 +124,14 @@ def _split_convex(corners: Array) -> Indices:
 
 
 def _clip_ears(corners: Array) -> Indices:
-    """Triangles (k - 2, 3) of a polygon of k corners (k, 3): corners are cut off that hold no other corner."""
-    # Twice the area vector (Newell).
+    """Return triangles (k - 2, 3) of a polygon of k corners (k, 3) by ear clipping."""
+    # Twice the area vector (Newell's method), also for polygons that are not planar.
     normal: Array = np.cross(corners, np.roll(corners, -1, axis=0)).sum(axis=0)
     left = list(range(len(corners)))
     triangles: list[tuple[int, int, int]] = []
     while len(left) > 3:
         ears = ((left[k - 1], left[k], left[(k + 1) % len(left)]) for k in range(len(left)))
-        # A polygon that crosses itself may have no ear; then any corner will do.
+        # A polygon that crosses itself may have no ear; then cut off any corner.
         ear = next(
             (ear for ear in ears if _is_ear(corners, ear, left, normal)),
             (left[0], left[1], left[2]),

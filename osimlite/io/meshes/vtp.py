@@ -25,7 +25,7 @@ from osimlite.io.meshes.surface import (
     Indices,
     Polygons,
     Surface,
-    split_strips,
+    split_strip,
     triangulate,
 )
 
@@ -65,38 +65,45 @@ _TYPES = {
 
 
 class _Unreadable(Exception):
-    """What is wrong with a file, without its name."""
+    """Error of a file, without its name."""
 
 
 def read_vtp(content: bytes, name: str) -> Surface:
-    """The surface in a ``.vtp`` file, its polygons cut into triangles.
+    """Read the surface of a ``.vtp`` file as triangles.
 
     Args:
-        content: of the file.
-        name: of the file, for messages.
+        content: content of the file.
+        name: name of the file, for messages.
 
     Raises:
-        OsimliteError: it is not such a file, is damaged, or is compressed in a way that osimlite
-            does not know.
+        OsimliteError: the file is not such a file, is damaged, or has an unsupported compression.
     """
-    with _find_named(name):
-        return _File(content).surface()
+    with _name_errors(name):
+        return _File(content).read_surface()
 
 
 def read_vtp_polygons(content: bytes, name: str) -> Polygons:
-    """The polygons in a ``.vtp`` file, with all digits of text that says it has single precision, as Simbody has them.
+    """Read the polygons of a ``.vtp`` file.
 
-    Arguments and errors as those of :func:`read_vtp`.
+    Numbers in text keep all digits even if the file declares single precision, as in Simbody.
+
+    Args:
+        content: content of the file.
+        name: name of the file, for messages.
+
+    Raises:
+        OsimliteError: the file is not such a file, is damaged, or has an unsupported compression.
     """
-    with _find_named(name):
-        return _File(content, all_digits=True).polygons()[0]
+    with _name_errors(name):
+        return _File(content, all_digits=True).read_polygons()[0]
 
 
 @contextmanager
-def _find_named(name: str) -> Iterator[None]:
+def _name_errors(name: str) -> Iterator[None]:
+    """Raise errors of a file with its name."""
     try:
-        # Nonsense in a damaged file is found by what it gives; numpy need not warn of it on the
-        # way.
+        # Invalid numbers of a damaged file are found in the result, so numpy need not warn of
+        # them.
         with np.errstate(all="ignore"):
             yield
     except _Unreadable as problem:
@@ -143,12 +150,16 @@ class _File:
             raise _Unreadable("one of its offsets is no number") from None
         self.offsets = [*sorted(offsets), len(self.appended)]
 
-    def surface(self) -> Surface:
-        polygons, normals = self.polygons()
+    def read_surface(self) -> Surface:
+        polygons, normals = self.read_polygons()
         return Surface(polygons.points, triangulate(*polygons), normals)
 
-    def polygons(self) -> tuple[Polygons, Array | None]:
-        """All polygons, those of strips among them, and the normals at the points if there are any."""
+    def read_polygons(self) -> tuple[Polygons, Array | None]:
+        """Return all polygons, including those of strips, and the normals.
+
+        Returns:
+            The polygons, and the normals at the points (n, 3); None if a piece has none.
+        """
         points, corners, normals = (
             [np.zeros((0, 3))],
             [np.zeros(0, dtype=np.int64)],
@@ -156,12 +167,12 @@ class _File:
         )
         sizes, count, all_normals = [np.zeros(0, dtype=np.int64)], 0, True
         for piece in self.root.iterfind("PolyData/Piece"):
-            own = self._vectors(piece.find("Points/DataArray"))
+            own = self._read_vectors(piece.find("Points/DataArray"))
             points.append(own)
-            for around, lengths in self._polygons(piece, len(own)):
+            for around, lengths in self._iterate_polygons(piece, len(own)):
                 corners.append(around + count)
                 sizes.append(lengths)
-            at_points = self._normals(piece, len(own))
+            at_points = self._read_normals(piece, len(own))
             all_normals = all_normals and at_points is not None
             normals += [] if at_points is None else [at_points]
             count += len(own)
@@ -171,20 +182,24 @@ class _File:
         result = Polygons(np.concatenate(points), np.concatenate(corners), ends)
         return result, np.concatenate(normals) if all_normals else None
 
-    def _polygons(self, piece: etree._Element, count: int) -> Iterator[tuple[Indices, Indices]]:
-        """Corners, one after the other, and numbers of corners: of polygons, then of the triangles of every strip."""
-        corners, ends = self._cells(piece, "Polys", count)
+    def _iterate_polygons(
+        self, piece: etree._Element, count: int
+    ) -> Iterator[tuple[Indices, Indices]]:
+        """Yield corners one after the other, and numbers of corners: polygons first, then triangles of each strip."""
+        corners, ends = self._read_cells(piece, "Polys", count)
         yield corners, np.diff(ends, prepend=0)
-        corners, ends = self._cells(piece, "Strips", count)
+        corners, ends = self._read_cells(piece, "Strips", count)
         for strip in np.split(corners, ends[:-1]) if len(ends) else []:
             if len(strip) >= 3:
-                triangles = split_strips(strip)
+                triangles = split_strip(strip)
                 yield triangles.ravel(), np.full(len(triangles), 3)
 
-    def _cells(self, piece: etree._Element, tag: str, count: int) -> tuple[Indices, Indices]:
-        """Corners of all cells of a kind, one after the other, and where each cell ends."""
+    def _read_cells(self, piece: etree._Element, tag: str, count: int) -> tuple[Indices, Indices]:
+        """Return the corners of all cells of a kind, one after the other, and the end of each cell."""
         corners, ends = (
-            np.zeros(0, dtype=np.int64) if array is None else self._numbers(array).astype(np.int64)
+            np.zeros(0, dtype=np.int64)
+            if array is None
+            else self._read_numbers(array).astype(np.int64)
             for array in (
                 piece.find(f"{tag}/DataArray[@Name='{name}']")
                 for name in ("connectivity", "offsets")
@@ -199,7 +214,7 @@ class _File:
             raise _Unreadable(f"its {tag} name points that are not there")
         return corners, ends
 
-    def _normals(self, piece: etree._Element, count: int) -> Array | None:
+    def _read_normals(self, piece: etree._Element, count: int) -> Array | None:
         data = piece.find("PointData")
         if data is None:
             return None
@@ -209,21 +224,21 @@ class _File:
         )
         if array is None or array.get("NumberOfComponents") != "3":
             return None
-        normals = self._vectors(array)
+        normals = self._read_vectors(array)
         return normals if len(normals) == count else None
 
-    def _vectors(self, array: etree._Element | None) -> Array:
+    def _read_vectors(self, array: etree._Element | None) -> Array:
         if array is None:
             raise _Unreadable("it has a piece without points")
-        numbers = self._numbers(array).astype(np.float64)
+        numbers = self._read_numbers(array).astype(np.float64)
         if len(numbers) % 3 or not np.isfinite(numbers).all():
             raise _Unreadable(
                 f"its {array.get('Name', 'points')} are not three finite numbers each"
             )
         return numbers.reshape(-1, 3)
 
-    def _numbers(self, array: etree._Element) -> NDArray[np.generic]:
-        """The numbers of a DataArray."""
+    def _read_numbers(self, array: etree._Element) -> NDArray[np.generic]:
+        """Return the numbers of a DataArray."""
         kind, form = array.get("type", ""), array.get("format", "ascii")
         if kind not in _TYPES:
             raise _Unreadable(f"it has numbers of the type '{kind}'")
@@ -236,9 +251,9 @@ class _File:
                         (array.text or "").split(), dtype=np.float64 if exact else dtype
                     )
                 case "binary":
-                    data = self._payload(_decode_base64((array.text or "").encode()))
+                    data = self._read_block(_decode_base64((array.text or "").encode()))
                 case "appended":
-                    data = self._payload(self._after(int(array.get("offset", "0"))))
+                    data = self._read_block(self._get_appended_array(int(array.get("offset", "0"))))
                 case _:
                     raise _Unreadable(f"it has numbers in the format '{form}'")
             return np.frombuffer(data, dtype)
@@ -251,26 +266,26 @@ class _File:
                 f"its numbers named '{array.get('Name', '')}' are damaged or cut off"
             ) from None
 
-    def _after(self, offset: int) -> bytes:
-        """The bytes of the array that starts at an offset of what is appended."""
+    def _get_appended_array(self, offset: int) -> bytes:
+        """Return the bytes of the array that starts at an offset of the appended data."""
         if not 0 <= offset < len(self.appended):
             raise ValueError
         end = next(place for place in self.offsets if place > offset)
         part = self.appended[offset:end]
         return part if self.raw else _decode_base64(part)
 
-    def _take(self, count: int) -> None:
-        """Count bytes of numbers; several arrays may be made of the same bytes of the file."""
+    def _count_bytes(self, count: int) -> None:
+        """Add bytes to the sum of numbers read, which is limited: several arrays may use the same bytes."""
         self.left -= count
         if self.left < 0:
             raise _Unreadable(f"it has more than {MAX_BYTES / 1e6:g} MB of numbers")
 
-    def _payload(self, stream: bytes) -> bytes:
-        """What a block of bytes holds after its header, decompressed."""
+    def _read_block(self, stream: bytes) -> bytes:
+        """Return the content of a block of bytes after its header, decompressed."""
         width = self.header.itemsize
         if not self.compressor:
             size = int(np.frombuffer(stream, self.header, 1)[0])
-            self._take(min(size, len(stream)))
+            self._count_bytes(min(size, len(stream)))
             data = stream[width : width + size]
             if len(data) != size:
                 raise ValueError
@@ -283,21 +298,21 @@ class _File:
         if not blocks:
             return b""
         _, whole, last, *sizes = np.frombuffer(stream, self.header, 3 + blocks).tolist()
-        # The size that is promised decides before anything is decompressed; no block may be longer.
-        self._take(whole * (blocks - bool(last)) + last)
+        # Check the declared size before decompressing anything; no block may be larger.
+        self._count_bytes(whole * (blocks - bool(last)) + last)
         place, parts = (3 + blocks) * width, []
         for size in sizes:
             parts.append(
                 _DECOMPRESS[self.compressor](stream[place : place + size], max(whole, last))
             )
             place += size
-        # A last block that is as long as the others is written as having length zero.
+        # VTK writes the length zero for a last block that is as long as the others.
         if sum(map(len, parts)) != whole * (blocks - bool(last)) + last:
             raise ValueError
         return b"".join(parts)
 
 
 def _decode_base64(text: bytes) -> bytes:
-    """The bytes of base64 text, in which header and data may each be encoded, and padded, on their own."""
+    """Decode base64 text, in which header and data may be encoded and padded separately."""
     parts = re.findall(rb"[^=]+=*", b"".join(text.split()))
     return b"".join(base64.b64decode(part, validate=True) for part in parts)

@@ -40,13 +40,14 @@ PROGRAM = "import sys; sys.path[:0] = sys.argv[3:]; from osimlite.io.tables.c3d_
 
 
 def read_c3d_markers(path: str | Path) -> tuple[tuple[str, ...], Array, Array]:
-    """Read names of the markers (m,), times (t,) in s and positions (t, m, 3) in m.
+    """Read the markers of a .c3d file.
 
-    Positions are NaN where a marker was not seen.
+    Returns:
+        Names (m,), times (t,) in s, and positions (t, m, 3) in m, NaN where a marker was not seen.
 
     Raises:
-        MissingFileError: there is no such file.
-        DocumentError: it is no .c3d file.
+        MissingFileError: the file does not exist.
+        DocumentError: the file is not a .c3d file.
         MissingDependency: ezc3d is not installed.
     """
     arrays = _run_reader(path, "markers")
@@ -54,14 +55,14 @@ def read_c3d_markers(path: str | Path) -> tuple[tuple[str, ...], Array, Array]:
 
 
 def read_c3d_forces(path: str | Path) -> StoTable:
-    """The forces of the plates over time, as OpenSim's reader names them.
+    """Read the forces of the force plates over time, with the labels of OpenSim's reader.
 
-    Of the first plate ``f1_x``, ``f1_y``, ``f1_z`` is the force (N), ``p1_x`` ... the middle of the
-    plate (m), and ``m1_x`` ... the moment about it (N·m).
+    Columns of the first plate are ``f1_x``, ``f1_y``, ``f1_z`` for the force (N), ``p1_x`` ... for the
+    centre of the plate (m), and ``m1_x`` ... for the moment about it (N·m).
 
     Raises:
-        MissingFileError: there is no such file.
-        DocumentError: it is no .c3d file, or it has no force plates.
+        MissingFileError: the file does not exist.
+        DocumentError: the file is not a .c3d file, or has no force plates.
         MissingDependency: ezc3d is not installed.
     """
     arrays = _run_reader(path, "forces")
@@ -73,18 +74,17 @@ def read_c3d_forces(path: str | Path) -> StoTable:
 
 
 def _run_reader(path: str | Path, what: str) -> dict[str, Array]:
-    """Return the arrays that a separate process reads from a file.
+    """Run the reader in a separate process.
 
-    Damaged files make ezc3d 1.6 write beyond its memory (a process ends by SIGSEGV), or loop
-    without
-    end: it may do so where nothing else is lost, and for a limited time.
+    Damaged files make ezc3d 1.6 write outside its memory (the process ends by SIGSEGV) or loop forever;
+    in a separate process nothing else is lost, and the time is limited.
 
     Args:
-        path: of the file.
+        path: the file.
         what: ``markers`` or ``forces``.
     """
     size = len(read_file(path))
-    # A name in sys.modules that is None, or a package that is not there.
+    # An entry None in sys.modules blocks the import, as a missing package does.
     if sys.modules.get("ezc3d", ...) is None or find_spec("ezc3d") is None:
         raise MissingDependency(
             "a .c3d file is read by ezc3d, which is not installed; run: pip install ezc3d, or pip install "
@@ -92,7 +92,7 @@ def _run_reader(path: str | Path, what: str) -> dict[str, Array]:
             file=str(path),
         )
     seconds = SECONDS + size // BYTES_PER_SECOND
-    # Imported here, since every tool knows of these files and few have one.
+    # Imported here because most commands never read such a file.
     import subprocess
 
     package = str(Path(__file__).parents[3])

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from osimlite.io.tables.headers import METRES
+from osimlite.io.tables.headers import METRES_PER_UNIT
 from osimlite.mechanics.multibody.spatial import Array
 
 MOMENTS = {"nm": 1.0, "n.m": 1.0, "nmm": 0.001, "n.mm": 0.001}
@@ -46,10 +46,14 @@ def run_process() -> None:
 
 
 def read_markers(path: str) -> dict[str, Array]:
-    """Return names (m,), times (t,) in s and positions (t, m, 3) in m; NaN where a marker was not seen."""
+    """Read the markers of a .c3d file.
+
+    Returns:
+        "names" (m,), "times" (t,) in s and "positions" (t, m, 3) in m, NaN where a marker was not seen.
+    """
     result = import_module("ezc3d").c3d(path)
     points = result["parameters"]["POINT"]
-    unit = METRES.get(points["UNITS"]["value"][0].strip().lower(), 0.001)
+    unit = METRES_PER_UNIT.get(points["UNITS"]["value"][0].strip().lower(), 0.001)
     names = [
         name for key, more in points.items() if key.startswith("LABELS") for name in more["value"]
     ]
@@ -65,11 +69,16 @@ def read_markers(path: str) -> dict[str, Array]:
 
 
 def read_forces(path: str) -> dict[str, Array]:
-    """Return names (k,), times (t,) in s and rows (t, k) in N, m and N·m; without plates there is no name."""
+    """Read the forces of the force plates.
+
+    Returns:
+        "names" of the columns (k,), "times" (t,) in s and "rows" (t, k) in N, m and N·m; without plates
+        all are empty.
+    """
     result = import_module("ezc3d").c3d(path, extract_forceplat_data=True)
     columns, rows = list[str](), list[Array]()
     for number, plate in enumerate(result["data"]["platform"], start=1):
-        length = METRES.get(plate["unit_position"].strip().lower(), 0.001)
+        length = METRES_PER_UNIT.get(plate["unit_position"].strip().lower(), 0.001)
         middle = np.repeat(
             length * plate["corners"].mean(axis=1)[:, None], plate["force"].shape[1], axis=1
         )

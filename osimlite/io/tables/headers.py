@@ -1,7 +1,6 @@
-"""The headers of tables over time: storage files (.sto, .mot) and marker files (.trc).
+"""Headers of tables over time: storage files (.sto, .mot) and marker files (.trc).
 
-Whatever is wrong with a header, all that can be read of it is there; who reads the rows says what
-is missing.
+A damaged header is read as far as possible. The functions that read the rows report what is missing.
 """
 
 from __future__ import annotations
@@ -16,15 +15,17 @@ from osimlite.io.document.source import Position
 MARKER_KEYS = (
     "DataRate", "CameraRate", "NumFrames", "NumMarkers", "Units", "OrigDataRate", "OrigDataStartFrame", "OrigNumFrames",
 )  # fmt: skip
-"""Keys in the second line of a marker file, all of which OpenSim requires in this order."""
-METRES = {"m": 1.0, "mm": 0.001, "cm": 0.01, "km": 1000.0}
-"""Units of markers that OpenSim knows, in metres."""
+"""Keys in the second line of a marker file; OpenSim requires all of them in this order."""
+METRES_PER_UNIT = {"m": 1.0, "mm": 0.001, "cm": 0.01, "km": 1000.0}
+"""Factors from the units of markers that OpenSim knows to metres."""
 COUNTS = {"nRows": "nRows", "nr": "nRows", "datarows": "nRows"} | dict.fromkeys(
     ("nColumns", "nc", "datacolumns"), "nColumns"
 )
-"""Keys of counts in the header of a storage file, by what they mean."""
-LONGEST_HEADER, LONGEST_LINE = 1_000_000, 4_000_000
-"""Bytes in which the header of a storage file ends, and those of a line that are looked at."""
+"""Keys of counts in the header of a storage file, each with the key that it is an alias of."""
+MAX_HEADER_BYTES = 1_000_000
+"""Number of bytes that are searched for the end of a storage file's header."""
+MAX_LINE_BYTES = 4_000_000
+"""Number of bytes of a line that are read."""
 
 SUFFIXES = {
     "double": ("",),
@@ -34,9 +35,10 @@ SUFFIXES = {
     "SpatialVec": ("_rx", "_ry", "_rz", "_tx", "_ty", "_tz"),
     **{f"Vec{size}": tuple(f"_{k + 1}" for k in range(size)) for size in (2, *range(4, 13))},
 }
-"""What a table may hold, and how OpenSim calls the numbers of one of these when it takes them apart."""
+"""Suffixes by type of a cell (``DataType``), which OpenSim appends to labels when it splits cells."""
 _SOLID = re.compile(rb"\S")
 MARK = b"\xef\xbb\xbf"
+"""Byte order mark of UTF-8."""
 _LINE = re.compile(rb"[^\n]*(?:\n|\Z)")
 _END = re.compile(rb"^[ \t]*endheader[ \t]*\r?(?:\n|\Z)", re.MULTILINE)
 _ANY_END = re.compile(_END.pattern, re.MULTILINE | re.IGNORECASE)
@@ -48,10 +50,17 @@ _BETWEEN_TABS = re.compile(r"[^\t\s][^\t]*(?<![\t\s])", re.ASCII)
 
 
 def list_suffixes(kind: str, file: str | None = None) -> tuple[str, ...]:
-    """The endings of the labels of one value of a kind (``DataType``).
+    """Return the suffixes of the labels for one cell of a type (``DataType``).
+
+    Args:
+        kind: type of the cells.
+        file: path of the file, for messages.
+
+    Returns:
+        One suffix for each number of a cell.
 
     Raises:
-        UnsupportedError: OpenSim has no such kind.
+        UnsupportedError: OpenSim has no such type.
     """
     if kind.lower() == "double":
         return SUFFIXES["double"]
@@ -77,15 +86,15 @@ class Entry(NamedTuple):
 
 
 class MarkerHeader:
-    """The first five lines of a marker file.
+    """First five lines of a marker file.
 
     Attributes:
-        lines: their text without ends; fewer if there are no more.
-        entries: what it says, by its keys.
-        labels: of the markers.
-        label_line: its number.
-        rows: the offset behind it.
-        row_line: the number of the line there.
+        lines: their texts without line ends; fewer if the file has fewer.
+        entries: entries of lines two and three, by key.
+        labels: labels of the markers.
+        label_line: number of the line with the labels.
+        rows: byte offset of the first row.
+        row_line: number of the line of the first row.
     """
 
     label_line = 4
@@ -93,10 +102,10 @@ class MarkerHeader:
     def __init__(self, data: bytes) -> None:
         result = [match for match in islice(_LINE.finditer(data), 5) if match.end() > match.start()]
         self.lines = [
-            _text(data[match.start() : min(match.end(), match.start() + LONGEST_LINE)])
+            _decode_line(data[match.start() : min(match.end(), match.start() + MAX_LINE_BYTES)])
             for match in result
         ]
-        # Where the line of X1 Y1 Z1 is missing the rows begin with the fifth.
+        # If the line of X1 Y1 Z1 is missing, the fifth line is the first row.
         self.row_line = 5 if self.lines[4:] and self.lines[4][:1].isdigit() else len(result) + 1
         self.rows = (
             result[4].start()
@@ -106,7 +115,7 @@ class MarkerHeader:
             else 0
         )
         keys, values = self.words(2), self.words(3)
-        # Of a value that is missing nobody knows to which key it belongs.
+        # If a value is missing, the others cannot be assigned to keys.
         pairs = zip(keys, values, strict=True) if len(keys) == len(values) else ()
         self.entries = {key.text: Entry(key, value) for key, value in reversed([*pairs])}
         self.labels = self.words(4)[2:]
@@ -121,31 +130,39 @@ class MarkerHeader:
 
 
 class StorageHeader:
-    """The header of a storage file, and the labels behind it.
+    """Header of a storage file, with the labels after it.
 
     Attributes:
-        lines: its text without ends, up to the line that ends it. end: what ends it, ``endheader``
-            in whatever letters, and where; before the labels it may be nothing. entries: the first
-            word of each line and the rest, by that word. labels: of all columns, with that of the
-            time. label_line: the number of their line. has_tabs: whether there are tabs in it.
-            rows: the offset behind it. row_line: the number of the line there.
+        lines: texts without line ends, up to the line that ends the header.
+        end: word that ends the header, ``endheader`` in any letter case, with its position; empty if
+            the labels follow without it.
+        entries: rest of each line by its first word.
+        labels: labels of all columns, including time.
+        label_line: number of the line with the labels.
+        has_tabs: whether that line contains tabs.
+        rows: byte offset of the first row.
+        row_line: number of the line of the first row.
     """
 
     def __init__(self, data: bytes, file: str = "") -> None:
         self._is_motion = file.lower().endswith(".mot")
         mark = len(MARK) if data.startswith(MARK) else 0
-        head = data[mark:LONGEST_HEADER]
+        head = data[mark:MAX_HEADER_BYTES]
         end = _END.search(head) or _ANY_END.search(head)
         labels = None if end else _LABELS.search(head)
         stop = end or labels
-        self.lines = [_text(line) for line in head[: stop.start() if stop else 0].split(b"\n")]
+        self.lines = [
+            _decode_line(line) for line in head[: stop.start() if stop else 0].split(b"\n")
+        ]
         number = len(self.lines)
-        self.end = split_header(_text(end[0]), number)[0] if end else Word("", Position(number, 1))
+        self.end = (
+            split_header(_decode_line(end[0]), number)[0] if end else Word("", Position(number, 1))
+        )
         self.entries: dict[str, Entry] = {}
         for count, line in enumerate(self.lines, 1):
             match = _KEY.match(line.rstrip())
             if match:
-                key, value = (_word(match, group, count) for group in (1, 2))
+                key, value = (_make_word(match, group, count) for group in (1, 2))
                 self.entries[COUNTS.get(key.text, key.text)] = Entry(key, value)
         start = mark + end.end() if end else mark + labels.start() if labels else len(data)
         result = _SOLID.search(data, start)
@@ -155,8 +172,9 @@ class StorageHeader:
         start = data.rfind(b"\n", 0, result.start()) + 1 if result else len(data)
         self.rows = data.find(b"\n", start) + 1 or len(data)
         self.row_line = self.label_line + 1
-        # The newer of OpenSim's readers takes a label up to a tab, the older up to a blank.
-        line = _text(data[max(start, mark) : min(self.rows, start + LONGEST_LINE)])
+        # OpenSim's newer reader (version 2 and later) separates labels by tabs, the older one by
+        # any blank.
+        line = _decode_line(data[max(start, mark) : min(self.rows, start + MAX_LINE_BYTES)])
         self.has_tabs = "\t" in line
         self.labels = split_header(
             line, self.label_line, _BETWEEN_TABS if self.is_strict and self.has_tabs else _WORD
@@ -201,18 +219,24 @@ class StorageHeader:
         said = self.value("inDegrees").lower() in ("yes", "y")
         if self.form or said:
             return said
-        # Files from before there were versions are those of SIMM.
+        # Files without a version are in the format of SIMM, whose motions are in degrees.
         return self._is_motion or "degrees" in self.value("Angles")
 
 
 def split_header(line: str, number: int, pattern: re.Pattern[str] = _WORD) -> list[Word]:
-    """Return the words of a line with its number."""
-    return [_word(match, 0, number) for match in pattern.finditer(line)]
+    """Return the words of a line of the header.
+
+    Args:
+        line: the line.
+        number: number of the line.
+        pattern: pattern of one word.
+    """
+    return [_make_word(match, 0, number) for match in pattern.finditer(line)]
 
 
-def _word(match: re.Match[str], group: int, number: int) -> Word:
+def _make_word(match: re.Match[str], group: int, number: int) -> Word:
     return Word(match[group], Position(number, match.start(group) + 1, max(1, len(match[group]))))
 
 
-def _text(line: bytes) -> str:
+def _decode_line(line: bytes) -> str:
     return line.decode("utf-8", "replace").rstrip("\r\n")

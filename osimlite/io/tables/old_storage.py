@@ -1,4 +1,4 @@
-"""Tables as OpenSim's tools print them: the older form of its storage files, with eight decimals."""
+"""Tables as OpenSim's tools print them: version 1 of the storage format, with eight decimals."""
 
 from __future__ import annotations
 
@@ -16,23 +16,24 @@ DEGREES = (
     "(yes) or radians (no).\n"
 )
 UNITS = f"Units are S.I. units (second, meters, Newtons, ...)\n{DEGREES}"
-"""What OpenSim says of its tables in their headers."""
+"""Text about units that OpenSim's tools write into the headers of their tables."""
 PRECISION = 8
-"""Digits behind the point that OpenSim prints unless it is told otherwise."""
+"""Decimals that OpenSim's tools print by default."""
 _PADDING = 8
-_BLOCK = 4096
-"""So many numbers are written at once."""
+"""Characters of a cell besides its decimals: OpenSim prints with `%(8 + precision).precision f`."""
+_BLOCK_SIZE = 4096
+"""Numbers that are formatted at once."""
 
 
 def format_old_table(
     table: StoTable, description: str = "", precision: int = PRECISION
 ) -> Iterator[str]:
-    """The text of a table as OpenSim's ``Storage`` prints it, in parts.
+    """Yield the text of a table in parts, as OpenSim's ``Storage`` prints it.
 
     Args:
         table: the table.
-        description: what stands before the end of the header; a line end is added.
-        precision: digits behind the point.
+        description: text before the end of the header; a line end is added.
+        precision: number of decimals.
     """
     expect_plain_labels(table.name, table.columns)
     yield f"{table.name}\nversion=1\nnRows={len(table.times)}\nnColumns={len(table.columns) + 1}\n"
@@ -42,7 +43,7 @@ def format_old_table(
     yield "endheader\n"
     yield "\t".join(("time", *table.columns)) + "\n"
     rows = np.column_stack([table.times, table.rows])
-    step = _BLOCK // rows.shape[1] + 1
+    step = _BLOCK_SIZE // rows.shape[1] + 1
     cell = f"%{precision + _PADDING}.{precision}f"
     for start in range(0, len(rows), step):
         block = rows[start : start + step]
@@ -54,21 +55,23 @@ def format_old_table(
 
 
 def _format_decimals(rows: Array, cell: str, eights: int) -> str | None:
-    """Lines of numbers with so many times eight decimals as the format of a cell writes them, all at once.
+    """Return the text of rows of numbers with 8 or 16 decimals, formatted all at once with numpy.
 
-    None if one is wider than the others.
+    It is the text that the format `cell` gives number by number. `eights` is the number of groups of
+    eight decimals. Return None if a number is wider than the cell.
     """
-    # What has more than four digits before the point is rare, and so is what is no number.
+    # Numbers with more than four digits before the point, NaN and infinities are rare and are
+    # formatted one by one below.
     plain = np.abs(rows) < 9999.0
     size = np.where(plain, np.abs(rows), 0.0)
-    digits = [size.astype(np.int64), *_format_8_digits(size - size.astype(np.int64), eights)]
+    digits = [size.astype(np.int64), *_split_decimals(size - size.astype(np.int64), eights)]
     for before, eight in zip(digits[-2::-1], digits[:0:-1], strict=True):
         before += eight == 10**8
         eight[eight == 10**8] = 0
-    wholes, fours = _format_numbers()
+    wholes, fours = _make_digit_tables()
     names = [f"{half}{number}" for number in range(eights) for half in ("first", "last")]
-    # A number as text: up to the point, four decimals and four more each time, and what stands
-    # behind it.
+    # Layout of a number: 8 characters up to the point, groups of four decimals, and the separator
+    # after it. Each group is copied from a table.
     cells = np.empty(
         rows.shape, [("whole", "u8"), *((name, "u4") for name in names), ("end", "u1")]
     )
@@ -87,12 +90,12 @@ def _format_decimals(rows: Array, cell: str, eights: int) -> str | None:
     return cells.tobytes().decode()
 
 
-def _format_8_digits(part: Array, count: int) -> list[NDArray[np.int64]]:
-    """Whole numbers of eight decimals each, one behind the other, of numbers from 0 up to 1.
+def _split_decimals(part: Array, count: int) -> list[NDArray[np.int64]]:
+    """Return the decimals of numbers in [0, 1) as `count` arrays of integers with eight digits each.
 
-    The last is rounded to the nearest, to the even of two, and may be 1e8. A product comes with
-    what its rounding leaves over: T. J. Dekker, Numer. Math. 18, 1971. 1e8 has few enough digits
-    for all to be exact.
+    The last integer is rounded to nearest, ties to even, and may be 1e8. The multiplication by 1e8 is
+    exact: each product comes with its rounding error (T. J. Dekker, Numer. Math. 18, 1971; 134217729 is
+    2^27 + 1, which splits a double into halves).
     """
     high, low, result = part, np.zeros_like(part), []
     for number in range(count):
@@ -103,7 +106,7 @@ def _format_8_digits(part: Array, count: int) -> list[NDArray[np.int64]]:
         over -= value - product
         if number == count - 1:
             whole = np.rint(value)
-            # Halves are none if something is left over.
+            # A value of exactly one half is no tie if the rounding error `over` is not zero.
             half = value - whole
             whole += np.where((np.abs(half) == 0.5) & (half * over > 0.0), 2.0 * half, 0.0)
         else:
@@ -117,8 +120,13 @@ def _format_8_digits(part: Array, count: int) -> list[NDArray[np.int64]]:
 
 
 @cache
-def _format_numbers() -> tuple[Array, Array]:
-    """What is before the decimals of numbers by sign and whole part (20000,), and all four decimals (10000,)."""
+def _make_digit_tables() -> tuple[Array, Array]:
+    """Return lookup tables of formatted numbers.
+
+    Returns:
+        Text up to the point by sign and whole part (20000,), and four decimals (10000,), as integers
+        of the same bytes.
+    """
     numbers, blank = np.arange(10000)[:, None], ord(" ")
     digits = (numbers // (1000, 100, 10, 1) % 10 + ord("0")).astype("u1")
     leading = numbers < (1000, 100, 10)

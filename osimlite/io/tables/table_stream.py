@@ -9,33 +9,16 @@ from pathlib import Path
 from osimlite.base.files import open_file
 from osimlite.base.text import format_count
 from osimlite.errors import DocumentError
-from osimlite.io.tables.headers import LONGEST_HEADER, StorageHeader, list_suffixes
+from osimlite.io.tables.headers import MAX_HEADER_BYTES, StorageHeader, list_suffixes
 
 _NO_NUMBER = re.compile(r"[-+]?1\.#(IND|QNAN|SNAN|INF)\d*", re.IGNORECASE)
 """How programs on Windows wrote what is no number."""
 
 
 class TableStream:
-    """A storage file of which one row at a time is read; close it after use, or use it in a ``with`` statement.
+    """Storage file of which one row at a time is read.
 
-    Iterating gives ``(time, row)`` with the time in s and the numbers of the columns in their
-    order; blank lines are passed over.
-
-    Attributes:
-        file: its path.
-        name: first line of the file.
-        kind: what it holds, ``double`` as a rule.
-        labels: of the columns as they are in the file, without the time.
-        columns: labels of the numbers; of a Vec3 ``p`` these are ``p_x``, ``p_y`` and ``p_z``.
-        in_degrees: whether rotational values are in degrees.
-        line: number of the line of the file that was read last.
-        text: of the row that was read last.
-        header: the first word of every line of the header, with the rest of the line.
-
-    Raises:
-        MissingFileError: there is no such file, or it may not be read.
-        DocumentError: it is not a storage file, or a row is damaged; with line and column.
-        UnsupportedError: it holds a kind that OpenSim does not know.
+    Close it after use, or use it in a ``with`` statement.
     """
 
     def __init__(self, path: str | Path) -> None:
@@ -48,7 +31,7 @@ class TableStream:
             raise
 
     def close(self) -> None:
-        """Close the file."""
+        """Close the file; further reads fail."""
         self._stream.close()
 
     def __enter__(self) -> TableStream:
@@ -99,7 +82,7 @@ class TableStream:
         return row
 
     def _read_header(self) -> None:
-        beginning = b"".join(self._stream.readlines(LONGEST_HEADER))
+        beginning = b"".join(self._stream.readlines(MAX_HEADER_BYTES))
         result = StorageHeader(beginning, self.file)
         if not result.end.text:
             raise DocumentError(_make_format_error(beginning[:100].lstrip()), file=self.file)

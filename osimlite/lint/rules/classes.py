@@ -13,7 +13,7 @@ from osimlite.lint.registry import ERROR, FindingCollector, rule
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import describe_object, with_article
 from osimlite.schema.base import Object
-from osimlite.schema.fields import Held
+from osimlite.schema.fields import ObjectField
 from osimlite.schema.model import Model
 from osimlite.schema.registry import find_class, list_class_tags, list_tags
 from osimlite.schema.specs import FieldSpec, get_field_specs
@@ -42,14 +42,14 @@ def report_unknown_class(subject: Subject, report: FindingCollector) -> None:
     ```
     """
     for note, owner in subject.notes_of("unknown-class"):
-        fate = _describe_consequence(subject, note)
+        consequence = _describe_consequence(subject, note)
         accepted = (
             list_tags()
             if note.spec is None or note.spec.accepts is None
             else list_class_tags(note.spec.accepts)
         )
         suggestion = _find_nearest_class(subject, note, accepted)
-        message = f"OpenSim has no class '{note.word}' and {fate}"
+        message = f"OpenSim has no class '{note.word}' and {consequence}"
         plugin = find_plugin(note.word)
         if plugin:
             message += f"; it belongs to {plugin}: load that first; nothing in it was checked"
@@ -243,7 +243,7 @@ def find_wrapper(note: Note, owner: Object) -> str | None:
     lists = (
         s
         for s in get_field_specs(type(owner)).values()
-        if isinstance(s.kind, Held) and s.kind.form == "list"
+        if isinstance(s.kind, ObjectField) and s.kind.form == "list"
     )
     best = next(
         (
@@ -262,7 +262,7 @@ def find_part(note: Note, owner: Object) -> FieldSpec | None:
         return None
     for spec in get_field_specs(type(owner)).values():
         free = (
-            isinstance(spec.kind, Held)
+            isinstance(spec.kind, ObjectField)
             and spec.kind.form == "single"
             and spec.name not in owner.model_fields_set
         )
@@ -274,13 +274,13 @@ def find_part(note: Note, owner: Object) -> FieldSpec | None:
 def _describe_consequence(subject: Subject, note: Note) -> str:
     """Return what OpenSim does with an object that it cannot accept."""
     spec = note.spec
-    if spec is None or not isinstance(spec.kind, Held):
+    if spec is None or not isinstance(spec.kind, ObjectField):
         return "leaves the object out"
     if spec.tag == "objects":
         return "rejects the file"
     if spec.kind.form != "single":
         return "leaves the object out"
-    attributes = None if subject.source is None else subject.source.attributes_of(note.number)
+    attributes = None if subject.source is None else subject.source.get_attributes(note.number)
     if attributes is None or ("name" in attributes and attributes["name"].value == spec.tag):
         return "rejects the file"
     return "leaves the object out, and fails where it needs one"

@@ -40,10 +40,10 @@ def describe_consequence(
             if number == 0 and not is_allowed
             else {}
         )
-        for fates in (case, facts.outside, {REFUSED: facts.refused}):
-            for fate, properties in fates.items():
+        for consequences in (case, facts.outside, {REFUSED: facts.refused}):
+            for consequence, properties in consequences.items():
                 if name in properties.split():
-                    return fate, bool(fate)
+                    return consequence, bool(consequence)
         if name in facts.doubts:
             return facts.doubts[name], False
     return "", False
@@ -77,13 +77,15 @@ def report_not_finite(subject: Subject, report: FindingCollector) -> None:
             if math.isnan(number) or (math.isinf(number) and not _may_be_infinite(item, spec))
         ]
         if bad:
-            fate = _describe_nan_consequence(item, spec, bad[0])
+            consequence = _describe_nan_consequence(item, spec, bad[0])
             report(
-                f"{subject.describe_property(item, spec)} is {format_value(value)}: {fate}",
+                f"{subject.describe_property(item, spec)} is {format_value(value)}: {consequence}",
                 item,
                 tag=spec.tag,
                 word=_find_word(subject, item, spec, bad[0]),
-                severity=WARNING if fate in (_DRAWN_CONSEQUENCE, _BOUND_CONSEQUENCE) else None,
+                severity=WARNING
+                if consequence in (_DRAWN_CONSEQUENCE, _BOUND_CONSEQUENCE)
+                else None,
             )
 
 
@@ -200,7 +202,7 @@ class DomainVerdict(NamedTuple):
 
     number: float
     domain: str
-    fate: str
+    consequence: str
     known: bool
 
 
@@ -245,21 +247,23 @@ def _iterate_outside_domain(subject: Subject) -> Iterator[_OutsideDomain]:
                     if not inside(number) and math.isfinite(number)
                 ]
                 if not wrong and _is_missing(item, spec, value):
-                    fate, fails = describe_consequence(cls, spec.name, math.nan)
+                    consequence, fails = describe_consequence(cls, spec.name, math.nan)
                     if fails:
-                        yield item, spec, value, DomainVerdict(math.nan, "", fate, fails)
+                        yield item, spec, value, DomainVerdict(math.nan, "", consequence, fails)
                     continue
                 if not wrong or (
                     subject.has_note(item, spec) and wrong == list(_to_numbers(spec.default))
                 ):
                     continue
                 if id(item) in obstacles and (spec.name, wrong[0]) != ("torus_radius", 0):
-                    fate, fails = REFUSED, True
+                    consequence, fails = REFUSED, True
                 else:
                     rigid = bool(getattr(item, "ignore_tendon_compliance", False))
-                    fate, fails = describe_consequence(cls, spec.name, wrong[0], rigid_tendon=rigid)
+                    consequence, fails = describe_consequence(
+                        cls, spec.name, wrong[0], rigid_tendon=rigid
+                    )
                 domain = _get_domain(cls, spec)
-                yield item, spec, value, DomainVerdict(wrong[0], domain, fate, fails)
+                yield item, spec, value, DomainVerdict(wrong[0], domain, consequence, fails)
 
 
 def _is_missing(item: Object, spec: FieldSpec, value: Any) -> bool:
@@ -280,7 +284,7 @@ def _report_domain(
     if verdict.number != verdict.number:
         report(
             f"{subject.describe_property(item, spec)} is missing and has no default: "
-            f"{verdict.fate}",
+            f"{verdict.consequence}",
             item,
             tag=spec.tag,
         )
@@ -295,9 +299,9 @@ def _report_domain(
         .replace(">", "more than")
         .replace("!=", "other than")
     )
-    fate = f": {verdict.fate}" if verdict.fate else ""
+    consequence = f": {verdict.consequence}" if verdict.consequence else ""
     report(
-        f"{subject.describe_property(item, spec)} is {size}, expected {wanted}{fate}",
+        f"{subject.describe_property(item, spec)} is {size}, expected {wanted}{consequence}",
         item,
         tag=spec.tag,
         word=_find_word(subject, item, spec, verdict.number),

@@ -50,8 +50,13 @@ def report_missing_mesh(subject: Subject, report: FindingCollector) -> None:
     for item, tag, name in items:
         severity = ERROR if isinstance(item, ContactMesh) else None
         if not name:
-            fate = "" if severity is None else ": OpenSim rejects the model"
-            report(f"{describe_object(item)} names no file{fate}", item, tag=tag, severity=severity)
+            consequence = "" if severity is None else ": OpenSim rejects the model"
+            report(
+                f"{describe_object(item)} names no file{consequence}",
+                item,
+                tag=tag,
+                severity=severity,
+            )
             continue
         if any(folders.has(place, name) for place in places):
             continue
@@ -124,7 +129,7 @@ def report_included_file(subject: Subject, report: FindingCollector) -> None:
         ignored = _has_content(subject.source, note.number)
         state = "is read from" if read else "should be read from"
         why = "" if read else f", which {note.why or 'OpenSim does not open for a member of a set'}"
-        fate = (
+        consequence = (
             ": OpenSim ignores the content given here"
             if ignored
             else ": it stays empty"
@@ -135,12 +140,12 @@ def report_included_file(subject: Subject, report: FindingCollector) -> None:
         uses = subject.uses if note.why and subject.model is not None else []
         wanted = sum(subject.resolution(use).target is note.owner for use in uses)
         if wanted:
-            fate += (
+            consequence += (
                 f", while {format_count(wanted, 'reference')} to it "
                 f"{'leads' if wanted == 1 else 'lead'} nowhere"
             )
         report(
-            f"{describe_object(note.owner)} {state} '{note.value}'{why}{fate}",
+            f"{describe_object(note.owner)} {state} '{note.value}'{why}{consequence}",
             note.owner,
             number=note.number,
             attribute="file",
@@ -200,11 +205,11 @@ def report_missing_data_file(subject: Subject, report: FindingCollector) -> None
         if name and any(folders.has(place, name) for place in places):
             continue
         twin = folders.in_other_case(places, name)
-        fate = (
+        consequence = (
             "it has no controls" if cls == "ControlSetController" else "OpenSim rejects the model"
         )
         report(
-            f"the file '{name}' of {describe_object(item)} does not exist: {fate}",
+            f"the file '{name}' of {describe_object(item)} does not exist: {consequence}",
             item,
             tag=tag,
             suggestion=twin,

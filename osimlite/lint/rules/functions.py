@@ -67,7 +67,7 @@ def report_unsorted_abscissae(subject: Subject, report: FindingCollector) -> Non
                     and not rejected
                     and function.y[index - 1 : index] == function.y[index : index + 1]
                 )
-                fate = (
+                consequence = (
                     UNUSED
                     if is_off
                     else "OpenSim rejects it"
@@ -80,7 +80,7 @@ def report_unsorted_abscissae(subject: Subject, report: FindingCollector) -> Non
                 word, nth = subject.word_at(function, "x", index)
                 report(
                     f"x of {subject.describe_part(function)}: number {index + 1}, "
-                    f"{format_quantity(here)}, {relation} the one before; {fate}",
+                    f"{format_quantity(here)}, {relation} the one before; {consequence}",
                     function,
                     tag="x",
                     word=word,
@@ -114,7 +114,7 @@ def report_unequal_points(subject: Subject, report: FindingCollector) -> None:
         if xs == ys:
             continue
         is_off = is_unused(subject, function)
-        fate = (
+        consequence = (
             UNUSED
             if is_off
             else "OpenSim reads beyond the end of the list"
@@ -122,7 +122,7 @@ def report_unequal_points(subject: Subject, report: FindingCollector) -> None:
             else "the extra values are ignored"
         )
         report(
-            f"{subject.describe_part(function)} has {xs} x values and {ys} y values: {fate}",
+            f"{subject.describe_part(function)} has {xs} x values and {ys} y values: {consequence}",
             function,
             tag="y",
             severity=WARNING if is_off or ys > xs else None,
@@ -159,21 +159,21 @@ def report_too_few_points(subject: Subject, report: FindingCollector) -> None:
                 if "half_order" in function.model_fields_set
                 else "not given"
             )
-            fate = _describe_refusal(subject, function)
+            consequence = _describe_refusal(subject, function)
             report(
-                f"half_order of {subject.describe_part(function)} is {given}: {fate}; 2 is a "
+                f"half_order of {subject.describe_part(function)} is {given}: {consequence}; 2 is a "
                 "cubic spline",
                 function,
                 tag="half_order",
                 severity=severity,
             )
         elif len(function.x) < least:
-            fate = "it has no value"
+            consequence = "it has no value"
             if is_off or isinstance(function, GCVSpline):
-                fate = _describe_refusal(subject, function)
+                consequence = _describe_refusal(subject, function)
             given = format_count(len(function.x), "point")
             report(
-                f"{subject.describe_part(function)} has {given} and needs {least}: {fate}",
+                f"{subject.describe_part(function)} has {given} and needs {least}: {consequence}",
                 function,
                 tag="x",
                 severity=severity,
@@ -205,9 +205,9 @@ def report_coefficient_count(subject: Subject, report: FindingCollector) -> None
     for function in subject.find_instances(LinearFunction):
         if not function.coefficients:
             is_off = is_unused(subject, function)
-            fate = UNUSED if is_off else "OpenSim crashes when it needs a value"
+            consequence = UNUSED if is_off else "OpenSim crashes when it needs a value"
             report(
-                f"{subject.describe_part(function)} has no coefficients: {fate}",
+                f"{subject.describe_part(function)} has no coefficients: {consequence}",
                 function,
                 tag="coefficients",
                 severity=WARNING if is_off else ERROR,
@@ -223,10 +223,10 @@ def report_coefficient_count(subject: Subject, report: FindingCollector) -> None
         )
         if given != wanted:
             is_off = is_unused(subject, polynomial)
-            fate = UNUSED if is_off else "OpenSim fails when it needs a value"
+            consequence = UNUSED if is_off else "OpenSim fails when it needs a value"
             report(
                 f"{subject.describe_part(polynomial)} has {format_count(given, 'coefficient')}; "
-                f"{format_count(dimension, 'variable')} to order {order} need {wanted}: {fate}",
+                f"{format_count(dimension, 'variable')} to order {order} need {wanted}: {consequence}",
                 polynomial,
                 tag="coefficients",
                 severity=WARNING if is_off else ERROR,
@@ -234,7 +234,7 @@ def report_coefficient_count(subject: Subject, report: FindingCollector) -> None
     for holder, names, function in _find_linear_functions(subject):
         given, wanted = len(function.coefficients), names + 1
         if given and given != wanted:
-            fate = (
+            consequence = (
                 "OpenSim reads beyond the end of the list"
                 if given < wanted
                 else "OpenSim ignores the rest"
@@ -242,7 +242,7 @@ def report_coefficient_count(subject: Subject, report: FindingCollector) -> None
             report(
                 f"the LinearFunction of {describe_object(holder)} has "
                 f"{format_count(given, 'coefficient')} for {format_count(names, 'coordinate')}, expected "
-                f"{wanted}; {fate}",
+                f"{wanted}; {consequence}",
                 function,
                 tag="coefficients",
                 severity=ERROR if given < wanted else None,
@@ -352,9 +352,9 @@ def report_missing_function(subject: Subject, report: FindingCollector) -> None:
     for function in subject.find_instances(MultiplierFunction):
         if function.function is None:
             is_off = is_unused(subject, function)
-            fate = UNUSED if is_off else "OpenSim fails when it needs a value"
+            consequence = UNUSED if is_off else "OpenSim fails when it needs a value"
             report(
-                f"{subject.describe_part(function)} has no function to multiply: {fate}",
+                f"{subject.describe_part(function)} has no function to multiply: {consequence}",
                 function,
                 severity=WARNING if is_off else None,
             )

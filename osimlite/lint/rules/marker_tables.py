@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import hypot
 
 from osimlite.io.document.source import Position
-from osimlite.io.tables.headers import METRES
+from osimlite.io.tables.headers import METRES_PER_UNIT
 from osimlite.lint.registry import INFO, WARNING, FindingCollector, rule
 from osimlite.lint.table import Table
 
@@ -35,7 +35,7 @@ def report_marker_units(table: Table, report: FindingCollector) -> None:
     ```
     """
     units = table.entries.get("Units")
-    unit = METRES.get(units.value.text) if units is not None else None
+    unit = METRES_PER_UNIT.get(units.value.text) if units is not None else None
     if units is None or unit is None or len(table.labels) < 2:
         return
     spreads = sorted(
@@ -46,7 +46,8 @@ def report_marker_units(table: Table, report: FindingCollector) -> None:
     usual = spreads[len(spreads) // 2]
     if not _SMALLEST <= usual * unit <= _LARGEST:
         right = next(
-            (name for name in ("m", "mm", "cm") if 0.2 <= usual * METRES[name] <= 3.0), None
+            (name for name in ("m", "mm", "cm") if 0.2 <= usual * METRES_PER_UNIT[name] <= 3.0),
+            None,
         )
         report(
             f"the markers of a frame are spread over {usual * unit:.3g} m if the units are "

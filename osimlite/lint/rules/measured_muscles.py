@@ -42,7 +42,7 @@ def report_start_off_equilibrium(subject: Subject, report: FindingCollector) -> 
     """
     most = subject.config.value_of(OFF)
     for start in get_measures(subject).starts:
-        muscle = subject.tree.at(start.owner)
+        muscle = subject.tree.find(start.owner)
         (length, settled), (tension, settled_tension) = start.lengths, start.tensions
         if settled != settled:
             report(
@@ -86,7 +86,7 @@ def report_fiber_limit(subject: Subject, report: FindingCollector) -> None:
     """
     longest = subject.config.value_of(LONGEST)
     for reach in get_measures(subject).reaches:
-        muscle = subject.tree.at(reach.owner)
+        muscle = subject.tree.find(reach.owner)
         lengths = f"{reach.length:.3g} optimal lengths"
         if reach.length != reach.length:
             report(f"{describe_object(muscle)} has no equilibrium {reach.pose}", muscle)

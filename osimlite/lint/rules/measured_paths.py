@@ -64,7 +64,7 @@ def report_wrong_wrapping(subject: Subject, report: FindingCollector) -> None:
     for wrapping in measures.wrappings:
         if abs(wrapping.worst) >= most and wrapping.owner not in told:
             owner, surfaces = (
-                subject.tree.at(wrapping.owner),
+                subject.tree.find(wrapping.owner),
                 join_words([f"'{name}'" for name in wrapping.surfaces]),
             )
             by_default = f"{1000.0 * wrapping.default:.3g} mm in the default pose and by "
@@ -108,7 +108,7 @@ def report_path_jump(subject: Subject, report: FindingCollector) -> None:
     for jump in get_measures(subject).jumps:
         if jump.size < subject.config.value_of(JUMP):
             continue
-        owner = subject.tree.at(jump.owner)
+        owner = subject.tree.find(jump.owner)
         parts = join_words([f"'{part}'" for part in jump.parts])
         why = (
             f"{parts} {'appear or disappear' if len(jump.parts) > 1 else 'appears or disappears'}"
@@ -144,7 +144,7 @@ def report_length_of_wrap(subject: Subject, report: FindingCollector) -> None:
     ```
     """
     for item in get_measures(subject).on_surfaces:
-        owner = subject.tree.at(item.owner)
+        owner = subject.tree.find(item.owner)
         path = f"the path of {describe_object(owner)}"
         if item.length < 0.0:
             report(
@@ -213,7 +213,7 @@ def report_moving_point_range(subject: Subject, report: FindingCollector) -> Non
                 other, point, key=lambda it: (it.moved >= made_up, it.moved, it.rate)
             )
     for point in worst.values():
-        owner, end = subject.tree.at(point.owner), point.end
+        owner, end = subject.tree.find(point.owner), point.end
         names = f"'{point.point}' of {describe_object(owner)}"
         if point.moved >= made_up:
             report(

@@ -338,7 +338,7 @@ def report_study_parts(setup: Setup, report: FindingCollector) -> None:
         if any(map(setup.find_by_class, ("MocoStudy", "MocoTool")))
         else ()
     ):
-        for joint in tree.of_class("Joint").values():
+        for joint in tree.find_by_class("Joint").values():
             faults = [
                 f"{describe_object(item)} is locked"
                 for item in joint.coordinates

@@ -100,21 +100,23 @@ def report_illegal_name(subject: Subject, report: FindingCollector) -> None:
     # In a file this old OpenSim fixes the name, but not what names it.
     for change in subject.changes:
         if change.step == "names" and subject.source is not None:
-            place = subject.source.of_attribute(change.number, "name")
+            place = subject.source.locate_attribute(change.number, "name")
             start = subject.source.line_start(place.line) + place.column - 1
             name = subject.source.text[start : start + place.length]
             if any(character.isspace() for character in name) and not name.startswith("<"):
                 better = "".join(name.split())
                 used = subject.source.text.count(name) > 1
                 frame = subject.source.spans[change.number].tag in ("Body", "Ground")
-                fate = f"OpenSim makes it '{better}'" + (
+                consequence = f"OpenSim makes it '{better}'" + (
                     ", but not where others use it" if used else ""
                 )
                 if frame:
-                    fate = "OpenSim creates frames of that name for the joints and rejects them"
+                    consequence = (
+                        "OpenSim creates frames of that name for the joints and rejects them"
+                    )
                 report(
                     f"the name '{name}' contains white space: in a file of version "
-                    f"{subject.version} {fate}",
+                    f"{subject.version} {consequence}",
                     at=place,
                     suggestion=better,
                     severity=ERROR if frame else None if used else INFO,

@@ -155,7 +155,7 @@ def report_reference_form(subject: Subject, report: FindingCollector) -> None:
                 continue
             # In files of the time a name stood in an element of its own inside a connector.
             inner = next(iter(subject.source.children(change.number)), change.number)
-            place = subject.source.of_text(inner)
+            place = subject.source.locate_text(inner)
             start = subject.source.line_start(place.line) + place.column - 1
             text = subject.source.text[start : start + place.length]
             report(
@@ -175,11 +175,11 @@ def _is_repeated(source: Source, number: int) -> bool:
             above = index
     if above is None:
         return False
-    name = source.attributes_of(number).get("name")
+    name = source.get_attributes(number).get("name")
     for index in source.children(above):
         if index >= number:
             return False
-        other = source.attributes_of(index).get("name")
+        other = source.get_attributes(index).get("name")
         names = [attribute.value for attribute in (name, other) if attribute is not None]
         if source.spans[index].tag == span.tag and len(names) == 2 and names[0] == names[1]:
             return True
@@ -253,7 +253,7 @@ def _iterate_broken_references(subject: Subject) -> Iterator[BrokenReference]:
             if refuses_axes(cast("CustomJoint", use.owner)):
                 yield _explain_reference(subject, use, text, resolution)
         elif not _is_undecided(subject, use, text) and not (
-            use.position == 0 and use.reference.takes(text)
+            use.position == 0 and use.reference.accepts_word(text)
         ):
             yield _explain_reference(subject, use, text, resolution)
 
@@ -336,7 +336,7 @@ def _list_right_words(subject: Subject, use: Use) -> list[str]:
             {item.name for item in tree.components if tree.parent_of(item) is use.owner}
         )
     elif key not in known:
-        known[key] = subject.tree.spellings(use)
+        known[key] = subject.tree.list_spellings(use)
     return known[key]
 
 

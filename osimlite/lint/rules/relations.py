@@ -63,11 +63,11 @@ def report_contradicting_values(subject: Subject, report: FindingCollector) -> N
         relation = next(
             (_RELATIONS[base.__name__] for base in cls.__mro__ if base.__name__ in _RELATIONS), None
         )
-        if relation is not None or cls.contradictions is not Object.contradictions:
+        if relation is not None or cls.find_contradictions is not Object.find_contradictions:
             for item in [item for item in items if id(item) not in strange]:
                 owner = subject.owner(item)
                 for tag, message in (
-                    relation(item, owner) if relation is not None else item.contradictions()
+                    relation(item, owner) if relation is not None else item.find_contradictions()
                 ):
                     of = "" if item.name and item is owner else f" of {describe_object(owner)}"
                     report(f"{describe_object(item)}{of}: {message}: {REFUSED}", item, tag=tag)
@@ -103,7 +103,7 @@ def report_controls_swapped(subject: Subject, report: FindingCollector) -> None:
 
 
 _Relation = Callable[[Any, Any], Iterator[Contradiction]]
-"""Gives the contradictions of an object, from it and the component that it belongs to."""
+"""Gives the find_contradictions of an object, from it and the component that it belongs to."""
 
 
 def _make_curve_relation(make: Callable[..., object]) -> _Relation:

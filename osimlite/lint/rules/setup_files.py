@@ -58,10 +58,10 @@ def report_missing_input(setup: Setup, report: FindingCollector) -> None:
         twin = slashed if is_meant else _find_other_case(naming)
         why = "; backslashes separate folders on Windows only" if "\\" in naming.name else ""
         goes_on = is_a(naming.item, "ControlSetController")
-        fate = "OpenSim continues without it" if goes_on else "OpenSim rejects the setup"
+        consequence = "OpenSim continues without it" if goes_on else "OpenSim rejects the setup"
         report(
             f"the file '{naming.name}' of {describe_object(naming.item)} does not exist{why}: "
-            f"{fate}",
+            f"{consequence}",
             naming.item,
             tag=naming.spec.tag,
             word=naming.name if naming.spec.tag == "force_set_files" else None,
@@ -107,9 +107,9 @@ def report_missing_input(setup: Setup, report: FindingCollector) -> None:
                     else "neither states nor coordinates"
                 )
                 severity = ERROR if given else WARNING
-                fate = "OpenSim rejects it" if given else NO_FILE_CONSEQUENCE
+                consequence = "OpenSim rejects it" if given else NO_FILE_CONSEQUENCE
                 report(
-                    f"{describe_object(item)} names {what}: {fate}",
+                    f"{describe_object(item)} names {what}: {consequence}",
                     item,
                     tag="coordinates_file",
                     severity=severity,

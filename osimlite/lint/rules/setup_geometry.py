@@ -8,7 +8,7 @@ from itertools import islice
 from typing import Any
 
 from osimlite.base.text import format_count
-from osimlite.io.tables.headers import METRES
+from osimlite.io.tables.headers import METRES_PER_UNIT
 from osimlite.lint.posture import locate_markers
 from osimlite.lint.registry import WARNING, FindingCollector, rule
 from osimlite.lint.rules.setup_markers import (
@@ -66,7 +66,7 @@ def report_scale_factor(setup: Setup, report: FindingCollector) -> None:
         said = table.entries.get("Units")
         places, unit = (
             locate_markers(setup),
-            METRES.get(said.value.text, math.nan) if said else math.nan,
+            METRES_PER_UNIT.get(said.value.text, math.nan) if said else math.nan,
         )
         rows, columns = (
             list(iterate_rows_between(table, scaler.time_range)),

@@ -160,7 +160,7 @@ def report_load_place(setup: Setup, report: FindingCollector) -> None:
     if motion is None or not weight:
         return
     up = tuple(-part / weight for part in model.gravity)
-    mass = sum(body.mass for body in setup.tree.members("/bodyset", "Body").values())
+    mass = sum(body.mass for body in setup.tree.list_members("/bodyset", "Body").values())
     for loads in setup.find_by_class("ExternalLoads"):
         table = setup.read_table(loads.datafile)
         whole = [0.0, 0.0, 0.0]
@@ -228,7 +228,7 @@ def _sample_load(setup: Setup, force: Any, table: Table | None, motion: Table) -
     """Sample a measured force at times at which it is large."""
     if setup.tree is None or table is None or table.span is None or motion.span is None:
         return []
-    bodies = setup.tree.members("/bodyset", "Body")
+    bodies = setup.tree.list_members("/bodyset", "Body")
     places = [
         [
             place

@@ -75,7 +75,7 @@ def report_marker_not_measured(setup: Setup, report: FindingCollector) -> None:
             )
         free = 0
         if setup.tree is not None and both:
-            free = sum(not setup.is_bound(name) for name in setup.tree.of_class("Coordinate"))
+            free = sum(not setup.is_bound(name) for name in setup.tree.find_by_class("Coordinate"))
         others = sum(task.apply for task in select_members(user.ik_task_set, "IKCoordinateTask"))
         if 3 * len(both) + others < free:
             report(

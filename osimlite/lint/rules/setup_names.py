@@ -71,9 +71,9 @@ def report_unknown_name(setup: Setup, report: FindingCollector) -> None:
             what = _get_kind(kind) if kind.required and kind.shape != "list" else None
             for item in items if what else ():
                 if getattr(item, spec.name) in ("", None) and counts(item):
-                    fate, severity = _CONSEQUENCES[kind.fate]
+                    consequence, severity = _CONSEQUENCES[kind.consequence]
                     report(
-                        f"{describe_object(item)} names no {what}: {fate}",
+                        f"{describe_object(item)} names no {what}: {consequence}",
                         item,
                         tag=spec.tag,
                         severity=severity,
@@ -97,7 +97,12 @@ def report_unknown_name(setup: Setup, report: FindingCollector) -> None:
 
     for use in setup.uses:
         item, kind, text = use.holder, use.reference, str(use.value).strip()
-        if not text or text.lower() == "unassigned" or kind.takes(text) or kind.fate == "ignored":
+        if (
+            not text
+            or text.lower() == "unassigned"
+            or kind.accepts_word(text)
+            or kind.consequence == "ignored"
+        ):
             continue
         if not counts(item):
             continue
@@ -116,14 +121,14 @@ def report_unknown_name(setup: Setup, report: FindingCollector) -> None:
         is_lost = (
             kind.rule == "socket" and what == "actuator" and not is_a(item, "PrescribedController")
         )
-        fate, severity = _CONSEQUENCES["left out" if is_lost else kind.fate]
+        consequence, severity = _CONSEQUENCES["left out" if is_lost else kind.consequence]
         more = "; write it in lower case" if text.lower() in kind.words else ""
         where: Where = {"tag": use.spec.tag, "word": text}
         if use.spec.tag == "@name":
             where = {"attribute": "name"}
             names = names.difference(other.name for other in setup.by_class[type(item)])
         report(
-            f"the model has no {what} '{text}', which {describe_object(item)} names: {fate}{more}",
+            f"the model has no {what} '{text}', which {describe_object(item)} names: {consequence}{more}",
             item,
             **where,
             severity=severity,
@@ -173,14 +178,14 @@ def _look_up_controls(
         return
     # Of tools that follow a motion these are bounds, and go by the whole name.
     follows = hasattr(tool, "desired_kinematics_file")
-    fate, severity = _CONSEQUENCES["left out" if follows else "refused"]
+    consequence, severity = _CONSEQUENCES["left out" if follows else "refused"]
     actuators = {f"{name}.excitation" for name in plain} | (set() if follows else plain)
     controls = list(setup.find_by_class("Control"))
     free = sorted(actuators.difference(control.name for control in controls))
     for control in controls:
         if control.name not in actuators:
             report(
-                f"the model has no actuator for {describe_object(control)}: {fate}",
+                f"the model has no actuator for {describe_object(control)}: {consequence}",
                 control,
                 attribute="name",
                 severity=severity,
@@ -253,7 +258,7 @@ def report_excluded_force(setup: Setup, report: FindingCollector) -> None:
         word = str(use.value)
         if (
             use.spec.tag != "forces_to_exclude"
-            or use.reference.takes(word)
+            or use.reference.accepts_word(word)
             or word in (groups or names)
         ):
             continue

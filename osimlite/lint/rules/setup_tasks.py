@@ -107,7 +107,9 @@ def report_unreachable_task(setup: Setup, report: FindingCollector) -> None:
       </InverseKinematicsTool>
     ```
     """
-    coordinates: dict[str, Any] = {} if setup.tree is None else setup.tree.of_class("Coordinate")
+    coordinates: dict[str, Any] = (
+        {} if setup.tree is None else setup.tree.find_by_class("Coordinate")
+    )
     angles = find_angles(setup)
     for user in setup.find_having("ik_task_set", "coordinate_file"):
         table = setup.read_table(user.coordinate_file)

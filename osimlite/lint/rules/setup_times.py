@@ -93,9 +93,11 @@ def report_time_outside_data(setup: Setup, report: FindingCollector) -> None:
     for item in setup.find_having("time_range"):
         count = len(item.time_range)
         if count != 2 and getattr(item, "apply", True):
-            fate, severity = ("fails", ERROR) if count < 2 else ("takes the first two", WARNING)
+            consequence, severity = (
+                ("fails", ERROR) if count < 2 else ("takes the first two", WARNING)
+            )
             report(
-                f"expected two times in a range, found {count}: OpenSim {fate}",
+                f"expected two times in a range, found {count}: OpenSim {consequence}",
                 item,
                 tag="time_range",
                 severity=severity,
@@ -112,14 +114,14 @@ def report_time_outside_data(setup: Setup, report: FindingCollector) -> None:
             )
     for item, tags, first, last in _find_time_ranges(setup):
         if any(number != number for number in (first, last)):
-            fate, severity = (
+            consequence, severity = (
                 ("takes all times", WARNING)
                 if is_a(item, "IMUInverseKinematicsTool")
                 else ("rejects it", ERROR)
             )
             tag = tags[0] if first != first else tags[-1]
             report(
-                f"a time of {describe_object(item)} is not a number: OpenSim {fate}",
+                f"a time of {describe_object(item)} is not a number: OpenSim {consequence}",
                 item,
                 tag=tag,
                 severity=severity,
@@ -130,7 +132,7 @@ def report_time_outside_data(setup: Setup, report: FindingCollector) -> None:
             first == last and is_a(item, "AbstractTool") and not is_a(item, "AnalyzeTool")
         ):
             # Either of the two may be wrong.
-            fate, severity = (
+            consequence, severity = (
                 ("uses the times of the tool", WARNING)
                 if is_a(item, "Analysis")
                 else ("fails", ERROR)
@@ -138,7 +140,7 @@ def report_time_outside_data(setup: Setup, report: FindingCollector) -> None:
             for tag in tags:
                 report(
                     f"{describe_object(item)} begins at {first:g} s and ends at {last:g} s: "
-                    f"OpenSim {fate}",
+                    f"OpenSim {consequence}",
                     item,
                     tag=tag,
                     severity=severity,

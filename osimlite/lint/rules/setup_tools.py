@@ -350,7 +350,7 @@ def report_tool_setting(setup: Setup, report: FindingCollector) -> None:
 
 def _find_unactuated_coordinates(setup: Setup) -> list[str]:
     """Return the free coordinates of joints to ground, if only paths between bodies act in the model."""
-    if setup.tree is None or not setup.tree.of_class("Actuator"):
+    if setup.tree is None or not setup.tree.find_by_class("Actuator"):
         return []
     files = setup.find_having("force_set_files")
     if any(len(tool.force_set_files) > len(setup.added_sets) for tool in files):
@@ -360,7 +360,7 @@ def _find_unactuated_coordinates(setup: Setup) -> list[str]:
     ]
     if any(
         not is_a(force, "PathActuator")
-        for force in (*setup.tree.of_class("Actuator").values(), *added)
+        for force in (*setup.tree.find_by_class("Actuator").values(), *added)
     ):
         return []
     parts: list[Any] = setup.tree.components
@@ -369,7 +369,7 @@ def _find_unactuated_coordinates(setup: Setup) -> list[str]:
         for part in parts
     ):
         return []
-    joints: Any = setup.tree.of_class("Joint").values()
+    joints: Any = setup.tree.find_by_class("Joint").values()
     on_ground = (
         joint
         for joint in joints

@@ -8,7 +8,7 @@ from itertools import islice
 from typing import Any
 
 from osimlite.base.text import join_words
-from osimlite.io.tables.headers import METRES
+from osimlite.io.tables.headers import METRES_PER_UNIT
 from osimlite.lint.placement import locate_frame
 from osimlite.lint.posture import locate_markers, make_model_subject
 from osimlite.lint.registry import WARNING, FindingCollector, rule
@@ -54,7 +54,7 @@ def report_marker_size(setup: Setup, report: FindingCollector) -> None:
     users = setup.find_having("marker_file", "time_range")
     for user, table in setup.iterate_with_tables(users, "marker_file"):
         units = table.entries.get("Units")
-        unit = METRES.get(units.value.text) if units is not None else None
+        unit = METRES_PER_UNIT.get(units.value.text) if units is not None else None
         if setup.tree is None or not table.is_markers or unit is None or units is None:
             continue
         if not getattr(user, "apply", True):
@@ -77,7 +77,9 @@ def report_marker_size(setup: Setup, report: FindingCollector) -> None:
             continue
         ratio = sorted(sizes)[len(sizes) // 2]
         low, high = _SIZE_RATIOS
-        better = [name for name in ("m", "cm", "mm") if low <= ratio * METRES[name] <= high]
+        better = [
+            name for name in ("m", "cm", "mm") if low <= ratio * METRES_PER_UNIT[name] <= high
+        ]
         if better and not low <= ratio * unit <= high:
             report(
                 f"the markers of '{user.marker_file}' are spread over {ratio * unit:.3g} of the "
@@ -121,7 +123,7 @@ def report_load_units(setup: Setup, report: FindingCollector) -> None:
     if setup.tree is None:
         return
     model: Any = setup.tree.model
-    mass = sum(body.mass for body in setup.tree.members("/bodyset", "Body").values())
+    mass = sum(body.mass for body in setup.tree.list_members("/bodyset", "Body").values())
     weight = mass * math.hypot(*model.gravity)
     for loads, table in setup.iterate_with_tables(setup.find_by_class("ExternalLoads"), "datafile"):
         largest = _find_largest_load(

@@ -271,12 +271,12 @@ def report_no_direction(subject: Subject, report: FindingCollector) -> None:
         for item in subject.find_by_class(cls):
             if not any(getattr(item, tag)):
                 is_off = not getattr(item, "appliesForce", True)
-                fate = (
+                consequence = (
                     "it does not act" if is_off else "accelerations become NaN, without a message"
                 )
                 report(
                     f"{subject.describe_property(item, type(item).field_specs()[tag])} is 0 0 0: "
-                    f"{fate}",
+                    f"{consequence}",
                     item,
                     tag=tag,
                     severity=WARNING if is_off else None,

@@ -19,7 +19,7 @@ from osimlite.lint.rules.classes import find_part, find_set, find_wrapper
 from osimlite.lint.subject import Subject
 from osimlite.lint.words import describe_object, format_value, with_article
 from osimlite.schema.base import Object
-from osimlite.schema.fields import Held, Reference, Value
+from osimlite.schema.fields import ObjectField, Reference, Value
 from osimlite.schema.model import CURRENT_VERSION, Model
 from osimlite.schema.registry import find_classes_mentioning
 from osimlite.schema.specs import FieldSpec, get_field_specs
@@ -134,7 +134,7 @@ def _can_hold(subject: Subject, note: Note, spec: FieldSpec) -> bool:
         return True
     children = subject.source.children(note.number)
     has_text = bool(_get_inner_text(subject, note.number).strip()) and not children
-    if isinstance(spec.kind, Held):
+    if isinstance(spec.kind, ObjectField):
         return not has_text
     return not children
 
@@ -161,7 +161,7 @@ def _is_switched_off(subject: Subject, number: int) -> bool:
 def _is_default(subject: Subject, number: int, spec: FieldSpec) -> bool:
     """Return whether an element has the default value of the property, so ignoring it does not matter."""
     text = _get_inner_text(subject, number)
-    if isinstance(spec.kind, Held):
+    if isinstance(spec.kind, ObjectField):
         return spec.kind.form == "list" and not text.strip()
     return reads_as(text, spec.kind, spec.default)
 
@@ -214,7 +214,7 @@ def report_duplicate_tag(subject: Subject, report: FindingCollector) -> None:
     for note, owner in subject.notes_of("duplicate-tag"):
         assert note.spec is not None
         value = getattr(owner, note.spec.name)
-        taken = "" if isinstance(note.spec.kind, Held) else f", {format_value(value)},"
+        taken = "" if isinstance(note.spec.kind, ObjectField) else f", {format_value(value)},"
         if note.word != note.spec.tag:
             report(
                 f"<{note.spec.tag}> of {describe_object(owner)} holds one object; OpenSim takes "
@@ -342,7 +342,7 @@ def _find_property(subject: Subject, source: Source, number: int) -> FieldSpec |
                 old = successor(type(item), span.tag)
                 tag = old.tag if old is not None and old.tag is not None else span.tag
                 spec = specs.get(tag)
-                return spec if spec is not None and not isinstance(spec.kind, Held) else None
+                return spec if spec is not None and not isinstance(spec.kind, ObjectField) else None
     return None
 
 
@@ -362,7 +362,7 @@ def _list_given(owner: Object) -> set[str]:
 
 
 def _format_default(spec: FieldSpec) -> str:
-    if isinstance(spec.kind, Held) or spec.default in ("", (), None):
+    if isinstance(spec.kind, ObjectField) or spec.default in ("", (), None):
         return ""
     return f" ({format_value(spec.default)})"
 

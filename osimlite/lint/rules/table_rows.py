@@ -37,8 +37,8 @@ def report_no_rows(table: Table, report: FindingCollector) -> None:
         and not table.rows.count
         and not table.rows.faults
     ):
-        fate = "hangs" if table.is_markers else "rejects the table"
-        report(f"there are no rows: OpenSim {fate}", at=Position(table.header.label_line, 1))
+        consequence = "hangs" if table.is_markers else "rejects the table"
+        report(f"there are no rows: OpenSim {consequence}", at=Position(table.header.label_line, 1))
 
 
 @rule("OSIM806", "ragged-row", severity=ERROR, fixes="safe", about="table")
@@ -151,20 +151,20 @@ def report_not_a_number(table: Table, report: FindingCollector) -> None:
     for fault in table.rows.select("cell", "time"):
         label = table.label_of(fault.number)
         if fault.kind == "time" and (table.is_markers or table.is_strict):
-            fate = "a row needs a time"
+            consequence = "a row needs a time"
         elif table.is_markers:
-            fate = "OpenSim treats the marker as not seen"
+            consequence = "OpenSim treats the marker as not seen"
         elif table.is_strict:
-            fate = "OpenSim reads it as NaN"
+            consequence = "OpenSim reads it as NaN"
         else:
             lost = max(0, end - fault.line)
-            fate = (
+            consequence = (
                 f"OpenSim reads 0 and loses the rest of the table, {format_count(lost, 'row')}, without "
                 "a message"
             )
         what = f"'{fault.text}' is not a number" if fault.text else "the number is missing"
         report(
-            f"{what} (column '{label}'): {fate}{fault.describe_rest()}",
+            f"{what} (column '{label}'): {consequence}{fault.describe_rest()}",
             at=Position(fault.line, fault.column, max(1, fault.length)),
             severity=WARNING
             if fault.kind == "cell" and (table.is_markers or table.is_strict)

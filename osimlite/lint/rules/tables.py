@@ -213,14 +213,14 @@ def report_table_count(table: Table, report: FindingCollector) -> None:
         number = float(said) if _WHOLE.fullmatch(said) else nan
         if number == count:
             continue
-        fate = ""
+        consequence = ""
         if severity is ERROR and what == "rows" and number == number:
             lost = count - number
-            severity, fate = (
+            severity, consequence = (
                 (ERROR, f": OpenSim ignores the last {lost:g}") if lost > 0 else (WARNING, "")
             )
         elif severity is ERROR:
-            fate = (
+            consequence = (
                 ": OpenSim rejects the file"
                 if table.is_markers
                 else ": OpenSim puts numbers into the wrong columns"
@@ -229,7 +229,7 @@ def report_table_count(table: Table, report: FindingCollector) -> None:
         in_rows = {"nColumns": rows.cells, "NumMarkers": (rows.cells - 2) // 3}.get(key, count)
         is_right = not odd_rows and rows.count > 0 and in_rows == count
         report(
-            f"'{entry.key.text}' is '{said}', but there are {count} {what}{fate}",
+            f"'{entry.key.text}' is '{said}', but there are {count} {what}{consequence}",
             at=entry.value.at,
             severity=severity,
             suggestion=str(count) if is_right else None,
@@ -511,7 +511,9 @@ def report_column_label(table: Table, report: FindingCollector) -> None:
         places.setdefault(label.text, []).append(label.at)
     for name, (_, *again) in places.items():
         if again:
-            fate = "rejects the file" if table.is_markers else "does not find this one by its name"
+            consequence = (
+                "rejects the file" if table.is_markers else "does not find this one by its name"
+            )
             more = (
                 f"; there are {format_count(len(again) - 1, 'more column')} of this name"
                 if again[1:]
@@ -519,7 +521,7 @@ def report_column_label(table: Table, report: FindingCollector) -> None:
             )
             severity = ERROR if table.is_markers else None
             report(
-                f"another column has the label '{name}': OpenSim {fate}{more}",
+                f"another column has the label '{name}': OpenSim {consequence}{more}",
                 at=again[0],
                 severity=severity,
                 fault="label-twice",

@@ -166,10 +166,10 @@ def report_not_a_model(subject: Subject, report: FindingCollector) -> None:
         if fault.meant is None or not subject.source.well_formed:
             _report_at(subject.source, report, message, fault.line, fault.column)
             continue
-        root = subject.source.of_tag(0)
+        root = subject.source.locate_tag(0)
         number = int((root.line, root.column) != (fault.line, fault.column))
         fix = rename_tag(subject.source, number, fault.meant, safe=False)
-        report(message, at=subject.source.of_tag(number), suggestion=fault.meant, fix=fix)
+        report(message, at=subject.source.locate_tag(number), suggestion=fault.meant, fix=fix)
 
 
 @rule("OSIM004", "document-version", severity=ERROR)

@@ -68,9 +68,9 @@ def report_unconnected_body(subject: Subject, report: FindingCollector) -> None:
             )
         elif bones.find_joints(body):
             message = f"{describe_object(body)} is not connected to ground, only with itself"
-        fate = "adds a FreeJoint to ground" if not fails else "rejects the model"
+        consequence = "adds a FreeJoint to ground" if not fails else "rejects the model"
         report(
-            f"{message}; OpenSim {fate}",
+            f"{message}; OpenSim {consequence}",
             body,
             attribute="name",
             severity=None if fails else WARNING,
@@ -185,9 +185,9 @@ def report_massless_leaf(subject: Subject, report: FindingCollector) -> None:
             if members
             else ""
         )
-        fate = "computes NaN" if isinstance(joint, CustomJoint) else "rejects the model"
+        consequence = "computes NaN" if isinstance(joint, CustomJoint) else "rejects the model"
         report(
-            f"{describe_object(body)}{welded} is massless and the end of its chain: OpenSim {fate}",
+            f"{describe_object(body)}{welded} is massless and the end of its chain: OpenSim {consequence}",
             body,
             tag="mass",
         )

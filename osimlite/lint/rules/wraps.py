@@ -101,10 +101,10 @@ def report_wrap_range(subject: Subject, report: FindingCollector) -> None:
             )
             start, end = max(first, 1), last if last > 0 else count
             if end > count and start <= end and not (is_left or is_off):
-                fate = "OpenSim fails when it computes its length"
-                fate += ", unless an earlier wrap has no points there" if may_leave else ""
+                consequence = "OpenSim fails when it computes its length"
+                consequence += ", unless an earlier wrap has no points there" if may_leave else ""
                 report(
-                    f"{tells} ends beyond the {format_count(count, 'point')} of the path: {fate}",
+                    f"{tells} ends beyond the {format_count(count, 'point')} of the path: {consequence}",
                     wrap,
                     tag="range",
                     # OpenSim does not compute the length for a disabled force.

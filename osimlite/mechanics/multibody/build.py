@@ -35,7 +35,7 @@ from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.frames import Body, PhysicalFrame
 from osimlite.schema.joints import Joint
 from osimlite.schema.markers import Station
-from osimlite.schema.model import Model, expect_model
+from osimlite.schema.model import Model, check_is_model
 
 
 @any_numbers
@@ -75,7 +75,7 @@ def build_mechanism(
         UnsupportedError: a joint, constraint, frame or function is of an unknown class, or a loop
             is closed by a FreeJoint or by a joint whose child is ground.
     """
-    expect_model(model)
+    check_is_model(model)
     return _Builder(model, opensim_derivatives, rolling).build()
 
 

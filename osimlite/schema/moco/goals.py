@@ -2,7 +2,7 @@
 
 from typing import Annotated
 
-from osimlite.schema.base import Object, made, none
+from osimlite.schema.base import Object, make_default, make_empty_list
 from osimlite.schema.facts import Facts
 from osimlite.schema.fields import (
     Flag,
@@ -60,9 +60,9 @@ class MocoGoal(Object, abstract=True):
         str | None, Value("string", "optional", choices=("cost", "endpoint_constraint"))
     ] = None
     """Whether it is a cost or a constraint; left out, what is usual for the goal."""
-    moco_constraint_info: Unnamed[MocoConstraintInfo] = made(MocoConstraintInfo)
+    moco_constraint_info: Unnamed[MocoConstraintInfo] = make_default(MocoConstraintInfo)
     """Bounds of the values if it is a constraint."""
-    scale_factors: Many[MocoScaleFactor] = none()
+    scale_factors: Many[MocoScaleFactor] = make_empty_list()
     """Factors that the optimization finds for reference data."""
     divide_by_displacement: Flag = False
     """Whether the number is divided by the way of the center of mass."""
@@ -100,9 +100,9 @@ class MocoControlGoal(MocoGoal):
 
     facts = Facts(refused="exponent")
 
-    control_weights: ControlWeights = made(MocoWeightSet, name="control_weights")
+    control_weights: ControlWeights = make_default(MocoWeightSet, name="control_weights")
     """Weights by paths of controls."""
-    control_weights_pattern: Annotated[Single[MocoWeightSet], PatternOfControls] = made(
+    control_weights_pattern: Annotated[Single[MocoWeightSet], PatternOfControls] = make_default(
         MocoWeightSet, name="control_weights_pattern"
     )
     """Weights by patterns of paths, for controls that have none by path."""
@@ -117,7 +117,7 @@ class MocoControlGoal(MocoGoal):
 class MocoSumSquaredStateGoal(MocoGoal):
     """Squares of states over the motion."""
 
-    state_weights: StateWeights = made(MocoWeightSet, name="state_weights")
+    state_weights: StateWeights = make_default(MocoWeightSet, name="state_weights")
     """Weights by paths of states."""
     pattern: StatePattern = None
     """A regular expression; only states whose paths match it count."""
@@ -128,7 +128,7 @@ class MocoExpressionBasedParameterGoal(MocoGoal):
 
     expression: Text = ""
     """The expression, in names of `variables`."""
-    parameters: Many[MocoParameter] = none()
+    parameters: Many[MocoParameter] = make_empty_list()
     """Parameters that stand in the expression."""
     variables: Strings = ()
     """The name of each parameter in the expression."""
@@ -148,9 +148,9 @@ class MocoPeriodicityGoalPair(Object):
 class MocoPeriodicityGoal(MocoGoal):
     """A motion that ends as it began."""
 
-    state_pairs: Annotated[Many[MocoPeriodicityGoalPair], OfStates] = none()
+    state_pairs: Annotated[Many[MocoPeriodicityGoalPair], OfStates] = make_empty_list()
     """Pairs of states."""
-    control_pairs: Annotated[Many[MocoPeriodicityGoalPair], OfControls] = none()
+    control_pairs: Annotated[Many[MocoPeriodicityGoalPair], OfControls] = make_empty_list()
     """Pairs of controls."""
 
 
@@ -174,7 +174,7 @@ class MocoJointReactionGoal(MocoGoal):
     """The frame along whose axes the load counts; left out, that of `loads_frame`."""
     reaction_measures: Annotated[tuple[str, ...], Value("string", "list", choices=MEASURES)] = ()
     """Components that count, such as force-x or moment-z; left out, all six."""
-    reaction_weights: Single[MocoWeightSet] = made(MocoWeightSet, name="reaction_weights")
+    reaction_weights: Single[MocoWeightSet] = make_default(MocoWeightSet, name="reaction_weights")
     """Weights by components."""
 
 
@@ -217,11 +217,11 @@ class MocoStepTimeAsymmetryGoalGroup(Object):
 class MocoStepTimeAsymmetryGoal(MocoGoal):
     """How far the asymmetry of step times is from a given one."""
 
-    left_contact_group: Single[MocoStepTimeAsymmetryGoalGroup] = made(
+    left_contact_group: Single[MocoStepTimeAsymmetryGoalGroup] = make_default(
         MocoStepTimeAsymmetryGoalGroup, name="left_contact_group"
     )
     """Contacts of the left foot."""
-    right_contact_group: Single[MocoStepTimeAsymmetryGoalGroup] = made(
+    right_contact_group: Single[MocoStepTimeAsymmetryGoalGroup] = make_default(
         MocoStepTimeAsymmetryGoalGroup, name="right_contact_group"
     )
     """Contacts of the right foot."""

@@ -2,7 +2,7 @@
 
 from typing import Annotated
 
-from osimlite.schema.base import Component, Object, made, none
+from osimlite.schema.base import Component, Object, make_default, make_empty_list
 from osimlite.schema.fields import (
     LegacyMany,
     Many,
@@ -24,13 +24,13 @@ Strings = Annotated[tuple[str, ...], Value("string", "list")]
 OfStates = NamesOf(Reference("state-path", "state variable"))
 MaybeOfStates = NamesOf(Reference("state-path", "state variable", required=False))
 OfControls = NamesOf(Reference("state-path", "control"))
-OfFrames = NamesOf(Reference("model-path", "Frame", fate="left out"))
-OfMarkers = NamesOf(Reference("marker-name", "Marker", required=False, fate="left out"))
+OfFrames = NamesOf(Reference("model-path", "Frame", consequence="left out"))
+OfMarkers = NamesOf(Reference("marker-name", "Marker", required=False, consequence="left out"))
 OfOutputs = NamesOf(Reference("state-path", "output"))
 OfForces = NamesOf(Reference("state-path", "generalized force"))
-PatternOfStates = NamesOf(Reference("pattern", "state variable", fate="left out"))
-PatternOfControls = NamesOf(Reference("pattern", "control", fate="left out"))
-PatternOfForces = NamesOf(Reference("pattern", "generalized force", fate="left out"))
+PatternOfStates = NamesOf(Reference("pattern", "state variable", consequence="left out"))
+PatternOfControls = NamesOf(Reference("pattern", "control", consequence="left out"))
+PatternOfForces = NamesOf(Reference("pattern", "generalized force", consequence="left out"))
 StatePattern = Annotated[str | None, Value("string", "optional"), PatternOfStates]
 
 
@@ -59,7 +59,7 @@ class MocoWeight(Object):
 class MocoWeightSet(Set):
     """Weights by name."""
 
-    objects: LegacyMany[MocoWeight] = none()
+    objects: LegacyMany[MocoWeight] = make_empty_list()
     """The weights; what has none counts one."""
 
 
@@ -72,7 +72,7 @@ MarkerWeights = Annotated[Single[MocoWeightSet], OfMarkers]
 class MocoConstraintInfo(Object):
     """Bounds of the equations of a constraint; OpenSim writes it and does not read it again."""
 
-    bounds: Many[MocoBounds] = none()
+    bounds: Many[MocoBounds] = make_empty_list()
     """For each equation its bounds; left out, they are zero."""
     suffixes: Strings = ()
     """What tells the equations apart in names."""
@@ -103,7 +103,7 @@ class MocoVariableInfo(Object):
 class MocoParameter(Object):
     """A property of the model that an optimization finds."""
 
-    moco_bounds: Unnamed[MocoBounds] = made(MocoBounds)
+    moco_bounds: Unnamed[MocoBounds] = make_default(MocoBounds)
     """The range that the value is looked for in."""
     component_paths: Annotated[Names, Reference("model-path", "Component", "list")] = ()
     """Paths of the components that all get the value."""

@@ -2,7 +2,7 @@
 
 from typing import Annotated
 
-from osimlite.schema.base import Object, made, none
+from osimlite.schema.base import Object, make_default, make_empty_list
 from osimlite.schema.fields import (
     Flag,
     Integer,
@@ -23,7 +23,7 @@ from osimlite.schema.moco.tracking import Projection
 class MocoPathConstraint(Object, abstract=True):
     """Something that must hold at every moment."""
 
-    moco_constraint_info: Unnamed[MocoConstraintInfo] = made(MocoConstraintInfo)
+    moco_constraint_info: Unnamed[MocoConstraintInfo] = make_default(MocoConstraintInfo)
     """Bounds of its equations."""
 
 
@@ -94,7 +94,7 @@ class MocoFrameDistanceConstraintPair(Object):
 class MocoFrameDistanceConstraint(MocoPathConstraint):
     """Frames neither too near nor too far apart."""
 
-    frame_pairs: Many[MocoFrameDistanceConstraintPair] = none()
+    frame_pairs: Many[MocoFrameDistanceConstraintPair] = make_empty_list()
     """Pairs of frames."""
     projection: Projection = "none"
     """Whether only the distance along a vector counts, or in the plane across it."""

@@ -2,7 +2,7 @@
 
 from typing import Annotated
 
-from osimlite.schema.base import Object, made, none
+from osimlite.schema.base import Object, make_default, make_empty_list
 from osimlite.schema.facts import Facts
 from osimlite.schema.fields import (
     Flag,
@@ -46,45 +46,47 @@ from osimlite.schema.tools.processors import ModelProcessor, TableProcessor
 class MocoPhase(Object):
     """A stretch of time in which one model moves under one set of goals."""
 
-    model: Single[ModelProcessor] = made(
+    model: Single[ModelProcessor] = make_default(
         ModelProcessor, name="model", model=lambda: Model.build({"name": "model"}, set())
     )
     """The model."""
-    time_initial_bounds: Single[MocoInitialBounds] = made(
+    time_initial_bounds: Single[MocoInitialBounds] = make_default(
         MocoInitialBounds, name="time_initial_bounds"
     )
     """When the phase begins."""
-    time_final_bounds: Single[MocoFinalBounds] = made(MocoFinalBounds, name="time_final_bounds")
+    time_final_bounds: Single[MocoFinalBounds] = make_default(
+        MocoFinalBounds, name="time_final_bounds"
+    )
     """When the phase ends."""
-    default_speed_bounds: Single[MocoBounds] = made(
+    default_speed_bounds: Single[MocoBounds] = make_default(
         MocoBounds, name="default_speed_bounds", bounds=(-50.0, 50.0)
     )
     """Bounds of speeds that have none of their own."""
     bound_activation_from_excitation: Flag = True
     """Whether activations without bounds have those of their excitations."""
-    state_infos: Annotated[Many[MocoVariableInfo], OfStates] = none()
+    state_infos: Annotated[Many[MocoVariableInfo], OfStates] = make_empty_list()
     """Bounds of states by path."""
-    state_infos_pattern: Annotated[Many[MocoVariableInfo], PatternOfStates] = none()
+    state_infos_pattern: Annotated[Many[MocoVariableInfo], PatternOfStates] = make_empty_list()
     """Bounds of states by patterns of paths."""
-    control_infos: Annotated[Many[MocoVariableInfo], OfControls] = none()
+    control_infos: Annotated[Many[MocoVariableInfo], OfControls] = make_empty_list()
     """Bounds of controls by path."""
-    control_infos_pattern: Annotated[Many[MocoVariableInfo], PatternOfControls] = none()
+    control_infos_pattern: Annotated[Many[MocoVariableInfo], PatternOfControls] = make_empty_list()
     """Bounds of controls by patterns of paths."""
-    input_control_infos: Many[MocoVariableInfo] = none()
+    input_control_infos: Many[MocoVariableInfo] = make_empty_list()
     """Bounds of inputs of controllers by path."""
-    input_control_infos_pattern: Many[MocoVariableInfo] = none()
+    input_control_infos_pattern: Many[MocoVariableInfo] = make_empty_list()
     """Bounds of inputs of controllers by patterns of paths."""
-    parameters: Many[MocoParameter] = none()
+    parameters: Many[MocoParameter] = make_empty_list()
     """Properties of the model that are looked for."""
-    goals: Many[MocoGoal] = none()
+    goals: Many[MocoGoal] = make_empty_list()
     """Costs and constraints at the ends."""
-    path_constraints: Many[MocoPathConstraint] = none()
+    path_constraints: Many[MocoPathConstraint] = make_empty_list()
     """What must hold at every moment."""
-    kinematic_constraint_bounds: Single[MocoBounds] = made(
+    kinematic_constraint_bounds: Single[MocoBounds] = make_default(
         MocoBounds, name="kinematic_constraint_bounds", bounds=(0.0,)
     )
     """Bounds of the errors of the model's constraints."""
-    multiplier_bounds: Single[MocoBounds] = made(
+    multiplier_bounds: Single[MocoBounds] = make_default(
         MocoBounds, name="multiplier_bounds", bounds=(-1000.0, 1000.0)
     )
     """Bounds of the multipliers of the model's constraints."""
@@ -93,7 +95,7 @@ class MocoPhase(Object):
 class MocoProblem(Object):
     """An optimal control problem."""
 
-    phases: Single[MocoPhase] = made(MocoPhase, name="phases")
+    phases: Single[MocoPhase] = make_default(MocoPhase, name="phases")
     """Its phases; there is one so far."""
 
 
@@ -144,15 +146,15 @@ class MocoDirectCollocationSolver(MocoSolver, abstract=True):
     """How much Ipopt prints, from 0 to 12; -1 for its own number."""
     guess_file: InputTable = ""
     """A motion to start from."""
-    velocity_correction_bounds: Single[MocoBounds] = made(
+    velocity_correction_bounds: Single[MocoBounds] = make_default(
         MocoBounds, name="velocity_correction_bounds", bounds=(-0.1, 0.1)
     )
     """Bounds of the corrections that constraints make to velocities."""
-    implicit_multibody_acceleration_bounds: Single[MocoBounds] = made(
+    implicit_multibody_acceleration_bounds: Single[MocoBounds] = make_default(
         MocoBounds, name="implicit_multibody_acceleration_bounds", bounds=(-1000.0, 1000.0)
     )
     """Bounds of accelerations that are variables."""
-    implicit_auxiliary_derivative_bounds: Single[MocoBounds] = made(
+    implicit_auxiliary_derivative_bounds: Single[MocoBounds] = make_default(
         MocoBounds, name="implicit_auxiliary_derivative_bounds", bounds=(-1000.0, 1000.0)
     )
     """Bounds of derivatives of auxiliary states that are variables."""
@@ -197,7 +199,7 @@ class MocoCasADiSolver(MocoDirectCollocationSolver):
     """Whether the way that states are moved onto the constraints is a cost."""
     state_projection_distance_weight: Number = 1e-6
     """How much that cost counts."""
-    projection_slack_variable_bounds: Single[MocoBounds] = made(
+    projection_slack_variable_bounds: Single[MocoBounds] = make_default(
         MocoBounds, name="projection_slack_variable_bounds", bounds=(-0.001, 0.001)
     )
     """Bounds of the variables that move states onto the constraints."""
@@ -210,9 +212,9 @@ class MocoStudy(Object):
     """Whether the solution is written."""
     results_directory: OutputFolder = "./"
     """Folder for the solution."""
-    problem: Single[MocoProblem] = made(MocoProblem, name="problem")
+    problem: Single[MocoProblem] = make_default(MocoProblem, name="problem")
     """What is to be solved."""
-    solver: Single[MocoSolver] = made(MocoCasADiSolver, name="solver")
+    solver: Single[MocoSolver] = make_default(MocoCasADiSolver, name="solver")
     """What solves it."""
 
 
@@ -227,14 +229,14 @@ class MocoTool(Object, abstract=True):
     """Length of an interval of the mesh."""
     clip_time_range: Flag = False
     """Whether the times are moved a little into the data."""
-    model: Single[ModelProcessor] = made(ModelProcessor, name="model")
+    model: Single[ModelProcessor] = make_default(ModelProcessor, name="model")
     """The model."""
 
 
 class MocoInverse(MocoTool):
     """Finds controls of muscles for a motion that is given exactly."""
 
-    kinematics: Annotated[Single[TableProcessor], OfStates] = made(
+    kinematics: Annotated[Single[TableProcessor], OfStates] = make_default(
         TableProcessor, name="kinematics"
     )
     """The motion."""
@@ -251,7 +253,7 @@ class MocoInverse(MocoTool):
     output_paths: Annotated[
         tuple[str, ...],
         Reference("input", "Output", "list", required=False),
-        NamesOf(Reference("pattern", "output", fate="left out")),
+        NamesOf(Reference("pattern", "output", consequence="left out")),
     ] = ()
     """Outputs that are computed for the solution, as patterns of `path|output`."""
     reserves_weight: Number = 1.0
@@ -261,27 +263,28 @@ class MocoInverse(MocoTool):
 class MocoTrack(MocoTool):
     """Finds a motion that follows measured states or markers."""
 
-    states_reference: Annotated[Single[TableProcessor], MaybeOfStates] = made(
+    states_reference: Annotated[Single[TableProcessor], MaybeOfStates] = make_default(
         TableProcessor, name="states_reference"
     )
     """States to follow."""
     states_global_tracking_weight: Number = 1.0
     """How much deviations of states count."""
     states_weight_set: Annotated[
-        Single[MocoWeightSet], NamesOf(Reference("state-path", "state variable", fate="left out"))
-    ] = made(MocoWeightSet, name="states_weight_set")
+        Single[MocoWeightSet],
+        NamesOf(Reference("state-path", "state variable", consequence="left out")),
+    ] = make_default(MocoWeightSet, name="states_weight_set")
     """Weights by paths of states."""
     scale_state_weights_with_range: Flag = False
     """Whether deviations are divided by the ranges of the coordinates."""
     track_reference_position_derivatives: Flag = False
     """Whether speeds are followed that are derivatives of the measured values."""
-    markers_reference: Annotated[Single[TableProcessor], OfMarkers] = made(
+    markers_reference: Annotated[Single[TableProcessor], OfMarkers] = make_default(
         TableProcessor, name="markers_reference"
     )
     """Markers to follow."""
     markers_global_tracking_weight: Number = 1.0
     """How much deviations of markers count."""
-    markers_weight_set: MarkerWeights = made(MocoWeightSet, name="markers_weight_set")
+    markers_weight_set: MarkerWeights = make_default(MocoWeightSet, name="markers_weight_set")
     """Weights by names of markers."""
     allow_unused_references: Flag = False
     """Whether tables may have columns that the model has not."""
@@ -293,5 +296,5 @@ class MocoTrack(MocoTool):
     """Whether squares of controls are a cost."""
     control_effort_weight: Number = 0.001
     """How much that cost counts."""
-    controls_weight_set: ControlWeights = made(MocoWeightSet, name="controls_weight_set")
+    controls_weight_set: ControlWeights = make_default(MocoWeightSet, name="controls_weight_set")
     """Weights by paths of controls."""

@@ -2,7 +2,7 @@
 
 from typing import Annotated
 
-from osimlite.schema.base import Object, made, none
+from osimlite.schema.base import Object, make_default, make_empty_list
 from osimlite.schema.fields import (
     Flag,
     Integer,
@@ -32,11 +32,11 @@ from osimlite.schema.moco.parts import (
     StateWeights,
 )
 from osimlite.schema.prescribed import ExternalLoads
-from osimlite.schema.references import InputTable, Names, reads
+from osimlite.schema.references import InputTable, Names, make_input_file
 from osimlite.schema.tools.inverse_kinematics import MarkersReference
 from osimlite.schema.tools.processors import TableProcessor
 
-LoadsFile = Annotated[str, reads("ExternalLoads")]
+LoadsFile = Annotated[str, make_input_file("ExternalLoads")]
 Projection = Annotated[str, word("none", "vector", "plane")]
 ExternalForceName = Annotated[str, Reference("external-force-name", "ExternalForce")]
 
@@ -44,9 +44,11 @@ ExternalForceName = Annotated[str, Reference("external-force-name", "ExternalFor
 class MocoStateTrackingGoal(MocoGoal):
     """States follow a table."""
 
-    reference: Annotated[Single[TableProcessor], OfStates] = made(TableProcessor, name="reference")
+    reference: Annotated[Single[TableProcessor], OfStates] = make_default(
+        TableProcessor, name="reference"
+    )
     """The table, a column for each state by its path."""
-    state_weights: StateWeights = made(MocoWeightSet, name="state_weights")
+    state_weights: StateWeights = make_default(MocoWeightSet, name="state_weights")
     """Weights by paths of states."""
     pattern: StatePattern = None
     """A regular expression; only states whose paths match it count."""
@@ -66,15 +68,17 @@ class MocoControlTrackingGoalReference(Object):
 class MocoControlTrackingGoal(MocoGoal):
     """Controls follow a table."""
 
-    reference: Annotated[Single[TableProcessor], OfControls] = made(
+    reference: Annotated[Single[TableProcessor], OfControls] = make_default(
         TableProcessor, name="reference"
     )
     """The table, a column for each control."""
     allow_unused_references: Flag = False
     """Whether the table may have columns that are no controls."""
-    control_weights: ControlWeights = made(MocoWeightSet, name="control_weights")
+    control_weights: ControlWeights = make_default(MocoWeightSet, name="control_weights")
     """Weights by paths of controls."""
-    reference_labels: Annotated[Many[MocoControlTrackingGoalReference], OfControls] = none()
+    reference_labels: Annotated[Many[MocoControlTrackingGoalReference], OfControls] = (
+        make_empty_list()
+    )
     """Columns for controls that are not followed by a column of their own path."""
     ignore_controlled_actuators: Flag = False
     """Whether controls that controllers of the model set are left out."""
@@ -85,7 +89,7 @@ class MocoControlTrackingGoal(MocoGoal):
 class MocoMarkerTrackingGoal(MocoGoal):
     """Markers follow measured ones."""
 
-    markers_reference: Annotated[Single[MarkersReference], OfMarkers] = made(
+    markers_reference: Annotated[Single[MarkersReference], OfMarkers] = make_default(
         MarkersReference, name="markers_reference"
     )
     """The measured markers and their weights."""
@@ -96,7 +100,7 @@ class MocoMarkerTrackingGoal(MocoGoal):
 class MocoTranslationTrackingGoal(MocoGoal):
     """Origins of frames follow given places."""
 
-    states_reference: Annotated[Single[TableProcessor], MaybeOfStates] = made(
+    states_reference: Annotated[Single[TableProcessor], MaybeOfStates] = make_default(
         TableProcessor, name="states_reference"
     )
     """A motion of the model, from which the places are computed."""
@@ -104,14 +108,14 @@ class MocoTranslationTrackingGoal(MocoGoal):
     """The places themselves, a column of vectors for each frame by its path."""
     frame_paths: FramePaths = ()
     """Paths of the frames; left out, all of the table."""
-    translation_weights: FrameWeights = made(MocoWeightSet, name="translation_weights")
+    translation_weights: FrameWeights = make_default(MocoWeightSet, name="translation_weights")
     """Weights by paths of frames."""
 
 
 class MocoOrientationTrackingGoal(MocoGoal):
     """Frames follow given orientations."""
 
-    states_reference: Annotated[Single[TableProcessor], MaybeOfStates] = made(
+    states_reference: Annotated[Single[TableProcessor], MaybeOfStates] = make_default(
         TableProcessor, name="states_reference"
     )
     """A motion of the model, from which the orientations are computed."""
@@ -119,14 +123,14 @@ class MocoOrientationTrackingGoal(MocoGoal):
     """The orientations themselves, a column of quaternions for each frame by its path."""
     frame_paths: FramePaths = ()
     """Paths of the frames; left out, all of the table."""
-    rotation_weights: FrameWeights = made(MocoWeightSet, name="rotation_weights")
+    rotation_weights: FrameWeights = make_default(MocoWeightSet, name="rotation_weights")
     """Weights by paths of frames."""
 
 
 class MocoAngularVelocityTrackingGoal(MocoGoal):
     """Frames follow given angular velocities."""
 
-    states_reference: Annotated[Single[TableProcessor], MaybeOfStates] = made(
+    states_reference: Annotated[Single[TableProcessor], MaybeOfStates] = make_default(
         TableProcessor, name="states_reference"
     )
     """A motion of the model, from which the angular velocities are computed."""
@@ -134,7 +138,9 @@ class MocoAngularVelocityTrackingGoal(MocoGoal):
     """The angular velocities themselves, a column of vectors for each frame by its path."""
     frame_paths: FramePaths = ()
     """Paths of the frames; left out, all of the table."""
-    angular_velocity_weights: FrameWeights = made(MocoWeightSet, name="angular_velocity_weights")
+    angular_velocity_weights: FrameWeights = make_default(
+        MocoWeightSet, name="angular_velocity_weights"
+    )
     """Weights by paths of frames."""
 
 
@@ -145,7 +151,7 @@ class MocoAccelerationTrackingGoal(MocoGoal):
     """The accelerations, a column of vectors for each frame by its path."""
     frame_paths: FramePaths = ()
     """Paths of the frames; left out, all of the table."""
-    acceleration_weights: FrameWeights = made(MocoWeightSet, name="acceleration_weights")
+    acceleration_weights: FrameWeights = make_default(MocoWeightSet, name="acceleration_weights")
     """Weights by paths of frames."""
     gravity_offset: Flag = False
     """Whether gravity is taken from the accelerations of the model, as accelerometers measure."""
@@ -156,20 +162,22 @@ class MocoAccelerationTrackingGoal(MocoGoal):
 class MocoGeneralizedForceTrackingGoal(MocoGoal):
     """Generalized forces follow a table."""
 
-    reference: Annotated[Single[TableProcessor], OfForces] = made(TableProcessor, name="reference")
+    reference: Annotated[Single[TableProcessor], OfForces] = make_default(
+        TableProcessor, name="reference"
+    )
     """The table, a column for each coordinate with the ending _moment or _force."""
     force_paths: Annotated[
         Names,
         Reference("model-path", "Force", "list", required=False),
-        NamesOf(Reference("pattern", "Force", fate="left out")),
+        NamesOf(Reference("pattern", "Force", consequence="left out")),
     ] = ()
     """Paths or patterns of the forces that are added up."""
-    generalized_force_weights: Annotated[Single[MocoWeightSet], OfForces] = made(
+    generalized_force_weights: Annotated[Single[MocoWeightSet], OfForces] = make_default(
         MocoWeightSet, name="generalized_force_weights"
     )
     """Weights by names of generalized forces."""
-    generalized_force_weights_pattern: Annotated[Single[MocoWeightSet], PatternOfForces] = made(
-        MocoWeightSet, name="generalized_force_weights_pattern"
+    generalized_force_weights_pattern: Annotated[Single[MocoWeightSet], PatternOfForces] = (
+        make_default(MocoWeightSet, name="generalized_force_weights_pattern")
     )
     """Weights by patterns of names."""
     allow_unused_references: Flag = False
@@ -194,7 +202,7 @@ class MocoContactTrackingGoalGroup(Object):
 class MocoContactTrackingGoal(MocoGoal):
     """Contact forces follow measured ones."""
 
-    contact_groups: Many[MocoContactTrackingGoalGroup] = none()
+    contact_groups: Many[MocoContactTrackingGoalGroup] = make_empty_list()
     """What follows what."""
     external_loads: Optional[ExternalLoads] = None
     """The measured forces."""
@@ -222,7 +230,7 @@ class MocoContactImpulseTrackingGoalGroup(Object):
 class MocoContactImpulseTrackingGoal(MocoGoal):
     """Impulses of contact forces follow measured ones."""
 
-    contact_groups: Many[MocoContactImpulseTrackingGoalGroup] = none()
+    contact_groups: Many[MocoContactImpulseTrackingGoalGroup] = make_empty_list()
     """What follows what."""
     external_loads: Optional[ExternalLoads] = None
     """The measured forces."""

@@ -2,7 +2,7 @@
 
 from typing import Annotated
 
-from osimlite.schema.base import Object, made, none
+from osimlite.schema.base import Object, make_default, make_empty_list
 from osimlite.schema.fields import (
     Flag,
     LegacyFlag,
@@ -23,7 +23,7 @@ from osimlite.schema.references import (
     LegacyJointNames,
     Named,
     Names,
-    several,
+    make_name_list,
 )
 from osimlite.schema.sets import ConstraintSet, Set
 
@@ -46,7 +46,7 @@ class Analysis(Object, abstract=True):
 class AnalysisSet(Set):
     """The analyses of a run."""
 
-    objects: LegacyMany[Analysis] = none()
+    objects: LegacyMany[Analysis] = make_empty_list()
     """The analyses."""
 
 
@@ -57,9 +57,9 @@ class Actuation(Analysis):
 class BodyKinematics(Analysis):
     """Places, velocities and accelerations of bodies."""
 
-    bodies: Annotated[Names, several("body-name-or-com", "Body", "all", "center_of_mass")] = (
-        "all",
-    )
+    bodies: Annotated[
+        Names, make_name_list("body-name-or-com", "Body", "all", "center_of_mass")
+    ] = ("all",)
     """Names of bodies, `all`, or center_of_mass."""
     express_results_in_body_local_frame: LegacyFlag = False
     """Whether velocities and accelerations are along the axes of the body; otherwise of ground."""
@@ -93,14 +93,14 @@ class InducedAccelerations(Analysis):
     """What each force contributes to accelerations."""
 
     coordinate_names: Annotated[
-        Names, several("coordinate-name", "Coordinate", "all", any_case=True)
+        Names, make_name_list("coordinate-name", "Coordinate", "all", any_case=True)
     ] = ()
     """Coordinates whose accelerations are divided up, or `all`."""
     body_names: Annotated[
-        Names, several("body-name-or-com", "Body", "all", "center_of_mass", any_case=True)
+        Names, make_name_list("body-name-or-com", "Body", "all", "center_of_mass", any_case=True)
     ] = ("center_of_mass",)
     """Bodies whose accelerations are divided up, `all`, or center_of_mass."""
-    constraint_set: LegacyUnnamed[ConstraintSet] = made(ConstraintSet)
+    constraint_set: LegacyUnnamed[ConstraintSet] = make_default(ConstraintSet)
     """Constraints that stand for the contact with the ground."""
     force_threshold: Annotated[float, real("N", legacy=True)] = 6.0
     """Measured force above which the constraints hold."""
@@ -120,7 +120,7 @@ class JointReaction(Analysis):
     apply_on_bodies: Annotated[tuple[str, ...], Value("string", "list", legacy=True)] = ("child",)
     """Which side of each joint the loads act on: child or parent, one word for all or one for each joint."""
     express_in_frame: Annotated[
-        Names, several("frame-path-or-member", "Frame", "child", "parent", any_case=True)
+        Names, make_name_list("frame-path-or-member", "Frame", "child", "parent", any_case=True)
     ] = ("ground",)
     """Frames along whose axes the loads are given: child, parent or a frame, one for all or one for each joint."""
 
@@ -128,21 +128,24 @@ class JointReaction(Analysis):
 class Kinematics(Analysis):
     """Values, speeds and accelerations of coordinates."""
 
-    coordinates: Annotated[Names, several("coordinate-name", "Coordinate", "all", legacy=False)] = (
-        "all",
-    )
+    coordinates: Annotated[
+        Names, make_name_list("coordinate-name", "Coordinate", "all", legacy=False)
+    ] = ("all",)
     """Coordinates that are written, or `all`."""
 
 
 class MuscleAnalysis(Analysis):
     """Lengths, speeds, forces and moment arms of muscles."""
 
-    muscle_list: Annotated[Names, several("muscle-name", "Muscle", "all", fate="left out")] = (
-        "all",
-    )
+    muscle_list: Annotated[
+        Names, make_name_list("muscle-name", "Muscle", "all", consequence="left out")
+    ] = ("all",)
     """Muscles that are written, or `all`."""
     moment_arm_coordinate_list: Annotated[
-        Names, several("coordinate-name", "Coordinate", "all", any_case=True, fate="left out")
+        Names,
+        make_name_list(
+            "coordinate-name", "Coordinate", "all", any_case=True, consequence="left out"
+        ),
     ] = ("all",)
     """Coordinates about which moment arms are computed, or `all`."""
     compute_moments: LegacyFlag = True
@@ -175,7 +178,7 @@ class PointKinematics(Analysis):
             required=False,
             legacy=True,
             words=("none",),
-            fate="left out",
+            consequence="left out",
         ),
     ] = "none"
     """The body along whose axes the results are given; none for ground."""

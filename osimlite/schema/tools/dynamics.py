@@ -2,7 +2,7 @@
 
 from typing import Annotated
 
-from osimlite.schema.base import Object, made
+from osimlite.schema.base import Object, make_default
 from osimlite.schema.fields import (
     LegacyFlag,
     LegacyInteger,
@@ -22,9 +22,9 @@ from osimlite.schema.references import (
     LegacyOutputFolder,
     LegacyOutputTable,
     Names,
-    reads,
-    several,
-    writes,
+    make_input_file,
+    make_name_list,
+    make_output_file,
 )
 from osimlite.schema.sets import ControllerSet
 from osimlite.schema.tools.analyses import AnalysisSet
@@ -43,8 +43,14 @@ class DynamicsTool(Tool, abstract=True):
     """First and last time."""
     forces_to_exclude: Annotated[
         Names,
-        several(
-            "set-member", "Force", "MUSCLES", "ACTUATORS", "ALL", any_case=True, fate="left out"
+        make_name_list(
+            "set-member",
+            "Force",
+            "MUSCLES",
+            "ACTUATORS",
+            "ALL",
+            any_case=True,
+            consequence="left out",
         ),
     ] = ()
     """Forces that do not act: ALL, ACTUATORS, MUSCLES, groups of the model's forces, names of forces."""
@@ -59,7 +65,7 @@ class InverseDynamicsTool(DynamicsTool):
     """The motion: a column for each coordinate by its plain name (.mot, .sto)."""
     lowpass_cutoff_frequency_for_coordinates: Annotated[float, real("Hz", legacy=True)] = -1.0
     """Cut-off frequency of the filter of the coordinates; negative for no filter."""
-    output_gen_force_file: Annotated[str, writes("table", legacy=True, required=True)] = (
+    output_gen_force_file: Annotated[str, make_output_file("table", legacy=True, required=True)] = (
         "inverse_dynamics.sto"
     )
     """File for the generalized forces, in `results_directory`."""
@@ -98,9 +104,9 @@ class AbstractTool(Object, abstract=True):
     """Shortest step of the integrator, in seconds."""
     integrator_error_tolerance: LegacyNumber = 1e-5
     """Error of a step above which the integrator takes a shorter one."""
-    analysis_set: LegacyUnnamed[AnalysisSet] = made(AnalysisSet, name="Analyses")
+    analysis_set: LegacyUnnamed[AnalysisSet] = make_default(AnalysisSet, name="Analyses")
     """What is computed and written along the run."""
-    controller_set: LegacyUnnamed[ControllerSet] = made(ControllerSet, name="Controllers")
+    controller_set: LegacyUnnamed[ControllerSet] = make_default(ControllerSet, name="Controllers")
     """Controllers that are added to those of the model."""
     external_loads_file: LegacyInputLoads = ""
     """Measured loads (.xml)."""
@@ -111,7 +117,7 @@ class AnalyzeTool(AbstractTool):
 
     states_file: LegacyInputTable = ""
     """The motion, as states."""
-    coordinates_file: Annotated[str, reads("motion", legacy=True)] = ""
+    coordinates_file: Annotated[str, make_input_file("motion", legacy=True)] = ""
     """The motion, as coordinates, if there is no `states_file`."""
     speeds_file: LegacyInputTable = ""
     """Generalized speeds; without it they are the derivatives of the coordinates."""

@@ -2,7 +2,7 @@
 
 from typing import Annotated
 
-from osimlite.schema.base import Object, made, none
+from osimlite.schema.base import Object, make_default, make_empty_list
 from osimlite.schema.fields import (
     Flag,
     LegacyMany,
@@ -23,8 +23,8 @@ from osimlite.schema.references import (
     InputTable,
     OutputFolder,
     OutputTable,
-    reads,
-    writes,
+    make_input_file,
+    make_output_file,
 )
 from osimlite.schema.sets import Set
 
@@ -48,7 +48,7 @@ class IKTask(Object, abstract=True):
 class IKMarkerTask(IKTask):
     """A marker that is to be where it was measured; the name is that of the marker, in the model and in the data."""
 
-    name_reference = Reference("marker-name", "Marker", fate="left out")
+    name_reference = Reference("marker-name", "Marker", consequence="left out")
 
 
 class IKCoordinateTask(IKTask):
@@ -67,7 +67,7 @@ class IKCoordinateTask(IKTask):
 class IKTaskSet(Set):
     """What inverse kinematics fits."""
 
-    objects: LegacyMany[IKTask] = none()
+    objects: LegacyMany[IKTask] = make_empty_list()
     """The tasks, each with the name of a marker or a coordinate."""
 
 
@@ -91,13 +91,13 @@ class InverseKinematicsToolBase(Tool, abstract=True):
 class InverseKinematicsTool(InverseKinematicsToolBase):
     """Fits the pose of a model to measured markers and coordinates."""
 
-    ik_task_set: Unnamed[IKTaskSet] = made(IKTaskSet)
+    ik_task_set: Unnamed[IKTaskSet] = make_default(IKTaskSet)
     """The markers and coordinates with their weights; if none applies, all markers count the same."""
-    marker_file: Annotated[str, reads("marker data", required=True)] = ""
+    marker_file: Annotated[str, make_input_file("marker data", required=True)] = ""
     """Measured markers (.trc, .sto)."""
     coordinate_file: InputTable = ""
     """Values of coordinates for tasks whose `value_type` is from_file; always read in degrees."""
-    output_motion_file: Annotated[str, writes("table", required=True)] = ""
+    output_motion_file: Annotated[str, make_output_file("table", required=True)] = ""
     report_marker_locations: Flag = False
     """Whether the markers of the model are written for every frame."""
 
@@ -112,7 +112,7 @@ class OrientationWeight(Object):
 class OrientationWeightSet(Set):
     """Weights of orientation sensors."""
 
-    objects: LegacyMany[OrientationWeight] = none()
+    objects: LegacyMany[OrientationWeight] = make_empty_list()
     """The weights; a sensor without one counts one."""
 
 
@@ -121,9 +121,9 @@ class IMUInverseKinematicsTool(InverseKinematicsToolBase):
 
     sensor_to_opensim_rotations: Annotated[Vec3, vec3("rad")] = (0.0, 0.0, 0.0)
     """Angles about x, y and z of space that turn the axes of the data into those of OpenSim's ground."""
-    orientations_file: Annotated[str, reads("table", required=True)] = ""
+    orientations_file: Annotated[str, make_input_file("table", required=True)] = ""
     """Measured orientations, a column of quaternions for each sensor (.sto)."""
-    orientation_weights: Single[OrientationWeightSet] = made(
+    orientation_weights: Single[OrientationWeightSet] = make_default(
         OrientationWeightSet, name="orientation_weights"
     )
     """How much each sensor counts."""
@@ -139,16 +139,16 @@ class MarkerWeight(Object):
 class MarkerWeightSet(Set, tag="Set_MarkerWeight_"):
     """Weights of markers."""
 
-    objects: LegacyMany[MarkerWeight] = none()
+    objects: LegacyMany[MarkerWeight] = make_empty_list()
     """The weights."""
 
 
 class MarkersReference(Object):
     """Measured markers and their weights."""
 
-    marker_file: Annotated[str, reads("marker data")] = ""
+    marker_file: Annotated[str, make_input_file("marker data")] = ""
     """The measured markers (.trc, .sto)."""
-    marker_weights: Single[MarkerWeightSet] = made(MarkerWeightSet, name="marker_weights")
+    marker_weights: Single[MarkerWeightSet] = make_default(MarkerWeightSet, name="marker_weights")
     """Weights by names of markers."""
     default_weight: Number = 1.0
     """Weight of markers that have none."""

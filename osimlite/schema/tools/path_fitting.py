@@ -2,7 +2,7 @@
 
 from typing import Annotated
 
-from osimlite.schema.base import Object, made, none
+from osimlite.schema.base import Object, make_default, make_empty_list
 from osimlite.schema.fields import (
     Flag,
     Integer,
@@ -33,9 +33,11 @@ class PolynomialPathFitterBounds(Object):
 class PolynomialPathFitter(Object):
     """Finds polynomials of the coordinates for lengths and moment arms of paths."""
 
-    model: Single[ModelProcessor] = made(ModelProcessor, name="model")
+    model: Single[ModelProcessor] = make_default(ModelProcessor, name="model")
     """The model."""
-    coordinate_values: Single[TableProcessor] = made(TableProcessor, name="coordinate_values")
+    coordinate_values: Single[TableProcessor] = make_default(
+        TableProcessor, name="coordinate_values"
+    )
     """The motion around which coordinates are varied."""
     output_directory: OutputFolder = ""
     """Folder for the polynomials and what they were fitted to."""
@@ -58,7 +60,7 @@ class PolynomialPathFitter(Object):
         10.0,
     )
     """Least and greatest deviation of coordinates that have none of their own."""
-    coordinate_sampling_bounds: Many[PolynomialPathFitterBounds] = none()
+    coordinate_sampling_bounds: Many[PolynomialPathFitterBounds] = make_empty_list()
     """Deviations of single coordinates."""
     num_samples_per_frame: Integer = 25
     """How many variations there are of each row of the motion."""

@@ -2,7 +2,7 @@
 
 from typing import Annotated
 
-from osimlite.schema.base import Object, none
+from osimlite.schema.base import Object, make_empty_list
 from osimlite.schema.fields import (
     Flag,
     LegacyMany,
@@ -16,7 +16,7 @@ from osimlite.schema.fields import (
 )
 from osimlite.schema.model import Model
 from osimlite.schema.paths import FunctionBasedPath
-from osimlite.schema.references import InputTable, Names, reads
+from osimlite.schema.references import InputTable, Names, make_input_file
 from osimlite.schema.sets import Set
 
 
@@ -27,9 +27,9 @@ class ModelOperator(Object, abstract=True):
 class ModelProcessor(Object):
     """A model and what is done to it before it is used."""
 
-    filepath: Annotated[str, reads("Model")] = ""
+    filepath: Annotated[str, make_input_file("Model")] = ""
     """File of the model, found from the folder that OpenSim runs in."""
-    operators: Many[ModelOperator] = none()
+    operators: Many[ModelOperator] = make_empty_list()
     """What is done, in this order."""
     model: Optional[Model] = None
     """The model itself, if it is in no file."""
@@ -38,7 +38,7 @@ class ModelProcessor(Object):
 class ModOpAddExternalLoads(ModelOperator):
     """Adds measured loads."""
 
-    filepath: Annotated[str, reads("ExternalLoads")] = ""
+    filepath: Annotated[str, make_input_file("ExternalLoads")] = ""
     """File of the loads."""
 
 
@@ -89,7 +89,7 @@ class ModOpReplaceMusclesWithPathActuators(ModelOperator):
 class ModOpReplacePathsWithFunctionBasedPaths(ModelOperator):
     """Puts functions in the places of paths."""
 
-    paths_file: Annotated[str, reads("Set_FunctionBasedPath_")] = ""
+    paths_file: Annotated[str, make_input_file("Set_FunctionBasedPath_")] = ""
     """File of the functions, each with the path of the force that it belongs to as its name."""
 
 
@@ -117,7 +117,7 @@ class ModOpTendonComplianceDynamicsModeDGF(ModelOperator):
 class FunctionBasedPathSet(Set, tag="Set_FunctionBasedPath_"):
     """Paths as functions of coordinates, in a document of their own."""
 
-    objects: LegacyMany[FunctionBasedPath] = none()
+    objects: LegacyMany[FunctionBasedPath] = make_empty_list()
     """The paths, each with the path of the force that it belongs to as its name."""
 
 
@@ -130,7 +130,7 @@ class TableProcessor(Object):
 
     filepath: InputTable = ""
     """File of the table, found from the folder of the document."""
-    operators: Many[TableOperator] = none()
+    operators: Many[TableOperator] = make_empty_list()
     """What is done, in this order."""
 
 

@@ -2,7 +2,7 @@
 
 from typing import Annotated
 
-from osimlite.schema.base import Object, made, none
+from osimlite.schema.base import Object, make_default, make_empty_list
 from osimlite.schema.fields import (
     LegacyFlag,
     LegacyMany,
@@ -22,8 +22,8 @@ from osimlite.schema.references import (
     LegacyOutputTable,
     Named,
     Names,
-    reads,
-    writes,
+    make_input_file,
+    make_output_file,
 )
 from osimlite.schema.sets import Set
 from osimlite.schema.tools.inverse_kinematics import IKTaskSet
@@ -36,7 +36,7 @@ class GenericModelMaker(Object):
 
     model_file: LegacyInputModel = "Unassigned"
     """The model, found from the folder of the setup file."""
-    marker_set_file: Annotated[str, reads("MarkerSet", legacy=True)] = "Unassigned"
+    marker_set_file: Annotated[str, make_input_file("MarkerSet", legacy=True)] = "Unassigned"
     """Markers that are added to those of the model, or replace those of the same name."""
 
 
@@ -44,7 +44,7 @@ class MarkerPair(Object):
     """Two markers whose distance is measured."""
 
     markers: Annotated[
-        Names, Reference("marker-name", "Marker", "list", legacy=True, fate="left out")
+        Names, Reference("marker-name", "Marker", "list", legacy=True, consequence="left out")
     ] = ()
     """Names of the two markers, of the model and of the data."""
 
@@ -52,14 +52,14 @@ class MarkerPair(Object):
 class MarkerPairSet(Set):
     """The pairs of markers of a measurement."""
 
-    objects: LegacyMany[MarkerPair] = none()
+    objects: LegacyMany[MarkerPair] = make_empty_list()
     """The pairs; the measurement is the mean of their ratios."""
 
 
 class BodyScale(Object):
     """A body that a measurement scales; the name is that of the body."""
 
-    name_reference = Reference("body-name", "Body", fate="left out")
+    name_reference = Reference("body-name", "Body", consequence="left out")
 
     axes: Annotated[tuple[str, ...], Value("string", "list", legacy=True)] = ()
     """Axes of the body along which it is scaled: X, Y, Z; other words do nothing."""
@@ -68,7 +68,7 @@ class BodyScale(Object):
 class BodyScaleSet(Set):
     """The bodies that a measurement scales."""
 
-    objects: LegacyMany[BodyScale] = none()
+    objects: LegacyMany[BodyScale] = make_empty_list()
     """The bodies with their axes."""
 
 
@@ -77,16 +77,16 @@ class Measurement(Object):
 
     apply: LegacyFlag = True
     """Whether the measurement counts."""
-    marker_pair_set: LegacyUnnamed[MarkerPairSet] = made(MarkerPairSet)
+    marker_pair_set: LegacyUnnamed[MarkerPairSet] = make_default(MarkerPairSet)
     """Pairs of markers whose distances are compared, measured to model."""
-    body_scale_set: LegacyUnnamed[BodyScaleSet] = made(BodyScaleSet)
+    body_scale_set: LegacyUnnamed[BodyScaleSet] = make_default(BodyScaleSet)
     """What is scaled by the ratio."""
 
 
 class MeasurementSet(Set):
     """The measurements of a subject."""
 
-    objects: LegacyMany[Measurement] = none()
+    objects: LegacyMany[Measurement] = make_empty_list()
     """The measurements; where two scale the same axis, the last counts."""
 
 
@@ -96,7 +96,7 @@ class Scale(Object):
     scales: Annotated[Reals, reals(least=3, most=3, legacy=True)] = (1.0, 1.0, 1.0)
     """Factors along the x, y and z axes of the body."""
     segment: Annotated[
-        Named, Reference("body-name", "PhysicalFrame", legacy=True, fate="left out")
+        Named, Reference("body-name", "PhysicalFrame", legacy=True, consequence="left out")
     ] = "unnamed_segment"
     """Name of the body."""
     apply: LegacyFlag = True
@@ -106,7 +106,7 @@ class Scale(Object):
 class ScaleSet(Set):
     """Scale factors given by hand."""
 
-    objects: LegacyMany[Scale] = none()
+    objects: LegacyMany[Scale] = make_empty_list()
     """The factors, body by body."""
 
 
@@ -117,9 +117,9 @@ class ModelScaler(Object):
     """Whether the model is scaled."""
     scaling_order: Annotated[tuple[str, ...], Value("string", "list", legacy=True)] = ()
     """What is scaled by, in turn: measurements, manualScale; both overwrite what was before."""
-    measurement_set: LegacyUnnamed[MeasurementSet] = made(MeasurementSet)
+    measurement_set: LegacyUnnamed[MeasurementSet] = make_default(MeasurementSet)
     """Lengths that are taken from the data."""
-    scale_set: LegacyUnnamed[ScaleSet] = made(ScaleSet)
+    scale_set: LegacyUnnamed[ScaleSet] = make_default(ScaleSet)
     """Factors given by hand."""
     marker_file: LegacyInputMarkers = "Unassigned"
     """Measured markers of a standing subject (.trc)."""
@@ -129,7 +129,7 @@ class ModelScaler(Object):
     """Whether the bodies keep their shares of the mass; otherwise their masses grow with their sizes."""
     output_model_file: LegacyOutputModel = "Unassigned"
     """File for the scaled model."""
-    output_scale_file: Annotated[str, writes("ScaleSet", legacy=True)] = "Unassigned"
+    output_scale_file: Annotated[str, make_output_file("ScaleSet", legacy=True)] = "Unassigned"
     """File for the factors."""
 
 
@@ -138,7 +138,7 @@ class MarkerPlacer(Object):
 
     apply: LegacyFlag = True
     """Whether markers are moved."""
-    ik_task_set: LegacyUnnamed[IKTaskSet] = made(IKTaskSet)
+    ik_task_set: LegacyUnnamed[IKTaskSet] = make_default(IKTaskSet)
     """What the pose is fitted to."""
     marker_file: LegacyInputMarkers = "Unassigned"
     """Measured markers of a standing subject (.trc)."""
@@ -150,7 +150,7 @@ class MarkerPlacer(Object):
     """File for the pose."""
     output_model_file: LegacyOutputModel = "Unassigned"
     """File for the model with its markers moved."""
-    output_marker_file: Annotated[str, writes("MarkerSet", legacy=True)] = "Unassigned"
+    output_marker_file: Annotated[str, make_output_file("MarkerSet", legacy=True)] = "Unassigned"
     """File for the moved markers."""
     max_marker_movement: Annotated[float, real("m", legacy=True)] = -1.0
     """How far a marker may be moved, negative for any distance; the placer does not look at it."""
@@ -167,9 +167,9 @@ class ScaleTool(Object):
     """Age of the subject, for readers only."""
     notes: LegacyText = "Unassigned"
     """On the subject, for readers only."""
-    generic_model_maker: LegacyUnnamed[GenericModelMaker] = made(GenericModelMaker)
+    generic_model_maker: LegacyUnnamed[GenericModelMaker] = make_default(GenericModelMaker)
     """First step: the model is read."""
-    model_scaler: LegacyUnnamed[ModelScaler] = made(ModelScaler)
+    model_scaler: LegacyUnnamed[ModelScaler] = make_default(ModelScaler)
     """Second step: the bodies are scaled."""
-    marker_placer: LegacyUnnamed[MarkerPlacer] = made(MarkerPlacer)
+    marker_placer: LegacyUnnamed[MarkerPlacer] = make_default(MarkerPlacer)
     """Third step: the markers are placed."""

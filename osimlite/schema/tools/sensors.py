@@ -2,9 +2,9 @@
 
 from typing import Annotated
 
-from osimlite.schema.base import Object, none
+from osimlite.schema.base import Object, make_empty_list
 from osimlite.schema.fields import Many, Reference, Text, Vec3, real, vec3, word
-from osimlite.schema.references import InputModel, reads, writes
+from osimlite.schema.references import InputModel, make_input_file, make_output_file
 
 
 class IMUPlacer(Object):
@@ -18,9 +18,9 @@ class IMUPlacer(Object):
     """Axis of that sensor that points forwards."""
     sensor_to_opensim_rotations: Annotated[Vec3, vec3("rad")] = (0.0, 0.0, 0.0)
     """Angles about x, y and z of space that turn the axes of the data into those of OpenSim's ground."""
-    orientation_file_for_calibration: Annotated[str, reads("table", required=True)] = ""
+    orientation_file_for_calibration: Annotated[str, make_input_file("table", required=True)] = ""
     """Measured orientations, of which the first row counts (.sto)."""
-    output_model_file: Annotated[str, writes("Model")] = ""
+    output_model_file: Annotated[str, make_output_file("Model")] = ""
     """File for the model with its sensors."""
 
 
@@ -34,7 +34,7 @@ class ExperimentalSensor(Object):
 class APDMDataReaderSettings(Object):
     """How files of APDM sensors are read."""
 
-    ExperimentalSensors: Many[ExperimentalSensor] = none()
+    ExperimentalSensors: Many[ExperimentalSensor] = make_empty_list()
     """The sensors."""
 
 
@@ -49,5 +49,5 @@ class XsensDataReaderSettings(Object):
     """What the names of the files end with."""
     sampling_rate: Annotated[float, real("Hz")] = 40.0
     """How often the sensors measured, if the files do not say."""
-    ExperimentalSensors: Many[ExperimentalSensor] = none()
+    ExperimentalSensors: Many[ExperimentalSensor] = make_empty_list()
     """The sensors."""

@@ -2,9 +2,9 @@
 
 from typing import Annotated
 
-from osimlite.schema.base import Object, none
+from osimlite.schema.base import Object, make_empty_list
 from osimlite.schema.fields import (
-    Fate,
+    Consequence,
     LegacyFlag,
     LegacyInteger,
     LegacyMany,
@@ -25,22 +25,27 @@ from osimlite.schema.references import (
     LegacyOutputModel,
     Named,
     Names,
-    reads,
-    several,
+    make_input_file,
+    make_name_list,
 )
 from osimlite.schema.sets import Set
 from osimlite.schema.tools.dynamics import AbstractTool
 
 _Direction = Annotated[Reals, reals(least=3, most=3, legacy=True)]
-_TaskSetFile = Annotated[str, reads("CMC_TaskSet", legacy=True, required=True)]
-_ControlSetFile = Annotated[str, reads("ControlSet", legacy=True)]
+_TaskSetFile = Annotated[str, make_input_file("CMC_TaskSet", legacy=True, required=True)]
+_ControlSetFile = Annotated[str, make_input_file("ControlSet", legacy=True)]
 _Optimizer = Annotated[str, word("ipopt", "cfsqp", legacy=True)]
 
 
-def _body(*words: str, fate: Fate = "refused") -> Reference:
+def _body(*words: str, consequence: Consequence = "refused") -> Reference:
     """Marker of the name of a body, or of a word for something else."""
     return Reference(
-        "body-name-or-com", "Body", required=False, legacy=True, words=words, fate=fate
+        "body-name-or-com",
+        "Body",
+        required=False,
+        legacy=True,
+        words=words,
+        consequence=consequence,
     )
 
 
@@ -87,8 +92,8 @@ class CMC_Task(TrackingTask, abstract=True):
 class CMC_Joint(CMC_Task):
     """A coordinate that is to be followed."""
 
-    wrt_body: Annotated[Named, _body(fate="ignored")] = ""
-    express_body: Annotated[Named, _body(fate="ignored")] = ""
+    wrt_body: Annotated[Named, _body(consequence="ignored")] = ""
+    express_body: Annotated[Named, _body(consequence="ignored")] = ""
     coordinate: LegacyCoordinateName = ""
     """Name of the coordinate."""
     limit: LegacyNumber = 0.0
@@ -112,7 +117,7 @@ class SMC_Joint(CMC_Joint):
 class CMC_TaskSet(Set):
     """What RRA and CMC follow."""
 
-    objects: LegacyMany[TrackingTask] = none()
+    objects: LegacyMany[TrackingTask] = make_empty_list()
     """The tasks."""
 
 
@@ -121,7 +126,7 @@ class CMCTool(AbstractTool):
 
     solve_for_equilibrium_for_auxiliary_states: LegacyFlag = True
     actuators_to_exclude: Annotated[
-        Names, several("actuator-name", "Actuator", fate="left out")
+        Names, make_name_list("actuator-name", "Actuator", consequence="left out")
     ] = ()
     """Actuators and groups of them that are not controlled."""
     desired_points_file: LegacyInputTable = ""

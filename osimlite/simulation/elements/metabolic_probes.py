@@ -46,7 +46,7 @@ def read_metabolic_probe(
         UnsupportedError: OpenSim disables the probe, because a muscle does not exist or a number has no
             meaning.
     """
-    known: dict[str, Any] = builder.tree.members("/forceset", "Muscle")
+    known: dict[str, Any] = builder.tree.list_members("/forceset", "Muscle")
     parameters = probe.metabolic_muscle_parameter_set.objects
     subjects = []
     for item in parameters:

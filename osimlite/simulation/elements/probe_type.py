@@ -272,7 +272,7 @@ def find_members(
     Raises:
         ModelError: the set has no component of a name.
     """
-    known = builder.tree.members(path, probe_type)
+    known = builder.tree.list_members(path, probe_type)
     names = [word if isinstance(word, str) else word.name for word in words]
     if names and names[0].upper() == "ALL":
         return list(known.values())

@@ -75,7 +75,7 @@ class MeshFiles:
 
     def name_of_stretched(self, name: str, shape: Surface, size: tuple[float, float, float]) -> str:
         """Relative name of the file of a unit shape that is stretched along its axes."""
-        return self.add((name, *size), name, ".obj", shape.stretched(size).obj().encode())
+        return self.add((name, *size), name, ".obj", shape.stretch(size).obj().encode())
 
     def add(self, key: tuple[object, ...], stem: str, kind: str, content: bytes) -> str:
         """Relative name of a mesh file, the same for the same key and unlike any other, whatever the capitals."""
@@ -98,5 +98,5 @@ def _written(source: Path, kind: str, signs: Signs) -> tuple[bytes, str]:
         binary = format_binary_stl(content, source.name, signs)
         return binary, "" if is_binary(content) else "written as a binary STL file"
     surface = read_surface(source)
-    text = (surface.stretched(signs) if min(signs) < 0.0 else surface).obj().encode()
+    text = (surface.stretch(signs) if min(signs) < 0.0 else surface).obj().encode()
     return text, "written as an OBJ file of triangles" if kind == ".vtp" else ""

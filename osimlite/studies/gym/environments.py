@@ -62,7 +62,7 @@ class _ObservedCopies:
         self.labels = tuple(self.state_names[k] for k in self._visible)
         paths = self.copies.controls
         tree = simulation.model.tree()
-        limits = [(tree.at(path).min_control, tree.at(path).max_control) for path in paths]
+        limits = [(tree.find(path).min_control, tree.find(path).max_control) for path in paths]
         low, high = self._limits = np.clip(
             np.array(limits, dtype=np.float32).reshape(-1, 2).T, -1.0, 1.0
         )

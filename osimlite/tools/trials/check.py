@@ -141,7 +141,7 @@ def check_trial(
         looked[str(file)] = None
         trial = Trial(
             str(file),
-            Source.of_file(file).data,
+            Source.from_file(file).data,
             file_numbers,
             find_settings(str(file)).config_for(file, given),
         )

@@ -179,7 +179,7 @@ class TrialFolder:
     def locate_row(self, file: Path, row: int) -> Position:
         """Return the position of a row of a table in its file."""
         table = self.compute_once(
-            ("text", file), lambda: Table(Source.of_file(file).data, str(file))
+            ("text", file), lambda: Table(Source.from_file(file).data, str(file))
         )
         return table.locate_time(table.rows.line_of(row))
 

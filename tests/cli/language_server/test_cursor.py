@@ -12,11 +12,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from osimlite.cli.language_server.analysis import Analysis
-from osimlite.cli.language_server.completion import completions
-from osimlite.cli.language_server.cursor import cursor_at
-from osimlite.cli.language_server.findings import diagnostics
-from osimlite.cli.language_server.hover import hover
-from osimlite.cli.language_server.navigation import folds, outline
+from osimlite.cli.language_server.completion import list_completions
+from osimlite.cli.language_server.cursor import find_cursor
+from osimlite.cli.language_server.findings import list_diagnostics
+from osimlite.cli.language_server.hover import describe_cursor
+from osimlite.cli.language_server.navigation import list_folding_ranges, list_symbols
 from osimlite.cli.language_server.project import Project
 from osimlite.cli.language_server.text import Text
 from osimlite.errors import OsimliteError
@@ -30,12 +30,12 @@ TEXT = WALKER.read_text()
 
 def test_every_object_is_known_from_the_tags_before_it() -> None:
     """The classes that the schema gives to tags are those that the reader makes of them."""
-    document = read_document(Source.of_characters(TEXT))
+    document = read_document(Source.from_text(TEXT))
     for item in document.model.walk():
         number = item.source_index
         if number is None:
             continue
-        cursor = cursor_at(TEXT, document.source.spans[number].start + 1)
+        cursor = find_cursor(TEXT, document.source.spans[number].start + 1)
         assert cursor.kind == "tag" and cursor.element is not None
         assert (cursor.element.cls, cursor.element.number) == (type(item), number)
 
@@ -53,14 +53,14 @@ def test_every_object_is_known_from_the_tags_before_it() -> None:
     ],
 )
 def test_broken_texts(before: str, after: str, kind: str, word: str, inner: str) -> None:
-    cursor = cursor_at(before + after, len(before))
+    cursor = find_cursor(before + after, len(before))
     assert (cursor.kind, cursor.word) == (kind, word)
     assert cursor.inner is not None and cursor.inner.tag == inner
 
 
 def test_a_part_is_told_by_the_name_of_its_property() -> None:
     text = "<CustomJoint><SpatialTransform><TransformAxis name='rotation2'>"
-    inner = cursor_at(text, len(text)).inner
+    inner = find_cursor(text, len(text)).inner
     assert inner is not None and inner.spec is not None and inner.spec.tag == "rotation2"
 
 
@@ -90,15 +90,15 @@ def test_no_question_about_a_damaged_setup_or_table_fails(
 def _ask(file: str, text: str, place: int) -> None:
     analysis = Analysis(Text(text), file)
     place = min(place, len(text))
-    hover(analysis, place)
-    completions(analysis, analysis if analysis.is_certain else None, place)
-    diagnostics(analysis)
-    outline(analysis)
-    folds(analysis)
-    target = analysis.target_at(place)
+    describe_cursor(analysis, place)
+    list_completions(analysis, analysis if analysis.is_readable else None, place)
+    list_diagnostics(analysis)
+    list_symbols(analysis)
+    list_folding_ranges(analysis)
+    target = analysis.find_target(place)
     if target is not None:
         try:
-            analysis.references(target)
-            Project().location(target)
+            analysis.find_references(target)
+            Project().find_location(target)
         except OsimliteError as error:  # pragma: no cover
             pytest.fail(str(error))

@@ -131,7 +131,9 @@ def test_what_is_held_needs_no_encoding(tmp_path: Path) -> None:
     file.write_text(text, encoding="iso-8859-1")
     project = Project()
     project.open["m"] = Analysis(Text(text.replace("é", "öß")), str(file))
-    assert project.hold(project.open["m"]) and not project.hold(project.open["m"])
+    assert project.publish_unsaved(project.open["m"]) and not project.publish_unsaved(
+        project.open["m"]
+    )
     assert read(file).name == "öß"
     project.close("m")
     assert read(file).name == "é"

@@ -139,6 +139,4 @@ def test_a_notice_that_is_none_changes_nothing(editor, method):
     before = len(editor.remarks)
     editor.send({"jsonrpc": "2.0", "method": method, "params": {}})
     assert "result" in editor.ask("textDocument/hover", _at(0, 0))
-    assert any(
-        "are not what the protocol says" in str(remark) for remark in editor.remarks[before:]
-    )
+    assert any("do not follow the protocol" in str(remark) for remark in editor.remarks[before:])

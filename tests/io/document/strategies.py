@@ -7,7 +7,7 @@ from typing import Any
 from hypothesis import strategies as st
 
 from osimlite.schema.base import Component, Object
-from osimlite.schema.fields import Held, ObjectList, Reference, Value
+from osimlite.schema.fields import ObjectField, ObjectList, Reference, Value
 from osimlite.schema.model import Model
 from osimlite.schema.registry import find_class, list_tags
 from osimlite.schema.specs import get_field_specs
@@ -71,7 +71,7 @@ def objects(draw: st.DrawFn, accepts: type[Object] = Component, depth: int = 2) 
             if not is_absent_text and not is_empty_vector:
                 given[spec.name] = value
         elif depth and spec.accepts is not None:
-            assert isinstance(kind, Held)
+            assert isinstance(kind, ObjectField)
             held = objects(spec.accepts, depth - 1)
             if kind.form == "list":
                 given[spec.name] = ObjectList(draw(st.lists(held, max_size=2)))

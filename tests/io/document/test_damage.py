@@ -48,7 +48,7 @@ def fate(data: bytes) -> str:
         for use in tree.uses():
             tree.resolve(use)
     for note in document.notes:
-        document.source.of_tag(note.number)
+        document.source.locate_tag(note.number)
     text = to_text(top)
     again = read_document(Source(text.encode("utf-8", "surrogatepass")), of=Object)
     assert (again.fault, again.changes) == (None, [])

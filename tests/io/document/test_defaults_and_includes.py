@@ -159,7 +159,7 @@ def marker(model: Model) -> Marker:
 
 
 def test_an_object_may_stand_in_a_file_of_its_own(folder: Path) -> None:
-    document = read_document(Source.of_file(folder / "model.osim"))
+    document = read_document(Source.from_file(folder / "model.osim"))
     assert marker(document.model).location == (1.0, 2.0, 3.0)
     assert marker(document.model).path == "/markerset/mk"
     # What is wrong in the other file is told at the place that names it.
@@ -200,7 +200,7 @@ def test_a_file_that_does_not_hold_it_leaves_the_object_as_it_is(
         (folder / "markers.xml").unlink()
     else:
         (folder / "markers.xml").write_text(content)
-    document = read_document(Source.of_file(folder / "model.osim"))
+    document = read_document(Source.from_file(folder / "model.osim"))
     assert document.model.marker_set.objects == []
     assert [(note.kind, note.word, note.value) for note in document.notes] == [
         ("include", "file", "markers.xml")

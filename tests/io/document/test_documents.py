@@ -31,9 +31,9 @@ def read(text: str) -> Object:
 
 @pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: path.name)
 def test_what_is_read_is_written_again(path: Path, tmp_path: Path) -> None:
-    read = read_document(Source.of_file(path), of=Object)
+    read = read_document(Source.from_file(path), of=Object)
     osimlite.write(read.top, tmp_path / path.name)
-    again = read_document(Source.of_file(tmp_path / path.name), of=Object)
+    again = read_document(Source.from_file(tmp_path / path.name), of=Object)
     assert again.top == read.top and type(again.top) is type(read.top)
     assert osimlite.to_text(again.top) == osimlite.to_text(read.top)
     assert (again.version, again.changes) == (40600, [])
@@ -82,9 +82,9 @@ def test_a_tool_made_in_python(tmp_path: Path) -> None:
 
 
 def test_an_unknown_tag_is_kept_and_told(fixtures: Path) -> None:
-    result = read_document(Source.of_file(fixtures / "documents" / "forward.xml"), of=Object)
+    result = read_document(Source.from_file(fixtures / "documents" / "forward.xml"), of=Object)
     (note,) = result.notes
-    assert (note.kind, note.word, result.source.of_tag(note.number).line) == (
+    assert (note.kind, note.word, result.source.locate_tag(note.number).line) == (
         "unknown-tag",
         "use_specified_dt",
         6,
@@ -119,7 +119,7 @@ def test_what_is_no_document_is_refused(text: str, message: str) -> None:
 def test_a_model_is_wanted(fixtures: Path) -> None:
     with pytest.raises(DocumentError, match="holds a <ScaleTool>, not a <Model>"):
         osimlite.read(fixtures / "documents" / "scale.xml")
-    with pytest.raises(OsimliteError, match="a Model is wanted here"):
+    with pytest.raises(OsimliteError, match="expected a Model"):
         osimlite.to_text("scale.xml")  # type: ignore[arg-type]
 
 

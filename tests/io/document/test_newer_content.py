@@ -39,13 +39,13 @@ def test_a_document_that_states_too_old_a_version_is_not_upgraded(tmp_path: Path
     assert done.code == 2 and 'write Version="40600"' in done.err
     assert not (tmp_path / "new.osim").exists()
     with pytest.raises(VersionError, match="which came with version"):
-        require_stated_version(Source.of_file(path))
+        require_stated_version(Source.from_file(path))
     assert any("did you mean" not in finding.message for finding in validate(path).errors)
 
 
 @pytest.mark.corpus
 def test_a_real_document_states_its_version(corpus_model):
-    source = Source.of_file(corpus_model.path)
+    source = Source.from_file(corpus_model.path)
     try:
         require_stated_version(source)
     except VersionError as error:

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import osimlite
-from osimlite.cli._validating import run as validate_paths
+from osimlite.cli._validating import validate_paths as validate_paths
 from osimlite.errors import OsimliteError
 from osimlite.io.document.plugins import classes_in
 from osimlite.io.document.source import Source

@@ -45,7 +45,7 @@ def test_the_walker(fixtures: Path) -> None:
 
 
 def test_every_element_keeps_its_number(fixtures: Path) -> None:
-    source = Source.of_file(fixtures / "walker" / "DynamicWalkerModel.osim")
+    source = Source.from_file(fixtures / "walker" / "DynamicWalkerModel.osim")
     model = read_document(source).model
     for component in model.walk():
         assert (

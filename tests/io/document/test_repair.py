@@ -66,10 +66,10 @@ def test_read_with_a_note(old: str, new: str, kind: str, line: int) -> None:
     assert thigh.mass == 8
     # Positions are those of the text as it is.
     source = result.source
-    assert source.lines[source.of_tag(thigh.source_index).line - 1].startswith("<Body")
+    assert source.lines[source.locate_tag(thigh.source_index).line - 1].startswith("<Body")
     mass = source.child(thigh.source_index, "mass")
     assert mass is not None
-    assert source.lines[source.of_tag(mass).line - 1].endswith("<mass>8</mass>")
+    assert source.lines[source.locate_tag(mass).line - 1].endswith("<mass>8</mass>")
     # What is written is XML.
     assert not [
         note

@@ -118,7 +118,7 @@ def test_an_end_may_have_a_blank(text: str) -> None:
 
 
 def test_the_walker_is_read_in_parts(fixtures: Path) -> None:
-    source = Source.of_file(fixtures / "walker" / "DynamicWalkerModel.osim")
+    source = Source.from_file(fixtures / "walker" / "DynamicWalkerModel.osim")
     parse_source(source)
     assert isinstance(source.spans, PlainSpans)
     assert source.spans[:2] == one_by_one(source.text)[:2]

@@ -227,7 +227,7 @@ def test_polygons_that_are_not_convex_are_covered_once(radii, tilt, turned):
 def test_a_mirrored_surface_still_faces_outwards(fixtures):
     surface = read_vtp((fixtures / "meshes" / "ascii.vtp").read_bytes(), "x.vtp")
     for signs in ((1.0, 1.0, -1.0), (-1.0, 1.0, -1.0), (-1.0, -1.0, -1.0)):
-        mirrored = surface.stretched(signs)
+        mirrored = surface.stretch(signs)
         assert volume(mirrored) == pytest.approx(volume(surface))
         assert mirrored.normals is not None
         a, b, c = (mirrored.points[mirrored.triangles[:, k]] for k in range(3))

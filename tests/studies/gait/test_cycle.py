@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from osimlite.cli import app
+from osimlite.cli import create_app
 from osimlite.errors import OsimliteError
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.models.walkers import human_walker, steady_walker
@@ -204,7 +204,7 @@ def test_the_command(tmp_path, monkeypatch):
     # Paths are never broken: a long folder would make long lines.
     monkeypatch.chdir(tmp_path)
     words = "gait steady-walker --to 5 --perturb 0.05 --starts 4 --steps 3 --basin --grid 2 --reach 0.01 --no-pictures"
-    done = CliRunner().invoke(app(["gait"]), [*words.split(), "-o", "."])
+    done = CliRunner().invoke(create_app(["gait"]), [*words.split(), "-o", "."])
     assert done.exit_code == 0, done.output
     assert "6 steps, 0 scuffs" in done.output and "stable: largest multiplier 0.56" in done.output
     assert max(len(line) for line in done.output.splitlines()) <= 80
@@ -213,10 +213,10 @@ def test_the_command(tmp_path, monkeypatch):
     assert len((tmp_path / "basin.csv").read_text().splitlines()) == 5
     (tmp_path / "basin.png").write_bytes(b"of an earlier walk")
     done = CliRunner().invoke(
-        app(["gait"]), ["gait", "steady-walker", "--to", "5", "-o", str(tmp_path)]
+        create_app(["gait"]), ["gait", "steady-walker", "--to", "5", "-o", str(tmp_path)]
     )
     assert done.exit_code == 0 and [each.name for each in tmp_path.iterdir()] == ["gait.json"]
-    done = CliRunner().invoke(app(["gait"]), ["gait", "dynamic-walker"])
+    done = CliRunner().invoke(create_app(["gait"]), ["gait", "dynamic-walker"])
     assert (
         done.exit_code == 1 and "0 steps, 1 scuff" in done.output and "makes no step" in done.output
     )

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from osimlite.cli import app
+from osimlite.cli import create_app
 from osimlite.errors import OsimliteError, SettingError, SimulationError, UnsupportedError
 from osimlite.io.document.printer import to_text
 from osimlite.io.document.reader import read
@@ -272,7 +272,9 @@ def test_the_command_writes_a_walker(tmp_path):
         "-o",
         str(tmp_path),
     ]
-    done = CliRunner().invoke(app(["find-gait"]), ["find-gait", "dynamic-walker", *words, *options])
+    done = CliRunner().invoke(
+        create_app(["find-gait"]), ["find-gait", "dynamic-walker", *words, *options]
+    )
     assert "largest multiplier" in done.output and done.exit_code in (0, 1)
     start = json.loads((tmp_path / "summary.json").read_text())["start"]
     numbers = np.array([number for each in start.values() for number in each.values()])

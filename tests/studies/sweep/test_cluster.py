@@ -152,7 +152,7 @@ def test_workers_and_coordinator_are_killed_and_nothing_is_lost(
         said = second.communicate(timeout=120)
         assert second.returncode == 0, said
     assert not partial.exists() and kept > 0
-    assert "there before" in said[0]
+    assert "done before" in said[0]
 
     table = pq.read_table(tmp_path / "results.parquet").to_pydict()
     assert table["run"] == list(range(420))

@@ -13,7 +13,7 @@ from importlib import import_module
 
 from lxml import etree
 
-from osimlite.io.document.names import as_written
+from osimlite.io.document.names import decode_name
 from osimlite.io.document.upgrade.class_names import rename_classes
 from osimlite.io.document.upgrade.draft import (
     Change,
@@ -148,7 +148,7 @@ class UpgradeResult:
         for element in self._draft.touched:
             parent = element.getparent()
             if parent is not None:
-                key = (self._draft.numbers[parent], as_written(element.tag))
+                key = (self._draft.numbers[parent], decode_name(element.tag))
                 result.setdefault(key, self._draft.numbers[element])
         return result
 

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from lxml import etree
 
 from osimlite.io.document.lexical import UncleanText, parse_real, split_words
-from osimlite.io.document.names import as_written
+from osimlite.io.document.names import decode_name
 from osimlite.schema.registry import cache_by_tags, find_class
 
 Element = etree._Element
@@ -98,7 +98,7 @@ class Step(NamedTuple):
 @cache_by_tags
 def find_families(tag: str) -> frozenset[str]:
     """Return the names of the class of a tag and of its bases; none if the tag is not a class."""
-    cls = find_class(as_written(tag))
+    cls = find_class(decode_name(tag))
     return frozenset() if cls is None else frozenset(base.__name__ for base in cls.__mro__)
 
 
@@ -139,7 +139,7 @@ class Draft:
 
     @cached_property
     def _tags(self) -> dict[str, set[str]]:
-        """All tags that the document has or had, by the names of their classes and base classes."""
+        """Return all tags that the document has or had, by the names of their classes and base classes."""
         result: dict[str, set[str]] = {}
         for tag in {element.tag for element in self.numbers}:
             for family in find_families(tag):
@@ -311,7 +311,7 @@ class Draft:
 def describe_element(element: Element) -> str:
     """Return class and name of an element for messages."""
     name = element.get("name")
-    tag = as_written(element.tag)
+    tag = decode_name(element.tag)
     return f"{tag} '{name}'" if name else tag
 
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from lxml import etree
 
-from osimlite.io.document.names import as_written
+from osimlite.io.document.names import decode_name
 from osimlite.io.document.upgrade.draft import Element
 
 
@@ -60,9 +60,9 @@ def find_newer_content(root: Element, version: int) -> NewerContent | None:
     for element in root.iter(etree.Element):
         for tags in _get_marks(element.tag):
             for child in element.iterchildren(etree.Element):
-                since = tags.get(as_written(child.tag), 0)
+                since = tags.get(decode_name(child.tag), 0)
                 if version < since and (len(child) or (child.text or "").strip()):
-                    return NewerContent(child, as_written(element.tag), since)
+                    return NewerContent(child, decode_name(element.tag), since)
     return None
 
 
@@ -72,4 +72,4 @@ def _get_marks(tag: str) -> list[dict[str, int]]:
 
     The result is cached, because documents have thousands of elements of few tags.
     """
-    return [tags for pattern, tags in _MARKS if pattern.fullmatch(as_written(tag))]
+    return [tags for pattern, tags in _MARKS if pattern.fullmatch(decode_name(tag))]

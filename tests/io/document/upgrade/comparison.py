@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from osimlite.schema.base import Object
-from osimlite.schema.fields import Held, Reference
+from osimlite.schema.fields import ObjectField, Reference
 from osimlite.schema.model import Model
 from osimlite.schema.specs import FieldSpec
 from osimlite.schema.tree import Tree, Use
@@ -38,7 +38,7 @@ def properties(ours: Object, theirs: Object) -> Iterator[tuple[Object, Object, F
     """Every property of two objects and of what they hold, side by side; classes and numbers of objects are equal."""
     assert type(ours) is type(theirs), f"{ours!r} is {theirs!r} to OpenSim"
     for spec in type(ours).field_specs().values():
-        if not isinstance(spec.kind, Held):
+        if not isinstance(spec.kind, ObjectField):
             yield ours, theirs, spec
             continue
         mine, other = held(ours, spec), held(theirs, spec)

@@ -50,7 +50,7 @@ def unresolved(model: Model) -> list[str]:
 @pytest.mark.parametrize("step", STEPS, ids=lambda step: step.name)
 def test_a_step_does_what_its_example_shows(step, fixtures: Path) -> None:
     (example,) = (fixtures / "versions").glob(f"{step.name}.*")
-    old = read_document(Source.of_file(example), of=Object)
+    old = read_document(Source.from_file(example), of=Object)
     assert old.version < step.below
     assert step.name in {change.step for change in old.changes}
     assert to_text(old.top) == (fixtures / "versions" / "upgraded" / example.name).read_text()
@@ -60,13 +60,13 @@ def test_a_step_does_what_its_example_shows(step, fixtures: Path) -> None:
 @pytest.mark.parametrize("step", STEPS, ids=lambda step: step.name)
 def test_what_is_upgraded_needs_no_upgrade(step, fixtures: Path) -> None:
     (path,) = (fixtures / "versions" / "upgraded").glob(f"{step.name}.*")
-    new = read_document(Source.of_file(path), of=Object)
+    new = read_document(Source.from_file(path), of=Object)
     assert (new.version, new.changes, new.notes) == (CURRENT_VERSION, [], [])
     assert to_text(new.top) == path.read_text()
 
 
 def test_steps_run_oldest_first_and_only_where_needed(fixtures: Path) -> None:
-    old = read_document(Source.of_file(fixtures / "versions" / "path_names.osim"))
+    old = read_document(Source.from_file(fixtures / "versions" / "path_names.osim"))
     assert {change.step for change in old.changes} == {"path_names"}
     assert all(step.below <= CURRENT_VERSION for step in STEPS)
     assert len({step.name for step in STEPS}) == len(STEPS)
@@ -204,16 +204,19 @@ def test_comments_survive() -> None:
 
 
 def test_positions_are_those_of_the_old_text(fixtures: Path) -> None:
-    old = read_document(Source.of_file(fixtures / "versions" / "joint_frames.osim"))
+    old = read_document(Source.from_file(fixtures / "versions" / "joint_frames.osim"))
     source, model = old.source, old.model
 
     def line_of(path: str, tag: str) -> str:
         number = source.child(model[path].source_index, tag)
         assert number is not None
-        return source.lines[source.of_tag(number).line - 1].strip()
+        return source.lines[source.locate_tag(number).line - 1].strip()
 
     hip = model["/jointset/hip"]
-    assert source.lines[source.of_tag(hip.source_index).line - 1].strip() == '<PinJoint name="hip">'
+    assert (
+        source.lines[source.locate_tag(hip.source_index).line - 1].strip()
+        == '<PinJoint name="hip">'
+    )
     assert line_of("/jointset/hip", "socket_parent_frame") == "<parent_body>ground</parent_body>"
     assert line_of("/jointset/hip/ground_offset", "translation") == (
         "<location_in_parent>0.1234567891 0 0</location_in_parent>"
@@ -237,7 +240,7 @@ def test_notes_stand_where_they_stood_in_the_old_text() -> None:
 
 
 def test_what_is_lost_is_said(fixtures: Path) -> None:
-    old = read_document(Source.of_file(fixtures / "versions" / "meaningless.osim"))
+    old = read_document(Source.from_file(fixtures / "versions" / "meaningless.osim"))
     [lost] = [change for change in old.changes if change.lost]
     assert (lost.lost, lost.where) == ("Vmax 12", "Thelen2003Muscle 'vastus'")
     assert old.source.spans[lost.number].tag == "Vmax"
@@ -305,7 +308,7 @@ def test_old_names_of_classes_are_read_in_every_version(version: int) -> None:
         "Unknown",
     ]
     [note] = old.notes
-    assert (note.word, old.source.of_tag(note.number).line) == ("Nonsense", 4)
+    assert (note.word, old.source.locate_tag(note.number).line) == ("Nonsense", 4)
     assert {change.what for change in old.changes if change.step == "class_names"} == {
         "Rename classes that have an old name"
     }
@@ -319,7 +322,7 @@ def test_an_included_file_is_upgraded_by_its_own_version(tmp_path: Path) -> None
     (tmp_path / "model.osim").write_text(
         '<OpenSimDocument Version="40600"><Model> <MarkerSet file="markers.osim" /> </Model></OpenSimDocument>'
     )
-    model = read_document(Source.of_file(tmp_path / "model.osim")).model
+    model = read_document(Source.from_file(tmp_path / "model.osim")).model
     assert model["/markerset/m"].socket_parent_frame == "/ground"
 
 
