@@ -132,7 +132,12 @@ class LocalPool:
         self._done: SimpleQueue[tuple[Any, Any]] = SimpleQueue()
 
     def submit(self, tag: Any, values: Any) -> None:
-        """Submit a task."""
+        """Start a task in a worker thread or process.
+
+        Args:
+            tag: value that is returned with the result.
+            values: input of the work.
+        """
         # Processes that start now inherit the blocked signal, so that Ctrl-C does not reach them.
         with _delay_interrupts(), _report_lost_workers():
             future = self._executor.submit(self._work, values)
@@ -226,7 +231,12 @@ class ClusterPool:
         return max(1, self._threads)
 
     def submit(self, tag: Any, values: Any) -> None:
-        """Submit a task."""
+        """Start a task on the cluster.
+
+        Args:
+            tag: value that is returned with the result.
+            values: input of the work.
+        """
         self._submit_task(tag, values, 0)
 
     def _submit_task(self, tag: Any, values: Any, losses: int) -> None:
@@ -304,7 +314,7 @@ def _check_address(address: str) -> None:
 
 
 def _get_from_queue(queue: SimpleQueue[Any], timeout: float | None) -> Any:
-    """Return the next item of a queue; raise TimeoutError if there is none in time."""
+    """Return the next item of a queue; raise TimeoutError after the timeout."""
     from queue import Empty
 
     try:

@@ -428,7 +428,7 @@ def _open_temporary(
 
     Args:
         target: path of the file.
-        there: status of the present file; None if there is none or if it may be replaced anyway.
+        there: status of the present file; None without one or if it may be replaced anyway.
         in_place: whether a file with several hard links, or whose owner cannot be copied, is
             overwritten instead of replaced.
     """

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from osimlite.lint.subject import Subject, cached_per_subject
+from osimlite.lint.subject import Subject, cache_per_subject
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.tree import ILLEGAL_CHARACTERS
 
@@ -62,7 +62,7 @@ def refuses_axes(joint: CustomJoint) -> bool:
     return moved and len(declared) != len(names)
 
 
-@cached_per_subject
+@cache_per_subject
 def find_made_up_paths(subject: Subject) -> set[str]:
     """Return the paths of the coordinates that OpenSim creates because only an axis names them."""
     return {

@@ -88,10 +88,10 @@ def _check_thresholds(given: Mapping[str, float]) -> None:
 
 
 def parse_codes(words: tuple[str, ...] | list[str] | str | None) -> tuple[str, ...]:
-    """Return codes or names of rules as a tuple; texts may contain several, separated by commas.
+    """Parse codes or names of rules; a text may contain several, separated by commas.
 
-    Raises:
-        OsimliteError: no rule has such a code or name.
+    Returns:
+        The codes and names.
     """
     given = (
         words.split(",")

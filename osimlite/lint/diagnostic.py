@@ -52,11 +52,20 @@ class Fix:
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """Something that a rule reports about one place.
+    """Finding of a rule at one position.
 
-    `line` and `column` are 1-based and None for a model made in Python; `length` characters are
-    concerned. `component` is the absolute path of the component, empty where there is none.
-    `suggestion` is the text that would be right in this place.
+    Attributes:
+        code: code of the rule.
+        name: name of the rule.
+        severity: severity of the finding.
+        message: message for the user.
+        file: path of the file; None for a model made in Python.
+        line: line from 1; None for a model made in Python.
+        column: column from 1; None for a model made in Python.
+        length: number of characters that are marked.
+        component: absolute path of the component; empty without one.
+        suggestion: text that would be correct at this position.
+        fix: change that removes the finding.
     """
 
     code: str
@@ -123,11 +132,14 @@ class MissingPackageNote(NamedTuple):
 class Report:
     """All findings of one or several files, sorted by file and position.
 
-    `texts` holds the text of each file with findings, for the snippets of a reporter; `checked`
-    counts the files, `known` the findings that a baseline left out. `unmeasured` has a sentence for each
-    file of which some rules were not
-    measured: its name, which rules, and why. `passed` names the files of a folder that are none of
-        OpenSim's.
+    Attributes:
+        findings: the findings.
+        texts: text of each file with findings, for the snippets of a reporter.
+        checked: number of files.
+        known: number of findings that a baseline left out.
+        unmeasured: for each file of which some rules were not measured, a sentence with its name, the
+            rules and the reason.
+        passed: files of a folder that were skipped because they are not OpenSim's.
     """
 
     findings: list[Finding] = field(default_factory=list)

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, cast
 from osimlite.errors import OsimliteError
 from osimlite.lint.axes import list_axes, list_coordinates
 from osimlite.lint.skeleton import build_skeleton
-from osimlite.lint.subject import Subject, cached_per_subject
+from osimlite.lint.subject import Subject, cache_per_subject
 from osimlite.mechanics.laws.rotations import (
     Axes,
     X,
@@ -100,7 +100,7 @@ def locate_frame(subject: Subject, frame: Component | None) -> FrameLocation:
     return (frame, pose) if isinstance(frame, (Body, Ground)) else None
 
 
-@cached_per_subject
+@cache_per_subject
 def compute_default_poses(subject: Subject) -> dict[int, FramePose]:
     """Return the default pose in ground of each body that can be located.
 
@@ -110,7 +110,7 @@ def compute_default_poses(subject: Subject) -> dict[int, FramePose]:
     return compute_poses(subject)
 
 
-@cached_per_subject
+@cache_per_subject
 def _locate_joint_frames(subject: Subject) -> dict[int, tuple[FrameLocation, FrameLocation]]:
     """Return the locations of parent and child frame of each joint, by its identity."""
     links = build_skeleton(subject).links
@@ -180,7 +180,7 @@ class _JointMotion(NamedTuple):
         return arguments[0] if self.function is None else self.function.evaluate(arguments)[0]
 
 
-@cached_per_subject
+@cache_per_subject
 def _find_joint_motions(subject: Subject, rough: bool) -> dict[int, list[_JointMotion]]:
     """Return the motions of the joints with known functions, by identity; later axes are rotated by earlier ones."""
     result: dict[int, list[_JointMotion]] = {}

@@ -8,7 +8,7 @@ from typing import Any
 from osimlite.io.tables.headers import StorageHeader
 from osimlite.lint.placement import FramePose, compute_poses, locate_frame
 from osimlite.lint.setup import Setup
-from osimlite.lint.subject import Subject, cached_per_subject
+from osimlite.lint.subject import Subject, cache_per_subject
 from osimlite.lint.table import Table
 from osimlite.mechanics.laws.vectors import Vector
 from osimlite.schema.states import list_motions
@@ -31,7 +31,7 @@ def coordinate_name(column: str) -> str:
     return column.removesuffix("/value").rpartition("/")[2]
 
 
-@cached_per_subject
+@cache_per_subject
 def compute_poses_of_motion(setup: Setup, motion: Table, time: float) -> dict[int, FramePose]:
     """Return the pose in ground of each body at a time of a motion.
 
@@ -53,7 +53,7 @@ def compute_poses_of_motion(setup: Setup, motion: Table, time: float) -> dict[in
     return compute_poses(make_model_subject(setup), values)
 
 
-@cached_per_subject
+@cache_per_subject
 def locate_markers(setup: Setup) -> dict[str, Vector]:
     """Return the positions of the markers in ground in the default pose, m.
 
@@ -76,7 +76,7 @@ def locate_markers(setup: Setup) -> dict[str, Vector]:
     return result
 
 
-@cached_per_subject
+@cache_per_subject
 def make_model_subject(setup: Setup) -> Subject:
     """Return the model that the tool of a setup works on, as rules on models see it."""
     assert setup.tree is not None

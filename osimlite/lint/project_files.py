@@ -58,7 +58,7 @@ def is_opensim_xml(beginning: bytes) -> bool:
 
 
 def find_misspelt_name(word: str, known: Iterable[str]) -> str | None:
-    """Return the known name that differs from a word in letter case and at most two letters; None if there is none."""
+    """Return the known name that differs from a word in letter case and at most two letters; None without one."""
     from rapidfuzz.distance import OSA
     from rapidfuzz.process import extractOne
 

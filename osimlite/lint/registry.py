@@ -156,10 +156,9 @@ class Rule:
 
     @property
     def page(self) -> str:
-        """What it does, why that is bad, an example and the same fixed: the paragraphs of the docstring.
+        """Page of the rule: the paragraphs of its docstring on what it reports, why, and an example with its fix.
 
-        The example stands there once, its lines marked as in a diff: `-` what fails, `+` what fixes
-        it.
+        The docstring has the example once, its lines marked as in a diff: `-` what fails, `+` what fixes it.
         """
         if self.fault is not None:
             return self.fault.page(f"{self.code[:-2]} {self.group}")
@@ -314,8 +313,11 @@ def all_rules(about: str = "") -> tuple[Rule, ...]:
     """Return every rule, sorted by code.
 
     Args:
-        about: what the rules must be about; modules about something else alone are not loaded, and
-            their rules may be missing. Empty for all.
+        about: type of subject, such as "table"; modules for other types are not imported, and their
+            rules may be missing. Empty for all.
+
+    Returns:
+        The rules.
     """
     for subject, modules in RULE_MODULES.items():
         if about in ("", subject) or subject == "model":

@@ -54,10 +54,16 @@ class RowFault(NamedTuple):
 
 @dataclass(slots=True)
 class TableRows:
-    """Rows of a table: their number, times and faults.
+    """Rows of a table.
 
-    `cells` is how many cells a row should have, `samples` are the numbers of a few rows (NaN for
-    what is none), `unseen` the markers that no row has.
+    Attributes:
+        cells: number of cells that a row should have.
+        count: number of rows.
+        times: time of each row.
+        lines: row index and line number of rows after which the difference between the two changes.
+        faults: faults by kind and column.
+        samples: numbers of a few rows, NaN for text that is not a number.
+        unseen: markers that no row contains.
     """
 
     cells: int = 0

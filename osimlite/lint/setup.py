@@ -79,7 +79,7 @@ class Setup(Subject):
 
     @cached_property
     def by_class(self) -> dict[type[Object], list[Object]]:
-        """Every object by its exact class."""
+        """Objects of the document by their exact class."""
         result: dict[type[Object], list[Object]] = {}
         for item in self.items:
             result.setdefault(type(item), []).append(item)
@@ -174,7 +174,7 @@ class Setup(Subject):
 
     @cached_property
     def tool(self) -> tuple[str, Object] | None:
-        """The tool that this is, or the first that reads this; with the path of its setup."""
+        """Tool of this document, or the first one that reads it, with the path of its setup."""
         return next(self.find_readers(), None)
 
     def find_readers(self) -> Iterator[tuple[str, Object]]:
@@ -286,7 +286,7 @@ class Setup(Subject):
         return [(file, added) for file in files if (added := get_object(file)) is not None]
 
     def find_writer(self, path: str) -> str | None:
-        """Return another setup of the project that writes a file; None if there is none."""
+        """Return another setup of the project that writes a file; None without one."""
         wanted = os.path.realpath(path)
         around = self._find_tools(list(Path(wanted).parents)[:3])
         named: dict[int, str] = {}

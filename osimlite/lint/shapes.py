@@ -12,10 +12,18 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import NamedTuple
 
-_SIGN, _POWER, _SPACE, _POINT = 1, 2, 4, 8
-"""What a character is, in the lower half of its byte; in the upper half is what must not follow on it."""
+# A code byte has the class of a character in its lower half, and in its upper half the classes that
+# must not follow it.
+_SIGN = 1
+"""Class of signs."""
+_POWER = 2
+"""Class of the letter of an exponent."""
+_SPACE = 4
+"""Class of blanks and tabs."""
+_POINT = 8
+"""Class of the decimal point."""
 _LAYOUT = (_SPACE | _POINT) << 4 | _SPACE
-"""The bits that tell separators from each other."""
+"""Bits of a code byte that distinguish separators."""
 
 _CHARACTERS = (
     # What belongs to no number: it must not follow on anything.
@@ -26,7 +34,7 @@ _CHARACTERS = (
     (b"eE", _POWER, _POWER | _SPACE | _POINT),
     (b" \t", _SPACE, _POWER),
 )
-"""Characters, what they are, and what must not follow on them."""
+"""Characters, their class, and the classes that must not follow them."""
 
 
 class Layout(NamedTuple):

@@ -7,7 +7,7 @@ from itertools import chain
 from typing import NamedTuple, cast
 
 from osimlite.base.records import dataclass, field
-from osimlite.lint.subject import Subject, cached_per_subject
+from osimlite.lint.subject import Subject, cache_per_subject
 from osimlite.mechanics.multibody.topology import new_base, spanning_tree
 from osimlite.schema.base import Component, Object, Unknown
 from osimlite.schema.custom_joint import CustomJoint
@@ -49,7 +49,11 @@ class Skeleton:
                 yield link, parent, child
 
     def compute_depths(self) -> dict[int, int]:
-        """Return the number of joints between ground and each reachable body, by its identity."""
+        """Return the number of joints between ground and each reachable body.
+
+        Returns:
+            Numbers by the identity (``id``) of the body.
+        """
         depth = {id(self.ground): 0}
         pending: list[Component] = [self.ground]
         while pending:
@@ -86,7 +90,7 @@ class TreeGrowth(NamedTuple):
     fails: bool
 
 
-@cached_per_subject
+@cache_per_subject
 def grow_tree(subject: Subject) -> TreeGrowth:
     """Return how OpenSim builds a tree from a skeleton."""
     bones = build_skeleton(subject)
@@ -144,7 +148,7 @@ def _fails_to_build(subject: Subject, edges: list[_Edge], order: dict[str, _Edge
     return False
 
 
-@cached_per_subject
+@cache_per_subject
 def build_skeleton(subject: Subject) -> Skeleton:
     """Return the skeleton of a model."""
     assert subject.model is not None

@@ -33,19 +33,19 @@ Cached = TypeVar("Cached")
 P = ParamSpec("P")
 
 
-def cached_per_subject(
+def cache_per_subject(
     make: Callable[Concatenate[S, P], Cached],
 ) -> Callable[Concatenate[S, P], Cached]:
     """Cache a function per subject and per value of its other arguments."""
 
     @wraps(make)
-    def kept(subject: S, /, *args: P.args, **named: P.kwargs) -> Cached:
+    def get_cached(subject: S, /, *args: P.args, **named: P.kwargs) -> Cached:
         key = (make, *args, *named.items())
         if key not in subject.cache:
             subject.cache[key] = make(subject, *args, **named)
         return cast("Cached", subject.cache[key])
 
-    return kept
+    return get_cached
 
 
 class Subject(CheckTarget):
@@ -125,7 +125,7 @@ class Subject(CheckTarget):
 
     @cached_property
     def tree(self) -> Tree:
-        """The component tree."""
+        """Component tree of the model."""
         assert self.model is not None
         # A model that was read for this check alone is not tied to its tree in a cycle, which only
         # the garbage collector could undo.
@@ -133,7 +133,7 @@ class Subject(CheckTarget):
 
     @property
     def by_class(self) -> dict[type[Object], list[Object]]:
-        """Every object of the model by its exact class, in tree order."""
+        """Objects of the model by their exact class, in tree order."""
         return {} if self.model is None else self.tree.by_class
 
     @cached_property
@@ -209,7 +209,7 @@ class Subject(CheckTarget):
         )
 
     def target_of(self, owner: Component, tag: str) -> Component | None:
-        """Return the component that a single reference of `owner` resolves to; None if there is none."""
+        """Return the component that a single reference of `owner` resolves to; None without one."""
         spec = type(owner).field_specs().get(tag)
         value = None if spec is None else getattr(owner, spec.name)
         return self.tree.resolve(Use(owner, owner, spec, value)).target if spec and value else None
@@ -250,7 +250,7 @@ class Subject(CheckTarget):
         }
 
     def element_of(self, item: Object, tag: str) -> int | None:
-        """Return the index of the element that gives a property of an object; None if there is none."""
+        """Return the index of the element that gives a property of an object; None without one."""
         if self.source is None or item._index is None:
             return None
         return self.source.child(item._index, tag)

@@ -64,7 +64,7 @@ class Table(CheckTarget):
 
     @cached_property
     def rows(self) -> TableRows:
-        """The rows."""
+        """Rows of the table with their faults, scanned on first access."""
         header, cells = self.header, len(self.labels)
         # Where labels are missing or too many, the first row says how many cells a row has.
         first = _ROW.search(self.data, header.rows)
@@ -106,7 +106,7 @@ class Table(CheckTarget):
 
     @property
     def span(self) -> tuple[float, float] | None:
-        """The first and the last time, None without rows."""
+        """First and last time, s; None without rows."""
         times = self.rows.times
         return (times[0], times[-1]) if times else None
 

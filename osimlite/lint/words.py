@@ -15,7 +15,7 @@ def describe_object(item: Object) -> str:
     return f"{kind} '{item.name}'" if item.name else kind
 
 
-def with_article(noun: str) -> str:
+def add_article(noun: str) -> str:
     """Return the noun with its article."""
     return f"{'an' if noun[:1].lower() in 'aeiou' else 'a'} {noun}"
 

@@ -18,7 +18,7 @@ import osimlite
 from osimlite.errors import OsimliteError
 from osimlite.lint.measures import Measures, Pose
 from osimlite.lint.measuring import measure_model
-from osimlite.lint.measuring.jumps import ASIDE
+from osimlite.lint.measuring.jumps import SIDE_OFFSET
 from osimlite.lint.measuring.muscles import REST_ACTIVATION
 from osimlite.lint.measuring.sweeps import find_tied_coordinates
 from tests.oracle.opensim_runs import put
@@ -76,7 +76,7 @@ class Beside:
             )
         for jump in filter(self.is_free, self.measures.jumps):
             lengths = []
-            for aside in (-ASIDE, ASIDE):
+            for aside in (-SIDE_OFFSET, SIDE_OFFSET):
                 self.at(jump.pose, aside)
                 lengths.append(self.length(jump.owner))
             yield "OSIM632", jump.owner, jump.size, abs(lengths[1] - lengths[0])

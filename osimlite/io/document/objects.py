@@ -503,7 +503,7 @@ def add_comment(node: etree._Element, remarks: list[Remark]) -> None:
 
 
 def get_layout(item: Object) -> Layout:
-    """Return the layout of an object; create it if there is none."""
+    """Return the layout of an object; create it if it is missing."""
     if item.layout is None:
         object.__setattr__(item, "_layout", Layout())
     assert item.layout is not None

@@ -1,4 +1,4 @@
-"""Builds a model as a simulation does, and reports what stops it: for rules of the linter.
+"""Attempt to build a model as a simulation does, with a report of what fails, for lint rules.
 
 The steps are those of `osimlite simulate`: the mechanism, its forces and controllers, the default
 pose that fulfils the constraints, one evaluation of the accelerations.
@@ -34,8 +34,8 @@ from osimlite.simulation.elements.probe_type import make_probes
 from osimlite.simulation.engines.linking import READY_CODE
 from osimlite.simulation.system import System
 
-SINGULAR = 1e-12
-"""Ratio of the least to the largest eigenvalue below which a mass matrix counts as singular."""
+SINGULAR_RATIO = 1e-12
+"""Ratio of the smallest to the largest eigenvalue below which a mass matrix counts as singular."""
 
 _QUOTED_PATH = re.compile(r"'(/[^']*)'")
 
@@ -44,15 +44,16 @@ _QUOTED_PATH = re.compile(r"'(/[^']*)'")
 def try_construction(
     model: Model, folder: Path | None = None
 ) -> tuple[list[Obstacle], Mechanism | None]:
-    """Return what stops the computation of a model.
+    """Try to build a model and to compute its accelerations.
 
     Args:
-        model: the model to build.
-        folder: where its file is, and the files that it names; None for a model that is in no file.
+        model: the model.
+        folder: folder of its file, to which the names of other files are relative; None for a model
+            without a file.
 
     Returns:
-        The obstacles in the order of the steps, and the mechanism for further computations; None if
-        the model has none.
+        The obstacles in the order of the steps, and the mechanism for further computations; None if it
+        cannot be built.
     """
     with warnings.catch_warnings():
         # Rules report what a simulation only warns of.
@@ -87,6 +88,8 @@ class _Construction:
             yield from self.describe_assembly(error)
             return
         yield from self.find_clamps(mechanism, q)
+        # A force that is missing by mistake changes the accelerations, so they are then evaluated without
+        # any forces: only errors of the mechanism itself are reported.
         if not is_complete:
             elements = []
         controls = builder.controls.controls if is_complete else Forces(()).controls
@@ -96,15 +99,16 @@ class _Construction:
     def gather(self, builder: ElementBuilder, elements: list[ForceElement]) -> Iterator[Obstacle]:
         """Make the elements of all forces and probes; yield the reasons why some have none."""
         try:
-            # What a controller cannot do is an error of each actuator that it drives.
+            # Building the controllers first reports an error of a controller once, and not again
+            # for each actuator that it drives.
             builder.controls  # noqa: B018
         except OsimliteError as error:
             yield self.describe(error, Stage.FORCE)
             return
         for force in builder.iterate_forces():
             if isinstance(getattr(force, "geometry_path", None), Scholz2015GeometryPath):
-                # Its way is searched once; in every evaluation it takes seconds without machine
-                # code.
+                # Check its cable once and leave it out of the evaluations, which take seconds each
+                # without machine code.
                 try:
                     check_cable(builder, force)
                 except OsimliteError as error:
@@ -154,7 +158,7 @@ class _Construction:
         for index in find_unclamped(mechanism, q):
             info = mechanism.coordinates[index]
             if abs(q[index] - info.default_value) < 1e-9 or info.locked:
-                # A default value outside of the range is another rule's.
+                # Another rule reports default values outside of the range.
                 continue
             low, high = info.range
             yield Obstacle(
@@ -180,6 +184,7 @@ class _Construction:
             return
         status = _evaluate_accelerations(system, state)
         if status == OUTCOME.SINGULAR_MASS:
+            # OpenSim computes with an indefinite mass matrix, so only a singular one is an obstacle.
             if not _is_indefinite(mechanism, q):
                 yield self.describe_inertia(system, state)
         elif status != OUTCOME.OK:
@@ -229,7 +234,7 @@ class _Construction:
     def find_culprits(
         self, mechanism: Mechanism, forces: Forces, q: Array, u: Array
     ) -> Iterator[Obstacle]:
-        """Yield the forces that alone make accelerations that are not numbers."""
+        """Yield the forces that produce accelerations which are not finite, each tested alone."""
         if not _is_computed(mechanism, Forces(()), q, u):
             # Other rules report NaN among the numbers of the mechanism.
             return
@@ -268,7 +273,7 @@ def _is_indefinite(mechanism: Mechanism, q: Array) -> bool:
     except (OsimliteError, np.linalg.LinAlgError):
         return False
     sizes = np.abs(values)
-    return bool(len(values) and values.min() < 0.0 and sizes.min() > SINGULAR * sizes.max())
+    return bool(len(values) and values.min() < 0.0 and sizes.min() > SINGULAR_RATIO * sizes.max())
 
 
 def _is_computed(mechanism: Mechanism, forces: Forces, q: Array, u: Array) -> bool:
@@ -276,7 +281,7 @@ def _is_computed(mechanism: Mechanism, forces: Forces, q: Array, u: Array) -> bo
     try:
         system = System(mechanism, forces, code=READY_CODE)
     except OsimliteError:
-        # A probe reads another element.
+        # A probe cannot be tested alone because it reads another element.
         return True
     status = _evaluate_accelerations(system, system.state.pack(q.tolist(), u.tolist()))
     if status == OUTCOME.OK:
@@ -285,9 +290,9 @@ def _is_computed(mechanism: Mechanism, forces: Forces, q: Array, u: Array) -> bo
 
 
 def _evaluate_accelerations(system: System, state: list[float]) -> int | None:
-    """Evaluate the accelerations and return the status, or None if a result is not finite.
+    """Evaluate the accelerations and return the status; None if a result is not finite.
 
-    Kernels that run as Python raise where machine code computes a number that is none.
+    Kernels that run as Python raise an exception where machine code computes NaN.
     """
     try:
         return system.realize(0.0, state, STAGE.ACCELERATION)

@@ -1,4 +1,4 @@
-"""Find jumps of path lengths: conditional points, and routes around surfaces that change."""
+"""Jumps of path lengths, at conditional points and where routes around surfaces change."""
 
 from __future__ import annotations
 
@@ -16,15 +16,27 @@ from osimlite.simulation.elements.geometries.paths.geometry_path import ThroughP
 from osimlite.simulation.paths import Paths
 
 MIN_JUMP_M = 1e-3
-"""A jump (m) that is told; smaller ones are not looked for."""
-ASIDE = 1e-4
-"""How far (rad or m) on either side of a jump lengths are taken: OpenSim's conditional points,
-which come 1e-5 before their range and go 1e-5 after it, are all there or gone then.
+"""Smallest jump that is reported, m."""
+SIDE_OFFSET = 1e-4
+"""Distance (rad or m) from a jump at which lengths on both sides are compared.
+
+OpenSim's conditional points become active 1e-5 before their range and inactive 1e-5 after it, so at
+this distance each is either active or not.
 """
 
 
 class JumpSuspect(NamedTuple):
-    """An interval of a sweep in which the length of a path may jump."""
+    """Interval of a sweep in which the length of a path may jump.
+
+    Attributes:
+        excess: change of the length that differs from that in neighbouring intervals, m; infinite at a
+            conditional point.
+        usual: change that neighbouring intervals predict, m.
+        sweep: sweep of a coordinate.
+        path: index of the path.
+        pose: index of the pose before the interval.
+        ends: values of the coordinate at both ends.
+    """
 
     # by how much the length changes otherwise than next to the interval, m; infinite at a
     # conditional point
@@ -37,10 +49,14 @@ class JumpSuspect(NamedTuple):
 
 
 def find_jumps(paths: Paths, looked_at: Sequence[Sweep]) -> Iterator[PathJump]:
-    """Yield the greatest jump of the length of each path that has one.
+    """Yield the largest jump of each path that has one.
 
-    They are looked for where conditional points come or go, and between values where a length
-    changes otherwise than next to them: there a jump can hardly be greater than the difference.
+    Candidates are the ends of the ranges of conditional points, and intervals in which a length changes
+    by more than neighbouring intervals predict. A jump is hardly larger than that difference.
+
+    Args:
+        paths: the paths of the model.
+        looked_at: sweeps of coordinates.
     """
     suspects = [suspect for sweep in looked_at for suspect in _find_suspects(paths, sweep)]
     if not suspects:
@@ -53,10 +69,12 @@ def find_jumps(paths: Paths, looked_at: Sequence[Sweep]) -> Iterator[PathJump]:
     both = paths.system.measure_one_path([item.path for item in suspects for _ in range(2)], sides)
     sizes = np.abs(np.diff(both.reshape(-1, 2), axis=1))[:, 0].tolist()
     greatest: dict[int, int] = {}
+    # Suspects are sorted by their excess, so a jump already found makes those with a smaller excess
+    # unnecessary.
     for k in sorted(range(len(suspects)), key=lambda k: (suspects[k].path, -suspects[k].excess)):
         suspect, values_of = suspects[k], suspects[k].sweep.values
         known = sizes[greatest[suspect.path]] if suspect.path in greatest else MIN_JUMP_M
-        is_inside = values_of[0] + ASIDE < values[k] < values_of[-1] - ASIDE
+        is_inside = values_of[0] + SIDE_OFFSET < values[k] < values_of[-1] - SIDE_OFFSET
         if is_inside and sizes[k] > known and not suspect.excess < known:
             greatest[suspect.path] = k
     names = [*paths.routes]
@@ -92,15 +110,17 @@ def _find_suspects(paths: Paths, sweep: Sweep) -> Iterator[JumpSuspect]:
 
 
 def _bisect_suspects(paths: Paths, suspects: Sequence[JumpSuspect]) -> list[float]:
-    """Return the value in each interval at which the path length changes most, besides the usual change."""
+    """Return the value in each interval at which the length changes most beyond the usual change."""
     low, high = np.array([item.ends for item in suspects]).T
-    first, last, active = low, high, high - low > ASIDE
+    first, last, active = low, high, high - low > SIDE_OFFSET
     begin, end = (np.array([item.sweep.poses[item.pose + k] for item in suspects]) for k in (0, 1))
     rate = np.array([item.usual for item in suspects]) / np.where(active, high - low, 1.0)
     before, after = (
         np.array([item.sweep.lengths[item.pose + k, item.path] for item in suspects])
         for k in (0, 1)
     )
+    # Bisect all intervals at once: keep the half in which the length deviates more from the linear
+    # change that neighbouring intervals predict.
     while places := np.flatnonzero(active).tolist():
         middle = 0.5 * (low + high)
         part = (middle - first) / (last - first)
@@ -113,13 +133,13 @@ def _bisect_suspects(paths: Paths, suspects: Sequence[JumpSuspect]) -> list[floa
         high, after = np.where(moves, middle, high), np.where(moves, here, after)
         moves = active & ~is_before
         low, before = np.where(moves, middle, low), np.where(moves, here, before)
-        active = high - low > ASIDE
+        active = high - low > SIDE_OFFSET
     return np.where([item.excess < inf for item in suspects], 0.5 * (low + high), low).tolist()
 
 
 def _compute_side_poses(suspect: JumpSuspect, value: float) -> Array:
     """Return the poses (2, n) on both sides of a value."""
-    beside = np.array([value - ASIDE, value + ASIDE])
+    beside = np.array([value - SIDE_OFFSET, value + SIDE_OFFSET])
     return suspect.sweep.interpolate_poses(beside, suspect.sweep.find_poses_before(beside))
 
 

@@ -34,13 +34,17 @@ NEEDS_MACHINE_CODE = (
     "so many wrap surfaces take minutes in Python: install osimlite where a C++ compiler is "
     "found, or run: pip install 'osimlite[jit]'"
 )
-"""Why paths around many surfaces are not measured."""
+"""Reason why paths around many surfaces are not measured."""
 
 MAX_LOOP_CONSTRAINTS = 8
-"""Constraints other than couplers of a model that is measured. Shoulders and knees of publications have up to six."""
+"""Largest number of constraints other than couplers of a model that is measured.
 
-MIDDLE_SHARE = 0.5
-"""Part of a range in which fibers are looked at: at the ends, few muscles have not reached a limit."""
+Published models of shoulders and knees have up to six. Every pose must be assembled with them, and
+a check should take seconds.
+"""
+
+MIDDLE_PART = 0.5
+"""Middle part of a range in which fiber lengths are computed; at its ends most muscles reach a limit."""
 
 
 @np.errstate(all="ignore")
@@ -78,7 +82,7 @@ def measure_model(
         isinstance(route, ThroughPoints) and route.surfaces for route in paths.routes.values()
     )
     around = paths.rewrap_paths(model, GEODESIC, code) if has_surfaces else None
-    _refuse_many_loops(paths.mechanism)
+    _check_loop_count(paths.mechanism)
     start = paths.mechanism.assemble({})
     default = np.array(list(paths.lengths(start).values()))
     looked_at = sweep_coordinates(
@@ -87,7 +91,7 @@ def measure_model(
     if before is not None and {sweep.place for sweep in looked_at} != find_swept_coordinates(
         before
     ):
-        # All paths are looked at in the same poses.
+        # The earlier measurements used other poses; all paths must be measured in the same ones.
         return measure_model(model, compiles=compiles, mechanism=mechanism)
     starts, reaches = [], []
     ends = dict(
@@ -132,13 +136,13 @@ def _find_bad_surface_lengths(
             yield LengthOnSurface(name, surface, float(lengths[k]), poses[k])
 
 
-def _refuse_many_loops(mechanism: Mechanism) -> None:
-    """Refuse models with too many loops to assemble poses within the time of a check.
+def _check_loop_count(mechanism: Mechanism) -> None:
+    """Check that poses can be assembled within the time of a check.
 
-    Couplers are not counted: a spine has a hundred, and they are assembled at once.
+    Couplers do not count: a spine has a hundred of them, and they are solved at once.
 
     Raises:
-        UnsupportedError: there are more than `MAX_LOOP_CONSTRAINTS` constraints that close loops.
+        UnsupportedError: more than `MAX_LOOP_CONSTRAINTS` constraints close loops.
     """
     count = sum(
         not isinstance(each, Coupler | Lock | PrescribedCoordinate)
@@ -154,12 +158,12 @@ def _refuse_many_loops(mechanism: Mechanism) -> None:
 def _find_length_extremes(
     looked_at: list[Sweep], default: Array
 ) -> Iterator[tuple[tuple[float, Pose], tuple[float, Pose]]]:
-    """Yield where each path is shortest and longest, among the default pose and the middle of the ranges."""
+    """Yield where each path is shortest and longest: in the default pose, or in the middle of the ranges."""
     poses, rows = [Pose()], [default[None]]
     for sweep in looked_at:
         low, high = sweep.info.range
         inside = np.flatnonzero(
-            np.round(np.abs((sweep.values - low) / (high - low) - 0.5), 9) <= 0.5 * MIDDLE_SHARE
+            np.round(np.abs((sweep.values - low) / (high - low) - 0.5), 9) <= 0.5 * MIDDLE_PART
         )
         poses += [sweep.pose(value) for value in sweep.values[inside]]
         rows.append(sweep.lengths[inside])

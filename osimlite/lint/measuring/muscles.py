@@ -22,21 +22,31 @@ from osimlite.simulation.elements.parameters import Fields, Number, Numbers, Tog
 from osimlite.simulation.elements.registry import FORCE_TYPES
 
 ROUNDING = 1e-9
+"""Relative tolerance within which a fiber is at its shortest length."""
 REST_ACTIVATION = 0.01
-"""The activation of a muscle at rest: none of Thelen's or Millard's has less by default."""
+"""Activation of a muscle at rest: the smallest default of minimum_activation in OpenSim's muscle classes."""
 
 
 class MuscleFibers(NamedTuple):
-    """Muscle with its law as a Python function: compiling would take longer than some hundred calls."""
+    """Muscle with its law as a Python function.
 
-    path: str  # of the muscle
-    kind: ForceType  # of the muscle
-    component: Any  # the muscle
-    values: tuple[Any, ...]  # of the parameters of the law, but for the control
+    Compiling the law would take longer than some hundred calls of it.
+
+    Attributes:
+        path: path of the muscle.
+        kind: force type of the muscle.
+        component: the muscle.
+        values: values of the law's parameters, except for the control.
+    """
+
+    path: str
+    kind: ForceType
+    component: Any
+    values: tuple[Any, ...]
 
     @property
     def is_elastic(self) -> bool:
-        """Whether the muscle has states to equilibrate."""
+        """True if the muscle has states to equilibrate."""
         return not set(self.kind.solved_states).isdisjoint(list_states(self.component))
 
     def get_start_states(self) -> dict[str, float]:
@@ -86,7 +96,7 @@ class MuscleFibers(NamedTuple):
                 MuscleInputs(length, 0.0, states.get("activation", 1.0), **states), *self.values
             )
         except (ArithmeticError, ValueError):
-            # Machine code has no number there.
+            # Machine code computes NaN where Python raises, for example for a root of -1.
             return [nan] * len(self.kind.outputs)
         return result
 
@@ -94,12 +104,12 @@ class MuscleFibers(NamedTuple):
 def find_fibers(
     model: Model, mechanism: Mechanism, wanted: Container[str]
 ) -> Iterator[MuscleFibers]:
-    """Yield the muscles whose laws have numeric parameters: Thelen, Millard, De Groote, Meyer.
+    """Yield the muscles whose laws have only numeric parameters: Thelen, Millard, De Groote, Meyer.
 
     Args:
-        model: whose muscles.
-        mechanism: of it.
-        wanted: paths of the muscles that are asked for.
+        model: the model.
+        mechanism: its mechanism.
+        wanted: paths of the requested muscles.
     """
     builder = ElementBuilder(model, mechanism, Path())
     for muscle in model.components(Muscle):
@@ -127,7 +137,12 @@ def find_fibers(
 
 
 def compute_start(fibers: MuscleFibers, length: float) -> MuscleStart | None:
-    """Compute start and equilibrium at a path length, m; None for a muscle without states to equilibrate."""
+    """Compute the initial state and the equilibrium of a muscle; None without states to equilibrate.
+
+    Args:
+        fibers: the muscle.
+        length: length of its path, m.
+    """
     if not fibers.is_elastic:
         return None
     states = fibers.get_start_states()
@@ -140,7 +155,14 @@ def compute_start(fibers: MuscleFibers, length: float) -> MuscleStart | None:
 
 
 def compute_reach(fibers: MuscleFibers, length: float, is_active: bool, pose: Pose) -> FiberReach:
-    """Compute the fibers in equilibrium at a path length, m."""
+    """Compute the fibers in equilibrium.
+
+    Args:
+        fibers: the muscle.
+        length: length of its path, m.
+        is_active: full activation; otherwise that at rest.
+        pose: pose with this length, for messages.
+    """
     known = fibers.evaluate_law(
         length,
         fibers.equilibrate(

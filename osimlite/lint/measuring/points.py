@@ -1,6 +1,6 @@
 """Moving path points at the ends of the ranges of their coordinates.
 
-Outside the range OpenSim keeps the position of a point but computes with a speed of it.
+Outside the range OpenSim keeps the position of a point constant, but computes with a nonzero speed.
 """
 
 from __future__ import annotations

@@ -16,28 +16,36 @@ from osimlite.mechanics.multibody.parts import CoordinateInfo
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.simulation.paths import Paths
 
-VALUES = 9
+FREE_VALUES = 9
 """Number of values of each free coordinate."""
 TIED_VALUES = 5
-"""Number of values of a coordinate that constraints tie to others: each pose must be assembled."""
+"""Number of values of a coordinate that constraints tie to others, each of which needs an assembly."""
 TIED_POSES = 40
-"""Largest number of assembled poses of a model."""
+"""Largest number of assembled poses of a model, which limits the time of a check."""
 MAX_RANGE = 4.0 * pi
-"""A wider range (rad or m) stands for none."""
+"""Widest range (rad or m) that is measured; authors who do not want a limit write wider ones."""
 MIN_CHANGE_M = 1e-9
-"""A length that changes by less (m) does not."""
+"""Change of a length (m) below which a coordinate does not move a path; larger than rounding errors."""
 
 
 @dataclass(frozen=True, eq=False)
 class Sweep:
-    """Sweep of a coordinate over its range, the others at their defaults or as near as constraints allow."""
+    """Sweep of a coordinate over its range, the others at their defaults or as near as constraints allow.
 
-    paths: Paths  # whose lengths change
-    place: int  # of the coordinate in the mechanism
-    # values of all coordinates (k, n), those of this one increasing; as far as constraints allow
+    Attributes:
+        paths: the paths of the model.
+        place: index of the coordinate in the mechanism.
+        poses: values of all coordinates (k, n), ascending in this one, as far as constraints allow.
+        is_tied: whether a constraint moves others with the coordinate.
+        lengths: lengths of all paths in the poses (k, p), m.
+    """
+
+    paths: Paths
+    place: int
+
     poses: Array
-    is_tied: bool  # whether a constraint moves others with the coordinate
-    lengths: Array  # of all paths there (k, p), m
+    is_tied: bool
+    lengths: Array
 
     @property
     def values(self) -> Array:
@@ -51,7 +59,7 @@ class Sweep:
 
     @property
     def info(self) -> CoordinateInfo:
-        """The coordinate."""
+        """Name, range and unit of the coordinate."""
         return self.paths.mechanism.coordinates[self.place]
 
     def value(self, value: float) -> Value:
@@ -66,8 +74,8 @@ class Sweep:
         """Return all coordinates (k, n) at values of this one, by linear interpolation between the poses.
 
         Args:
-            values: of the coordinate (k,), rad or m.
-            place: numbers (k,) of the poses that the lines begin at.
+            values: values of the coordinate (k,), rad or m.
+            place: indices (k,) of the poses before the values.
         """
         before, after = self.poses[place], self.poses[place + 1]
         part = (values - before[:, self.place]) / (after[:, self.place] - before[:, self.place])
@@ -82,9 +90,9 @@ def sweep_coordinates(paths: Paths, start: Array, others: Container[int] = ()) -
     """Return a sweep of each coordinate that changes the length of a path.
 
     Args:
-        paths: that are looked at.
-        start: the default pose (n,).
-        others: places of coordinates that change the length of a path that is not among these.
+        paths: the paths.
+        start: default pose (n,).
+        others: indices of coordinates that change the length of a path which is not among these.
     """
     are_tied, left = find_tied_coordinates(paths, start), TIED_POSES
     result: list[tuple[int, Array, bool]] = []
@@ -102,7 +110,11 @@ def sweep_coordinates(paths: Paths, start: Array, others: Container[int] = ()) -
             continue
         left -= is_tied * TIED_VALUES
         poses = _find_poses(
-            paths, start, place, np.linspace(low, high, TIED_VALUES if is_tied else VALUES), is_tied
+            paths,
+            start,
+            place,
+            np.linspace(low, high, TIED_VALUES if is_tied else FREE_VALUES),
+            is_tied,
         )
         if len(poses) > 1:
             result.append((place, poses, is_tied))
@@ -129,6 +141,7 @@ def _find_poses(paths: Paths, start: Array, place: int, values: Array, is_tied: 
             try:
                 result.append(paths.mechanism.assemble(q, kept=(place,)))
             except SimulationError:
+                # Constraints allow no pose here, so poses farther out are not tried.
                 break
     return np.array(sorted(result, key=lambda q: float(q[place]))).reshape(-1, len(start))
 

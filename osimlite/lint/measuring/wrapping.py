@@ -1,4 +1,4 @@
-"""Compare OpenSim's path lengths around surfaces with geodesics."""
+"""Comparison of OpenSim's path lengths around surfaces with geodesics."""
 
 from __future__ import annotations
 
@@ -13,25 +13,25 @@ from osimlite.mechanics.multibody.spatial import Array
 from osimlite.simulation.paths import Paths
 
 RANDOM_POSES = 64
-"""Poses with values of all coordinates within their ranges, at random but always the same."""
+"""Number of poses with random values of all coordinates within their ranges, the same in every check."""
 
 
-ASIDE = 1e-7
-"""Distance (rad or m) from a pose at which a length is computed again."""
-NEAR = 1e-4
-"""Largest difference (m) of the excess length at that distance."""
+REPEAT_OFFSET = 1e-7
+"""Distance (rad or m) from a pose at which a length is computed again, to detect rounding errors."""
+MAX_REPEAT_DIFFERENCE_M = 1e-4
+"""Largest difference of the excess length between neighbouring poses that is not due to rounding, m."""
 
 
 def compare_wrappings(
     geodesic: Paths, paths: Paths, start: Array, looked_at: Sequence[Sweep]
 ) -> Iterator[WrappingError]:
-    """Yield for each path around surfaces its excess length over geodesics, by default and at worst.
+    """Yield the excess length of each path around surfaces over geodesics, in the default and the worst pose.
 
     Args:
-        geodesic: those of the paths that have surfaces, along geodesics.
-        paths: all of them in OpenSim's way.
-        start: the default pose (n,).
-        looked_at: the sweeps.
+        geodesic: the paths with surfaces, along geodesics.
+        paths: all paths, as OpenSim wraps them.
+        start: default pose (n,).
+        looked_at: sweeps of coordinates.
     """
     free = [sweep for sweep in looked_at if not sweep.is_tied]
     together = _sample_poses(start, free)
@@ -52,7 +52,7 @@ def compare_wrappings(
         moved = [sweep for sweep in free if sweep.moved[path]]
 
         def describe_pose(k: int, moved: Sequence[Sweep] = moved) -> tuple[Pose, Array]:
-            """Return pose k for the message, with irrelevant coordinates at their defaults."""
+            """Return pose k with irrelevant coordinates at their defaults, and for messages."""
             if k == 0:
                 return Pose(), start
             for sweep in looked_at:
@@ -63,6 +63,7 @@ def compare_wrappings(
             q[places] = together[k - 1][places]
             return Pose(tuple(sweep.value(q[sweep.place]) for sweep in moved)), q
 
+        # Try the poses from the largest excess downwards until one is not a rounding error.
         order = np.argsort(-np.nan_to_num(np.abs(excess)), kind="stable").tolist()
         certain = (
             k
@@ -77,8 +78,8 @@ def compare_wrappings(
 
 def _sample_poses(start: Array, free: Sequence[Sweep]) -> Array:
     """Return poses (k, n) with random values of all free coordinates within their ranges."""
-    # Python's own generator, since pydantic has loaded it: `numpy.random` would take five
-    # milliseconds more.
+    # Use Python's generator, which pydantic has imported already: importing `numpy.random` takes
+    # five milliseconds.
     generator = Random(0)
     parts = np.array([[generator.random() for _ in free] for _ in range(RANDOM_POSES)]).reshape(
         RANDOM_POSES, len(free)
@@ -97,9 +98,9 @@ def _sample_poses(start: Array, free: Sequence[Sweep]) -> Array:
 def _is_certain(
     geodesic: Paths, paths: Paths, own: int, path: int, excess: float, q: Array
 ) -> bool:
-    """Return whether a path has the same excess right beside a pose; otherwise it is due to rounding."""
-    beside = np.array([q - ASIDE, q + ASIDE])
+    """Return whether a path has the same excess next to a pose; otherwise rounding caused it."""
+    beside = np.array([q - REPEAT_OFFSET, q + REPEAT_OFFSET])
     there = paths.system.measure_one_path([path] * 2, beside) - geodesic.system.measure_one_path(
         [own] * 2, beside
     )
-    return bool((np.abs(there - excess) < NEAR).all())
+    return bool((np.abs(there - excess) < MAX_REPEAT_DIFFERENCE_M).all())

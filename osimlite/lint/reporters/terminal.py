@@ -60,7 +60,7 @@ def describe_unmeasured(report: Report) -> str:
 
 
 def describe_skipped(report: Report, everything: bool) -> str:
-    """Return the sentence about skipped files that are not OpenSim's; empty if there are none.
+    """Return the sentence about skipped files that are not OpenSim's; empty without any.
 
     Args:
         report: the report.
@@ -183,7 +183,7 @@ def _group_by(items: Iterable[T], key: Callable[[T], Hashable]) -> list[list[T]]
 
 
 def hint_at_folds(folds: Iterable[Fold]) -> str:
-    """Return the hint how to print every finding; empty if there are none."""
+    """Return the hint how to print every finding; empty without any."""
     return "--all prints every finding." if any(fold.remarks for fold in folds) else ""
 
 

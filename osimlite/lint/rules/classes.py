@@ -11,7 +11,7 @@ from osimlite.lint.fixes import rename_tag, replace_text
 from osimlite.lint.old_tags import successor
 from osimlite.lint.registry import ERROR, FindingCollector, rule
 from osimlite.lint.subject import Subject
-from osimlite.lint.words import describe_object, with_article
+from osimlite.lint.words import add_article, describe_object
 from osimlite.schema.base import Object
 from osimlite.schema.fields import ObjectField
 from osimlite.schema.model import Model
@@ -158,7 +158,7 @@ def report_wrong_class(subject: Subject, report: FindingCollector) -> None:
             else describe_object(owner)
         )
         report(
-            f"{holder} expects {with_article(kinds)}, found {with_article(note.word)}: OpenSim "
+            f"{holder} expects {add_article(kinds)}, found {add_article(note.word)}: OpenSim "
             f"{_describe_consequence(subject, note)}{where}",
             owner,
             number=note.number,
@@ -237,7 +237,7 @@ def report_missing_wrapper(subject: Subject, report: FindingCollector) -> None:
 
 
 def find_wrapper(note: Note, owner: Object) -> str | None:
-    """Return the list of `owner` that should contain an object placed directly in it; None if there is none."""
+    """Return the list of `owner` that should contain an object placed directly in it; None without one."""
     if note.value is None or find_part(note, owner) is not None:
         return None
     lists = (
@@ -257,7 +257,7 @@ def find_wrapper(note: Note, owner: Object) -> str | None:
 
 
 def find_part(note: Note, owner: Object) -> FieldSpec | None:
-    """Return the property that would accept this object under its name; None if there is none."""
+    """Return the property that would accept this object under its name; None without one."""
     if note.value is None:
         return None
     for spec in get_field_specs(type(owner)).values():
@@ -287,7 +287,7 @@ def _describe_consequence(subject: Subject, note: Note) -> str:
 
 
 def find_set(cls: type[Object] | None) -> str | None:
-    """Return the set of a model that accepts objects of a class; None if there is none."""
+    """Return the set of a model that accepts objects of a class; None without one."""
     if cls is None:
         return None
     for spec in get_field_specs(Model).values():

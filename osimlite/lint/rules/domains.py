@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from osimlite.base.text import find_nearest, join_words
 from osimlite.lint.registry import ERROR, WARNING, FindingCollector, rule
-from osimlite.lint.subject import Subject, cached_per_subject
+from osimlite.lint.subject import Subject, cache_per_subject
 from osimlite.lint.words import format_quantity, format_value
 from osimlite.schema.base import Object
 from osimlite.schema.facts import REFUSED
@@ -222,7 +222,7 @@ _DRAWN = {
 _OutsideDomain = tuple[Object, FieldSpec, Any, DomainVerdict]
 
 
-@cached_per_subject
+@cache_per_subject
 def find_outside_domain(subject: Subject) -> list[_OutsideDomain]:
     """Return every number outside its domain."""
     return list(_iterate_outside_domain(subject))
@@ -377,7 +377,7 @@ def _may_be_infinite(item: Object, spec: FieldSpec) -> bool:
 
 
 def _find_word(subject: Subject, item: Object, spec: FieldSpec, number: float) -> str | None:
-    """Return the word of the text that a number was read from; None if there is none."""
+    """Return the word of the text that a number was read from; None without one."""
     element = subject.element_of(item, spec.tag)
     if element is None or subject.source is None:
         return None

@@ -60,7 +60,7 @@ def report_missing_mesh(subject: Subject, report: FindingCollector) -> None:
             continue
         if any(folders.has(place, name) for place in places):
             continue
-        twin = folders.in_other_case(places, name)
+        twin = folders.find_other_case(places, name)
         message = (
             f"the file '{name}' of {describe_object(item)} was not found; searched {tried}; "
             f"{remedy}"
@@ -78,7 +78,7 @@ def report_missing_mesh(subject: Subject, report: FindingCollector) -> None:
         elif "\\" in name:
             plain = name.replace("\\", "/")
             twin = plain if any(folders.has(place, plain) for place in places) else None
-            other = None if twin is not None else folders.in_other_case(places, plain)
+            other = None if twin is not None else folders.find_other_case(places, plain)
             if other is not None:
                 twin = f"{plain.rpartition('/')[0]}/{other}"
             if twin is not None:
@@ -204,7 +204,7 @@ def report_missing_data_file(subject: Subject, report: FindingCollector) -> None
             continue
         if name and any(folders.has(place, name) for place in places):
             continue
-        twin = folders.in_other_case(places, name)
+        twin = folders.find_other_case(places, name)
         consequence = (
             "it has no controls" if cls == "ControlSetController" else "OpenSim rejects the model"
         )
@@ -227,11 +227,12 @@ class _FolderListings:
         listing, last = self._listing(place, name)
         if last.isascii() and last.lower() not in listing:
             return False
-        # A system may take other letters for the same, or the name be that of a folder.
+        # The file system may ignore letter case for other characters, and the name may be that of
+        # a folder, so ask it.
         return os.path.isfile(os.path.join(place, name))
 
-    def in_other_case(self, places: list[str], name: str) -> str | None:
-        """Return the first file that differs from `name` in letter case only; None if there is none."""
+    def find_other_case(self, places: list[str], name: str) -> str | None:
+        """Return the first file that differs from `name` in letter case only; None without one."""
         for place in places:
             listing, last = self._listing(place, name)
             twin = listing.get(last.lower(), last)

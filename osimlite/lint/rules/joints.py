@@ -8,7 +8,7 @@ from osimlite.lint.placement import find_rotation_axes
 from osimlite.lint.registry import ERROR, INFO, WARNING, FindingCollector, rule
 from osimlite.lint.skeleton import build_skeleton, find_base
 from osimlite.lint.subject import Subject
-from osimlite.lint.words import describe_object, with_article
+from osimlite.lint.words import add_article, describe_object
 from osimlite.mechanics.laws.vectors import dot
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.frames import Ground
@@ -101,7 +101,7 @@ def report_wrong_coordinate_count(subject: Subject, report: FindingCollector) ->
         elif given != wanted and (declared or given):
             report(
                 f"{describe_object(joint)} has {format_count(given, 'coordinate')}, "
-                f"{with_article(type(joint).tag)} needs {wanted}: OpenSim rejects the model",
+                f"{add_article(type(joint).tag)} needs {wanted}: OpenSim rejects the model",
                 joint,
                 number=subject.element_of(joint, "coordinates"),
             )

@@ -9,8 +9,10 @@ from osimlite.io.tables.headers import METRES_PER_UNIT
 from osimlite.lint.registry import INFO, WARNING, FindingCollector, rule
 from osimlite.lint.table import Table
 
-_LARGEST, _SMALLEST = 8.0, 0.02
-"""Plausible range of the spread of the markers in a frame, m."""
+_MAX_SPREAD_M = 8.0
+"""Largest plausible spread of the markers of a moving subject, m."""
+_MIN_SPREAD_M = 0.02
+"""Smallest plausible spread of the markers of a moving subject, m."""
 
 
 @rule("OSIM811", "marker-units", severity=WARNING, fixes="unsafe", about="table")
@@ -44,7 +46,7 @@ def report_marker_units(table: Table, report: FindingCollector) -> None:
     if not spreads:
         return
     usual = spreads[len(spreads) // 2]
-    if not _SMALLEST <= usual * unit <= _LARGEST:
+    if not _MIN_SPREAD_M <= usual * unit <= _MAX_SPREAD_M:
         right = next(
             (name for name in ("m", "mm", "cm") if 0.2 <= usual * METRES_PER_UNIT[name] <= 3.0),
             None,

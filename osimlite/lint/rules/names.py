@@ -5,7 +5,7 @@ from __future__ import annotations
 from osimlite.base.text import format_count, join_words
 from osimlite.lint.registry import ERROR, INFO, WARNING, FindingCollector, rule
 from osimlite.lint.rules.references import BrokenReference, find_broken_references
-from osimlite.lint.subject import Subject, cached_per_subject
+from osimlite.lint.subject import Subject, cache_per_subject
 from osimlite.lint.words import describe_object
 from osimlite.schema.base import Component, Unknown
 from osimlite.schema.coordinates import Coordinate
@@ -229,7 +229,7 @@ def _get_last_part(text: str) -> str:
     return text.rpartition("/")[2]
 
 
-@cached_per_subject
+@cache_per_subject
 def _find_holders(subject: Subject) -> dict[int, dict[str, None]]:
     """Return the components that refer to each component, by its identity."""
     known: dict[int, dict[str, None]] = {}

@@ -237,8 +237,8 @@ def _find_limits(
 ) -> Iterator[tuple[CoordinateLimitForce, Coordinate, float, float, float]]:
     """Yield limit forces with their coordinate, the factor to their unit, and the range in that unit.
 
-    A coordinate without a range is left out, and one of which the functions of its joint decide
-    what it means.
+    Coordinates without a range are left out, and those whose meaning depends on the functions of their
+    joint.
     """
     spec = CoordinateLimitForce.field_specs()["coordinate"]
     for force in subject.find_instances(CoordinateLimitForce):

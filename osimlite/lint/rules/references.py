@@ -10,8 +10,8 @@ from osimlite.io.document.source import Source
 from osimlite.lint.axes import find_made_up_paths, refuses_axes
 from osimlite.lint.fixes import replace_text
 from osimlite.lint.registry import ERROR, WARNING, FindingCollector, rule
-from osimlite.lint.subject import Subject, cached_per_subject
-from osimlite.lint.words import describe_object, find_nearest_name, pick_closest, with_article
+from osimlite.lint.subject import Subject, cache_per_subject
+from osimlite.lint.words import add_article, describe_object, find_nearest_name, pick_closest
 from osimlite.schema.base import Component, Object, Unknown
 from osimlite.schema.contact import ContactGeometry
 from osimlite.schema.frames import Frame
@@ -75,7 +75,7 @@ def report_reference_to_wrong_type(subject: Subject, report: FindingCollector) -
         kind = other.class_name if isinstance(other, Unknown) else type(other).tag
         message = (
             f"{_format_subject(subject, broken.use)} '{broken.text}', which is "
-            f"{with_article(kind)}, not {with_article(broken.use.reference.target)}"
+            f"{add_article(kind)}, not {add_article(broken.use.reference.target)}"
         )
         fixed = (
             _list_contacts(subject, other)
@@ -106,8 +106,8 @@ def report_missing_reference(subject: Subject, report: FindingCollector) -> None
         use = broken.use
         if use.spec.name == "name":
             report(
-                f"the name of {with_article(type(use.holder).tag)} is blank, expected that of "
-                f"{with_article(use.reference.target)}; OpenSim disables the whole probe",
+                f"the name of {add_article(type(use.holder).tag)} is blank, expected that of "
+                f"{add_article(use.reference.target)}; OpenSim disables the whole probe",
                 use.holder,
                 attribute="name",
             )
@@ -116,7 +116,7 @@ def report_missing_reference(subject: Subject, report: FindingCollector) -> None
         state = "is empty" if given else "is not given"
         report(
             f"{use.spec.tag} of {_describe_holder(subject, use)} {state}, expected the name of "
-            f"{with_article(use.reference.target)}",
+            f"{add_article(use.reference.target)}",
             use.holder,
             tag=use.spec.tag,
         )
@@ -224,7 +224,7 @@ def _select_broken(subject: Subject, why: str) -> Iterator[BrokenReference]:
     return (broken for broken in find_broken_references(subject) if broken.why == why)
 
 
-@cached_per_subject
+@cache_per_subject
 def find_broken_references(subject: Subject) -> list[BrokenReference]:
     """Return every broken reference of the model."""
     return list(_iterate_broken_references(subject))
@@ -348,7 +348,7 @@ def _differs_in_form(text: str, candidates: list[str]) -> bool:
 
 
 def _find_elsewhere(subject: Subject, use: Use, text: str) -> Component | None:
-    """Return a component of another class with this name or path; None if there is none."""
+    """Return a component of another class with this name or path; None without one."""
     tree = subject.tree
     at_path = tree.by_path.get(normalize_path("/" + text) or "")
     if at_path is not None and not is_a(at_path, use.reference.target):

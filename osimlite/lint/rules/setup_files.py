@@ -14,7 +14,7 @@ from osimlite.lint.setup import (
     get_content_type,
     is_given,
 )
-from osimlite.lint.words import describe_object, with_article
+from osimlite.lint.words import add_article, describe_object
 from osimlite.schema.specs import get_file_specs
 from osimlite.schema.tree import is_a
 
@@ -165,7 +165,7 @@ def report_input_of_another_kind(setup: Setup, report: FindingCollector) -> None
                 )
         elif wanted[:1].isupper():
             top = None if is_table(naming.name) else setup.read_document(naming.name)
-            held = "a table" if top is None else with_article(type(top).__name__)
+            held = "a table" if top is None else add_article(type(top).__name__)
             if is_table(naming.name) or (top is not None and not is_a(top, wanted)):
                 report(
                     f"{naming.spec.tag} of {describe_object(naming.item)}: expected a {wanted}, "

@@ -20,8 +20,10 @@ from osimlite.lint.setup import Setup, select_members
 from osimlite.lint.table import Table
 from osimlite.lint.words import describe_object
 
-_MIN_FACTOR, _MAX_FACTOR = 0.5, 2.0
-"""Plausible range of the factor that scales a body."""
+_MIN_FACTOR = 0.5
+"""Smallest plausible scale factor of a body."""
+_MAX_FACTOR = 2.0
+"""Largest plausible scale factor of a body."""
 _MIN_ROWS = 3
 """Sampled rows within the time range of the tool that suffice; with fewer, the table is read."""
 _MAX_ROWS = 100
@@ -182,7 +184,7 @@ def _hide_origin(point: Sequence[float]) -> Sequence[float]:
 
 
 def _find_left_marker(name: str, names: Set[str]) -> str:
-    """Return the name of the left counterpart of a right marker; empty if there is none."""
+    """Return the name of the left counterpart of a right marker; empty without one."""
     for right, left in _SIDES:
         for fellow in (
             left + name.removeprefix(right),

@@ -11,7 +11,7 @@ from osimlite.lint.placement import FramePose, locate_frame
 from osimlite.lint.posture import compute_poses_of_motion, make_model_subject
 from osimlite.lint.registry import ERROR, INFO, WARNING, FindingCollector, rule
 from osimlite.lint.setup import Setup, find_motion_file, select_members
-from osimlite.lint.subject import cached_per_subject
+from osimlite.lint.subject import cache_per_subject
 from osimlite.lint.table import Table
 from osimlite.lint.words import describe_object, find_nearest_name
 from osimlite.mechanics.laws.vectors import Vector, dot
@@ -282,7 +282,7 @@ def _sample_load(setup: Setup, force: Any, table: Table | None, motion: Table) -
     return result
 
 
-@cached_per_subject
+@cache_per_subject
 def _list_body_points(setup: Setup) -> dict[str, list[Vector]]:
     """Return known points on each body by its name (m): mass centre, joint frames, markers and contacts."""
     subject = make_model_subject(setup)

@@ -81,7 +81,7 @@ def report_unknown_name(setup: Setup, report: FindingCollector) -> None:
     unknown = {item.name for item in tree.by_class.get(Unknown, ())}
 
     @cache
-    def known(what: str, rule: str) -> set[str]:
+    def list_known_names(what: str, rule: str) -> set[str]:
         if rule in _PATHS:
             return set(find_variables(tree, what))
         if what == "Actuator":
@@ -109,7 +109,7 @@ def report_unknown_name(setup: Setup, report: FindingCollector) -> None:
         what, text, target = _look_up_text(setup, tree, use, text)
         if what is None or target is not None:
             continue
-        names = known(what, kind.rule)
+        names = list_known_names(what, kind.rule)
         if (
             text in names
             or not unknown.isdisjoint(text.split("/"))

@@ -17,7 +17,7 @@ from osimlite.lint.old_tags import Successor, is_comment, reason_unused, success
 from osimlite.lint.registry import ERROR, INFO, WARNING, FindingCollector, rule
 from osimlite.lint.rules.classes import find_part, find_set, find_wrapper
 from osimlite.lint.subject import Subject
-from osimlite.lint.words import describe_object, format_value, with_article
+from osimlite.lint.words import add_article, describe_object, format_value
 from osimlite.schema.base import Object
 from osimlite.schema.fields import ObjectField, Reference, Value
 from osimlite.schema.model import CURRENT_VERSION, Model
@@ -111,7 +111,7 @@ def _describe_unknown(subject: Subject, note: Note, owner: Object) -> _UnknownTa
             else ""
         )
     elif note.value is not None:
-        message += f": {with_article(note.word)} cannot stand in {with_article(type(owner).tag)}"
+        message += f": {add_article(note.word)} cannot stand in {add_article(type(owner).tag)}"
         home = find_set(note.value)
         message += f"; it belongs in the {home}" if home and isinstance(owner, Model) else ""
     else:

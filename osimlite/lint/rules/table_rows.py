@@ -107,7 +107,7 @@ _BLANK_LINES = re.compile(rb"^[ \t\r]*\n(?:[ \t\r\n]*\n)?(?=[^\n]*\S)", re.MULTI
 
 
 def _remove_last_tabs(table: Table, width: int) -> Fix | None:
-    """Return the fix that deletes tabs beyond the cells of rows of markers; None if there are none."""
+    """Return the fix that deletes tabs beyond the cells of rows of markers; None without one."""
     edits = []
     for match in _LAST_TABS.finditer(table.data, table.line_start(table.header.label_line + 2)):
         start = table.data.rfind(b"\n", 0, match.start()) + 1

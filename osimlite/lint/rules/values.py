@@ -233,7 +233,7 @@ def _describe_kept_value(note: Note, owner: Object, spec: FieldSpec, kind: Value
 
 
 def _describe_foreign_characters(text: str) -> str:
-    """Return which characters of a number only look like ASCII; empty if there are none."""
+    """Return which characters of a number only look like ASCII; empty without any."""
     odd = [character for character in dict.fromkeys(text) if not character.isascii()]
     if not odd:
         return ""

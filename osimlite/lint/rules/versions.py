@@ -5,7 +5,7 @@ from __future__ import annotations
 from osimlite.lint.history import NEWEST, find_new_properties, load_later_changes
 from osimlite.lint.registry import ERROR, INFO, FindingCollector, rule
 from osimlite.lint.subject import Subject
-from osimlite.lint.words import describe_object, with_article
+from osimlite.lint.words import add_article, describe_object
 from osimlite.schema.base import Object
 from osimlite.schema.model import CURRENT_VERSION
 from osimlite.schema.specs import FieldSpec
@@ -52,7 +52,7 @@ def report_newer_class(subject: Subject, report: FindingCollector) -> None:
                 # What is there by default stands in no file.
                 if subject.source is None or item._index is not None:
                     report(
-                        f"{describe_object(item)}: OpenSim has {with_article(cls.tag)} since "
+                        f"{describe_object(item)}: OpenSim has {add_article(cls.tag)} since "
                         f"version {first}; {target} rejects it",
                         item,
                     )

@@ -9,7 +9,7 @@ from osimlite.base.text import find_nearest, format_count
 from osimlite.lint.fixes import replace_text
 from osimlite.lint.registry import ERROR, FindingCollector, rule
 from osimlite.lint.subject import Subject
-from osimlite.lint.words import describe_object, with_article
+from osimlite.lint.words import add_article, describe_object
 from osimlite.schema.base import Component, Unknown
 from osimlite.schema.frames import Frame
 from osimlite.schema.geometry import Geometry
@@ -202,4 +202,4 @@ def _describe_input_fault(subject: Subject, use: Use, text: str) -> _InputFault 
 
 
 def _describe_type(kind: str) -> str:
-    return "a number" if kind == "double" else with_article(kind)
+    return "a number" if kind == "double" else add_article(kind)

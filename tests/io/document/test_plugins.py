@@ -230,7 +230,7 @@ def test_a_wrong_declaration_is_told_with_its_line(folder, entry, line, words):
 
 def test_what_is_no_declaration_at_all_is_told(folder, capsys):
     for text, words in [
-        ("{", "mine.json:1: this is no JSON"),
+        ("{", "mine.json:1: not JSON"),
         ("[]", "must be an object of JSON"),
         ('{"classes": {"Body": {"bases": ["Frame"]}}}', "'Body' is a class of OpenSim itself"),
         (

@@ -177,7 +177,7 @@ def upgrade(root: Element, version: int) -> UpgradeResult:
 
 
 def rename_old_classes(root: Element) -> UpgradeResult | None:
-    """Rename the classes of a current document that have an old name; return None if there are none.
+    """Rename the classes of a current document that have an old name; return None without one.
 
     OpenSim accepts the old names in documents of every version.
     """
