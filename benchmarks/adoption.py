@@ -1,4 +1,6 @@
-"""Checks a kit of docs/adoption once more: python benchmarks/adoption.py opensim-org-opensim-models CLONE
+"""Check a kit of docs/adoption again.
+
+Usage: python benchmarks/adoption.py opensim-org-opensim-models CLONE
 
 Counts what the linter finds by the settings of the kit, applies its patches one by one, tells which
 findings each takes away, and asks OpenSim what it reads before and after. The clone must be at the

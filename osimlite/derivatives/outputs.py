@@ -75,7 +75,7 @@ def compute_frame_columns(
     """Compute the results of `CasadiModel.frames`.
 
     Args:
-        found: workspace of an evaluation up to the speeds.
+        workspace: workspace of an evaluation up to the speeds.
         frames: link, and axes and origin in the link (12,), of each frame; the numbers may be
             symbols.
 
@@ -267,7 +267,7 @@ def compute_joint_load_columns(
     """Compute the results of `CasadiModel.joint_load`.
 
     Args:
-        found: workspace of inverse dynamics.
+        workspace: workspace of inverse dynamics.
         link: link that the joint carries.
         origin: link of the frame at whose origin the load acts, and the point in the link (3,).
         sign: 1 for the load on the carried body, -1 for the load on the carrying body.

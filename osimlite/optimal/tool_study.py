@@ -45,7 +45,7 @@ def set_time_range(
     """Set bounds of time and the mesh of a study by the settings of a tool.
 
     Args:
-        asked: tool with its folder, for messages.
+        context: tool with its folder, for messages.
         tool: settings.
         tables: reference tables, which the motion must not exceed.
         study: study to change.

@@ -83,8 +83,9 @@ class KernelController:
 
     @property
     def header(self) -> dict[str, str]:
-        """Header of the record, by which a continued run recognizes its controller: gains, and a
-        checksum of everything else.
+        """Header of the record: gains, and a checksum of everything else.
+
+        A continued run recognizes its controller by it.
         """
         others = crc32(self.plan.tobytes() + self.numbers.tobytes())
         return {

@@ -194,8 +194,9 @@ class StateEvaluator:
         self._y[:] = y
 
     def get_derivative(self) -> list[float]:
-        """Return the derivative (y,) of the state after an evaluation; after the force stage it has
-        generalized forces in place of udot.
+        """Return the derivative (y,) of the state after an evaluation.
+
+        After the force stage it has generalized forces in place of udot.
         """
         return self._f.tolist()
 
@@ -218,8 +219,10 @@ class StateEvaluator:
         return self.get_derivative()
 
     def compute_required_forces(self, moments: Floats, udot: Floats) -> Floats:
-        """Compute inverse dynamics: generalized forces (k, n) that accelerations need beyond
-        gravity and the forces of the model.
+        """Compute inverse dynamics.
+
+        The result are the generalized forces (k, n) that accelerations need beyond gravity and the
+        forces of the model.
 
         Constraints are ignored. Errors are those of :meth:`evaluate_moments`.
 
@@ -315,8 +318,10 @@ class StateEvaluator:
     def _equilibrate_all(
         self, t: float, y: Sequence[float], numbers: Floats | None = None
     ) -> tuple[list[float], int | None]:
-        """Equilibrate all muscles; return the state, and the index of the first muscle without
-        equilibrium (None if there is none).
+        """Equilibrate all muscles.
+
+        Returns:
+            The state, and the index of the first muscle without equilibrium; None without one.
 
         Raises:
             SimulationError: the rates of coordinates are not defined at this state.

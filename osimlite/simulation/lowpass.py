@@ -92,8 +92,13 @@ def _resample_evenly(times: Array, values: Array) -> tuple[Array, Array, float]:
 
 
 def extend_ends(values: Array, count: int) -> Array:
-    """Extend values by `count` rows at both ends by point reflection about the first and last row,
-    repeatedly for short records.
+    """Extend values by `count` rows at both ends by point reflection about the first and last row.
+
+    Short records are reflected repeatedly.
+
+    Args:
+        values: the rows.
+        count: number of rows to add at each end.
     """
     while count > 0:
         more = min(count, len(values) - 1)

@@ -101,8 +101,9 @@ def _encode_joint(packer: Packer, joint: RobotJoint) -> tuple[int, int, int, lis
 
 
 def _list_products(packer: Packer, shares: Sequence[tuple[int, int]], count: int) -> list[int]:
-    """Return the records of products: for each entry of the mass matrix, pairs of shares, the entry
-    of the other program's matrix, and the offset of the sum.
+    """Return the records of products for each entry of the mass matrix.
+
+    A record has pairs of shares, the entry of the other program's matrix, and the offset of the sum.
     """
     of_freedom: dict[int, list[tuple[int, int]]] = defaultdict(list)
     for number, (joint, freedom) in enumerate(shares):

@@ -279,8 +279,9 @@ class Paths:
 def _compute_coupled_speeds(
     constraints: Sequence[Constraint], state: Kinematics, places: Sequence[int]
 ) -> Array:
-    """Return, in the columns of `places`, the admissible speeds nearest to 1 for a coordinate and 0
-    for all others, divided by its own speed.
+    """Return the admissible speeds nearest to 1 for one coordinate and 0 for all others.
+
+    They are in the columns of `places`, divided by the speed of the coordinate itself.
     """
     coupling = np.eye(len(state.q))
     if constraints and places:

@@ -314,8 +314,10 @@ class RecordedMotion(Movement):
         return RecordedMotion(self.mechanism, self.times, poses, self.missing, self.ignored)
 
     def bodies(self) -> StoTable:
-        """Return position (m) and body-fixed X-Y-Z angles (degrees) of each body's mass centre in
-        ground, then the model's mass centre.
+        """Return positions of bodies over time in ground.
+
+        These are position (m) and body-fixed X-Y-Z angles (degrees) of each body's mass centre, then
+        the position of the model's mass centre.
         """
         mechanism = self.mechanism
         columns = [

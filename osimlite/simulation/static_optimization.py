@@ -369,11 +369,14 @@ class StaticOptimization:
     def _project_accelerations(
         self, times: Array, values: Array, speeds: Array, wanted: Array
     ) -> tuple[Array, Array]:
-        """Return the accelerations (t, n) that the constraints allow, and the motion of all
-        coordinates with each free one (t, n, m).
+        """Return admissible accelerations and the motion of all coordinates with the free ones.
 
         Where the constraints do not allow the given accelerations of free coordinates, the nearest
         ones are used.
+
+        Returns:
+            The accelerations (t, n) that the constraints allow, and the motion of all coordinates
+            with each free one (t, n, m).
         """
         size, free = len(self.mechanism.coordinates), self._free
         ways = np.zeros((len(times), size, len(free)))

@@ -24,8 +24,9 @@ Progress = Callable[[float, float], object]
 
 
 class NoSolution(SimulationError, ArithmeticError):
-    """The equations of a force have no solution at a state; within a step the integrator then tries
-    a smaller step, as Simbody does.
+    """Error of a state at which the equations of a force have no solution.
+
+    Within a step the integrator then tries a smaller step, as Simbody does.
     """
 
 

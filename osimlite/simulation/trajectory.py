@@ -220,9 +220,9 @@ class Trajectory(Tabular):
         )
 
     def write(self, folder: str | Path) -> list[Path]:
-        """Write ``states.sto``, ``forces.sto``, ``summary.json``, and ``probes.sto`` and
-        ``controller.sto`` where there are any.
+        """Write ``states.sto``, ``forces.sto`` and ``summary.json`` into a folder.
 
+        Models with probes also have ``probes.sto``, and runs with a controller ``controller.sto``.
         The folder is made if it does not exist.
 
         Returns:

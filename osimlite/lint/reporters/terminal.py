@@ -32,7 +32,12 @@ def paint(text: str, style: Severity | str, colour: bool) -> str:
 
 
 def format_summary(report: Report, colour: bool = False) -> str:
-    """Return the closing line: ``Found 3 errors, 1 warning in 2 files.``"""
+    """Return the closing line, such as ``Found 3 errors, 1 warning in 2 files``.
+
+    Args:
+        report: the findings.
+        colour: whether to colour the counts.
+    """
     counts = (
         (Severity.ERROR, len(report.errors)),
         (Severity.WARNING, len(report.warnings)),

@@ -59,9 +59,9 @@ def report_duplicate_name(subject: Subject, report: FindingCollector) -> None:
 
 @rule("OSIM312", "illegal-name", severity=ERROR, before=(30500, WARNING))
 def report_illegal_name(subject: Subject, report: FindingCollector) -> None:
-    """The name of a component contains an illegal character.
+    r"""The name of a component contains an illegal character.
 
-    Reports white space, `/`, `\\`, `*` and `+` in the names of components.
+    Reports white space, `/`, `\`, `*` and `+` in the names of components.
 
     Names are the parts of paths; OpenSim rejects the file. In files older than version 30500 it
     removes white space from the names, but not from references to them: a muscle or a marker is

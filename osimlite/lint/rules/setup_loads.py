@@ -213,8 +213,14 @@ def report_load_place(setup: Setup, report: FindingCollector) -> None:
 
 
 class _LoadSample(NamedTuple):
-    """What a force does at a time: how far from the origin of its body, m, and what its torque adds
-    to that, m; its size, N, and its direction, as it is written and in ground.
+    """Distance and size of an external force at one time.
+
+    Attributes:
+        away: distance of the force from the origin of its body, m.
+        twist: distance that its torque adds, m.
+        size: size of the force, N.
+        written: direction as it is written.
+        direction: direction in ground.
     """
 
     away: float

@@ -267,7 +267,7 @@ def find_members(
         probe: the probe.
         words: names, or components.
         path: path of the set.
-        kind: class of the components.
+        probe_type: class of the components.
 
     Raises:
         ModelError: the set has no component of a name.

@@ -353,8 +353,9 @@ class Program:
             return function(*parts)
 
     def _catch_errors(self, python: Callable[..., None]) -> Callable[..., int]:
-        """Return a function that stores exceptions in `failures`, since they cannot pass through
-        machine code; the caller raises them.
+        """Return a function that stores exceptions in `failures`.
+
+        Exceptions cannot pass through machine code, so the caller raises them.
         """
 
         def kernel(*parts: Any) -> int:

@@ -210,7 +210,7 @@ def _find_swapped_markers(
         tool: an InverseKinematicsTool.
         motion: its motion.
 
-    Returns:
+    Yields:
         Names of both markers, and the numbers of the frames in which the exchange fits better.
     """
     errors = motion.marker_errors

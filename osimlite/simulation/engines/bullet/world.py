@@ -228,8 +228,9 @@ def write_robot(robot: Robot) -> str:
 
 
 def compute_inertia_excess(link: Link) -> float:
-    """Return what to add to each principal moment of inertia so that Bullet does not replace them
-    by zero; 0 if they are valid.
+    """Return what to add to each principal moment of inertia; 0 if the moments are valid.
+
+    Bullet would replace invalid moments by zero.
     """
     moments = [float(moment) for moment in principal_axes(link.inertia)[0]]
     low, middle, high = sorted(moments)
