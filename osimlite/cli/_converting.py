@@ -11,7 +11,7 @@ from osimlite.base.records import dataclass, field
 from osimlite.base.text import format_json, join_words, suggest_name
 from osimlite.base.writing import write_into
 from osimlite.cli import _options as options
-from osimlite.cli._console import add_row, plain_console, plain_table, say
+from osimlite.cli._console import add_row, create_console, create_table, say
 from osimlite.cli.translate import tabulate
 from osimlite.errors import SettingError
 from osimlite.translate.exporters import EXPORTERS, Exporter
@@ -106,7 +106,7 @@ class Request:
         is_file = output is not None and output.suffix.lower() == _get_suffix(goal) != ""
         folder = output.parent if output is not None and is_file else output
         name = output.stem if output is not None and is_file else file.stem
-        return cls(file, found, goal, options.results_folder(file, folder), name)
+        return cls(file, found, goal, options.choose_output_folder(file, folder), name)
 
     def carry_out(
         self, motion: Path | None, geometry: Sequence[Path] | None, chosen: Mapping[str, Any]
@@ -180,7 +180,7 @@ class Request:
         choices: Mapping[str, Any],
     ) -> Conversion:
         """Write a model in the format of an exporter."""
-        folders = options.mesh_folders(self.file, geometry)
+        folders = options.list_mesh_folders(self.file, geometry)
         if exporter.command == "translate":
             moved = {"motion": motion} if exporter.takes_motion else {}
             made = exporter.write(
@@ -241,7 +241,7 @@ def _get_relative(path: Path, folder: Path) -> str:
 def report(request: Request, result: Conversion) -> None:
     """Print what was lost, and which files were written."""
     if len(result.fidelity):
-        plain_console().print(tabulate(result.fidelity, request.target))
+        create_console().print(tabulate(result.fidelity, request.target))
     same, changed, dropped = result.fidelity.counts()
     say(f"parts: {same} exact, {changed} approximated or converted, {dropped} left out")
     say("wrote " + join_words([str(path) for path in result.files], most=4))
@@ -249,7 +249,7 @@ def report(request: Request, result: Conversion) -> None:
 
 def print_formats() -> None:
     """Print all formats, with suffix, direction and contents."""
-    table = plain_table()
+    table = create_table()
     for heading in ("format", "suffix", "", "carries"):
         table.add_column(heading, overflow="fold")
     add_row(
@@ -274,4 +274,4 @@ def print_formats() -> None:
         if name not in importers:
             title = exporter.title or name.upper()
             add_row(table, name, exporter.suffix, "out", f"{title}: {exporter.carries}")
-    plain_console().print(table)
+    create_console().print(table)
