@@ -43,7 +43,7 @@ def make_plot(by: str) -> Callable[..., Any]:
         by: name of the function in :mod:`osimlite.view.plotted` that returns the pictures.
     """
 
-    def plot(self: Any, folder: Any = None) -> Any:
+    def plot(self: Any, folder: Any = None) -> Any:  # noqa: D417 - `self` is not an argument
         """Draw the columns: left and right in one panel, one unit per axis, twelve panels a page.
 
         Args:

@@ -58,7 +58,7 @@ def static_optimization(
         --forces reserves.xml
     """
     from osimlite.cli._console import complain
-    from osimlite.cli._recorded import draw_tables, require_plots, print_motion_summary
+    from osimlite.cli._recorded import draw_tables, print_motion_summary, require_plots
     from osimlite.io.document.reader import read
     from osimlite.simulation.muscle_forces import static_optimization as shared_forces
 

@@ -292,7 +292,7 @@ def places_of(source: Source) -> Iterator[Place]:
         if number is None or not isinstance(use.value, str):
             continue
         if use.spec.name == "name":
-            line, column, _ = source.of_attribute(number, "name")
+            line, column, _ = source.locate_attribute(number, "name")
             start, kind = source.line_start(line) + column - 1, f"{type(use.holder).__name__}.name"
         else:
             element = source.child(number, use.spec.tag)
@@ -321,7 +321,7 @@ def targets_of(source: Source) -> Iterator[Target]:
             continue
         seen.add(target.source_index)
         span = source.spans[target.source_index]
-        line, column, _ = source.of_attribute(target.source_index, "name")
+        line, column, _ = source.locate_attribute(target.source_index, "name")
         start = source.line_start(line) + column - 1
         if target.name and source.text.startswith(f'"{target.name}"', start - 1):
             yield Target(type(target).__name__, target.name, span.start, span.end, start)
