@@ -70,10 +70,8 @@ def sample_perturbed_starts(
     """Draw random initial states (count, y) near a state.
 
     Each value and speed is multiplied by a uniform random number between 1 - `part` and 1 + `part`,
-    except
-    along neutral directions. Then the walker is lifted or lowered until the penetration of the
-    stance foot
-    is as before.
+    except along neutral directions. Then the walker is lifted or lowered until the penetration of
+    the stance foot is as before.
 
     Args:
         step_map: step map of the walker.
@@ -151,8 +149,7 @@ def find_basin(
         step_map: step map of the walker.
         cycle: gait cycle.
         x: coordinate that varies along the columns, or its speed as `NAME/speed`. The default is
-            the
-            speed of the first joint of the leg that touches down.
+            the speed of the first joint of the leg that touches down.
         y: coordinate that varies along the rows; the default is the same speed of the other leg.
         reach: half the width of the grid (rad, m, rad/s or m/s).
         grid: number of values along each side.
@@ -162,8 +159,7 @@ def find_basin(
 
     Raises:
         OsimliteError: a coordinate is unknown or locked, or the legs are not alike, so that there
-            are no
-            defaults.
+            are no defaults.
     """
     selected = find_basin_offsets(step_map.engine, x, y)
     defaults = (0, 0) if None not in selected else _find_leg_speeds(step_map)

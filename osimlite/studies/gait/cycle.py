@@ -33,14 +33,11 @@ class Cycle:
         state: state at the touch-down of the first foot, in the order of the engine (y,).
         length: length of a step along the slope, from foot to foot (m).
         travel: distance that the walker moves along the slope in a step (m); rolling feet take it
-            further
-            than `length`.
+            further than `length`.
         period: duration of a step (s).
         multipliers: Floquet multipliers of a step, or of a stride if the legs differ, largest
-            magnitude
-            first. Those of neutral directions are left out; that of the direction of motion, zero,
-            is
-            among them.
+            magnitude first. Those of neutral directions are left out; that of the direction of
+            motion, zero, is among them.
         neutral: number of neutral directions.
         residual: norm of the residual of the step map.
         scuffs: number of scuffs in one step.
@@ -103,8 +100,7 @@ def find_cycle(
     Args:
         step_map: step map of the walker.
         state: initial guess (y,), at a touch-down of the first foot; by default the state in which
-            the
-            step map was made.
+            the step map was made.
         tolerance: largest norm of the residual.
         max_steps: most steps of Newton's method.
         warm_up_steps: number of steps that the walker makes before the first step of Newton's

@@ -6,8 +6,7 @@ make
 2. The initial state and the numbers of the best candidates are changed together until the state at
 the
    end of a step equals that at its start (least squares in a trust region, then Newton's method),
-   which
-   is a cycle.
+   which is a cycle.
 3. The numbers of the best cycle are changed from cycle to cycle until its largest multiplier is
 small,
    and then until most of the walkers that start near it walk
@@ -135,8 +134,7 @@ class ModelCycle:
         cycle: gait cycle of the model with these numbers.
         walking: part of the walkers started near the cycle that walk; 0 if it was not measured.
         cost: objective of the search, smaller is better: largest multiplier plus `SCUFF_COST` per
-            scuff,
-            or `stable` minus `walking` once that is below `stable`.
+            scuff, or `stable` minus `walking` once that is below `stable`.
     """
 
     fractions: Floats
@@ -151,12 +149,10 @@ class CycleSearch:
 
     Args:
         plan: variables: initial values and speeds, from which random walkers are drawn, and numbers
-            of the
-            model, which are searched.
+            of the model, which are searched.
         feet: contacts of each foot; found from the structure of the model by default.
         stable: largest multiplier that is small enough; below it, the part of perturbed walkers
-            that walk
-            counts.
+            that walk counts.
         perturb: largest relative change of values and speeds of the perturbed walkers.
         threads: number of threads; by default one per core.
 
@@ -242,7 +238,8 @@ class CycleSearch:
         return self.compute_fractions(numbers)
 
     def make_model(self, fractions: Floats, start: Mapping[str, tuple[float, float]]) -> Model:
-        """Return the model with some numbers, and an initial state as its default values and speeds.
+        """Return the model with some numbers, and an initial state as its default values and
+        speeds.
 
         Args:
             fractions: fractions of the numbers (k,).
@@ -270,8 +267,8 @@ class CycleSearch:
     def find_candidates(
         self, count: int, seed: int, progress: Progress | None = None
     ) -> list[Candidate]:
-        """Simulate random walkers, and return those that make two steps without a scuff between, the
-        best first.
+        """Simulate random walkers, and return those that make two steps without a scuff between,
+        the best first.
 
         Args:
             count: number of random walkers.

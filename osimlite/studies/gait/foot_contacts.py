@@ -60,10 +60,8 @@ def find_footing(engine: BatchEngine, feet: Sequence[str] | None = None) -> Foot
 
     Bodies that touch the ground and carry no other such body are the ends of the legs. On each, the
     contact farthest from the joint belongs to the foot, and so do others that are at least half as
-    far.
-    If this is ambiguous (no contact is clearly farthest, or a contact farther up is named after a
-    part of
-    the foot), names decide. Every other contact with the ground ends the walk.
+    far. If this is ambiguous (no contact is clearly farthest, or a contact farther up is named
+    after a part of the foot), names decide. Every other contact with the ground ends the walk.
 
     Args:
         engine: engine of the model.

@@ -1,5 +1,5 @@
-"""Search for a stable gait of a model: find cycles, make the best one stable, round it, and write the
-walker.
+"""Search for a stable gait of a model: find cycles, make the best one stable, round it, and write
+the walker.
 """
 
 from __future__ import annotations
@@ -40,7 +40,8 @@ SUMMARY_FILE = "summary.json"
 """File in the output folder: settings and results of the search."""
 
 START_PHASES = (0.4, 0.5, 0.3, 0.6, 0.2, 0.7, 0.1, 0.8, 0.9)
-"""Parts of a step after touch-down at which the written walker may start, in the order of preference.
+"""Parts of a step after touch-down at which the written walker may start, in the order of
+preference.
 
 The middle of a step is preferred: there only one foot is in contact.
 """
@@ -98,8 +99,7 @@ def find_gait(
 
     Args:
         plan: variables: values and speeds of coordinates, from which random initial states are
-            drawn, and
-            numbers of the model.
+            drawn, and numbers of the model.
         folder: output folder for `best.osim`, `cycles.csv` and `summary.json`.
         feet: contacts of each foot; found from the structure of the model by default.
         samples: number of random walkers.
@@ -107,8 +107,7 @@ def find_gait(
         enough: number of cycles after which no more are searched.
         budget: number of sets of numbers that the optimization of stability tries.
         stable: largest multiplier that is small enough; below it, the part of perturbed walkers
-            that walk
-            counts.
+            that walk counts.
         perturb: largest relative change of values and speeds of the perturbed walkers.
         digits: significant digits to which the numbers of the model are rounded.
         start_digits: significant digits to which the initial state is rounded; None for no
@@ -126,8 +125,7 @@ def find_gait(
         SimulationError: there is no cycle, or rounding the numbers destroys the best one.
         UnsupportedError: the model has constraints.
         OsimliteError: the plan cannot be run, the model does not have two feet, or the folder
-            cannot be
-            written.
+            cannot be written.
     """
     settings = {
         **plan.settings(),
@@ -269,8 +267,7 @@ def choose_start(
     """Choose an initial state within a step of a cycle, and simulate the walk from it.
 
     It is at the first of several phases of the step from which, after rounding, the walker walks
-    without a
-    scuff. If none of them does, it is at the first phase.
+    without a scuff. If none of them does, it is at the first phase.
 
     Args:
         search: search with the plan.

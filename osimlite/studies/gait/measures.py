@@ -1,5 +1,5 @@
-"""Measures of sweeps for walkers (steps, scuffs, time of the fall), and a start with the feet on the
-ground.
+"""Measures of sweeps for walkers (steps, scuffs, time of the fall), and a start with the feet on
+the ground.
 
 The names of the public functions are the names that users write in a sweep. A fall ends the run.
 """
@@ -55,7 +55,8 @@ def scuffs(engine: Any, feet: Sequence[str] | None = None) -> Measure:
 
 @registry.measure(is_maximized=True)
 def time_to_fall(engine: Any, feet: Sequence[str] | None = None) -> Measure:
-    """Return the measure of the time of the fall (s); the end of the run for walkers that do not fall.
+    """Return the measure of the time of the fall (s); the end of the run for walkers that do not
+    fall.
 
     Args:
         engine: engine of the model.
@@ -66,14 +67,12 @@ def time_to_fall(engine: Any, feet: Sequence[str] | None = None) -> Measure:
 
 @registry.measure(is_maximized=True)
 def progress(engine: Any, feet: Sequence[str] | None = None) -> Measure:
-    """Return a measure that a search can climb: steps before the first scuff, plus how near the next
-    one was.
+    """Return a measure that a search can climb: steps before the first scuff, plus how near the
+    next one was.
 
     The fraction after the decimal point is the mean of two numbers below 1. The first is m / (m +
-    d), where
-    m is the shortest length of a step and d is what the foot lacked to it when it scuffed or the
-    run ended.
-    The second is t / (t + 1 s) for the time t until then.
+    d), where m is the shortest length of a step and d is what the foot lacked to it when it scuffed
+    or the run ended. The second is t / (t + 1 s) for the time t until then.
 
     Args:
         engine: engine of the model.
@@ -119,8 +118,8 @@ def planted(engine: Any, feet: Sequence[str] | None) -> registry.Place:
 
 
 def _compute_progress(walk: Walk, places: Sequence[float]) -> float:
-    """Return the progress of a walk; `places` are the positions of the feet along the slope at its end
-    (m).
+    """Return the progress of a walk; `places` are the positions of the feet along the slope at its
+    end (m).
     """
     if walk.scuffs:
         until, lead = walk.scuffs[0].time, walk.scuffs[0].length

@@ -29,10 +29,8 @@ class StabilityOptimization:
     """Minimization of the cost of a cycle with CMA-ES in rounds, each from the best cycle so far.
 
     As long as no cycle is stable enough, numbers are not rounded: the valley of small multipliers
-    is
-    narrow, and between rounded numbers it has steps on which a search stalls. From then on numbers
-    are
-    rounded, so that the cost is that of the numbers which will be written.
+    is narrow, and between rounded numbers it has steps on which a search stalls. From then on
+    numbers are rounded, so that the cost is that of the numbers which will be written.
 
     Args:
         search: search that computes the cycle of a model.

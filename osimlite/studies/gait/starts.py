@@ -164,8 +164,7 @@ def move_along_neutral_directions(states: Floats, neutral: Floats) -> Floats:
     """Move states along neutral directions until the first entries that these can change are zero.
 
     A walker that may be anywhere, and whose trunk may have any orientation, is then at the origin
-    and
-    with the trunk as built.
+    and with the trunk as built.
 
     Args:
         states: states (..., y).

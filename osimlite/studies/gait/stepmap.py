@@ -1,9 +1,8 @@
 """Step map of a walker: the state at a touch-down as a function of the state at the previous one.
 
 The Poincaré section is the moment at which a foot begins to touch the ground. A state on it is
-written
-as if the first foot had just touched down. Where the legs are alike, they are exchanged after each
-step, so that the map goes from step to step; otherwise it goes from stride to stride.
+written as if the first foot had just touched down. Where the legs are alike, they are exchanged
+after each step, so that the map goes from step to step; otherwise it goes from stride to stride.
 """
 
 from __future__ import annotations
@@ -87,8 +86,7 @@ class StepMap:
     Attributes:
         start: state at the first touch-down after `near`, exchanged to the first foot (y,).
         exchange: permutation of the state that exchanges the legs, see `find_leg_exchange`; None if
-            they
-            differ.
+            they differ.
         neutral: orthonormal directions that do not change the motion (y, m).
         basis: orthonormal directions of all others (y, y - m).
 
@@ -129,14 +127,12 @@ class StepMap:
         possible.
 
         The new basis is the old one, projected onto the complement of the new neutral directions
-        and made
-        orthonormal by a polar decomposition, which changes it least.
+        and made orthonormal by a polar decomposition, which changes it least.
 
         Args:
             engine: engine of that model, of the same structure.
             near: state (y,) from which it makes a step, and which defines the position along
-                neutral
-                directions.
+                neutral directions.
             accuracy: accuracy of the integrator; by default the same.
 
         Raises:

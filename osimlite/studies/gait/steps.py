@@ -1,10 +1,8 @@
 """Steps, scuffs and falls of walks, from the contact events of simulations.
 
 A step is a touch-down of the other foot, far enough ahead along the slope and after long enough in
-the
-air. Any other touch-down of a foot is a scuff. Ground contact of anything but a foot is a fall and
-ends
-the walk.
+the air. Any other touch-down of a foot is a scuff. Ground contact of anything but a foot is a fall
+and ends the walk.
 """
 
 from __future__ import annotations
@@ -136,8 +134,7 @@ def walk_many(
         to: duration of walks without a fall (s).
         footing: contacts of the feet; found automatically by default.
         numbers: numbers of models of the same structure, one row per walker, see `run_many`; by
-            default
-            those of the engine.
+            default those of the engine.
         accuracy: accuracy of the integrator.
         most_tries: most steps of the integrator per walker.
         threads: number of threads; by default one per core.
@@ -293,8 +290,7 @@ def measure_along_slope(
     """Measure positions of contacts along the slope, and their penetration.
 
     The direction is that of gravity's component along the plane, downhill; on level ground it is
-    the x axis
-    of ground.
+    the x axis of ground.
 
     Args:
         engine: engine of the model.

@@ -17,8 +17,8 @@ DIFFERENCE_STEP = 1e-6
 """Change of a state in central differences (rad, m, rad/s, m/s)."""
 
 MAX_UNEVENNESS = 10.0
-"""States whose derivative is this many times less even than the median are left out: a contact begins
-there.
+"""States whose derivative is this many times less even than the median are left out: a contact
+begins there.
 """
 
 
@@ -27,8 +27,7 @@ def find_leg_exchange(engine: BatchEngine, footing: FootContacts, states: ArrayL
     motion.
 
     The coordinates of one leg, from where the legs part to the foot, are exchanged with those of
-    the other,
-    and auxiliary states with those that have the same effect there.
+    the other, and auxiliary states with those that have the same effect there.
 
     Args:
         engine: engine of the model.
@@ -91,8 +90,7 @@ def exchange_auxiliary(engine: BatchEngine, source: Ints, states: Floats) -> Non
     Args:
         engine: engine of the model.
         source: permutation (y,), known for values and speeds; changed where an auxiliary state has
-            the
-            effect of another one after the exchange.
+            the effect of another one after the exchange.
         states: states at which the effects are compared (k, y).
     """
     first = 2 * len(engine.order)
@@ -115,8 +113,7 @@ def _compute_effects(engine: BatchEngine, state: Floats) -> Floats:
     """Return the effect of each auxiliary state (z, 2n + 2).
 
     It consists of the derivatives of all rates of coordinates and speeds, and of its own rate, by
-    the
-    auxiliary state, and of its own rate.
+    the auxiliary state, and of its own rate.
     """
     first, here = 2 * len(engine.order), np.array(engine.compute_derivative(0.0, state.tolist()))
     rows = []
@@ -129,13 +126,12 @@ def _compute_effects(engine: BatchEngine, state: Floats) -> Floats:
 
 
 def find_neutral_directions(engine: BatchEngine, states: ArrayLike) -> Floats:
-    """Find the directions of the state that do not change the motion except for the motion along them.
+    """Find the directions of the state that do not change the motion except for the motion along
+    them.
 
     A walker may be anywhere along an even slope, and a body that hangs in its mass centre may turn
-    at any
-    rate. The derivative of the state does not change in these directions, or changes along them
-    only, at
-    all of the given states.
+    at any rate. The derivative of the state does not change in these directions, or changes along
+    them only, at all of the given states.
 
     Args:
         engine: engine of the model.
@@ -177,8 +173,7 @@ def compute_derivative_matrix(engine: BatchEngine, state: Floats) -> tuple[Float
 
     Returns:
         Matrix (y, y), and its unevenness: the relative difference between both one-sided
-        differences. It
-        is large where a contact just touches.
+        differences. It is large where a contact just touches.
     """
     columns, uneven = [], []
     here = np.array(engine.compute_derivative(0.0, state.tolist()))

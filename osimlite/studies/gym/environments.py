@@ -86,8 +86,8 @@ class _ObservedCopies:
         self.copies.set_states(which, start)
 
     def observe(self, controls: Array) -> Observation:
-        """Return the states of all copies by name, as rewards need them; `controls` are those of the
-        step (w, c).
+        """Return the states of all copies by name, as rewards need them; `controls` are those of
+        the step (w, c).
         """
         states = self.copies.states.copy()
         return Observation(
@@ -168,8 +168,7 @@ class MuscleEnv(gymnasium.Env[Any, Any]):
     """Environment with one copy of a model.
 
     Observations are values of coordinates (rad or m), generalized speeds, and states of muscles,
-    named by
-    `labels`. Actions are the controls of the actuators, named by `controls`.
+    named by `labels`. Actions are the controls of the actuators, named by `controls`.
 
     Args:
         task: task, or a function that returns it.
@@ -226,8 +225,7 @@ class MuscleEnv(gymnasium.Env[Any, Any]):
 
         Returns:
             Observation (o,), reward, whether the model has failed, whether the time of the episode
-            is over,
-            and an empty dictionary.
+            is over, and an empty dictionary.
         """
         rewards, over = self._all.step(np.asarray(action)[None])
         self._steps += 1
@@ -304,8 +302,7 @@ class MuscleVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
 
         Args:
             seed: seed of the first copy, the k-th has this plus k; or a list of seeds; None to
-                continue the
-                sequences.
+                continue the sequences.
             options: unused; gymnasium requires it.
 
         Returns:
@@ -331,8 +328,7 @@ class MuscleVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
 
         Returns:
             Observations (w, o), rewards (w,), whether each copy has failed (w,), whether the time
-            of its
-            episode is over (w,), and an empty dictionary.
+            of its episode is over (w,), and an empty dictionary.
         """
         again = np.flatnonzero(self._ended)
         # All copies are stepped, then those with a new episode are set to their initial state.

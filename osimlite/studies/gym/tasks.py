@@ -24,8 +24,7 @@ class Observation:
 
     Attributes:
         columns: values of coordinates ("knee_angle_r", rad or m), speeds ("knee_angle_r/speed") and
-            states
-            of muscles ("soleus_r/activation"), each (w,).
+            states of muscles ("soleus_r/activation"), each (w,).
         controls: controls that were held in the step (w, c).
         step: duration of the step (s).
     """
@@ -48,8 +47,7 @@ class Task(IntegrationOptions):
         is_over: function of an observation that returns which copies have failed (w,).
         hidden: coordinates that are not observed, for example the position of a walker.
         start: function that returns an initial state (y,) from the default one, the paths of the
-            states
-            and a random generator; None for the default state.
+            states and a random generator; None for the default state.
         seconds: duration of an episode (s).
         step: duration of a control step (s).
 
@@ -66,8 +64,8 @@ class Task(IntegrationOptions):
 
 
 CONTACT_INTEGRATOR = "euler2"
-"""Integrator for models with ground contact: contact limits the step size, so that a higher order does
-not pay.
+"""Integrator for models with ground contact: contact limits the step size, so that a higher order
+does not pay.
 """
 STANDING_POSE = {
     "pelvis_tilt": -0.05,

@@ -2,8 +2,7 @@
 
 Supported are GaitStateController, ReflexController, FeedForwardController, CompositeController and
 NoiseController. The kernels add terms `gain * (sensor - offset)` with a delay, which may depend on
-the
-state of a leg, and terms `gain * (t - start)**power`; see
+the state of a leg, and terms `gain * (t - start)**power`; see
 :mod:`osimlite.mechanics.kernels.reflexes`.
 """
 
@@ -57,8 +56,8 @@ MAX_NOISE_SEED = 10**15
 
 
 class TermOrGate(NamedTuple):
-    """Term of a controller, or a gate: a range of a coordinate beyond which terms rest while it moves
-    away.
+    """Term of a controller, or a gate: a range of a coordinate beyond which terms rest while it
+    moves away.
 
     Attributes:
         ints: integers for the kernels: `TERM`, or for a gate the sensors of the coordinate and its
@@ -220,8 +219,8 @@ class Reflexes:
             )
 
     def _read_functions(self, node: Node, parameters: Parameters) -> None:
-        """Read a function of time for some actuators; a symmetric one has the same parameters on both
-        sides.
+        """Read a function of time for some actuators; a symmetric one has the same parameters on
+        both sides.
         """
         symmetric = node.flag("symmetric", True)
         include, exclude = node.text("include", "*"), node.text("exclude", "")
@@ -326,7 +325,8 @@ class Reflexes:
             raise node.error("a ReflexController needs reflexes")
 
     def _find_index(self, node: Node, name: str, names: list[str], leg: int) -> int:
-        """Return the index of a name with or without the side of a leg; `_o` means the opposite leg.
+        """Return the index of a name with or without the side of a leg; `_o` means the opposite
+        leg.
 
         Args:
             node: node for errors.

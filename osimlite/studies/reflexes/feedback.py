@@ -39,19 +39,15 @@ class Feedback:
     """Reflex controller for `osimlite.simulate(model, controller=Feedback("hold.yaml"))`.
 
     It computes the controls of the actuators that its reflexes name at every control step, and
-    holds them
-    constant until the next. Controls of other sources add to them.
+    holds them constant until the next. Controls of other sources add to them.
 
     Args:
         given: file of SCONE or YAML, or Python data, with a ReflexController, GaitStateController,
             FeedForwardController or CompositeController, alone or within a scenario. Beside a
-            controller
-            that stands alone there may be `init`, `fixed_control_step_size` and the names of the
-            legs,
-            which a scenario has in its ModelOpenSim4.
+            controller that stands alone there may be `init`, `fixed_control_step_size` and the
+            names of the legs, which a scenario has in its ModelOpenSim4.
         values: values of parameters by name, or a .par file. Parameters without a value have the
-            best
-            value of `init`, or their mean.
+            best value of `init`, or their mean.
 
     Attributes:
         step: duration of a control step (s).

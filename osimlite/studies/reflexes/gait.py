@@ -30,12 +30,10 @@ class Strides(NamedTuple):
         stance: part of a stride in which the foot is in contact, per leg: left, right.
         both: part of the time in double support.
         humps: mean over stance phases of the ground reaction force over the weight: largest in the
-            first
-            half, smallest between the peaks, largest in the second half.
+            first half, smallest between the peaks, largest in the second half.
         peak: largest force on one foot over the weight.
         touches: touch-downs of both feet, the first ones included; unlike SCONE's count of steps it
-            has
-            no scuffs.
+            has no scuffs.
     """
 
     number: int

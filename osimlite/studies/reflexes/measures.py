@@ -1,10 +1,8 @@
 """Measures of SCONE that score walks; all candidates are scored at once.
 
 Each class of SCONE is one class here, which scenarios find by its name. During a simulation the
-kernels
-update the criteria that measures have requested (:mod:`osimlite.mechanics.kernels.criteria`);
-measures
-compute their results from these afterwards.
+kernels update the criteria that measures have requested
+(:mod:`osimlite.mechanics.kernels.criteria`); measures compute their results from these afterwards.
 """
 
 from __future__ import annotations
@@ -109,8 +107,7 @@ class Measure(ABC):
         start: time from which the measure is active (s).
         stop: time until which it is active (s).
         report: further quantities by name (w,): of efforts the power per mass ("power", W/kg) and
-            the
-            cost of transport ("transport", J/(kg m)).
+            the cost of transport ("transport", J/(kg m)).
         terms: weighted results of the measure and of its parts by name (w,).
         minimize: whether the measure is to be minimized; the attribute of the class is the default.
     """
@@ -169,8 +166,7 @@ class Measure(ABC):
         """Return the contribution to the total score (w,), and store it in `terms`.
 
         With a threshold T and a transition D, a value v counts as 0 below T, as v (v - T) / D
-        between T and
-        T + D, and as v above.
+        between T and T + D, and as v above.
 
         Args:
             times: times at which the walks ended (w,) (s).

@@ -47,15 +47,13 @@ class Parameters:
 
     Args:
         values: per name one value for all candidates, or an array (w,) with one value each. A
-            parameter
-            that is not named has its mean.
+            parameter that is not named has its mean.
         count: number of candidates w.
 
     Attributes:
         requested: per name the parameters that a scenario has asked for.
         values_used: per name all numbers that a scenario has asked for, fixed ones too, of the
-            first
-            candidate.
+            first candidate.
         auto_std_factor: standard deviation over the absolute mean of a parameter that states none.
     """
 
@@ -67,8 +65,8 @@ class Parameters:
         self.values_used: dict[str, float] = {}
 
     def get_number(self, node: Node, key: str, default: float, name: str = "") -> Array:
-        """Return a number of each candidate (w,): the literal number in the scenario, or the value of
-        the parameter.
+        """Return a number of each candidate (w,): the literal number in the scenario, or the value
+        of the parameter.
 
         Args:
             node: node that the number is a part of.
@@ -87,8 +85,8 @@ class Parameters:
         return found
 
     def parse_number(self, part: Node, name: str) -> Array:
-        """Return a number of each candidate (w,) from its own node; values of parameters are clipped
-        to their bounds.
+        """Return a number of each candidate (w,) from its own node; values of parameters are
+        clipped to their bounds.
 
         Args:
             part: node of the number.

@@ -1,5 +1,5 @@
-"""Scenarios of SCONE: a model, its controller, the measures that score a walk, and the parameters to
-optimize.
+"""Scenarios of SCONE: a model, its controller, the measures that score a walk, and the parameters
+to optimize.
 """
 
 from __future__ import annotations
@@ -76,8 +76,7 @@ class WalkResult:
 
     Attributes:
         results: score of each candidate (w,), smaller is better; a measure to be maximized has its
-            sign
-            changed.
+            sign changed.
         times: time at which each walk ended (w,) (s).
         terms: per name of a measure its weighted contribution to the results (w,).
         report: per name a further quantity of a measure (w,), for example the speed (m/s).
@@ -100,8 +99,7 @@ class Scenario:
 
     Args:
         given: file of SCONE or YAML, or Python data of the same content, whose files are relative
-            to the
-            working directory.
+            to the working directory.
         model: model to use instead of the `model_file` of the scenario.
 
     Attributes:
@@ -243,15 +241,13 @@ class Scenario:
 
         Args:
             values: per name of a parameter one value for all candidates, or an array (w,) with one
-                each.
-                Others have their means.
+                each. Others have their means.
             count: number of candidates w.
             duration: longest duration (s); by default that of the scenario.
 
         Raises:
             SettingError: the duration is shorter than a control step or has too many, a parameter
-                is
-                unknown, or has another number of values than there are candidates.
+                is unknown, or has another number of values than there are candidates.
         """
         if duration is not None and not duration >= self.step:
             raise SettingError(
@@ -274,8 +270,8 @@ class Scenario:
         return candidates.walk()
 
     def get_walkers(self, count: int) -> Walkers:
-        """Return the copies of the model for a number of candidates; they are cached, because making
-        them takes longer than a walk.
+        """Return the copies of the model for a number of candidates; they are cached, because
+        making them takes longer than a walk.
         """
         if count not in self._walkers:
             node = self.settings
@@ -442,8 +438,7 @@ def read_initial_parameters(optimizer: Node, folder: Path) -> dict[str, tuple[fl
 
     Returns:
         Per parameter the best value, the mean (the best value with `use_best_as_mean`) and the
-        standard
-        deviation times `std_factor`.
+        standard deviation times `std_factor`.
     """
     result: dict[str, tuple[float, float, float]] = {}
     for _, init in optimizer.select_all("init"):

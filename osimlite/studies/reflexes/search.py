@@ -57,8 +57,7 @@ def search_parameters(
     """Minimize the result of a scenario over its parameters with CMA-ES.
 
     The file `best.par` is rewritten whenever the best result improves. Ctrl-C ends the search and
-    returns
-    the best parameters so far. The search also ends where CMA-ES stops by its own criteria.
+    returns the best parameters so far. The search also ends where CMA-ES stops by its own criteria.
 
     Args:
         scenario: scenario to optimize.
@@ -76,8 +75,7 @@ def search_parameters(
     Raises:
         MissingDependency: cma is not installed.
         SettingError: the scenario has no parameters, there are too few candidates or generations,
-            the
-            folder has the result of another search, or its parameters are not those of the
+            the folder has the result of another search, or its parameters are not those of the
             scenario.
     """
     generations = scenario.generations if generations is None else generations

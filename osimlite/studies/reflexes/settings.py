@@ -1,10 +1,9 @@
-"""Reader of scenarios as trees of keys and values: SCONE files (.scone, .zml), YAML and Python data.
+"""Reader of scenarios as trees of keys and values: SCONE files (.scone, .zml), YAML and Python
+data.
 
 SCONE files may include other files and define constants (`$name = 3`). In YAML and in Python data,
-a
-key that occurs several times in SCONE has a list of mappings; the key `include` of YAML names
-another
-file.
+a key that occurs several times in SCONE has a list of mappings; the key `include` of YAML names
+another file.
 """
 
 from __future__ import annotations
@@ -37,8 +36,7 @@ MAX_INCLUDED_FILES = 200
 """Most files that one scenario reads.
 
 The depth alone does not bound them: where each file includes the next one twice, their number
-doubles
-with each level.
+doubles with each level.
 """
 MAX_PARTS = 200_000
 """Most parts of all files together; a file that is included twice counts twice."""
@@ -176,8 +174,8 @@ class Node:
         return np.array([x, y, z])
 
     def select_all(self, *names: str) -> Iterator[tuple[str, Node]]:
-        """Return an iterator over the parts with any of some keys, in the order of the file, as (key,
-        node).
+        """Return an iterator over the parts with any of some keys, in the order of the file, as
+        (key, node).
         """
         self.read_keys.update(names)
         return ((name, node) for name, node in self.parts if name in names)
@@ -253,8 +251,7 @@ def read_settings(path: str | Path) -> Node:
     """Read a scenario file and the files that it includes.
 
     Included files are searched in the folder of the file that includes them, in that of the
-    scenario, and
-    in up to three folders above each.
+    scenario, and in up to three folders above each.
 
     Raises:
         MissingFileError: a file does not exist.
@@ -471,10 +468,8 @@ def _resolve_include(name: str, path: Path, base: Path) -> Path:
     """Return the path of an included file.
 
     Errors in an included file quote its words. Therefore it must not be an arbitrary file of the
-    user: it
-    ends like a settings file, lies in the folders of the scenario, and is not hidden. The same
-    holds for
-    the target of a link.
+    user: it ends like a settings file, lies in the folders of the scenario, and is not hidden. The
+    same holds for the target of a link.
 
     Raises:
         MissingFileError: there is no such file.

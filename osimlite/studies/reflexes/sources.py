@@ -33,8 +33,7 @@ class Source(NamedTuple):
         place: index in the sensor row, or number of a link.
         more: second index in the sensor row, where the kind has one.
         numbers: numbers of the sensor, such as a point and a direction. If there are any, the
-            kernels
-            find their offset where `more` would be.
+            kernels find their offset where `more` would be.
     """
 
     name: str
@@ -48,8 +47,7 @@ SourceFactory = Callable[[SensedModel, Node, int, str], Source]
 """Function that makes the sensor of a reflex.
 
 Its arguments are the model, the node of the reflex, the index of the muscle, coordinate or body
-that
-is its `source`, and the side of the reflex ("" for a reflex without a side).
+that is its `source`, and the side of the reflex ("" for a reflex without a side).
 """
 
 
@@ -61,8 +59,7 @@ class Channel(NamedTuple):
         make_source: function that makes its sensor.
         rest: offset without a setting.
         is_free: whether the term may be negative without a setting `allow_neg_`; None if SCONE has
-            no such
-            setting for it.
+            no such setting for it.
     """
 
     letter: str
@@ -199,8 +196,7 @@ def _read_axis(sensed: SensedModel, node: Node, number: int, side: str) -> Array
     """Return the unit vector (3,) of a reflex on the rotation of a body.
 
     On the left side x and y change sign, so that one setting serves both sides: a mirror image in
-    the
-    sagittal plane reverses rotations about x and y and keeps those about z.
+    the sagittal plane reverses rotations about x and y and keeps those about z.
     """
     if node.flag("use_rotation_vector", False):
         raise node.error("'use_rotation_vector' of reflexes is not done here")

@@ -65,8 +65,7 @@ class SensedModel:
         count: number of its copies; each has its own parameters.
         step: duration of a control step (s).
         legs: names without their side: bodies of upper legs (`upper`), of feet (`lower`; empty for
-            those
-            two bodies below the upper leg), and contact forces of feet (`contact`).
+            those two bodies below the upper leg), and contact forces of feet (`contact`).
         lags: whether a control step starts from the derivative at the end of the previous one.
 
     Attributes:
@@ -216,8 +215,8 @@ class SensedModel:
 
 
 def _read_control_bounds(actuator: Any) -> tuple[float, float]:
-    """Return smallest and largest control of an actuator; one with several controls has no bounds in
-    OpenSim's tools.
+    """Return smallest and largest control of an actuator; one with several controls has no bounds
+    in OpenSim's tools.
     """
     if isinstance(actuator, Muscle):
         return getattr(actuator, "minimum_activation", actuator.min_control), 1.0
@@ -291,8 +290,7 @@ class Walkers(SensedModel):
 
         Args:
             plan: integers of the reflexes, see :mod:`osimlite.mechanics.kernels.reflexes`; its
-                `ROOM` is
-                increased by the workspace of the criteria.
+                `ROOM` is increased by the workspace of the criteria.
             numbers: numbers of the reflexes of each candidate (w, r).
             criteria: integers of the criteria, see :mod:`osimlite.mechanics.kernels.criteria`.
             bounds: numbers of the criteria.
@@ -323,8 +321,7 @@ class Walkers(SensedModel):
 
         Returns:
             Per control step of the first walker its state at the start, excitations and leg loads,
-            one row
-            each.
+            one row each.
 
         Raises:
             SimulationError: forces cannot be computed in a state from which a walker starts.
@@ -341,8 +338,8 @@ class Walkers(SensedModel):
         return record[: int(self.progress[0, STEPS]) - before] if order > 0 else record
 
     def get_leg_loads(self) -> Array:
-        """Return the ground reaction forces on the legs over the weight, from the last sensor rows (w,
-        l).
+        """Return the ground reaction forces on the legs over the weight, from the last sensor rows
+        (w, l).
         """
         return self.rows[:, self.sensor_plan[SENSES.LOADS] : self.sensor_plan[SENSES.PLACES]]
 
