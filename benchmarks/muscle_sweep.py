@@ -44,7 +44,7 @@ def main() -> None:
         equilibrate=True,
     )
     chosen = choose_samples(made.variables, "sobol", RUNS)
-    rows, variants = chosen.block(0, RUNS), Variants(made)
+    rows, variants = chosen.make_block(0, RUNS), Variants(made)
     variants.apply_sample(rows[0].tolist())
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder)

@@ -40,7 +40,7 @@ import osimlite
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.studies.sweep.optimize import Objective, optimize
 from osimlite.studies.sweep.plan import plan
-from osimlite.studies.sweep.search import Search, cma
+from osimlite.studies.sweep.search import Search, run_cma
 from osimlite.studies.sweep.variables import Floats, Range
 
 MODEL = Path(__file__).resolve().parent.parent / "fixtures" / "walker" / "DynamicWalkerModel.osim"
@@ -251,7 +251,7 @@ def by_opensim(opensim: Any, first: Floats, seed: int) -> tuple[float, Moved]:
         return np.array([price for price, _, _ in found[-len(points) :]])
 
     with suppress(StopIteration):
-        cma(
+        run_cma(
             costs,
             Search(np.full(len(first), 0.5), STEP, POPULATION, seed, False, BUDGET, TOLERANCE),
         )

@@ -164,13 +164,18 @@ def optimize(
 
 
 def _describe_optimum(objective: str, found: Optimum) -> FactTable:
-    from osimlite.studies.sweep.optimize import BEST, HISTORY, PAR, SUMMARY
+    from osimlite.studies.sweep.optimize import BEST_FILE, HISTORY_FILE, PAR_FILE, SUMMARY_FILE
 
     facts = FactTable(f"{objective} {found.value:.6g}")
     for name, value in found.values.items():
         facts.add(name, f"{value:.6g}")
     facts.add("runs", f"{found.evaluations}, the best was number {found.evaluation}")
     facts.add("ended", found.ended)
-    names = BEST, HISTORY, SUMMARY, *([PAR] if found.model.with_name(PAR).exists() else [])
+    names = (
+        BEST_FILE,
+        HISTORY_FILE,
+        SUMMARY_FILE,
+        *([PAR_FILE] if found.model.with_name(PAR_FILE).exists() else []),
+    )
     facts.add("files", ", ".join(str(found.model.with_name(name)) for name in names))
     return facts

@@ -138,7 +138,7 @@ def sweep(
 
 def _describe_sweep(plan: Plan, outcome: Outcome) -> FactTable:
     from osimlite.base.text import format_count
-    from osimlite.studies.sweep.measures import measure_name
+    from osimlite.studies.sweep.measures import get_measure_name
     from osimlite.studies.sweep.results import compute_ranges
 
     facts = FactTable(format_count(outcome.count, "run"))
@@ -161,7 +161,7 @@ def _describe_sweep(plan: Plan, outcome: Outcome) -> FactTable:
             f"{format_count(others, 'run')} for other reasons; the column 'reason' has them all",
         )
     for name, result in compute_ranges(
-        outcome.path, [measure_name(spec) for spec in plan.measures]
+        outcome.path, [get_measure_name(spec) for spec in plan.measures]
     ).items():
         facts.add(
             name,

@@ -9,7 +9,7 @@ import osimlite
 from osimlite.errors import SettingError, SimulationError, UnsupportedError
 from osimlite.models.walkers import furthest_walker
 from osimlite.studies.sweep import registry
-from osimlite.studies.sweep.measures import measure_name
+from osimlite.studies.sweep.measures import get_measure_name
 from osimlite.studies.sweep.optimize import Objective, optimize
 from osimlite.studies.sweep.plan import plan
 from osimlite.studies.sweep.runner import Runner
@@ -31,7 +31,7 @@ def steps(run):
 
 def both(made, values):
     """Derivatives of the first measure, and extrapolated differences of runs."""
-    free, runner, name = list(range(len(values))), Runner(made), measure_name(made.measures[0])
+    free, runner, name = list(range(len(values))), Runner(made), get_measure_name(made.measures[0])
 
     def moved(place, by):
         row = np.array(values)
@@ -47,7 +47,7 @@ def both(made, values):
         slope(place, 1e-3 * (made.variables[place].high - made.variables[place].low))
         for place in free
     ]
-    return registry.gradients(made).at(values, free), np.array(wanted)
+    return registry.make_gradients(made).evaluate(values, free), np.array(wanted)
 
 
 @pytest.mark.parametrize(
@@ -89,8 +89,10 @@ def test_a_search_arrives(tmp_path):
     made = plan(pendulum(), vary, measures=(), to=0.4, accuracy=1e-8)
     found = optimize(made, Objective(cost), tmp_path / "gradient", method="gradient", budget=60)
     assert found.ended.startswith("converged") and found.evaluations < 60
-    slopes = registry.gradients(plan(pendulum(), vary, measures=(cost,), to=0.4, accuracy=1e-8))
-    assert np.abs(slopes.at([*found.values.values()], [0, 1, 2])).max() < 1e-3
+    slopes = registry.make_gradients(
+        plan(pendulum(), vary, measures=(cost,), to=0.4, accuracy=1e-8)
+    )
+    assert np.abs(slopes.evaluate([*found.values.values()], [0, 1, 2])).max() < 1e-3
     again = optimize(made, Objective(cost), tmp_path / "part", method="gradient", budget=4)
     assert again.evaluations == 4
     rest = optimize(
@@ -116,14 +118,14 @@ def test_what_has_no_derivatives_is_refused(choices, message):
         furthest_walker(), {"RHip_rz": (0.3, 0.7)}, to=0.1, **{"measures": ("distance",), **choices}
     )
     with pytest.raises((SettingError, UnsupportedError), match=message):
-        registry.gradients(made)
+        registry.make_gradients(made)
 
 
 @pytest.mark.parametrize("measure", ["largest_force", steps])
 def test_measures_of_more_than_states_are_refused(measure):
     made = plan(furthest_walker(), {"RHip_rz": (0.3, 0.7)}, to=0.1, measures=(measure,))
     with pytest.raises((SimulationError, UnsupportedError), match="another measure"):
-        registry.gradients(made).at([0.5], [0])
+        registry.make_gradients(made).evaluate([0.5], [0])
 
 
 def test_constraints_go_with_a_motion():

@@ -207,7 +207,7 @@ class CycleSearch:
         for place, fraction in zip(self._numbers, fractions, strict=True):
             # Fourteen digits drop the rounding errors of the fraction, so that rounded numbers stay
             # rounded.
-            row[place] = float(f"{self.plan.variables[place].at(np.array(fraction)):.14g}")
+            row[place] = float(f"{self.plan.variables[place].interpolate(np.array(fraction)):.14g}")
         return row
 
     def get_numbers(self, fractions: Floats) -> dict[str, float]:
@@ -222,7 +222,7 @@ class CycleSearch:
     def compute_fractions(self, numbers: Mapping[str, float]) -> Floats:
         """Return the fractions of their ranges (k,) at which numbers, by name, lie."""
         items = {item.name: item for item in self.plan.variables}
-        return np.array([items[name].fraction(numbers[name]) for name in self.names])
+        return np.array([items[name].compute_fraction(numbers[name]) for name in self.names])
 
     def round_fractions(self, fractions: Floats, digits: int) -> Floats:
         """Return the fractions (k,) of numbers that are rounded to significant digits.
@@ -258,7 +258,7 @@ class CycleSearch:
         Raises:
             OsimliteError: the model is invalid, or has another structure.
         """
-        variant = self.variants.variant(self.make_sample(fractions))
+        variant = self.variants.make_variant(self.make_sample(fractions))
         if variant.structure != self.variants.given.structure:
             raise OsimliteError("the numbers change the structure of the model; vary others")
         return variant.engine
@@ -298,15 +298,18 @@ class CycleSearch:
         for row in range(count):
             sample = self.make_sample(fractions[row])
             for place, fraction in zip(self._starts, starts[row], strict=True):
-                sample[place] = float(self.plan.variables[place].at(np.array(fraction)))
+                sample[place] = float(self.plan.variables[place].interpolate(np.array(fraction)))
             try:
-                variant = self.variants.variant(sample)
+                variant = self.variants.make_variant(sample)
             except OsimliteError:
                 made[row] = False
                 continue
             made[row] = variant.structure == self.variants.given.structure
             if made[row]:
-                states[row], vectors[row] = self.variants.start(variant, sample), variant.numbers
+                states[row], vectors[row] = (
+                    self.variants.make_start(variant, sample),
+                    variant.numbers,
+                )
                 variants.append(variant)
         states, vectors, fractions = states[made], vectors[made], fractions[made]
         if not len(states):

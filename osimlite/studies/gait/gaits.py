@@ -27,7 +27,7 @@ from osimlite.studies.gait.stability import StabilityOptimization, get_cost
 from osimlite.studies.gait.stepmap import TIGHT_ACCURACY, refuse_constraints
 from osimlite.studies.gait.steps import Walk, walk_many
 from osimlite.studies.sweep.plan import Plan
-from osimlite.studies.sweep.results import refuse_others, refuse_overwrite
+from osimlite.studies.sweep.results import refuse_other_settings, refuse_overwrite
 from osimlite.studies.sweep.variables import Floats
 
 BEST_FILE = "best.osim"
@@ -203,7 +203,7 @@ def _protect_results(folder: Path, wanted: dict[str, Any]) -> None:
     except (OsimliteError, ValueError, LookupError, TypeError, RecursionError):
         refuse_overwrite(folder / name for name in (BEST_FILE, CYCLES_FILE, SUMMARY_FILE))
     else:
-        refuse_others(summary, before, wanted)
+        refuse_other_settings(summary, before, wanted)
 
 
 def close_candidates(

@@ -24,15 +24,15 @@ from osimlite.studies.gait.steps import (
     measure_along_slope,
 )
 from osimlite.studies.sweep import registry
-from osimlite.studies.sweep.measures import Batch, Measure
+from osimlite.studies.sweep.measures import Batch, RunMeasure
 from osimlite.studies.sweep.variables import Floats
 
 PLANTED_DEPTH_M = 8e-4
 """Penetration (m) of the foot of a planted walker: enough for a contact, too little for a large force."""
 
 
-@registry.measure(is_maximized=True)
-def steps(engine: Any, feet: Sequence[str] | None = None) -> Measure:
+@registry.register_measure(is_maximized=True)
+def steps(engine: Any, feet: Sequence[str] | None = None) -> RunMeasure:
     """Return the measure of the number of steps.
 
     Args:
@@ -42,8 +42,8 @@ def steps(engine: Any, feet: Sequence[str] | None = None) -> Measure:
     return _make_walk_measure("steps", engine, feet, lambda walk: len(walk.steps))
 
 
-@registry.measure()
-def scuffs(engine: Any, feet: Sequence[str] | None = None) -> Measure:
+@registry.register_measure()
+def scuffs(engine: Any, feet: Sequence[str] | None = None) -> RunMeasure:
     """Return the measure of the number of touch-downs that are not steps.
 
     Args:
@@ -53,8 +53,8 @@ def scuffs(engine: Any, feet: Sequence[str] | None = None) -> Measure:
     return _make_walk_measure("scuffs", engine, feet, lambda walk: len(walk.scuffs))
 
 
-@registry.measure(is_maximized=True)
-def time_to_fall(engine: Any, feet: Sequence[str] | None = None) -> Measure:
+@registry.register_measure(is_maximized=True)
+def time_to_fall(engine: Any, feet: Sequence[str] | None = None) -> RunMeasure:
     """Return the measure of the time of the fall (s); the end of the run for walkers that do not
     fall.
 
@@ -65,8 +65,8 @@ def time_to_fall(engine: Any, feet: Sequence[str] | None = None) -> Measure:
     return _make_walk_measure("time_to_fall", engine, feet, lambda walk: walk.end)
 
 
-@registry.measure(is_maximized=True)
-def progress(engine: Any, feet: Sequence[str] | None = None) -> Measure:
+@registry.register_measure(is_maximized=True)
+def progress(engine: Any, feet: Sequence[str] | None = None) -> RunMeasure:
     """Return a measure that a search can climb: steps before the first scuff, plus how near the
     next one was.
 
@@ -91,7 +91,7 @@ def progress(engine: Any, feet: Sequence[str] | None = None) -> Measure:
     return _make_measure("progress", footing, numbers)
 
 
-@registry.start
+@registry.register_start
 def planted(engine: Any, feet: Sequence[str] | None) -> registry.Place:
     """Return the start in which the deeper foot is on the ground, and at rest there.
 
@@ -132,7 +132,7 @@ def _compute_progress(walk: Walk, places: Sequence[float]) -> float:
 
 def _make_walk_measure(
     name: str, engine: Any, feet: Sequence[str] | None, number: Callable[[Walk], float]
-) -> Measure:
+) -> RunMeasure:
     """Return a measure that is a number of a walk."""
     footing = _find_footing(name, engine, feet)
     return _make_measure(
@@ -149,9 +149,11 @@ def _find_footing(name: str, engine: Any, feet: Sequence[str] | None) -> FootCon
     return find_footing(engine, feet)
 
 
-def _make_measure(name: str, footing: FootContacts, numbers: Callable[[Batch], Floats]) -> Measure:
+def _make_measure(
+    name: str, footing: FootContacts, numbers: Callable[[Batch], Floats]
+) -> RunMeasure:
     """Return a measure whose runs end with a fall."""
-    return Measure(name, numbers, tuple(make_fall_watches(footing)), estimate_event_count, True)
+    return RunMeasure(name, numbers, tuple(make_fall_watches(footing)), estimate_event_count, True)
 
 
 def _list_walks(footing: FootContacts, batch: Batch) -> list[Walk]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from osimlite.errors import OsimliteError
 from osimlite.studies.gait.cycle_search import CycleSearch, ModelCycle, Progress
-from osimlite.studies.sweep.search import BudgetExhausted, Search, cma, nelder_mead
+from osimlite.studies.sweep.search import OutOfBudget, Search, run_cma, run_nelder_mead
 from osimlite.studies.sweep.variables import Floats
 
 INITIAL_STEP = 0.05
@@ -65,13 +65,13 @@ class StabilityOptimization:
             seed: seed of the first round; each further round adds 1.
             progress: callback with the number of sets that were tried, and of all.
         """
-        minimize = cma if len(self._first.fractions) > 1 else nelder_mead
+        minimize = run_cma if len(self._first.fractions) > 1 else run_nelder_mead
         tried = 0
 
         def ask(points: Floats) -> Floats:
             nonlocal tried
             if tried >= budget or self._is_enough(self.best) != rounds:
-                raise BudgetExhausted
+                raise OutOfBudget
             tried += len(points)
             if progress is not None:
                 progress(min(tried, budget), budget)
@@ -80,7 +80,7 @@ class StabilityOptimization:
         while tried < budget:
             # A round ends by an exception when its first stable cycle switches to rounded numbers.
             rounds = self._is_enough(self.best)
-            with suppress(BudgetExhausted):
+            with suppress(OutOfBudget):
                 minimize(
                     ask,
                     Search(

@@ -1,15 +1,15 @@
-"""What a sweep varies of controls, and the controllers that do so.
+"""Variables of a sweep that are controls of actuators, and the controllers that apply them.
 
-=============================  ===========================================================================
-``soleus_r/control``           a number that is added at all times
-``soleus_r/control@0.1``       a node: what is added at a time (s); all nodes of an actuator are joined
+=============================  ==========================================================================
+``soleus_r/control``           number that is added to the control at all times
+``soleus_r/control@0.1``       node: value that is added at a time (s); all nodes of an actuator are joined
 ``soleus_r/control@0:0.5:6``   six nodes from 0 to 0.5 s; ``@0,0.1,0.3`` are nodes at these times
-``soleus_r/control@switch1``   a time (s) from which 1 is added until the next one, ``@switch2``, and so on
-``soleus_r/control@scale``     factor of what the PrescribedControllers of the model make it
-=============================  ===========================================================================
+``soleus_r/control@switch1``   time (s) from which 1 is added until the next one, ``@switch2``, and so on
+``soleus_r/control@scale``     factor of the functions of PrescribedControllers of the model
+=============================  ==========================================================================
 
-All of it becomes functions of PrescribedControllers, so that the model that is written does the
-same in OpenSim.
+All of these become functions of PrescribedControllers, so that the model that is written behaves
+the same in OpenSim.
 """
 
 from __future__ import annotations
@@ -37,48 +37,74 @@ from osimlite.schema.functions import (
 from osimlite.schema.model import Model
 from osimlite.schema.sets import Controller
 
-OFFSET, NODE, SWITCH, SCALE = "offset", "node", "switch", "scale"
+OFFSET = "offset"
+"""Kind of a control: a number that is added at all times."""
+NODE = "node"
+"""Kind of a control: a value at a time, between which controls are interpolated."""
+SWITCH = "switch"
+"""Kind of a control: a time at which 1 is added or removed."""
+SCALE = "scale"
+"""Kind of a control: a factor of the model's own control functions."""
 
 INTERPOLATIONS = ("linear", "steps", "cubic")
-"""What may be between nodes. Before the first and after the last one, lines and steps hold their values."""
+"""Interpolations between nodes. Before the first and after the last node, lines and steps hold
+their values.
+"""
 
-FEWEST_OF_CUBIC = 4
+MIN_CUBIC_NODES = 4
+"""Fewest nodes of a cubic spline of OpenSim (GCVSpline of degree 3)."""
 
-BEFORE = -1.0
-"""A time before any run, s."""
+BEFORE_START_S = -1.0
+"""Time (s) before any run, at which functions begin so that their first value holds from the start."""
 
 Values = Sequence[float]
+"""Values of all variables of a sample."""
 
 
 @dataclass(frozen=True)
 class Control:
-    """A number that several controls depend on."""
+    """Number that the controls of one or more actuators depend on.
 
-    actuators: tuple[str, ...]  # paths of those that are controlled
-    kind: str = OFFSET  # `OFFSET`, `NODE`, `SWITCH` or `SCALE`
-    at: float = 0.0  # time of a node (s), or number of a switch
+    Attributes:
+        actuators: paths of the actuators.
+        kind: `OFFSET`, `NODE`, `SWITCH` or `SCALE`.
+        at: time of a node (s), or number of a switch.
+    """
+
+    actuators: tuple[str, ...]
+    kind: str = OFFSET
+    at: float = 0.0
 
     @property
     def parts(self) -> tuple[Control, ...]:
-        """The same of each actuator."""
+        """Controls of the single actuators.
+
+        Returns:
+            One control per actuator, so that two variables of the same one can be found.
+        """
         return tuple(Control((path,), self.kind, self.at) for path in self.actuators)
 
     @property
     def unit(self) -> str:
-        """Of the number."""
+        """Unit of the number."""
         return "s" if self.kind == SWITCH else ""
 
     @property
-    def present(self) -> float | None:
-        """The number with which nothing changes, if a search should begin there."""
+    def current_value(self) -> float | None:
+        """Number that changes nothing, from which a search starts; None for nodes and switches."""
         return {OFFSET: 0.0, SCALE: 1.0}.get(self.kind)
 
 
-def control(name: str, actuators: Sequence[str], word: str) -> Control:
-    """What is meant by the word behind the ``@`` in the name of a variable; empty without one.
+def parse_control(name: str, actuators: Sequence[str], word: str) -> Control:
+    """Return the control that is meant by the word after the `@` in the name of a variable.
+
+    Args:
+        name: name of the variable, for errors.
+        actuators: paths of the actuators.
+        word: word after the `@`, or "" for an offset.
 
     Raises:
-        SettingError: it is no such word.
+        SettingError: the word has no meaning.
     """
     kind, at = OFFSET, 0.0
     if word == SCALE:
@@ -90,11 +116,12 @@ def control(name: str, actuators: Sequence[str], word: str) -> Control:
     return Control(tuple(actuators), kind, at)
 
 
-def nodes_of(name: str) -> list[str]:
-    """Names of the nodes that one name means: ``a@0:0.4:3`` is ``a@0``, ``a@0.2`` and ``a@0.4``.
+def expand_nodes(name: str) -> list[str]:
+    """Return the names of the nodes that one name stands for: `a@0:0.4:3` is `a@0`, `a@0.2` and
+    `a@0.4`.
 
     Raises:
-        SettingError: the times are not written so.
+        SettingError: the times are malformed.
     """
     front, at, word = name.partition("@")
     if at and not word:
@@ -127,16 +154,16 @@ def _parse_time(name: str, word: str) -> float:
 
 
 def check_nodes(controls: Mapping[int, Control], interpolation: str, to: float) -> None:
-    """Stop at nodes through which there is no curve.
+    """Refuse nodes that define no curve.
 
     Args:
-        controls: that are varied, by the places of their variables.
+        controls: controls that vary, by the indices of their variables.
         interpolation: one of `INTERPOLATIONS`.
-        to: how long the runs last, s.
+        to: duration of the runs (s).
 
     Raises:
-        SettingError: there is no such interpolation, or a cubic has too few nodes, or goes on
-            beyond them.
+        SettingError: the interpolation is unknown, or a cubic has too few nodes or does not span
+            the run.
     """
     if interpolation not in INTERPOLATIONS:
         raise SettingError(
@@ -146,27 +173,28 @@ def check_nodes(controls: Mapping[int, Control], interpolation: str, to: float) 
         return
     for actuator, parts in _group_by_actuator(controls, NODE).items():
         times = [time for time, _ in parts]
-        if len(times) < FEWEST_OF_CUBIC or times[0] > 0.0 or times[-1] < to * (1.0 - 1e-9):
+        if len(times) < MIN_CUBIC_NODES or times[0] > 0.0 or times[-1] < to * (1.0 - 1e-9):
             raise SettingError(
-                f"a cubic needs {FEWEST_OF_CUBIC} nodes or more, the first at 0 and the last at the end of the runs, "
+                f"a cubic needs {MIN_CUBIC_NODES} nodes or more, the first at 0 and the last at the end of the runs, "
                 f"{to:g} s; those of '{actuator}' are at {', '.join(f'{time:g}' for time in times)} s"
             )
 
 
-def controller_of(model: Model, controls: Mapping[str, Any]) -> PrescribedController:
-    """The controller that makes given controls; outside of the times of a table its first and last values hold.
+def make_controller(model: Model, controls: Mapping[str, Any]) -> PrescribedController:
+    """Return a controller with given controls; outside of the times of a table its first and last
+    values hold.
 
     Args:
-        model: whose actuators they are.
-        controls: by the name or path of an actuator a number, or ``(times, values)``.
+        model: model with the actuators.
+        controls: by the name or path of an actuator a number, or `(times, values)` with times in s.
 
     Raises:
-        SettingError: there is no such actuator, or a control is something else.
+        SettingError: an actuator is unknown, or a control is something else.
     """
     actuators = {
         key: item.path for item in model.components(Actuator) for key in (item.name, item.path)
     }
-    made = _make_controller(model, "given", [actuators.get(key, key) for key in controls])
+    made = _make_empty_controller(model, "given", [actuators.get(key, key) for key in controls])
     for name, given in controls.items():
         if name not in actuators:
             raise SettingError(
@@ -187,52 +215,56 @@ def controller_of(model: Model, controls: Mapping[str, Any]) -> PrescribedContro
     return made
 
 
-def _make_controller(model: Model, kind: str, actuators: Sequence[str]) -> PrescribedController:
-    """One without functions, and with a name of its own: a model that a search has written has others of the kind."""
+def _make_empty_controller(
+    model: Model, kind: str, actuators: Sequence[str]
+) -> PrescribedController:
+    """Return a controller without functions, with an unused name: a model of an earlier search has
+    others.
+    """
     taken = {item.name for item in model.components(Controller)}
     name = next(name for number in count(1) if (name := f"{kind}_{number}") not in taken)
     return PrescribedController(name=name, socket_actuators=tuple(actuators))
 
 
 def _extend_times(times: Values) -> tuple[float, ...]:
-    """Times with one more at either end, so that the outer values hold."""
-    return (min(BEFORE, times[0] - 1.0), *times, times[-1] + 1.0)
+    """Return times with one more at either end, so that the outer values hold."""
+    return (min(BEFORE_START_S, times[0] - 1.0), *times, times[-1] + 1.0)
 
 
 class VariedControls:
-    """The controllers that make of a model what is varied of its controls.
+    """Controllers that apply the controls which a sweep varies.
 
     Args:
-        model: to which they are added.
-        controls: that are varied, by the places of their variables.
-        interpolation: of nodes.
+        model: model to which they are added.
+        controls: controls that vary, by the indices of their variables.
+        interpolation: interpolation between nodes.
 
     Attributes:
-        controllers: those that the variables have a part in.
+        controllers: controllers whose functions depend on variables.
 
     Raises:
-        SettingError: nothing in the model makes a control that is to be scaled.
+        SettingError: the model has no function for a control that is to be scaled.
     """
 
     def __init__(self, model: Model, controls: Mapping[int, Control], interpolation: str) -> None:
         self.controllers: list[Controller] = []
         self._puts: list[tuple[Function, str, Callable[[Values], Any]]] = []
         for actuator, ((_, place),) in _group_by_actuator(controls, SCALE).items():
-            self._scale(model, actuator, place)
+            self._add_multiplier(model, actuator, place)
         for kind in (OFFSET, NODE, SWITCH):
             if parts := _group_by_actuator(controls, kind):
-                made = _make_controller(model, kind, list(parts))
+                made = _make_empty_controller(model, kind, list(parts))
                 made.ControlFunctions.objects += [
-                    self._function(kind, own, interpolation) for own in parts.values()
+                    self._make_function(kind, own, interpolation) for own in parts.values()
                 ]
                 self.controllers.append(model.add(made))
 
     def apply(self, values: Values) -> None:
-        """Set the controls to what the values of all variables make them."""
+        """Set the functions of the controllers to the values of all variables."""
         for function, name, made in self._puts:
             setattr(function, name, made(values))
 
-    def _function(
+    def _make_function(
         self, kind: str, parts: Sequence[tuple[float, int]], interpolation: str
     ) -> Function:
         times, places = zip(*parts, strict=True)
@@ -241,11 +273,14 @@ class VariedControls:
             function = Constant()
             self._puts.append((function, "value", lambda values: values[places[0]]))
         elif kind == SWITCH:
-            # Switches may pass each other: what counts is when something is switched.
-            x, y = (BEFORE, *(0.0 for _ in places)), (float(k % 2) for k in range(len(places) + 1))
+            # A search may move one switch past another: sorting keeps the function defined.
+            x, y = (
+                (BEFORE_START_S, *(0.0 for _ in places)),
+                (float(k % 2) for k in range(len(places) + 1)),
+            )
             function = PiecewiseConstantFunction(x=x, y=tuple(y))
             self._puts.append(
-                (function, "x", lambda values: (BEFORE, *sorted(values[k] for k in places)))
+                (function, "x", lambda values: (BEFORE_START_S, *sorted(values[k] for k in places)))
             )
         else:
             if interpolation == "cubic":
@@ -261,8 +296,8 @@ class VariedControls:
             self._puts.append((function, "y", lambda values: tuple(values[k] for k in places)))
         return function
 
-    def _scale(self, model: Model, actuator: str, place: int) -> None:
-        """Put the functions of a control into others that multiply them."""
+    def _add_multiplier(self, model: Model, actuator: str, place: int) -> None:
+        """Replace the functions of a control by multiples of them."""
         before = len(self._puts)
         for controller in model.components(PrescribedController):
             functions = controller.ControlFunctions.objects
@@ -285,7 +320,9 @@ class VariedControls:
 def _group_by_actuator(
     controls: Mapping[int, Control], kind: str
 ) -> dict[str, list[tuple[float, int]]]:
-    """For each actuator that has parts of a kind, when or which they are, in order, and places of the variables."""
+    """Return the controls of a kind by actuator, as sorted pairs of time or number, and index of
+    the variable.
+    """
     result: dict[str, list[tuple[float, int]]] = {}
     for place, part in controls.items():
         if part.kind == kind:

@@ -1,9 +1,8 @@
-"""The derivatives of what is wanted of a run, by the numbers that a search varies.
+"""Derivatives of a measure by the variables of a search.
 
-A motion is followed along its very steps with exact derivatives, in machine code. What a measure
-makes of the states at the times of the reports and at the end is a formula, and so is what a
-variable makes of the numbers of a model: these are differences, good to 1e-9 where the formulas are
-smooth.
+The motion is differentiated exactly along the steps of the integrator, in compiled code. The
+measure as a function of states, and the numbers of the model as functions of the variables, are
+differentiated by central differences, which are accurate to 1e-9 where these functions are smooth.
 """
 
 from __future__ import annotations
@@ -22,25 +21,34 @@ from osimlite.simulation.batches import Runs, run_many
 from osimlite.simulation.engines.protocol import Settings
 from osimlite.simulation.options import MERSON, compute_report_times
 from osimlite.simulation.pack import pack
-from osimlite.studies.sweep.measures import Batch, measure
-from osimlite.studies.sweep.plan import MOST_TRIES, Plan
+from osimlite.studies.sweep.measures import Batch, make_measure
+from osimlite.studies.sweep.plan import MAX_INTEGRATOR_STEPS, Plan
 from osimlite.studies.sweep.variants import Variant, Variants
 
-PART = 3e-5
-"""Of the range of a variable is what it is changed by, either way: curves and rounding count for 1e-9."""
+DIFFERENCE_PART = 3e-5
+"""Change of a variable in central differences, as a part of its range.
+
+The truncation error and the rounding error are then both about 1e-9.
+"""
 
 
 @dataclass(frozen=True)
-class _Near:
-    """A model whose variables are others."""
+class _Neighbour:
+    """Model with changed variables.
+
+    Attributes:
+        values: values of all variables.
+        variant: model with these values.
+        start: initial state (y,).
+    """
 
     values: list[float]
     variant: Variant
     start: Array
 
 
-class _Events(list[Any]):
-    """Of a run beside another one, which nobody knows."""
+class _UnknownEvents(list[Any]):
+    """Events of a neighbouring run, which is not simulated: any access is an error."""
 
     def _refuse(self, *_: object) -> NoReturn:
         raise UnsupportedError(
@@ -51,15 +59,15 @@ class _Events(list[Any]):
 
 
 class Gradients:
-    """Derivatives of a measure of the runs of a plan.
+    """Derivatives of the first measure of a plan.
 
     Args:
-        plan: its first measure is meant.
+        plan: plan of the runs.
 
     Raises:
-        SettingError: the plan has other steps than Merson's, or something that ends a run before
-            its time.
-        UnsupportedError: the measure is of events.
+        SettingError: the plan has another integrator than Merson's, a controller, or levels that
+            end runs.
+        UnsupportedError: the measure depends on events.
     """
 
     def __init__(self, plan: Plan) -> None:
@@ -77,7 +85,7 @@ class Gradients:
             )
         self._plan, self._variants = plan, Variants(plan)
         given = self._variants.given
-        self._measure = measure(plan.measures[0], given.engine, plan.feet)
+        self._measure = make_measure(plan.measures[0], given.engine, plan.feet)
         if self._measure.watches:
             raise UnsupportedError(
                 f"'{self._measure.name}' is of events; take another measure, or another --method"
@@ -89,20 +97,24 @@ class Gradients:
         )
         self._steps: tuple[bytes, TangentSteps] | None = None
 
-    def at(self, values: Sequence[float], free: Sequence[int]) -> Array:
-        """The derivatives (f,) by the variables whose places are `free`, at values of all (d,).
+    def evaluate(self, values: Sequence[float], free: Sequence[int]) -> Array:
+        """Return the derivatives by some variables (f,).
+
+        Args:
+            values: values of all variables (d,).
+            free: indices of the variables (f,).
 
         Raises:
             OsimliteError: there is no run with these values, or it has no derivatives.
         """
-        here = self._near(list(values))
+        here = self._make_neighbour(list(values))
         sizes = [
-            PART * (self._plan.variables[place].high - self._plan.variables[place].low)
+            DIFFERENCE_PART * (self._plan.variables[place].high - self._plan.variables[place].low)
             for place in free
         ]
         changes = np.array([by for size in sizes for by in (size, -size)])
         near = [
-            self._near([x + by * (number == place) for number, x in enumerate(values)])
+            self._make_neighbour([x + by * (number == place) for number, x in enumerate(values)])
             for by, place in zip(changes.tolist(), np.repeat(free, 2).tolist(), strict=True)
         ]
         if any(item.variant.structure != here.variant.structure for item in near):
@@ -110,18 +122,18 @@ class Gradients:
                 "models with other values have other equations, and no derivatives between them"
             )
 
-        def slopes(rows: Sequence[Array] | Array) -> Array:
-            """By each variable, of what is near."""
+        def differentiate(rows: Sequence[Array] | Array) -> Array:
+            """Return central differences (f, n) of values of the neighbours (2 f, n)."""
             both = np.reshape(rows, (len(free), 2, -1))
             result: Array = (both[:, 0] - both[:, 1]) / (2.0 * np.array(sizes)[:, None])
             return result
 
         dy, dx = (
-            slopes([item.start for item in near]).T,
-            slopes([item.variant.numbers for item in near]).T,
+            differentiate([item.start for item in near]).T,
+            differentiate([item.variant.numbers for item in near]).T,
         )
         runs = self._run(here)
-        steps, (times, states) = self._steps_of(here.variant), self._motion(here)
+        steps, (times, states) = self._get_tangent_steps(here.variant), self._record_motion(here)
         steps.take(here.variant.numbers, dx)
         moved = integrate_sensitivities(
             steps, times, states, dy, self._times, self._plan.accuracy, here.variant.state.names
@@ -130,14 +142,15 @@ class Gradients:
         reports = np.repeat(runs.reports, count, axis=0)
         if self._plan.interval is not None:
             reports += changes[:, None, None] * moved[:, :, by].transpose(2, 0, 1)
+        # Neighbouring runs are extrapolated linearly, so that any measure of states can be evaluated.
         ends = runs.states + changes[:, None] * moved[-1][:, by].T
-        beside = Runs(
+        neighbours = Runs(
             np.repeat(runs.times, count),
             ends,
             np.repeat(runs.endings, count),
             np.repeat(runs.counts, count, axis=0),
             reports,
-            [_Events() for _ in near],
+            [_UnknownEvents() for _ in near],
             np.full((count, *runs.peaks.shape[1:]), np.nan),
         )
         batch = Batch(
@@ -145,12 +158,14 @@ class Gradients:
             lambda number: near[number].variant.engine,
             np.stack([item.variant.numbers for item in near]),
             np.stack([item.start for item in near]),
-            beside,
+            neighbours,
             np.array([item.values for item in near]),
             [item.name for item in self._plan.variables],
             np.array(self._times if self._plan.interval is not None else []),
         )
-        result: Array = slopes(np.asarray(self._measure.of(batch), dtype=float)[:, None])[:, 0]
+        result: Array = differentiate(
+            np.asarray(self._measure.compute(batch), dtype=float)[:, None]
+        )[:, 0]
         if not np.isfinite(result).all():
             worst = self._plan.variables[free[int(np.argmin(np.isfinite(result)))]].name
             raise SimulationError(
@@ -159,14 +174,14 @@ class Gradients:
             )
         return result
 
-    def _near(self, values: list[float]) -> _Near:
-        variant = self._variants.variant(values)
-        start = self._variants.start(variant, values)
-        return _Near(
+    def _make_neighbour(self, values: list[float]) -> _Neighbour:
+        variant = self._variants.make_variant(values)
+        start = self._variants.make_start(variant, values)
+        return _Neighbour(
             values, variant, self._variants.place_states(variant.engine, [variant], start[None])[0]
         )
 
-    def _run(self, here: _Near) -> Runs:
+    def _run(self, here: _Neighbour) -> Runs:
         plan = self._plan
         return run_many(
             here.variant.engine,
@@ -174,12 +189,12 @@ class Gradients:
             plan.to,
             **plan.integration_choices(),
             report_times=self._times if plan.interval is not None else [],
-            most_tries=MOST_TRIES,
+            most_tries=MAX_INTEGRATOR_STEPS,
             threads=1,
         )
 
-    def _motion(self, here: _Near) -> tuple[list[float], Array]:
-        """Times (s,) and states (s, y) at the ends of all steps of a run."""
+    def _record_motion(self, here: _Neighbour) -> tuple[list[float], Array]:
+        """Return times (s,) and states (s, y) at the ends of all integrator steps of a run."""
         times, states = [0.0], [here.start.tolist()]
 
         def note(t: float, y: list[float]) -> None:
@@ -195,7 +210,7 @@ class Gradients:
             raise stepper.ended
         return times, np.array(states)
 
-    def _steps_of(self, variant: Variant) -> TangentSteps:
+    def _get_tangent_steps(self, variant: Variant) -> TangentSteps:
         if self._steps is None or self._steps[0] != variant.structure:
             engine = variant.engine
             packed = pack(

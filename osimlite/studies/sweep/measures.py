@@ -1,4 +1,4 @@
-"""What is kept of a run: one number for each measure.
+"""Measures of runs: one number for each run of a sweep or a search.
 
 A measure of your own is a function of a :class:`Run` that returns a number, named as
 ``module:function`` or ``file.py:function``::
@@ -6,8 +6,9 @@ A measure of your own is a function of a :class:`Run` that returns a number, nam
     def drop(run):
         return run.start["Pelvis_ty"] - run.end["Pelvis_ty"]
 
-or an expression, as :mod:`osimlite.studies.sweep.expressions` has them: ``start(Pelvis_ty) -
-end(Pelvis_ty)``.
+or an expression of :mod:`osimlite.studies.sweep.expressions`: ``start(Pelvis_ty) -
+end(Pelvis_ty)``. The names of the public functions here that are registered are the names that
+users write.
 """
 
 from __future__ import annotations
@@ -31,26 +32,37 @@ from osimlite.studies.sweep.variables import Floats
 
 @dataclass(frozen=True)
 class Batch:
-    """Runs of models of one structure."""
+    """Runs of models of one structure, from which measures are computed.
 
-    engine: Any  # of a model of the same structure
-    engine_of: Callable[[int], Any]  # the engine of the model of a run, by its place
-    numbers: Floats | None  # of the compiled engines (W, m); None if all are those of `engine`
-    starts: Floats  # initial states (W, y), in the engine's order
-    runs: Runs  # what came of them
-    values: Floats  # of the variables (W, d)
-    names: Sequence[str]  # of the variables
-    report_times: Floats  # at which states were kept, s
-    # where measures leave for each other what they have found
+    Attributes:
+        engine: engine of a model of this structure.
+        engine_of: function that returns the engine of the model of a run, by its index.
+        numbers: numbers of the compiled engines (W, m); None if all are those of `engine`.
+        starts: initial states (W, y), in the order of the engine.
+        runs: results of the runs.
+        values: values of the variables (W, d).
+        names: names of the variables.
+        report_times: times at which states were saved (s).
+        memory: intermediate results that measures share.
+    """
+
+    engine: Any
+    engine_of: Callable[[int], Any]
+    numbers: Floats | None
+    starts: Floats
+    runs: Runs
+    values: Floats
+    names: Sequence[str]
+    report_times: Floats
     memory: dict[str, Any] = field(default_factory=dict)
 
     @cached_property
     def quantities(self) -> Mapping[str, Quantity]:
-        """What can be looked at during the runs."""
+        """Quantities of the runs by name, for expressions."""
         return list_quantities(self.engine)
 
-    def part(self, place: int) -> Batch:
-        """One of the runs."""
+    def select_run(self, place: int) -> Batch:
+        """Return a batch with one of the runs."""
         rows = [place]
         return replace(
             self,
@@ -64,25 +76,35 @@ class Batch:
 
 
 @dataclass(frozen=True)
-class Measure:
-    """One number for each run."""
+class RunMeasure:
+    """Measure: one number for each run.
 
-    name: str  # of the column
-    of: Callable[[Batch], Any]  # computes them (W,); not a number where there is none
-    watches: tuple[Watch, ...] = ()  # what it needs to have watched
-    # how many events of a run of so many seconds it looks at
-    room: Callable[[float], int] = lambda to: 0
-    event_states: bool = False  # whether it looks at the states there
+    Attributes:
+        name: name of its column.
+        compute: function that computes the numbers (W,) of a batch; NaN for runs without one.
+        watches: events that must be watched.
+        event_count: function that returns the number of events to record in a run of a duration
+            (s).
+        event_states: whether it needs the states at events.
+    """
+
+    name: str
+    compute: Callable[[Batch], Any]
+    watches: tuple[Watch, ...] = ()
+    event_count: Callable[[float], int] = lambda to: 0
+    event_states: bool = False
 
 
 class State(Mapping[str, float]):
-    """States by name: ``state["RHip_rz"]``, ``state["RHip_rz/speed"]``, and any by its path in ``states.sto``."""
+    """State by name: `state["RHip_rz"]`, `state["RHip_rz/speed"]`, and any variable by its path in
+    `states.sto`.
+    """
 
     def __init__(self, engine: Any, y: Floats) -> None:
         self._engine, self._y = engine, y
 
     def __getitem__(self, name: str) -> float:
-        place, locked = _state_place(self._engine, name)
+        place, locked = _find_state(self._engine, name)
         return locked if place is None else float(self._y[place])
 
     def __iter__(self) -> Iterator[str]:
@@ -95,23 +117,38 @@ class State(Mapping[str, float]):
 
 @dataclass(frozen=True)
 class Run:
-    """One run, for a measure of your own."""
+    """Run of one sample, as the argument of a measure of your own.
 
-    values: Mapping[str, float]  # of the variables, by name (rad, m)
-    start: State  # initial state
-    end: State  # last state
-    time: float  # at which it ended, s
-    # moments up to the end at which the state was kept, if a report interval was asked for, s
+    Attributes:
+        values: values of the variables by name (rad, m).
+        start: initial state.
+        end: last state.
+        time: time at which the run ended (s).
+        times: times until then at which states were saved (s); empty without a report interval.
+        events: time (s), name of a contact or a watch, and whether it begins.
+        largest_forces: largest force of each contact (N).
+        engine: engine that computed the run, with its `mechanism`.
+        states: states at the times (t, y).
+        quantities: quantities by name, see :meth:`history`.
+    """
+
+    values: Mapping[str, float]
+    start: State
+    end: State
+    time: float
     times: Floats
-    # time (s), name of a contact or of what was watched, whether it begins
     events: Sequence[tuple[float, str, bool]]
-    largest_forces: Mapping[str, float]  # N, by contact
-    engine: Any = field(repr=False)  # that computed it, with its `mechanism`
+    largest_forces: Mapping[str, float]
+    engine: Any = field(repr=False)
     states: Floats = field(repr=False)
     quantities: Mapping[str, Quantity] = field(repr=False)
 
     def history(self, name: str) -> Floats:
-        """What a name in an expression stands for, at the times."""
+        """Return a quantity of expressions at the saved times (t,).
+
+        Raises:
+            SettingError: the name is unknown.
+        """
         if name not in self.quantities:
             raise SettingError(f"a run has no '{name}'{suggest_name(name, self.quantities)}")
         return self.quantities[name](
@@ -120,65 +157,80 @@ class Run:
 
     @cached_property
     def mechanism(self) -> Any:
-        """The mechanism that moved."""
+        """Mechanism of the model."""
         return self.engine.mechanism
 
 
-def measure(spec: Any, engine: Any, feet: Sequence[str] | None = None) -> Measure:
-    """The measure that is meant by a name, ``NAME/value`` or ``NAME/speed`` at the end, an expression or a function.
+def make_measure(spec: Any, engine: Any, feet: Sequence[str] | None = None) -> RunMeasure:
+    """Return the measure that a user has selected.
 
     Args:
-        spec: what is meant.
-        engine: of the model.
-        feet: contacts of each foot, for the measures of a walker; found by the structure of the
-            model if left out.
+        spec: registered name, `NAME/value` or `NAME/speed` (at the end of the run), expression,
+            `module:function`, or a function.
+        engine: engine of the model.
+        feet: contacts of each foot for measures of a walker; found from the structure of the model
+            by default.
 
     Raises:
-        SettingError: there is none of that name, or the model has nothing of the kind.
+        SettingError: the name is unknown, or the model lacks what the measure needs.
     """
-    name = measure_name(spec)
+    name = get_measure_name(spec)
     if callable(spec):
-        return Measure(name, partial(_each, spec), room=_reserve_rows)
-    if (known := registry.measure_named(name)) is not None:
+        return RunMeasure(
+            name, partial(_call_for_each_run, spec), event_count=_estimate_event_count
+        )
+    if (known := registry.find_measure(name)) is not None:
         return known.make(engine, feet)
     if ":" in name:
-        return Measure(name, partial(_each, _function(name)), room=_reserve_rows)
+        return RunMeasure(
+            name,
+            partial(_call_for_each_run, _import_function(name)),
+            event_count=_estimate_event_count,
+        )
     if is_expression(name):
-        return Measure(name, partial(_measure_expression, Expression(name, engine)))
+        return RunMeasure(name, partial(_measure_expression, Expression(name, engine)))
     if "/" in name:
         try:
-            place, locked = _state_place(engine, name)
+            place, locked = _find_state(engine, name)
         except ModelError as error:
             raise SettingError(f"there is no measure '{name}': {error.message}") from None
-        return Measure(name, partial(_find_ends, place, locked))
+        return RunMeasure(name, partial(_read_end_states, place, locked))
     raise SettingError(
-        f"there is no measure '{name}'{suggest_or_list(name, registry.measure_names(), 'module:function')}"
+        f"there is no measure '{name}'{suggest_or_list(name, registry.list_measure_names(), 'module:function')}"
     )
 
 
 def is_expression(spec: Any) -> bool:
-    """Whether it is an expression, which looks at the states of a run."""
+    """Return whether a measure is an expression, which needs the states of a run."""
     return isinstance(spec, str) and "(" in spec and ":" not in spec
 
 
 EVENTS_PER_SECOND = 100
-"""So many events of a run a function can see."""
+"""Number of events per second that a function of the user can see."""
 
 
-def _reserve_rows(to: float) -> int:
+def _estimate_event_count(to: float) -> int:
     return 40 + round(EVENTS_PER_SECOND * to)
 
 
-def measure_name(spec: Any) -> str:
-    """What a measure is called."""
+def get_measure_name(spec: Any) -> str:
+    """Return the name of a measure, which is the name of its column."""
     if callable(spec):
         return f"{getattr(spec, '__module__', '?')}:{getattr(spec, '__qualname__', type(spec).__name__)}"
     return str(spec)
 
 
-@registry.measure(is_maximized=True)
-def distance(engine: Any, feet: Sequence[str] | None = None) -> Measure:
-    """How far the first free coordinate that slides has come, m."""
+@registry.register_measure(is_maximized=True)
+def distance(engine: Any, feet: Sequence[str] | None = None) -> RunMeasure:
+    """Return the measure of the displacement of the first free translational coordinate (m).
+
+    Args:
+        engine: engine of the model.
+        feet: unused.
+
+    Raises:
+        SettingError: the model has no such coordinate.
+    """
     infos = engine.mechanism.coordinates
     place = next(
         (k for k, j in enumerate(engine.order) if infos[j].motion_type == "translational"), None
@@ -187,22 +239,34 @@ def distance(engine: Any, feet: Sequence[str] | None = None) -> Measure:
         raise SettingError(
             "no coordinate of the model slides, so that it has no distance; take another measure"
         )
-    return Measure("distance", lambda batch: batch.runs.states[:, place] - batch.starts[:, place])
+    return RunMeasure(
+        "distance", lambda batch: batch.runs.states[:, place] - batch.starts[:, place]
+    )
 
 
-@registry.measure()
-def largest_force(engine: Any, feet: Sequence[str] | None = None) -> Measure:
-    """The largest force of any contact at the end of a step, N."""
-    return Measure(
+@registry.register_measure()
+def largest_force(engine: Any, feet: Sequence[str] | None = None) -> RunMeasure:
+    """Return the measure of the largest force of any contact at the ends of integrator steps (N).
+
+    Args:
+        engine: engine of the model.
+        feet: unused.
+    """
+    return RunMeasure(
         "largest_force", lambda batch: batch.runs.peaks[:, :, 0].max(axis=1, initial=0.0)
     )
 
 
-@registry.measure()
-def energy(engine: Any, feet: Sequence[str] | None = None) -> Measure:
-    """Mechanical energy at the end less that at the start, J; contact and damping take it away."""
+@registry.register_measure()
+def energy(engine: Any, feet: Sequence[str] | None = None) -> RunMeasure:
+    """Return the measure of the change of mechanical energy (J); contact and damping reduce it.
 
-    def gained(batch: Batch) -> Floats:
+    Args:
+        engine: engine of the model.
+        feet: unused.
+    """
+
+    def compute_change(batch: Batch) -> Floats:
         runs = batch.runs
         ends = zip(runs.times.tolist(), batch.starts.tolist(), runs.states.tolist(), strict=True)
         result = []
@@ -211,10 +275,10 @@ def energy(engine: Any, feet: Sequence[str] | None = None) -> Measure:
             result.append(sum(one.compute_energies(t, end)) - sum(one.compute_energies(0.0, start)))
         return np.array(result)
 
-    return Measure("energy", gained)
+    return RunMeasure("energy", compute_change)
 
 
-def _find_ends(place: int | None, locked: float, batch: Batch) -> Floats:
+def _read_end_states(place: int | None, locked: float, batch: Batch) -> Floats:
     return np.full(len(batch.starts), locked) if place is None else batch.runs.states[:, place]
 
 
@@ -227,11 +291,11 @@ def _measure_expression(expression: Expression, batch: Batch) -> list[float]:
             *zip(times[:kept].tolist(), runs.reports[k, :kept].tolist(), strict=True),
             (end, state),
         ]
-        result.append(expression.of(batch.engine_of(k), moments))
+        result.append(expression.evaluate(batch.engine_of(k), moments))
     return result
 
 
-def _each(function: Callable[[Run], float], batch: Batch) -> list[float]:
+def _call_for_each_run(function: Callable[[Run], float], batch: Batch) -> list[float]:
     result = []
     names, contacts = batch.names, batch.engine.contacts
     for k in range(len(batch.starts)):
@@ -249,13 +313,21 @@ def _each(function: Callable[[Run], float], batch: Batch) -> list[float]:
             batch.runs.reports[k, :kept],
             batch.quantities,
         )
-        # What a function forgets to return would become no number, silently.
+        # numpy would turn None, of a function without a return, into NaN; float() raises.
         result.append(float(function(run)))
     return result
 
 
-def _state_place(engine: Any, name: str) -> tuple[int | None, float]:
-    """Where in a state ``NAME``, ``NAME/value`` or ``NAME/speed`` is, or a path; None and its value if it is locked."""
+def _find_state(engine: Any, name: str) -> tuple[int | None, float]:
+    """Find a state variable by name.
+
+    Args:
+        engine: engine of the model.
+        name: path of a state, or coordinate with or without `/value` or `/speed`.
+
+    Returns:
+        Offset in the state and 0; for a locked coordinate None and its value, or 0 for its speed.
+    """
     if name in engine.state.paths:
         return 2 * len(engine.order) + engine.state.paths.index(name), 0.0
     front, _, last = name.rpartition("/")
@@ -267,7 +339,7 @@ def _state_place(engine: Any, name: str) -> tuple[int | None, float]:
     return engine.order.index(place) + (count if last == "speed" else 0), 0.0
 
 
-def _function(name: str) -> Callable[[Run], float]:
+def _import_function(name: str) -> Callable[[Run], float]:
     place, _, function = name.rpartition(":")
     module = run_python_file(Path(place)) if place.endswith(".py") else import_user_module(place)
     result = getattr(module, function, None)

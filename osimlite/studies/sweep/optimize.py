@@ -1,4 +1,6 @@
-"""The best start, or the best numbers, of a model: a search whose points are run like those of a sweep."""
+"""Optimization of an objective over the variables of a plan; evaluations run like the samples of a
+sweep.
+"""
 
 from __future__ import annotations
 
@@ -20,39 +22,46 @@ from osimlite.base.text import format_count
 from osimlite.errors import OsimliteError, SettingError, SimulationError
 from osimlite.io.document.printer import write
 from osimlite.studies.sweep import registry
-from osimlite.studies.sweep.measures import measure_name
+from osimlite.studies.sweep.measures import get_measure_name
 from osimlite.studies.sweep.plan import Plan
 from osimlite.studies.sweep.pools import make_pool
 from osimlite.studies.sweep.results import (
-    KEY,
-    Partial,
+    SETTINGS_KEY,
+    PartialTable,
     ResultTable,
-    damage_told,
+    get_partial_path,
     make_schema,
-    partial_of,
     protect_results,
     refuse_overwrite,
+    report_damage,
 )
 from osimlite.studies.sweep.run import describe_interruption
 from osimlite.studies.sweep.runner import FAILED, Block
-from osimlite.studies.sweep.search import BudgetExhausted, Search, gradient, method_named
+from osimlite.studies.sweep.search import OutOfBudget, Search, find_method, run_lbfgs
 from osimlite.studies.sweep.variables import Floats, refuse_counts
 from osimlite.studies.sweep.variants import Variants
 
-HISTORY, BEST, SUMMARY, PAR = "history.parquet", "best.osim", "summary.json", "best.par"
-"""What a search writes into its folder."""
+HISTORY_FILE = "history.parquet"
+"""File in the output folder: table of all evaluations."""
+BEST_FILE = "best.osim"
+"""File in the output folder: the best model."""
+SUMMARY_FILE = "summary.json"
+"""File in the output folder: best values and settings."""
+PAR_FILE = "best.par"
+"""File in the output folder: best parameters of a controller, as SCONE reads them."""
 
 Progress = Callable[[float, float], object]
-"""Called with the number of evaluations that are done, and of all that are allowed."""
+"""Callback with the number of evaluations that are done, and of all that are allowed."""
 
 
 @dataclass(frozen=True)
 class Objective:
-    """What is wanted of a run.
+    """Measure to optimize.
 
     Attributes:
-        measure: name of a measure, ``module:function``, or a function.
-        is_maximized: whether more is better; by default for the measures that are registered so.
+        measure: name of a measure, `module:function`, or a function.
+        is_maximized: whether to maximize it; by default as the measure is registered, else
+            minimize.
     """
 
     measure: Any
@@ -60,25 +69,25 @@ class Objective:
 
     @property
     def sign(self) -> float:
-        """What makes a cost of the measure."""
-        known = registry.measure_named(measure_name(self.measure))
-        wanted = (
+        """Factor that makes a cost of the measure: -1 to maximize, 1 to minimize."""
+        known = registry.find_measure(get_measure_name(self.measure))
+        is_maximized = (
             bool(known and known.is_maximized) if self.is_maximized is None else self.is_maximized
         )
-        return -1.0 if wanted else 1.0
+        return -1.0 if is_maximized else 1.0
 
 
 @dataclass(frozen=True)
 class Optimum(ResultTable):
-    """The best that was found; as a table, all evaluations.
+    """Result of an optimization; as a table, all its evaluations.
 
     Attributes:
-        value: of the objective.
-        values: of the variables, by name.
-        evaluations: that the search took, with those of before.
-        evaluation: number of the best.
+        value: best value of the objective.
+        values: best values of the variables by name.
+        evaluations: number of evaluations, with those before a resumption.
+        evaluation: number of the best evaluation.
         ended: why the search ended.
-        model: file of the model, with its start as default values and speeds.
+        model: file of the best model, with its initial state as default values and speeds.
         history: file of all evaluations.
     """
 
@@ -115,36 +124,37 @@ def optimize(
     cluster: str | None = None,
     progress: Progress | None = None,
 ) -> Optimum:
-    """Look for the values of the variables that serve an objective best.
+    """Search the values of the variables with the best objective.
 
     Args:
-        plan: what is run; its measures are kept in the history too.
-        objective: what is wanted.
-        folder: where `history.parquet`, `best.osim`, `summary.json`, and of a controller
-            `best.par`, are written.
+        plan: plan of the runs; its measures are columns of the history, too.
+        objective: measure to optimize.
+        folder: output folder for `history.parquet`, `best.osim`, `summary.json`, and `best.par` of
+            a controller.
         method: one of `METHODS` in :mod:`osimlite.studies.sweep.search`.
-        budget: runs that are allowed.
-        popsize: runs between two decisions of the method.
-        seed: what makes the search the same again.
-        sigma: how far from where it begins the method looks at first, as a fraction of the ranges;
-            `sobol-cma` has looked all over them before.
-        tolerance: of the cost and of the points (as fractions of the ranges), at which the search
-            ends.
-        is_bounded: whether the ranges are bounds, or say only where to begin.
-        start: values to begin at, of all variables or by name; for others those of the model where
-            they are within the ranges, else the middle.
-        resume: go on with an interrupted search, or with a finished one and a larger budget.
-        force: replace what another search has left in the folder.
-        workers: as of a sweep.
-        cluster: as of a sweep.
-        progress: called as runs are done.
+        budget: number of runs that are allowed.
+        popsize: number of runs per batch; by default that of the method.
+        seed: seed of the random numbers, so that a search can be repeated.
+        sigma: initial step size, as a fraction of the ranges; `sobol-cma` samples all of the ranges
+            first.
+        tolerance: change of the cost and of the points (as fractions of the ranges) at which the
+            search ends; by default that of the method.
+        is_bounded: whether the ranges are bounds; otherwise they only define the scale.
+        start: values to start from, of all variables in their order or by name. Others start from
+            the model if its values are within the ranges, else from the middle.
+        resume: whether to continue an interrupted search, or a finished one with a larger budget.
+        force: whether to overwrite the results of another search in the folder.
+        workers: number of threads or processes; by default one per core.
+        cluster: address of a Dask scheduler whose workers run the evaluations.
+        progress: callback during the search.
 
     Raises:
-        Interrupted: by the keyboard; the search can be resumed.
-        SimulationError: no run came to its end.
-        OsimliteError: as of a sweep.
+        SweepInterruption: the user has pressed Ctrl-C; the search can be resumed.
+        SimulationError: no run has succeeded.
+        OsimliteError: an argument is out of bounds, the model cannot be simulated, or the folder
+            has results of other settings.
     """
-    look = method_named(method)
+    minimize = find_method(method)
     refuse_counts(plan.variables)
     free = [index for index, item in enumerate(plan.variables) if not item.is_fixed]
     if not free:
@@ -159,7 +169,7 @@ def optimize(
         raise SettingError(f"the tolerance is a number from 0 on, not {tolerance:g}")
     if not (isfinite(sigma) and sigma > 0.0):
         raise SettingError(f"the first search distance is positive, not {sigma:g}")
-    names = [measure_name(spec) for spec in (objective.measure, *plan.measures)]
+    names = [get_measure_name(spec) for spec in (objective.measure, *plan.measures)]
     measures = tuple(dict(zip(names, (objective.measure, *plan.measures), strict=True)).values())
     plan = replace(plan, measures=measures)
     variants = Variants(plan)
@@ -184,7 +194,7 @@ def optimize(
             plan, free, objective.sign, is_bounded, budget, workforce, progress
         )
         partial = _open_history(
-            where / HISTORY,
+            where / HISTORY_FILE,
             make_schema(plan.columns("evaluation", "batch"), wanted),
             resume,
             force,
@@ -192,10 +202,14 @@ def optimize(
         )
         evaluations.partial, ended = partial, ""
         try:
-            with suppress(BudgetExhausted):
-                slopes = evaluations.slopes(registry.gradients(plan)) if look is gradient else None
+            with suppress(OutOfBudget):
+                slopes = (
+                    evaluations.make_gradient(registry.make_gradients(plan))
+                    if minimize is run_lbfgs
+                    else None
+                )
                 search = Search(point, sigma, popsize, seed, is_bounded, budget, tolerance, slopes)
-                ended = look(evaluations.ask, search)
+                ended = minimize(evaluations.evaluate, search)
             partial.finish()
         except KeyboardInterrupt:
             raise describe_interruption(partial, format_count(partial.rows, "run")) from None
@@ -212,13 +226,14 @@ def _resolve_start(
     start: Sequence[float] | Mapping[str, float] | None,
     is_bounded: bool,
 ) -> Floats:
+    """Return the first point (f,) as fractions of the ranges of the free variables."""
     if not isinstance(start, Mapping):
         if start is not None and len(start) != len(plan.variables):
             raise SettingError(
                 f"the start has one number for each of the {len(plan.variables)} variables, not {len(start)}"
             )
         start = dict(zip((item.name for item in plan.variables), start or (), strict=False))
-    result, present = [], variants.present()
+    result, present = [], variants.list_current_values()
     for place in free:
         item = plan.variables[place]
         value = start.get(item.name, present[place])
@@ -227,19 +242,26 @@ def _resolve_start(
             raise SettingError(
                 f"'{item.name}' cannot start at {value}, outside {item.low:g} to {item.high:g}"
             )
+        # A logarithmic range cannot express this value, even for an unbounded search.
         if value is not None and item.is_log and value <= 0.0:
             within = False
-        result.append(item.fraction(value) if value is not None and within else 0.5)
+        result.append(item.compute_fraction(value) if value is not None and within else 0.5)
     return np.array(result)
 
 
 def read_best_values(folder: str | Path) -> dict[str, float]:
-    """The best values that another search has left in its folder, by the names of its variables.
+    """Read the best values of a search from its folder.
+
+    Args:
+        folder: output folder of the search.
+
+    Returns:
+        Value per name of a variable.
 
     Raises:
-        OsimliteError: there are none.
+        OsimliteError: the folder has no summary of a search.
     """
-    path = Path(folder) / SUMMARY
+    path = Path(folder) / SUMMARY_FILE
     try:
         return {name: float(value) for name, value in json.loads(read_file(path))["values"].items()}
     except (OsimliteError, ValueError, LookupError, AttributeError, TypeError, RecursionError):
@@ -250,36 +272,53 @@ def read_best_values(folder: str | Path) -> dict[str, float]:
 
 def _open_history(
     path: Path, table: Any, resume: bool, force: bool, evaluations: _Evaluations
-) -> Partial:
-    """The history, and what is in it already."""
-    if path.is_file() and not force and not (resume and partial_of(path).exists()):
-        protect_results(path, json.loads(table.metadata[KEY]))
+) -> PartialTable:
+    """Open the history for new rows, and give the rows that it has to the evaluations."""
+    if path.is_file() and not force and not (resume and get_partial_path(path).exists()):
+        protect_results(path, json.loads(table.metadata[SETTINGS_KEY]))
         pq = require("pyarrow.parquet", extra="sweep", purpose="a table of results")
-        with damage_told(path), open_file(path) as stream:
-            # A program that ends while pyarrow's threads do is killed by their C++ now and then.
+        with report_damage(path), open_file(path) as stream:
+            # If the program ends while pyarrow's threads still run, C++ sometimes aborts it.
             before = pq.ParquetFile(stream, page_checksum_verification=True).read(use_threads=False)
         if resume:
-            partial = Partial(path, table)
+            partial = PartialTable(path, table)
             for batch in before.to_batches():
                 partial.add(batch.columns)
-                evaluations.remember(batch)
+                evaluations.add_history(batch)
             return partial
         if before.num_rows > evaluations.budget:
             raise SettingError(
                 f"'{path}' has {before.num_rows} runs of this search, more than are asked for now; keep them with "
                 "--resume, or replace them with --force"
             )
-    if not force and not path.exists() and not partial_of(path).exists():
-        refuse_overwrite(path.with_name(name) for name in (BEST, SUMMARY, PAR))
-    partial = Partial(path, table, resume=resume)
-    partial.read(evaluations.remember)
+    if not force and not path.exists() and not get_partial_path(path).exists():
+        refuse_overwrite(path.with_name(name) for name in (BEST_FILE, SUMMARY_FILE, PAR_FILE))
+    partial = PartialTable(path, table, resume=resume)
+    partial.read(evaluations.add_history)
     return partial
 
 
 class _Evaluations:
-    """Answers what a method asks: from the history while there is one, then by running."""
+    """Cost function of a search: from the history as far as it goes, then by simulation.
 
-    partial: Partial
+    Args:
+        plan: plan with the objective as its first measure.
+        free: indices of the variables that vary.
+        sign: factor that makes a cost of the objective.
+        is_bounded: whether points are clipped to the ranges.
+        budget: number of evaluations that are allowed.
+        workforce: pool of workers.
+        progress: callback during the search.
+
+    Attributes:
+        count: number of evaluations that the method has requested.
+        batches: number of requests.
+        worst: largest cost so far.
+        best: smallest cost, its number and the values of the variables; None before any success.
+        reason: first reason of a failure.
+    """
+
+    partial: PartialTable
 
     def __init__(
         self,
@@ -293,15 +332,15 @@ class _Evaluations:
     ) -> None:
         self.plan, self.free, self.sign, self.is_bounded = plan, list(free), sign, is_bounded
         self.budget, self.pool, self.progress = budget, workforce, progress
-        self.objective = measure_name(plan.measures[0])
+        self.objective = get_measure_name(plan.measures[0])
         self.count = self.batches = 0
         self.worst = 0.0
         self.best: tuple[float, int, list[float]] | None = None
         self.reason: str | None = None
         self._history: list[tuple[list[float], str, float]] = []
 
-    def remember(self, batch: Any) -> None:
-        """Take what was found before."""
+    def add_history(self, batch: Any) -> None:
+        """Add rows of an earlier session."""
         columns = batch.to_pydict()
         values = [columns[item.name] for item in self.plan.variables]
         result = zip(
@@ -309,7 +348,7 @@ class _Evaluations:
         )
         self._note(columns["status"], columns["reason"])
         self._history += [(list(row), status, value) for row, status, value in result]
-        # What is there is not forgotten, even if fewer runs are asked for now.
+        # All rows of the history count, even if the budget is smaller than before.
         self.budget = max(self.budget, len(self._history))
 
     def _note(self, status: Sequence[str], reasons: Sequence[str | None]) -> None:
@@ -317,12 +356,19 @@ class _Evaluations:
         failed = (why for word, why in zip(status, reasons, strict=True) if word == FAILED)
         self.reason = self.reason or next(failed, None)
 
-    def ask(self, points: Floats) -> Floats:
-        """Costs (k,) of points (k, d) of the cube of the free variables; of those that the budget allows at least."""
-        wanted, points = len(points), points[: self.budget - self.count]
+    def evaluate(self, points: Floats) -> Floats:
+        """Return the costs (k,) of points (k, d) of the cube of the free variables.
+
+        Raises:
+            OutOfBudget: the budget does not suffice for all points; those that it allows are
+                evaluated.
+            SettingError: a resumed search requests other points than before.
+        """
+        requested, points = len(points), points[: self.budget - self.count]
         if len(points) == 0:
-            raise BudgetExhausted
-        values = self._values(points)
+            raise OutOfBudget
+        values = self._compute_values(points)
+        # A deterministic method requests the same points again when it is resumed.
         known = self._history[self.count : self.count + len(points)]
         if any(row != list(new) for (row, _, _), new in zip(known, values.tolist(), strict=False)):
             raise SettingError(
@@ -332,7 +378,7 @@ class _Evaluations:
         rest = values[len(known) :]
         if len(rest):
             known = known + self._run(rest, self.count + len(known))
-        costs = [self._cost(status, value) for _, status, value in known]
+        costs = [self._compute_cost(status, value) for _, status, value in known]
         for number, (cost, row) in enumerate(zip(costs, values.tolist(), strict=True)):
             _, status, value = known[number]
             if status != FAILED and isfinite(value) and (self.best is None or cost < self.best[0]):
@@ -341,36 +387,42 @@ class _Evaluations:
         self.batches += 1
         if self.progress is not None:
             self.progress(self.count, self.budget)
-        if len(points) < wanted:
-            raise BudgetExhausted
+        if len(points) < requested:
+            raise OutOfBudget
         return np.array(costs)
 
-    def slopes(self, gradients: Any) -> Callable[[Floats], Floats]:
-        """The derivatives of the cost by points (d,) of the cube.
+    def make_gradient(self, gradients: Any) -> Callable[[Floats], Floats]:
+        """Return the function that computes the gradient of the cost at a point (d,) of the cube.
 
         Args:
-            gradients: what finds those of the objective, see
-                :func:`osimlite.studies.sweep.registry.gradients`.
+            gradients: derivatives of the objective, see
+                :func:`osimlite.studies.sweep.registry.make_gradients`.
         """
 
         def at(point: Floats) -> Floats:
-            (values,) = self._values(point[None])
-            stretched = [self.plan.variables[place].stretch(values[place]) for place in self.free]
-            found: Floats = gradients.at(values.tolist(), self.free)
+            (values,) = self._compute_values(point[None])
+            stretched = [
+                self.plan.variables[place].differentiate(values[place]) for place in self.free
+            ]
+            found: Floats = gradients.evaluate(values.tolist(), self.free)
             return self.sign * found * stretched
 
         return at
 
-    def _values(self, points: Floats) -> Floats:
-        """Values of all variables (k, v) at points (k, d) of the cube of the free ones."""
+    def _compute_values(self, points: Floats) -> Floats:
+        """Return the values of all variables (k, v) at points (k, d) of the cube of the free ones."""
         values = np.tile([item.low for item in self.plan.variables], (len(points), 1))
         for column, place in enumerate(self.free):
             item = self.plan.variables[place]
-            values[:, place] = (item.at if self.is_bounded else item.beyond)(points[:, column])
+            values[:, place] = (item.interpolate if self.is_bounded else item.extrapolate)(
+                points[:, column]
+            )
         return values
 
-    def _cost(self, status: str, value: float) -> float:
-        """Of a run; what fails is worse than anything before."""
+    def _compute_cost(self, status: str, value: float) -> float:
+        """Return the cost of a run; a failure costs more than anything before, so that methods
+        avoid it.
+        """
         if status == FAILED or not isfinite(value):
             return self.worst + max(1.0, abs(self.worst))
         cost = self.sign * value
@@ -378,6 +430,10 @@ class _Evaluations:
         return cost
 
     def _run(self, values: Floats, first: int) -> list[tuple[list[float], str, float]]:
+        """Run samples (k, v) on the pool, and save them; return values, status and objective of
+        each.
+        """
+        # Two tasks per worker balance runs of different duration.
         size = max(1, -(-len(values) // (2 * self.pool.workers)))
         starts = range(0, len(values), size)
         for place in starts:
@@ -400,17 +456,20 @@ def _finish_search(
     wanted: dict[str, Any],
     ended: str,
 ) -> Optimum:
+    """Write the best model, parameters and summary."""
     if evaluations.best is None:
         if evaluations.reason:
             raise SimulationError(f"no run came to its end: {evaluations.reason}")
         raise SimulationError(f"'{wanted['objective']}' is not a finite number in any run")
     cost, number, row = evaluations.best
-    write(variants.build_model(row), where / BEST)
+    write(variants.build_model(row), where / BEST_FILE)
     if plan.controller is not None:
-        write_atomically(where / PAR, variants.controller(row).par())
+        write_atomically(where / PAR_FILE, variants.make_controller(row).par())
     value = evaluations.sign * cost
     named = {item.name: x for item, x in zip(plan.variables, row, strict=True)}
-    result = Optimum(value, named, evaluations.count, number, ended, where / BEST, where / HISTORY)
+    result = Optimum(
+        value, named, evaluations.count, number, ended, where / BEST_FILE, where / HISTORY_FILE
+    )
     summary = {
         "objective": wanted["objective"],
         "value": value,
@@ -420,5 +479,5 @@ def _finish_search(
         "ended": ended,
         "settings": wanted,
     }
-    write_atomically(where / SUMMARY, json.dumps(summary, indent=2) + "\n")
+    write_atomically(where / SUMMARY_FILE, json.dumps(summary, indent=2) + "\n")
     return result

@@ -1,4 +1,6 @@
-"""What is to be run, as something that can be sent to other processes."""
+"""Plan of a sweep or a search: model, variables, measures and settings, which can be sent to other
+processes.
+"""
 
 from __future__ import annotations
 
@@ -24,28 +26,44 @@ from osimlite.simulation.engines import engine_name
 from osimlite.simulation.initial_state import convert_value, describe_suspect_value
 from osimlite.simulation.options import IntegrationOptions
 from osimlite.simulation.run import Simulation
-from osimlite.studies.sweep.controls import Control, check_nodes, controller_of
-from osimlite.studies.sweep.measures import is_expression, measure_name
-from osimlite.studies.sweep.variables import Gains, Parameter, Range, Variable, resolve_variables
+from osimlite.studies.sweep.controls import Control, check_nodes, make_controller
+from osimlite.studies.sweep.measures import get_measure_name, is_expression
+from osimlite.studies.sweep.variables import (
+    FunctionParameter,
+    Gains,
+    Range,
+    Variable,
+    resolve_variables,
+)
 
 if TYPE_CHECKING:
     from osimlite.simulation.control_steps import Controller, Gain
 
 Maker = Callable[[Mapping[str, float]], Model]
-"""Makes a model from the values of some of its parameters."""
+"""Function that makes a model from the values of some of its parameters."""
 
-MOST_TRIES = 1_000_000
-"""Steps that a run may try: one that hardly moves on must not keep the others waiting."""
+MAX_INTEGRATOR_STEPS = 1_000_000
+"""Most steps of the integrator in a run, so that a run which hardly advances does not delay the
+others.
+"""
 
 REPORT_INTERVAL = 0.01
-"""Time between the states that an expression looks at, unless another is asked for, s."""
+"""Default interval (s) between the states from which expressions are computed."""
 
 DEFAULT_MEASURES = ("distance", "largest_force")
+"""Measures of a plan that names none."""
 
 
 @dataclass(frozen=True)
 class Stop:
-    """A coordinate that ends a run when it falls below a level, or rises above it (rad or m)."""
+    """Level of a coordinate that ends a run.
+
+    Attributes:
+        coordinate: name or path of the coordinate.
+        level: level (rad or m).
+        is_below: whether the run ends when the coordinate falls below the level, else when it rises
+            above.
+    """
 
     coordinate: str
     level: float
@@ -53,53 +71,72 @@ class Stop:
 
     @property
     def words(self) -> str:
-        """Why a run ended."""
+        """Text for why a run ended."""
         return f"{self.coordinate} {'below' if self.is_below else 'above'} {self.level:g}"
 
 
 @dataclass(frozen=True)
 class Plan(IntegrationOptions):
-    """Runs of one model, each with its own values of some numbers."""
+    """Runs of one model, each with its own values of the variables.
 
-    text: str  # the model as .osim
-    variables: tuple[Variable, ...]  # what differs
-    # names of measures, `module:function`, or functions
+    Attributes:
+        text: model as XML text (.osim).
+        variables: variables that differ between runs.
+        measures: names of measures, `module:function`, or functions.
+        to: duration of a run (s).
+        engine: name of the engine.
+        wrapping: method of wrapping, see `Options`.
+        stops: levels that end a run early.
+        is_planted: whether each run starts with the deeper foot of the walker at rest on the
+            ground.
+        feet: contacts of each foot, see `find_footing`; found from the structure by default.
+        report_interval: interval (s) at which states are saved for functions of the user; None for
+            none.
+        equilibrate: whether muscles start in equilibrium of fiber and tendon.
+        interpolation: interpolation between the nodes of a control: "linear", "steps" or "cubic".
+        skip_unsupported: whether to leave out forces that are not supported.
+        make: function that makes the model, if its parameters vary.
+        folder: folder of the model file, to which its files are relative.
+        controller: feedback controller of all runs.
+
+    Options of the integration, such as `accuracy` and `integrator`, are attributes too.
+    """
+
+    text: str
+    variables: tuple[Variable, ...]
     measures: tuple[Any, ...] = DEFAULT_MEASURES
-    to: float = 2.0  # how long a run lasts, s
-    engine: str = "compiled"  # that computes it, by name
-    wrapping: str = OPENSIM  # see `Options`
-    stops: tuple[Stop, ...] = ()  # what ends a run before
-    # whether the walker is put on the ground with the deeper foot, at rest there, before each run
+    to: float = 2.0
+    engine: str = "compiled"
+    wrapping: str = OPENSIM
+    stops: tuple[Stop, ...] = ()
     is_planted: bool = False
-    # contacts of each foot of a walker, as `find_footing` takes them; found by its structure if
-    # left out
     feet: tuple[str, ...] | None = None
-    # time between the moments that a measure of one's own can look at (s), None for none
     report_interval: float | None = None
-    equilibrate: bool = False  # start muscles where fiber and tendon are in equilibrium
-    # what is between the nodes of a control: "linear", "steps" or "cubic"
+    equilibrate: bool = False
     interpolation: str = "linear"
-    skip_unsupported: bool = False  # leave out forces that cannot be computed
-    make: Maker | None = None  # makes the model from parameters, where some of them are varied
-    folder: str | None = None  # of the model's file, where the files are that it names
-    controller: Controller | None = None  # what drives actuators by what it feels
+    skip_unsupported: bool = False
+    make: Maker | None = None
+    folder: str | None = None
+    controller: Controller | None = None
 
     def model(self) -> Model:
-        """The model, with none of the variables set."""
+        """Return the model, with none of the variables set."""
         return read_text(self.text.encode())
 
     @property
     def interval(self) -> float | None:
-        """Time between the states that are kept, s: what was asked for, or else what an expression needs."""
+        """Interval (s) at which states are saved: the requested one, or the default if there are
+        expressions.
+        """
         return self.report_interval or (
             REPORT_INTERVAL if any(map(is_expression, self.measures)) else None
         )
 
     def pack(self) -> bytes:
-        """The plan for other processes.
+        """Return the plan as bytes for other processes.
 
         Raises:
-            SettingError: a function cannot be named there.
+            SettingError: a function of the plan cannot be pickled.
         """
         try:
             return zlib.compress(pickle.dumps(self))
@@ -111,19 +148,27 @@ class Plan(IntegrationOptions):
 
     @staticmethod
     def unpack(data: bytes) -> Plan:
-        """The plan that was packed; only from those whom you would let run programs here."""
+        """Return a packed plan. Unpickling runs code, so that the bytes must come from a trusted
+        program.
+        """
         return pickle.loads(zlib.decompress(data))
 
     def columns(self, *first: str) -> dict[str, str]:
-        """Columns of a table of the runs, after some of whole numbers, and what they hold.
+        """Return the columns of the table of results.
+
+        Args:
+            first: names of columns of whole numbers that come first.
+
+        Returns:
+            Type of each column by name: "int64", "float64" or "string".
 
         Raises:
-            SettingError: two of them have one name.
+            SettingError: two columns have the same name.
         """
         result = dict.fromkeys(first, "int64")
         rest = [(item.name, "float64") for item in self.variables]
         rest += [("status", "string"), ("reason", "string"), ("time", "float64")]
-        rest += [(measure_name(spec), "float64") for spec in dict.fromkeys(self.measures)]
+        rest += [(get_measure_name(spec), "float64") for spec in dict.fromkeys(self.measures)]
         for name, kind in rest:
             if name in result:
                 raise SettingError(
@@ -133,7 +178,11 @@ class Plan(IntegrationOptions):
         return result
 
     def settings(self) -> dict[str, Any]:
-        """All that the results depend on."""
+        """Return all settings on which the results depend, as data for JSON.
+
+        Returns:
+            Value per setting; the model is represented by its digest.
+        """
         import hashlib
 
         from osimlite import __version__
@@ -142,7 +191,7 @@ class Plan(IntegrationOptions):
             "osimlite": __version__,
             "model": hashlib.sha256(self.text.encode()).hexdigest(),
             "vary": [item.settings() for item in self.variables],
-            "measures": [measure_name(item) for item in self.measures],
+            "measures": [get_measure_name(item) for item in self.measures],
             "to": self.to,
             "engine": self.engine,
             "stops": [item.words for item in self.stops],
@@ -166,37 +215,37 @@ def plan(
     below: Mapping[str, float | str] = MappingProxyType({}),
     above: Mapping[str, float | str] = MappingProxyType({}),
     controls: Mapping[str, Any] = MappingProxyType({}),
-    **choices: Any,
+    **options: Any,
 ) -> Plan:
-    """Make a plan.
+    """Make a plan of runs.
 
     Args:
-        source: the model, or what makes it from the parameters that it is given.
-        vary: ranges by name, see :mod:`osimlite.studies.sweep.variables`; if nothing differs by
-            them, all other parameters of a controller do, between their bounds.
-        parameters: that `source` takes, with their defaults.
-        below: levels that end a run when a coordinate falls below them: rad, m, or a text such as
+        source: model, or a function that makes it from parameters.
+        vary: ranges by name, see :mod:`osimlite.studies.sweep.variables`. If none of them varies
+            anything, all other parameters of the controller vary within their bounds.
+        parameters: parameters of `source` with their defaults.
+        below: levels that end a run when a coordinate falls below them: rad, m, or text such as
             "30deg".
-        above: levels that end a run when a coordinate rises above them, likewise.
-        controls: that every run has: by the name or path of an actuator a number, or ``(times,
-            values)``.
-        choices: further attributes of :class:`Plan`.
+        above: levels that end a run when a coordinate rises above them.
+        controls: controls of all runs, by the name or path of an actuator: a number, or `(times,
+            values)`.
+        options: further attributes of :class:`Plan`.
 
     Raises:
-        SettingError: a name means nothing, or a number has no meaning.
-        ModelError: the model is no mechanism.
+        SettingError: a name is unknown, or a number is out of bounds.
+        ModelError: the model is not a valid mechanism.
     """
     if controls:
-        maker = partial(_copy_model, to_text(source)) if isinstance(source, Model) else source
-        source = partial(_list_driven_actuators, maker, controls)
+        maker = partial(_parse_model, to_text(source)) if isinstance(source, Model) else source
+        source = partial(_make_controlled_model, maker, controls)
     model = source if isinstance(source, Model) else source({})
     mechanism = build_mechanism(model)
     gains: list[Gain] = []
-    if (controller := choices.get("controller")) is not None:
+    if (controller := options.get("controller")) is not None:
         own = {
-            name: choices[name]
+            name: options[name]
             for name in ("skip_unsupported", "wrapping", "folder")
-            if choices.get(name)
+            if options.get(name)
         }
         gains = controller.gains(model, Simulation(model, **own).engine)
         if not (vary or gains):
@@ -211,16 +260,16 @@ def plan(
         rest = {gain.name: _read_bounds(gain) for gain in gains if gain.name not in held}
         result = resolve_variables({**vary, **rest}, model, mechanism, parameters, gains)
     for item in result:
-        warn_of_unit(item.doubt)
-    needs_maker = any(isinstance(item.target, Parameter) for item in result)
+        warn_of_unit(item.warning)
+    needs_maker = any(isinstance(item.target, FunctionParameter) for item in result)
     make = source if needs_maker and not isinstance(source, Model) else None
     made = Plan(to_text(model), result, make=make)
     if not any(
         info.motion_type == "translational" and not info.locked for info in mechanism.coordinates
     ):
-        # Only who asks for the distance by name is told that the model has none.
+        # The default measures leave out the distance if the model has none; a selected one is an error.
         made = replace(made, measures=tuple(name for name in made.measures if name != "distance"))
-    made = replace(made, **{name: value for name, value in choices.items() if value is not None})
+    made = replace(made, **{name: value for name, value in options.items() if value is not None})
     for name, value in (
         ("to", made.to),
         ("accuracy", made.accuracy),
@@ -235,13 +284,14 @@ def plan(
     nodes = {place: target for place, target in targets.items() if isinstance(target, Control)}
     check_nodes(nodes, made.interpolation, made.to)
     named = (*_make_stops(mechanism, below, True), *_make_stops(mechanism, above, False))
-    given = (
+    prescribed = (
         _make_stop(mechanism, stop.coordinate, stop.level, stop.is_below) for stop in made.stops
     )
-    return replace(made, engine=engine_name(made.engine), stops=(*given, *named))
+    return replace(made, engine=engine_name(made.engine), stops=(*prescribed, *named))
 
 
 def _read_bounds(gain: Gain) -> tuple[float, float]:
+    """Return the bounds of a parameter of the controller as a range."""
     if not (isfinite(gain.low) and isfinite(gain.high)):
         raise SettingError(
             f"the parameter '{gain.name}' has no bounds, as in 1~0.1<0,2>; vary it as in {gain.name}=0:2"
@@ -249,15 +299,17 @@ def _read_bounds(gain: Gain) -> tuple[float, float]:
     return gain.low, gain.high
 
 
-def _copy_model(text: str, parameters: Mapping[str, float]) -> Model:
+def _parse_model(text: str, parameters: Mapping[str, float]) -> Model:
+    """Return the model of a text; a partial application of it can be pickled, a lambda cannot."""
     return read_text(text.encode())
 
 
-def _list_driven_actuators(
+def _make_controlled_model(
     source: Maker, controls: Mapping[str, Any], parameters: Mapping[str, float]
 ) -> Model:
+    """Return the model of a function with a controller for prescribed controls added."""
     model = source(parameters)
-    model.add(controller_of(model, controls))
+    model.add(make_controller(model, controls))
     return model
 
 

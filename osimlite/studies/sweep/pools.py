@@ -1,4 +1,6 @@
-"""Pools of workers that run the samples of a sweep: threads, processes, or a Dask cluster, with the same results."""
+"""Workers that run the samples of a sweep: threads, processes or a Dask cluster, with the same
+results.
+"""
 
 from __future__ import annotations
 
@@ -18,15 +20,15 @@ from osimlite.studies.sweep.variables import Floats
 def make_pool(
     plan: Plan, *, workers: int | None = None, cluster: str | None = None
 ) -> Iterator[Pool]:
-    """Make a pool for a plan; without a cluster, on this machine.
+    """Open a pool of workers for a plan; without a cluster, on this machine.
 
     Args:
-        plan: what is run.
-        workers: threads or processes here; by default one for each core.
-        cluster: address of a Dask scheduler, such as ``tcp://127.0.0.1:8786``.
+        plan: plan to run.
+        workers: number of threads or processes; by default one per core.
+        cluster: address of a Dask scheduler, such as `tcp://127.0.0.1:8786`.
 
     Raises:
-        SettingError: the settings do not go together.
+        SettingError: the settings exclude each other.
         OsimliteError: the cluster cannot be reached.
         MissingDependency: dask.distributed is not installed.
     """
@@ -34,7 +36,7 @@ def make_pool(
         with closing(ThreadPool(plan, count_workers(workers))) as threads:
             yield threads
         return
-    # What tells of a plan that cannot be run does so here.
+    # An invalid plan fails here, not in a worker.
     Runner(plan)
     with open_process_pool(
         partial(run_packed, plan.pack()), workers=workers, cluster=cluster
@@ -43,10 +45,15 @@ def make_pool(
 
 
 class ThreadPool(LocalPool):
-    """Threads: the compiled engine lets them run side by side."""
+    """Pool of threads: the compiled engine releases Python's lock, so that they run in parallel.
+
+    Args:
+        plan: plan to run.
+        count: number of threads.
+    """
 
     def __init__(self, plan: Plan, count: int) -> None:
-        # What tells of a plan that cannot be run serves the first thread.
+        # An invalid plan fails here; otherwise this runner serves the first thread.
         spare = [Runner(plan)]
 
         def begin() -> None:
@@ -63,7 +70,7 @@ _local = threading.local()
 
 
 def _thread_runner(plan: Plan) -> Runner:
-    """The runner of this thread."""
+    """Return the runner of this thread, which is cached."""
     kept: Runner | None = getattr(_local, "runner", None)
     if kept is None or kept.plan is not plan:
         kept = _local.runner = Runner(plan)
@@ -71,10 +78,14 @@ def _thread_runner(plan: Plan) -> Runner:
 
 
 def run_packed(packed: bytes, values: Floats) -> Block:
-    """Run samples of a packed plan.
+    """Run samples of a packed plan in a worker process.
+
+    Args:
+        packed: plan from `Plan.pack`.
+        values: values of the variables of the samples (k, d).
 
     Raises:
-        OsimliteError: a sample cannot be run.
+        OsimliteError: the plan cannot be run.
     """
     if getattr(_local, "packed", None) != packed:
         _local.packed, _local.plan = packed, Plan.unpack(packed)

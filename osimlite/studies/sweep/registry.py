@@ -1,9 +1,10 @@
-"""What is asked for by name: measures, and ways to start. Who has some registers them, by the names of the functions.
+"""Registry of measures and of initial states that users select by name.
 
-A measure is made of an engine and the contacts of each foot (None: found by the structure of the
-model). So is a start: a function of states (k, y), the numbers of their engines (None: all those of
-the engine), and what gives auxiliary states their start; it returns the states at which the runs
-begin. Both raise OsimliteError of a model that has nothing of the kind.
+Providers register functions, whose names users write. A measure is made of an engine and the
+contacts of each foot (None: found from the structure of the model). So is a start: a function of
+states (k, y), of the numbers of their engines (None: all those of the engine), and of a function
+that initializes auxiliary states; it returns the initial states. Both raise OsimliteError for a
+model that lacks what they need.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 if TYPE_CHECKING:
-    from osimlite.studies.sweep.measures import Measure
+    from osimlite.studies.sweep.measures import RunMeasure
     from osimlite.studies.sweep.plan import Plan
     from osimlite.studies.sweep.variables import Floats
 
@@ -23,59 +24,68 @@ T = TypeVar("T")
 F = TypeVar("F", bound=Callable[..., Any])
 
 PROVIDERS = ("osimlite.studies.sweep.measures", "osimlite.studies.gait.measures")
-"""Modules that register something; one is loaded when those before it have nothing of a name."""
+"""Modules that register something; each is imported only if those before it do not know a name."""
 
 
-GRADIENTS = "osimlite.studies.sweep.gradients"
-"""Module that finds derivatives of measures, by its class `Gradients`; it is loaded when a search asks for them."""
+GRADIENTS_MODULE = "osimlite.studies.sweep.gradients"
+"""Module with the class `Gradients`; it is imported only when a search needs derivatives."""
 
 
-class Known(NamedTuple):
-    """What makes a measure, and whether a search looks for more of it."""
+class RegisteredMeasure(NamedTuple):
+    """Measure in the registry.
 
-    make: Callable[[Any, Sequence[str] | None], Measure]
+    Attributes:
+        make: function of the engine and the feet that returns the measure.
+        is_maximized: whether a search maximizes it by default.
+    """
+
+    make: Callable[[Any, Sequence[str] | None], RunMeasure]
     is_maximized: bool
 
 
-_MEASURES: dict[str, Known] = {}
+_MEASURES: dict[str, RegisteredMeasure] = {}
+"""Measures by name."""
 _STARTS: dict[str, Callable[[Any, Sequence[str] | None], Place]] = {}
+"""Initial states by name."""
 
 
-def measure(*, is_maximized: bool = False) -> Callable[[F], F]:
-    """Register what makes a measure."""
+def register_measure(*, is_maximized: bool = False) -> Callable[[F], F]:
+    """Return a decorator that registers a function which makes a measure, under its name."""
 
     def register(make: F) -> F:
-        _MEASURES[make.__name__] = Known(make, is_maximized)
+        _MEASURES[make.__name__] = RegisteredMeasure(make, is_maximized)
         return make
 
     return register
 
 
-def start(make: F) -> F:
-    """Register what makes a start."""
+def register_start(make: F) -> F:
+    """Register a function that makes a start, under its name."""
     _STARTS[make.__name__] = make
     return make
 
 
-def measure_named(name: str) -> Known | None:
-    """The measure of a name; None if nobody has one."""
+def find_measure(name: str) -> RegisteredMeasure | None:
+    """Return the measure of a name, or None."""
     return _load_provider(_MEASURES, name) if name.isidentifier() else None
 
 
-def gradients(plan: Plan) -> Any:
-    """What finds the derivatives of the first measure of a plan: ``at(values, free)``."""
-    return import_module(GRADIENTS).Gradients(plan)
+def make_gradients(plan: Plan) -> Any:
+    """Return the derivatives of the first measure of a plan, with a method `evaluate(values,
+    free)`.
+    """
+    return import_module(GRADIENTS_MODULE).Gradients(plan)
 
 
-def start_named(name: str) -> Callable[[Any, Sequence[str] | None], Place]:
-    """What makes the start of a name."""
+def find_start(name: str) -> Callable[[Any, Sequence[str] | None], Place]:
+    """Return the function that makes the start of a name."""
     result = _load_provider(_STARTS, name)
     assert result is not None
     return result
 
 
-def measure_names() -> list[str]:
-    """The names of all measures."""
+def list_measure_names() -> list[str]:
+    """Return the names of all measures."""
     _load_provider(_MEASURES, "")
     return list(_MEASURES)
 

@@ -1,8 +1,9 @@
-"""Results as a table in a file: Parquet when it is whole, and until then a file to which rows are added.
+"""Tables of results: a Parquet file when complete, and until then a partial file to which rows are
+added.
 
-The partial file is one record after another: Arrow's schema, with the settings, then batches of
-rows in the order of the runs. Each begins with its length and a checksum. Whatever has become of
-the file, what comes from the first damaged record on is cut off, said, and computed again.
+The partial file consists of records: Arrow's schema with the settings, then batches of rows in the
+order of the runs. Each record starts with its length and a checksum. If the file is damaged, the
+reader keeps the records before the first damaged one, reports it, and the rest is computed again.
 """
 
 from __future__ import annotations
@@ -26,15 +27,16 @@ from osimlite.base.writing import open_to_append
 from osimlite.errors import OsimliteError, SettingError
 from osimlite.simulation.interrupts import defer_sigint
 
-KEY = b"osimlite"
-"""Where the settings are in the metadata of the schema, as JSON."""
+SETTINGS_KEY = b"osimlite"
+"""Key of the settings (as JSON) in the metadata of the schema."""
 
 ROWS_PER_GROUP = 65536
-"""Of the Parquet file."""
+"""Rows per group of the Parquet file."""
 
-HEAD = struct.Struct("<4sQ16s")
+RECORD_HEAD = struct.Struct("<4sQ16s")
+"""Head of a record of the partial file: mark, length and checksum of the body."""
 _MARK = b"OSB1"
-"""What a record of the partial file begins with; then the length and the checksum of the rest follow."""
+"""First bytes of each record of the partial file."""
 
 _log = logging.getLogger(__name__)
 
@@ -44,40 +46,58 @@ def _load_arrow() -> Any:
 
 
 def make_schema(columns: Mapping[str, str], settings: Mapping[str, Any]) -> Any:
-    """Of a table: type of each column by its name ("int64", "float64" or "string"), and the settings."""
+    """Return the Arrow schema of a table.
+
+    Args:
+        columns: type of each column by name: "int64", "float64" or "string".
+        settings: settings, stored in the metadata.
+    """
     pa = _load_arrow()
     fields = [
         pa.field(name, getattr(pa, kind)(), nullable=kind != "int64")
         for name, kind in columns.items()
     ]
-    return pa.schema(fields, metadata={KEY: json.dumps(settings).encode()})
+    return pa.schema(fields, metadata={SETTINGS_KEY: json.dumps(settings).encode()})
 
 
 def settings_of(path: str | Path) -> dict[str, Any]:
-    """The settings that a Parquet file of results was made with.
+    """Return the settings with which a Parquet file of results was made.
+
+    Args:
+        path: Parquet file.
+
+    Returns:
+        Value per setting.
 
     Raises:
         MissingFileError: there is no such file.
-        OsimliteError: the file is none of osimlite's results.
+        OsimliteError: the file is not a table of results.
     """
     pq = require("pyarrow.parquet", extra="sweep", purpose="a table of results")
     if not Path(path).exists():
         raise make_missing_error(path)
     try:
-        # By the stream: of a name, pyarrow thinks that what is before a colon is a protocol, and
-        # that all is UTF-8.
+        # A stream, because pyarrow takes a name with a colon for a URL, and assumes UTF-8.
         with open_file(path) as stream:
-            return _settings_in(pq.read_schema(stream))
+            return _parse_settings(pq.read_schema(stream))
     except (ValueError, OSError):
         raise OsimliteError(
             "this file is not the results of a sweep; give them another name", file=str(path)
         ) from None
 
 
-def _settings_in(table: Any) -> dict[str, Any]:
-    """The settings in the schema of a table; ValueError (what is no Arrow is one too) if there are none."""
+def _parse_settings(table: Any) -> dict[str, Any]:
+    """Return the settings in a schema.
+
+    Returns:
+        Value per setting.
+
+    Raises:
+        ValueError: the schema has no settings; errors of Arrow for other files are of this class,
+            too.
+    """
     try:
-        result = json.loads((table.metadata or {})[KEY])
+        result = json.loads((table.metadata or {})[SETTINGS_KEY])
     except (KeyError, RecursionError):
         result = None
     if not isinstance(result, dict):
@@ -86,7 +106,12 @@ def _settings_in(table: Any) -> dict[str, Any]:
 
 
 def describe_differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
-    """In what settings differ, in words."""
+    """Return texts about the settings that differ.
+
+    Args:
+        old: settings of existing results.
+        new: settings of the present run.
+    """
     result = []
     for name in {**old, **new}:
         a, b = old.get(name), new.get(name)
@@ -101,20 +126,29 @@ def describe_differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> list
 
 
 def protect_results(path: Path, wanted: Mapping[str, Any]) -> None:
-    """Stop before finished results of other settings are lost.
+    """Refuse to overwrite finished results of other settings.
+
+    Args:
+        path: Parquet file that would be overwritten.
+        wanted: settings of the present run.
 
     Raises:
-        SettingError: there are such results.
-        OsimliteError: the file is none of osimlite's results.
+        SettingError: the results have other settings.
+        OsimliteError: the file is not a table of results.
     """
-    refuse_others(path, settings_of(path), wanted)
+    refuse_other_settings(path, settings_of(path), wanted)
 
 
-def refuse_others(path: Path, before: Mapping[str, Any], wanted: Mapping[str, Any]) -> None:
-    """Stop where the settings of what is there are others.
+def refuse_other_settings(path: Path, before: Mapping[str, Any], wanted: Mapping[str, Any]) -> None:
+    """Refuse settings that differ from those of existing results.
+
+    Args:
+        path: file of the results, for the message.
+        before: settings of the results.
+        wanted: settings of the present run.
 
     Raises:
-        SettingError: they are.
+        SettingError: they differ.
     """
     if unlike := describe_differences(before, wanted):
         raise SettingError(
@@ -124,10 +158,10 @@ def refuse_others(path: Path, before: Mapping[str, Any], wanted: Mapping[str, An
 
 
 def refuse_overwrite(paths: Iterable[Path]) -> None:
-    """Stop before files are lost of which nothing says that they are results of the same command.
+    """Refuse to overwrite files of unknown origin.
 
     Raises:
-        SettingError: one of them is there.
+        SettingError: one of the files exists.
     """
     for path in paths:
         if path.exists():
@@ -136,25 +170,26 @@ def refuse_overwrite(paths: Iterable[Path]) -> None:
             )
 
 
-def partial_of(path: Path) -> Path:
-    """Where the rows of a file are until all of them are there."""
+def get_partial_path(path: Path) -> Path:
+    """Return the path of the partial file of a table."""
     return path.with_name(f"{path.name}.partial")
 
 
-class Partial:
-    """A table that grows; close it after use.
+class PartialTable:
+    """Table to which rows are added; call `close` after use.
 
     Args:
-        path: of the Parquet file that it will be.
-        table: schema of it.
-        resume: go on with what is there.
+        path: Parquet file that it will become.
+        table: schema of the table.
+        resume: whether to continue an existing partial file.
 
     Attributes:
-        rows: that are there.
+        partial: path of the partial file.
+        rows: number of rows.
 
     Raises:
-        SettingError: there is a partial file already, or one with other settings.
-        OsimliteError: it cannot be written, or another program is writing it.
+        SettingError: there is a partial file already, or it has other settings.
+        OsimliteError: the file cannot be written, or another program is writing it.
     """
 
     def __init__(self, path: Path, table: Any, *, resume: bool = False) -> None:
@@ -163,7 +198,7 @@ class Partial:
             raise OsimliteError(
                 "cannot write the file: this is a folder; name a file in it", file=str(path)
             )
-        self.partial = partial_of(path)
+        self.partial = get_partial_path(path)
         is_there = self.partial.exists()
         if is_there and not resume:
             raise SettingError(
@@ -178,7 +213,7 @@ class Partial:
                 else:
                     self._write_batch(table)
             except BaseException:
-                self._let_go()
+                self._release()
                 raise
         except OSError as error:
             raise OsimliteError(
@@ -186,7 +221,7 @@ class Partial:
             ) from None
 
     def add(self, columns: Sequence[Any]) -> None:
-        """Add rows, column by column."""
+        """Add rows, given as columns in the order of the schema."""
         pa = _load_arrow()
         arrays = [
             pa.array(column, field.type, from_pandas=False)
@@ -204,10 +239,10 @@ class Partial:
             self.rows += batch.num_rows
 
     def read(self, take: Callable[[Any], object]) -> None:
-        """Give every batch that is there to a function.
+        """Call a function with each batch of rows.
 
         Raises:
-            OsimliteError: another program has damaged the file meanwhile.
+            OsimliteError: another program has damaged the file in the meantime.
         """
         end = _read_batches(self.partial, take)
         if end < self.partial.stat().st_size:
@@ -217,28 +252,30 @@ class Partial:
 
     def _write_batch(self, item: Any) -> None:
         body = item.serialize().to_pybytes()
-        self.stream.write(HEAD.pack(_MARK, len(body), _compute_checksum(body)) + body)
+        self.stream.write(RECORD_HEAD.pack(_MARK, len(body), _compute_checksum(body)) + body)
         self.stream.flush()
 
     def finish(self) -> Path:
-        """Make the Parquet file of it, which appears whole; without rows there is none."""
+        """Convert the rows to the Parquet file, which replaces an older one in one step; without
+        rows nothing is written.
+        """
         if self.rows == 0:
             return self.path
         pq = require("pyarrow.parquet", extra="sweep", purpose="a table of results")
         pa = _load_arrow()
         self.stream.close()
-        beside = self.path.with_name(f".{self.path.name}.{os.getpid()}")
+        temporary = self.path.with_name(f".{self.path.name}.{os.getpid()}")
         waiting: list[Any] = []
         try:
             with (
-                beside.open("wb") as stream,
+                temporary.open("wb") as stream,
                 pq.ParquetWriter(stream, self.schema, write_page_checksum=True) as writer,
             ):
 
-                def put(least: int) -> None:
+                def write_groups(least: int) -> None:
                     table = pa.Table.from_batches(waiting, self.schema)
                     while table.num_rows >= least:
-                        # Whatever pieces the rows came in, the file is the same.
+                        # Groups of fixed size make the file independent of the sizes of batches.
                         writer.write_table(table.slice(0, ROWS_PER_GROUP).combine_chunks())
                         table = table.slice(ROWS_PER_GROUP)
                     waiting[:] = table.to_batches()
@@ -246,51 +283,51 @@ class Partial:
                 def take(batch: Any) -> None:
                     waiting.append(batch)
                     if sum(item.num_rows for item in waiting) >= ROWS_PER_GROUP:
-                        put(ROWS_PER_GROUP)
+                        write_groups(ROWS_PER_GROUP)
 
                 self.read(take)
-                put(1)
-            replace_with(beside, self.path)
+                write_groups(1)
+            replace_with(temporary, self.path)
         except OSError as error:
             raise OsimliteError(
                 f"cannot write the file: {error.strerror or error}", file=str(self.path)
             ) from None
         finally:
-            beside.unlink(missing_ok=True)
+            temporary.unlink(missing_ok=True)
         self.partial.unlink()
         return self.path
 
     def close(self) -> None:
-        """Let go of the file, and leave it as it is; one without rows is removed."""
-        self._let_go(removing=self.rows == 0)
+        """Close and unlock the partial file; it is removed if it has no rows."""
+        self._release(removing=self.rows == 0)
 
-    def _let_go(self, *, removing: bool = False) -> None:
+    def _release(self, *, removing: bool = False) -> None:
         with suppress(OSError, AttributeError):
-            # What was lost to a full disk has been told of; and there may be no stream yet.
+            # The user has been told about a full disk already; and there may be no stream yet.
             self.stream.close()
         if removing:
-            # Windows removes no file that is open, and others may write one as soon as the lock is
-            # gone.
+            # After `close`, because Windows does not remove open files; before the lock is released,
+            # because others may then write a new file.
             self.partial.unlink(missing_ok=True)
         if self._lock.is_locked:
             with suppress(OSError):
-                # Windows removes no file that is open, but the lock does so there itself.
+                # Windows does not remove the open lock file; there filelock removes it itself.
                 Path(self._lock.lock_file).unlink()
             self._lock.release()
 
     def _reopen(self) -> None:
-        """Count what is there, and cut off what is damaged."""
+        """Check the settings, count the rows, and cut off damaged records."""
         pa = _load_arrow()
         first = next(_read_records(self.partial), None)
         try:
             result = pa.ipc.read_schema(pa.py_buffer(b"" if first is None else first[0]))
-            before = _settings_in(result)
+            before = _parse_settings(result)
         except (ValueError, OSError):
             raise SettingError(
                 f"'{self.partial}' is no interrupted sweep, or is damaged at its beginning; remove it, or take another "
                 "name"
             ) from None
-        unlike = describe_differences(before, json.loads(self.schema.metadata[KEY]))
+        unlike = describe_differences(before, json.loads(self.schema.metadata[SETTINGS_KEY]))
         if unlike or not result.equals(self.schema):
             raise SettingError(
                 f"the interrupted work in '{self.partial}' has other settings: {join_words(unlike) or 'its columns'}; "
@@ -310,14 +347,14 @@ class Partial:
 
 
 def _lock_file(path: Path) -> Any:
-    """A lock that keeps other programs from writing a file until it is released.
+    """Lock a file against other programs until the lock is released.
 
     Raises:
-        OsimliteError: another program has it, or there can be none.
+        OsimliteError: another program has locked it, or the folder does not exist.
     """
     filelock = require("filelock", extra="sweep", purpose="a table of results")
     if not path.parent.is_dir():
-        # The lock would make the folder.
+        # filelock would create the folder.
         raise OsimliteError("cannot write here: the folder does not exist", file=str(path))
     lock = filelock.FileLock(path.with_name(f"{path.name}.lock"), thread_local=False)
     try:
@@ -327,17 +364,17 @@ def _lock_file(path: Path) -> Any:
             "this file is being written by another program; wait until it has ended", file=str(path)
         ) from None
     except NotImplementedError:
-        # Not every file system knows locks.
+        # Not every file system supports locks.
         pass
     return lock
 
 
 def _read_records(path: Path) -> Iterator[tuple[bytes, int]]:
-    """The records of a partial file as far as they are whole, and where each ends."""
+    """Yield the intact records of a partial file, with the offset after each."""
     with open_file(path) as stream:
-        while len(head := stream.read(HEAD.size)) == HEAD.size:
-            mark, length, checksum = HEAD.unpack(head)
-            # A damaged length may be that of no memory.
+        while len(head := stream.read(RECORD_HEAD.size)) == RECORD_HEAD.size:
+            mark, length, checksum = RECORD_HEAD.unpack(head)
+            # A damaged length could exceed the memory.
             if mark != _MARK or length > path.stat().st_size:
                 return
             body = stream.read(length)
@@ -351,7 +388,9 @@ def _compute_checksum(body: bytes) -> bytes:
 
 
 def _read_batches(path: Path, take: Callable[[Any], object]) -> int:
-    """Give every batch of a partial file to a function, up to the first that is damaged; where the last one ends."""
+    """Call a function with each batch up to the first damaged one; return the offset after the
+    last.
+    """
     pa = _load_arrow()
     records = _read_records(path)
     head, end = next(records)
@@ -363,36 +402,49 @@ def _read_batches(path: Path, take: Callable[[Any], object]) -> int:
 
 
 class ResultTable:
-    """What tells of results in a Parquet file, one row for each run; all of them are read at once."""
+    """Access to a Parquet file of results with one row per run; each method reads the complete
+    file.
+    """
 
-    def _results(self) -> Path:
+    def _get_results_path(self) -> Path:
+        """Return the path of the Parquet file."""
         raise NotImplementedError
 
     def to_arrow(self) -> Any:
-        """The rows as a pyarrow Table.
+        """Return the rows as a pyarrow Table.
 
         Raises:
             OsimliteError: the file is damaged.
         """
         pq = require("pyarrow.parquet", extra="sweep", purpose="a table of results")
-        with damage_told(self._results()), open_file(self._results()) as stream:
+        with report_damage(self._get_results_path()), open_file(self._get_results_path()) as stream:
             return pq.read_table(stream)
 
     def to_frame(self) -> Any:
-        """The rows as a pandas DataFrame; OsimliteError as of :meth:`to_arrow`, MissingDependency without pandas."""
+        """Return the rows as a pandas DataFrame, indexed by the number of the run.
+
+        Raises:
+            OsimliteError: the file is damaged.
+            MissingDependency: pandas is not installed.
+        """
         require("pandas", extra="frame", purpose="a data frame")
         table = self.to_arrow()
         return table.to_pandas().set_index(table.column_names[0])
 
     def to_xarray(self) -> Any:
-        """The rows as an xarray Dataset over their number; errors as of :meth:`to_frame`."""
+        """Return the rows as an xarray Dataset over the number of the run.
+
+        Raises:
+            OsimliteError: the file is damaged.
+            MissingDependency: pandas or xarray is not installed.
+        """
         require("xarray", extra="frame", purpose="a data set of xarray")
         return self.to_frame().to_xarray()
 
 
 @contextmanager
-def damage_told(path: str | Path) -> Iterator[None]:
-    """An error that names the file, where Parquet is read that is damaged."""
+def report_damage(path: str | Path) -> Iterator[None]:
+    """Return a context that turns errors of reading Parquet into one that names the file."""
     try:
         yield
     except (OSError, ValueError):
@@ -401,8 +453,16 @@ def damage_told(path: str | Path) -> Iterator[None]:
         ) from None
 
 
-class Range(NamedTuple):
-    """The least and the largest number of a column, with the runs that have them, and the mean."""
+class ColumnRange(NamedTuple):
+    """Extremes of a column.
+
+    Attributes:
+        least: smallest number.
+        run_of_least: number of the run that has it.
+        most: largest number.
+        run_of_most: number of the run that has it.
+        mean: mean of all finite numbers.
+    """
 
     least: float
     run_of_least: int
@@ -411,13 +471,21 @@ class Range(NamedTuple):
     mean: float
 
 
-def compute_ranges(path: str | Path, names: Sequence[str]) -> dict[str, Range]:
-    """Ranges of columns of results; those without any number are left out."""
+def compute_ranges(path: str | Path, names: Sequence[str]) -> dict[str, ColumnRange]:
+    """Compute the extremes and means of columns of results, batch by batch.
+
+    Args:
+        path: Parquet file.
+        names: names of the columns.
+
+    Returns:
+        Range by name; columns without a finite number are left out.
+    """
     pq = require("pyarrow.parquet", extra="sweep", purpose="a table of results")
-    result: dict[str, Range] = {}
+    result: dict[str, ColumnRange] = {}
     counts = dict.fromkeys(names, 0)
     with (
-        damage_told(path),
+        report_damage(path),
         open_file(path) as stream,
         pq.ParquetFile(stream, page_checksum_verification=True) as file,
     ):
@@ -430,7 +498,7 @@ def compute_ranges(path: str | Path, names: Sequence[str]) -> dict[str, Range]:
                     continue
                 column, numbers = column[good], runs[good]
                 low, high = int(column.argmin()), int(column.argmax())
-                new = Range(
+                new = ColumnRange(
                     float(column[low]),
                     int(numbers[low]),
                     float(column[high]),
@@ -442,7 +510,7 @@ def compute_ranges(path: str | Path, names: Sequence[str]) -> dict[str, Range]:
                 lower = min((old, new), key=lambda item: item.least)
                 upper = max((old, new), key=lambda item: item.most)
                 mean = (old.mean * before + new.mean * len(column)) / counts[name]
-                result[name] = Range(
+                result[name] = ColumnRange(
                     lower.least, lower.run_of_least, upper.most, upper.run_of_most, mean
                 )
     return result

@@ -1,4 +1,4 @@
-"""A sweep: every sample run, every result in its place, whatever happens in between."""
+"""Sweep: run every sample, and save the results in order, also through interruptions."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from osimlite.simulation.interrupts import defer_sigint
 from osimlite.studies.sweep.plan import Plan
 from osimlite.studies.sweep.pools import make_pool
 from osimlite.studies.sweep.results import (
-    Partial,
+    PartialTable,
     ResultTable,
+    get_partial_path,
     make_schema,
-    partial_of,
     protect_results,
 )
 from osimlite.studies.sweep.runner import Block
@@ -29,45 +29,65 @@ from osimlite.studies.sweep.sampling import Samples
 from osimlite.studies.sweep.variables import Floats
 
 Progress = Callable[[float, float], object]
-"""Called with the number of runs that are done, and of all."""
+"""Callback with the number of runs that are done, and of all."""
 
-FIRST_TASK, LARGEST_TASK = 4, 4096
-OTHER_TABLES = (".csv", ".tsv", ".txt", ".json", ".xlsx", ".feather", ".arrow", ".sto", ".mot")
-"""Endings of files of which nobody expects Parquet."""
+INITIAL_TASK_SIZE = 4
+"""Samples of the first tasks, from which the duration of a run is measured."""
+MAX_TASK_SIZE = 4096
+"""Most samples of a task."""
+OTHER_TABLE_ENDINGS = (
+    ".csv",
+    ".tsv",
+    ".txt",
+    ".json",
+    ".xlsx",
+    ".feather",
+    ".arrow",
+    ".sto",
+    ".mot",
+)
+"""Endings of other table formats, which a Parquet file must not have."""
 
-AHEAD = 3
-"""So many tasks for each worker are under way; a lost worker takes no more with it."""
+TASKS_PER_WORKER = 3
+"""Tasks per worker that are submitted at a time; few, because a lost worker loses them."""
 
 SAVE_SECONDS = 2.0
-"""So often results are saved; at most so much work is done again after the program was killed."""
+"""Interval (s) at which results are saved, which bounds the work that is lost if the program is
+killed.
+"""
 
 
-class Interrupted(OsimliteError):
-    """A sweep was stopped before its end; what was done is saved."""
+class SweepInterruption(OsimliteError):
+    """A sweep or a search was interrupted; what was done is saved."""
 
     exit_code = 130
 
 
-def describe_interruption(partial: Partial, runs: str) -> Interrupted:
-    """What is said of a file that is not whole, after so many runs."""
+def describe_interruption(partial: PartialTable, runs: str) -> SweepInterruption:
+    """Return the error for an interrupted sweep or search.
+
+    Args:
+        partial: table with the rows so far.
+        runs: number of runs as text.
+    """
     if partial.rows == 0:
-        return Interrupted("interrupted before any run was saved")
-    return Interrupted(
+        return SweepInterruption("interrupted before any run was saved")
+    return SweepInterruption(
         f"interrupted after {runs}, which are in '{partial.partial}'; go on with --resume"
     )
 
 
 @dataclass
 class Outcome(ResultTable):
-    """What a sweep did.
+    """Outcome of a sweep.
 
     Attributes:
-        path: of the results.
-        count: of runs in them.
-        before: of runs that were there when it began.
-        status: how many ended how, of those that it did itself.
-        reasons: why runs failed, with their number.
-        seconds: that it took.
+        path: Parquet file of the results.
+        count: number of runs in it.
+        before: number of runs that existed before.
+        status: number of new runs by status.
+        reasons: number of failed runs by reason.
+        seconds: duration of the sweep (s).
     """
 
     path: Path
@@ -83,8 +103,16 @@ class Outcome(ResultTable):
         return self.path
 
 
-def settings(plan: Plan, samples: Samples) -> dict[str, Any]:
-    """All that the results of a sweep depend on."""
+def collect_settings(plan: Plan, samples: Samples) -> dict[str, Any]:
+    """Return all settings on which the results of a sweep depend.
+
+    Args:
+        plan: plan of the runs.
+        samples: samples of the sweep.
+
+    Returns:
+        Value per setting, as data for JSON.
+    """
     return {
         **plan.settings(),
         "sampler": samples.sampler,
@@ -106,42 +134,42 @@ def sweep(
 ) -> Outcome:
     """Run all samples of a plan, and write one row for each.
 
-    The rows are in the order of the samples, and the same however many work at them, here or
-    elsewhere. Until all are there, they are kept in ``<output>.partial``.
+    The rows are in the order of the samples, and do not depend on the number and kind of workers.
+    Until all are done, they are in `<output>.partial`.
 
     Args:
-        plan: what is run.
-        samples: with which numbers.
+        plan: plan of the runs.
+        samples: samples to run.
         output: Parquet file to write.
-        resume: go on with an interrupted sweep.
-        force: replace results that were made with other settings, or whatever else has that name.
-        workers: threads or processes of this machine; by default one for each core.
-        cluster: address of a Dask scheduler whose workers do it instead.
-        progress: called as runs are done.
+        resume: whether to continue an interrupted sweep.
+        force: whether to overwrite results of other settings, or any other file of this name.
+        workers: number of threads or processes; by default one per core.
+        cluster: address of a Dask scheduler whose workers run the samples instead.
+        progress: callback during the sweep.
 
     Raises:
-        Interrupted: by the keyboard; the sweep can be resumed.
+        SweepInterruption: the user has pressed Ctrl-C; the sweep can be resumed.
         OsimliteError: the model cannot be simulated, there are results of other settings, or the
             cluster cannot be reached.
     """
     path, started = Path(output), time.perf_counter()
-    if path.suffix.lower() in OTHER_TABLES:
+    if path.suffix.lower() in OTHER_TABLE_ENDINGS:
         better = path.with_suffix(".parquet").name
         raise SettingError(
             f"the results are a Parquet file, not '{path.name}'; name the file '{better}'"
         )
-    wanted = settings(plan, samples)
+    wanted = collect_settings(plan, samples)
     table = make_schema(plan.columns("run"), wanted)
-    # Who goes on with an interrupted sweep was asked before it began.
-    if path.is_file() and not force and not (resume and partial_of(path).exists()):
+    # With a partial file, finished results of other settings were confirmed before the interruption.
+    if path.is_file() and not force and not (resume and get_partial_path(path).exists()):
         protect_results(path, wanted)
         if resume:
             return Outcome(path, samples.count, samples.count)
     with make_pool(plan, workers=workers, cluster=cluster) as workforce:
-        partial = Partial(path, table, resume=resume)
+        partial = PartialTable(path, table, resume=resume)
         outcome = Outcome(path, samples.count, partial.rows)
         try:
-            _Work(samples, workforce, partial, outcome, progress).do()
+            _Dispatcher(samples, workforce, partial, outcome, progress).run()
             partial.finish()
         except KeyboardInterrupt:
             raise describe_interruption(
@@ -153,14 +181,22 @@ def sweep(
     return outcome
 
 
-class _Work:
-    """Gives out samples, and saves what comes back in their order."""
+class _Dispatcher:
+    """Distributor of samples to workers, which saves the results in the order of the samples.
+
+    Args:
+        samples: samples to run.
+        workforce: pool of workers.
+        partial: table for the rows.
+        outcome: outcome to update.
+        progress: callback during the sweep.
+    """
 
     def __init__(
         self,
         samples: Samples,
         workforce: Pool,
-        partial: Partial,
+        partial: PartialTable,
         outcome: Outcome,
         progress: Progress | None,
     ) -> None:
@@ -168,20 +204,21 @@ class _Work:
         self.progress = progress
         self.next = self.saved = partial.rows
         self.under_way = 0
-        self.size = FIRST_TASK
+        self.size = INITIAL_TASK_SIZE
         self.done: dict[int, tuple[Floats, Block]] = {}
         self.values: dict[int, Floats] = {}
         self.last_saved = time.monotonic()
 
-    def do(self) -> None:
+    def run(self) -> None:
+        """Run all samples; results so far are saved even if an exception ends it."""
         try:
-            self._tell()
+            self._report_progress()
             while self.saved < self.samples.count:
-                self._give_out()
+                self._submit_tasks()
                 first, block = self.pool.result()
                 self.under_way -= 1
                 self.done[first] = self.values.pop(first), block
-                self._note(block)
+                self._record_block(block)
                 is_last = not self.under_way and self.next >= self.samples.count
                 if is_last or time.monotonic() - self.last_saved > SAVE_SECONDS:
                     self._save()
@@ -189,26 +226,30 @@ class _Work:
             self._save()
             raise
 
-    def _give_out(self) -> None:
-        # One run that takes long must not let all that comes after it pile up.
-        farthest = self.saved + 64 * max(LARGEST_TASK, self.size)
+    def _submit_tasks(self) -> None:
+        # Results after a slow run wait in memory for it, so that their number must be bounded.
+        farthest = self.saved + 64 * max(MAX_TASK_SIZE, self.size)
         while (
             self.next < min(self.samples.count, farthest)
-            and self.under_way < AHEAD * self.pool.workers
+            and self.under_way < TASKS_PER_WORKER * self.pool.workers
         ):
-            values = self.samples.block(self.next, self.size)
+            values = self.samples.make_block(self.next, self.size)
             self.values[self.next] = values
             self.pool.submit(self.next, values)
             self.next += len(values)
             self.under_way += 1
 
-    def _note(self, block: Block) -> None:
-        """Let tasks take about as long as they should; the last of them end together."""
+    def _record_block(self, block: Block) -> None:
+        """Update the outcome, and adapt the size of tasks to the duration of runs; the last tasks
+        are smaller.
+        """
         each = max(block.seconds, 1e-6) / max(len(block.status), 1)
         left = self.samples.count - self.next
-        fair = -(-left // (AHEAD * self.pool.workers)) if left else 1
-        wanted = int(self.pool.task_seconds / each)
-        self.size = max(1, min(wanted, 4 * self.size, LARGEST_TASK, max(fair, FIRST_TASK)))
+        fair = -(-left // (TASKS_PER_WORKER * self.pool.workers)) if left else 1
+        suitable = int(self.pool.task_seconds / each)
+        self.size = max(
+            1, min(suitable, 4 * self.size, MAX_TASK_SIZE, max(fair, INITIAL_TASK_SIZE))
+        )
         self.outcome.status.update(block.status)
         self.outcome.reasons.update(
             reason
@@ -217,16 +258,16 @@ class _Work:
         )
         if len(self.outcome.reasons) > 1000:
             self.outcome.reasons = Counter(dict(self.outcome.reasons.most_common(100)))
-        self._tell()
+        self._report_progress()
 
-    def _tell(self) -> None:
+    def _report_progress(self) -> None:
         if self.progress is not None:
             there = self.outcome.before + sum(self.outcome.status.values())
             self.progress(there, self.samples.count)
 
     @defer_sigint()
     def _save(self) -> None:
-        """Write the rows before which none is missing."""
+        """Write the rows before which no row is missing."""
         values: list[Floats] = []
         blocks: list[Block] = []
         first = self.saved

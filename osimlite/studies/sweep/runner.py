@@ -1,4 +1,4 @@
-"""Runs samples of a plan: what every thread and every process of a sweep does."""
+"""Runner of samples, one for each thread and process of a sweep."""
 
 from __future__ import annotations
 
@@ -15,35 +15,48 @@ from osimlite.simulation.options import compute_report_times
 from osimlite.studies.sweep.expressions import Expression, list_driven_names
 from osimlite.studies.sweep.measures import (
     Batch,
-    Measure,
+    RunMeasure,
     State,
+    get_measure_name,
     is_expression,
-    measure,
-    measure_name,
+    make_measure,
 )
-from osimlite.studies.sweep.plan import MOST_TRIES, Plan
+from osimlite.studies.sweep.plan import MAX_INTEGRATOR_STEPS, Plan
 from osimlite.studies.sweep.variables import Floats
-from osimlite.studies.sweep.variants import MOST_KEPT, Variant, Variants
+from osimlite.studies.sweep.variants import CACHED_VARIANTS, Variant, Variants
 
-DONE, STOPPED, FAILED = "done", "stopped", "failed"
+DONE = "done"
+"""Status of a run that reached its end."""
+STOPPED = "stopped"
+"""Status of a run that a level or a fall has ended."""
+FAILED = "failed"
+"""Status of a run without a result."""
 
 Endings = list[tuple[str, str | None]]
-"""How each run ended, and why."""
+"""Status of each run, and its reason or None."""
 
 
 @dataclass(frozen=True)
 class Block:
-    """What came of some samples, in their order."""
+    """Results of some samples, in the order of the samples.
 
-    status: list[str]  # of each, `DONE`, `STOPPED` (by what the plan watches) or `FAILED`
-    reasons: list[str | None]  # why it stopped or failed, else None
-    times: Floats  # at which it ended, s
-    measures: dict[str, Floats]  # by name (k,); not a number where there is none
-    seconds: float = 0.0  # that the work took
+    Attributes:
+        status: `DONE`, `STOPPED` (by a watch of the plan) or `FAILED`.
+        reasons: why a run stopped or failed, else None.
+        times: times at which the runs ended (s).
+        measures: values of each measure by name (k,); NaN for failed runs.
+        seconds: duration of the work (s).
+    """
+
+    status: list[str]
+    reasons: list[str | None]
+    times: Floats
+    measures: dict[str, Floats]
+    seconds: float = 0.0
 
     @classmethod
     def join(cls, blocks: Sequence[Block]) -> Block:
-        """Several of them in one."""
+        """Return several blocks as one."""
         return cls(
             [word for block in blocks for word in block.status],
             [words for block in blocks for words in block.reasons],
@@ -56,31 +69,37 @@ class Block:
 
     @property
     def columns(self) -> list[Any]:
-        """What stands behind the values of the variables in a table of results."""
+        """Columns of a table of results after the values of the variables."""
         return [self.status, self.reasons, self.times, *self.measures.values()]
 
 
 class _Sample(NamedTuple):
-    """A row of the samples, with its model and its initial state (y,)."""
+    """Sample with its model and its initial state.
+
+    Attributes:
+        place: index of the sample in the block.
+        variant: model of the sample.
+        start: initial state (y,).
+    """
 
     place: int
     variant: Variant
     start: Floats
 
 
-class _Look:
-    """What is looked at in the runs of models of one structure.
+class _Observers:
+    """Measures and watches for the runs of models of one structure.
 
     Args:
-        plan: that asks for it.
-        engine: of a model of that structure.
+        plan: plan of the runs.
+        engine: engine of a model of this structure.
 
     Raises:
-        OsimliteError: the model has nothing of the kind.
+        OsimliteError: the model lacks what a measure needs.
     """
 
     def __init__(self, plan: Plan, engine: Any) -> None:
-        self.measures = [measure(spec, engine, plan.feet) for spec in plan.measures]
+        self.measures = [make_measure(spec, engine, plan.feet) for spec in plan.measures]
         expressions = [
             spec for spec in plan.measures if plan.controller is not None and is_expression(spec)
         ]
@@ -105,67 +124,67 @@ class _Look:
         )
         if self.watches and plan.engine != "compiled":
             raise SettingError("what stops a run needs --engine compiled")
-        # Without room for events, none is looked for.
-        rooms = [made.room(plan.to) for made in self.measures]
+        # The engine detects no events unless it may record at least one.
+        rooms = [made.event_count(plan.to) for made in self.measures]
         self.most_events = max([*rooms, 1 if self.watches else 0])
 
 
 class Runner:
-    """Runs samples; for one thread.
+    """Runner of samples, for one thread.
 
     Args:
-        plan: whose.
+        plan: plan of the runs.
 
     Raises:
-        OsimliteError: the model cannot be simulated, or has no such measure.
+        OsimliteError: the model cannot be simulated, or lacks what a measure needs.
     """
 
     def __init__(self, plan: Plan) -> None:
         self.plan = plan
         self.variants = Variants(plan)
         given = self.variants.given
-        self._looks: dict[bytes, _Look] = {given.structure: _Look(plan, given.engine)}
+        self._looks: dict[bytes, _Observers] = {given.structure: _Observers(plan, given.engine)}
         moments = [] if plan.interval is None else compute_report_times(plan.to, plan.interval)
         self._report_times = np.array(moments)
 
     def run(self, values: Floats) -> Block:
-        """Run samples (k, d); a run that fails is told of, not raised."""
+        """Run samples (k, d); a run that fails is reported in the block and raises nothing."""
         started = time.perf_counter()
         count = len(values)
         block = Block(
             [FAILED] * count,
             [None] * count,
             np.full(count, np.nan),
-            {measure_name(spec): np.full(count, np.nan) for spec in self.plan.measures},
+            {get_measure_name(spec): np.full(count, np.nan) for spec in self.plan.measures},
         )
         groups: dict[bytes, list[_Sample]] = {}
         for index, row in enumerate(values.tolist()):
             try:
-                variant = self.variants.variant(row)
-                start = self.variants.start(variant, row)
+                variant = self.variants.make_variant(row)
+                start = self.variants.make_start(variant, row)
             except OsimliteError as error:
                 block.reasons[index] = str(error)
             else:
                 groups.setdefault(variant.structure, []).append(_Sample(index, variant, start))
         for group in groups.values():
             try:
-                self._run(group, values, block)
+                self._run_group(group, values, block)
             except OsimliteError as error:
-                # What is asked for may mean nothing in a model of another structure.
+                # A measure may need something that models of another structure lack.
                 for sample in group:
                     block.status[sample.place], block.reasons[sample.place] = FAILED, str(error)
-        # A measure may have failed after others had been taken.
+        # A run whose measure fails counts as failed, so that its other measures are dropped.
         failed = [index for index in range(count) if block.status[index] == FAILED]
         for column in block.measures.values():
             column[failed] = np.nan
         return replace(block, seconds=time.perf_counter() - started)
 
-    def _run(self, group: Sequence[_Sample], values: Floats, block: Block) -> None:
-        """Run samples whose models have one structure."""
-        # Any of the same structure will do, and making one takes time.
+    def _run_group(self, group: Sequence[_Sample], values: Floats, block: Block) -> None:
+        """Run samples whose models have one structure, in one call of the engine."""
+        # Any engine of the same structure works, and making one takes time.
         given, first = self.variants.given, group[0].variant
         engine = (given if first.structure == given.structure else first).engine
-        look = self._look(first.structure, engine)
+        look = self._get_observers(first.structure, engine)
         variants = [sample.variant for sample in group]
         starts = self.variants.place_states(
             engine, variants, np.stack([sample.start for sample in group])
@@ -179,12 +198,12 @@ class Runner:
         )
         if len(good) == 0:
             return
-        chosen = [group[number].variant for number in good]
+        selected = [group[number].variant for number in good]
         rows = np.array([group[number].place for number in good])
         batch = Batch(
             engine,
-            lambda number: chosen[number].engine,
-            self._numbers(chosen),
+            lambda number: selected[number].engine,
+            self._stack_numbers(selected),
             starts[good],
             runs.select(good),
             values[rows],
@@ -192,25 +211,27 @@ class Runner:
             self._report_times,
         )
         for made in look.measures:
-            self._measure(made, batch, rows, block)
+            self._apply_measure(made, batch, rows, block)
 
-    def _look(self, structure: bytes, engine: Any) -> _Look:
+    def _get_observers(self, structure: bytes, engine: Any) -> _Observers:
         result = self._looks.get(structure)
         if result is None:
-            if len(self._looks) >= MOST_KEPT:
+            if len(self._looks) >= CACHED_VARIANTS:
                 self._looks = {}
-            result = self._looks[structure] = _Look(self.plan, engine)
+            result = self._looks[structure] = _Observers(self.plan, engine)
         return result
 
-    def _measure(self, made: Measure, batch: Batch, rows: Any, block: Block) -> None:
-        """Fill in a measure of some runs; a function of a user may raise anything, which is told of."""
+    def _apply_measure(self, made: RunMeasure, batch: Batch, rows: Any, block: Block) -> None:
+        """Compute a measure of some runs; an exception of a user's function becomes the reason of a
+        failed run.
+        """
         try:
-            block.measures[made.name][rows] = made.of(batch)
+            block.measures[made.name][rows] = made.compute(batch)
         except Exception as error:
             if len(rows) > 1:
-                # One by one, to find which run it is.
+                # Repeat run by run, to find the one that fails.
                 for number, row in enumerate(rows):
-                    self._measure(made, batch.part(number), np.array([row]), block)
+                    self._apply_measure(made, batch.select_run(number), np.array([row]), block)
             else:
                 block.status[rows[0]] = FAILED
                 block.reasons[rows[0]] = (
@@ -219,23 +240,23 @@ class Runner:
 
     # --------------------------------------------------------------------------------------------- motions
     def _simulate(
-        self, engine: Any, look: _Look, variants: Sequence[Variant], starts: Floats
+        self, engine: Any, look: _Observers, variants: Sequence[Variant], starts: Floats
     ) -> tuple[Runs, Endings]:
         if self.plan.engine != "compiled":
-            return self._one_by_one(engine, variants, starts)
+            return self._simulate_one_by_one(engine, variants, starts)
         from osimlite.simulation.batches import ENDINGS, run_many
 
         runs = run_many(
             engine,
             starts,
             self.plan.to,
-            numbers=self._numbers(variants),
+            numbers=self._stack_numbers(variants),
             **self.plan.integration_choices(),
             report_times=self._report_times.tolist(),
             watches=look.watches,
             most_events=look.most_events,
             event_states=any(made.event_states for made in look.measures),
-            most_tries=MOST_TRIES,
+            most_tries=MAX_INTEGRATOR_STEPS,
             threads=1,
             held=[variant.held for variant in variants if variant.held is not None],
         )
@@ -243,6 +264,7 @@ class Runner:
         for number, (ending, state) in enumerate(
             zip(runs.endings.tolist(), runs.states, strict=True)
         ):
+            # An integrator that ends normally may still have overflowed.
             words, t = ENDINGS[ending], runs.times[number]
             if words == "done" and np.isfinite(state).all():
                 why.append((DONE, None))
@@ -252,7 +274,7 @@ class Runner:
                 why.append(
                     (
                         FAILED,
-                        f"{MOST_TRIES} steps came no further than t = {t:.9g} s; ask for less accuracy",
+                        f"{MAX_INTEGRATOR_STEPS} steps came no further than t = {t:.9g} s; ask for less accuracy",
                     )
                 )
             else:
@@ -264,15 +286,21 @@ class Runner:
                 )
         return runs, why
 
-    def _numbers(self, variants: Sequence[Variant]) -> Floats | None:
+    def _stack_numbers(self, variants: Sequence[Variant]) -> Floats | None:
         return (
             None if self.variants.is_fixed else np.stack([variant.numbers for variant in variants])
         )
 
     def _find_stop(
-        self, engine: Any, look: _Look, events: Sequence[tuple[float, str, bool]], state: Floats
+        self,
+        engine: Any,
+        look: _Observers,
+        events: Sequence[tuple[float, str, bool]],
+        state: Floats,
     ) -> str:
-        """The watch that ended a run: the last event, if there was room for it, or the level that the state is at."""
+        """Return the watch that ended a run: the last event if it was recorded, else the level
+        nearest to the state.
+        """
         last = events[-1][1] if events else ""
         if any(watch.stops and watch.name == last for watch in look.watches):
             return last
@@ -280,10 +308,10 @@ class Runner:
         names = {stop.words: abs(y[stop.coordinate] - stop.level) for stop in self.plan.stops}
         return min(names, key=lambda name: names[name])
 
-    def _one_by_one(
+    def _simulate_one_by_one(
         self, engine: Any, variants: Sequence[Variant], starts: Floats
     ) -> tuple[Runs, Endings]:
-        """With an engine that computes one motion at a time."""
+        """Run samples with an engine that simulates one motion at a time."""
         plan = self.plan
         why: Endings = []
         order, contacts = engine.order, engine.contacts

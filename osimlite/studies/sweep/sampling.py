@@ -1,7 +1,7 @@
-"""Where the runs of a sweep are: grids and samples of the unit cube, any part of which can be had without the rest.
+"""Samples of a sweep: grids, random numbers, Sobol sequences and Latin hypercubes.
 
-Row i depends on the settings and on i alone. A sweep of any length needs memory for one block only,
-and can go on where it was interrupted.
+Sample i depends on the settings and on i only. A sweep of any length therefore needs memory for one
+block only, and continues where it was interrupted.
 """
 
 from __future__ import annotations
@@ -20,52 +20,70 @@ from osimlite.errors import SettingError
 from osimlite.studies.sweep.variables import Floats, Variable
 
 Counts = NDArray[np.uint64]
+"""Array of whole numbers of 64 bits."""
 
 SAMPLERS = ("grid", "random", "sobol", "lhs")
-"""Every combination; independent; Sobol's sequence, scrambled; one in every layer of each variable (Latin)."""
+"""Names of the samplers: every combination, independent uniform numbers, scrambled Sobol sequence,
+Latin hypercube (one sample in every layer of each variable).
+"""
 
-MOST_SOBOL = 2**30
-"""So many points scipy's sequence has."""
+MAX_SOBOL_POINTS = 2**30
+"""Number of points of scipy's Sobol sequence."""
 
 
 @dataclass(frozen=True)
 class Samples:
-    """The runs of a sweep."""
+    """Samples of a sweep.
 
-    variables: tuple[Variable, ...]  # d numbers that vary
-    sampler: str  # one of `SAMPLERS`
-    count: int  # N runs
-    seed: int = 0  # what makes random samples the same again
-    # of the last block, from which the next one goes on; for one thread at a time
+    Attributes:
+        variables: variables (d).
+        sampler: one of `SAMPLERS`.
+        count: number of samples N.
+        seed: seed of the random numbers.
+        memory: generator that continues from the last block; for one thread only.
+    """
+
+    variables: tuple[Variable, ...]
+    sampler: str
+    count: int
+    seed: int = 0
     memory: dict[str, Sobol] = field(default_factory=dict, init=False, repr=False, compare=False)
 
-    def block(self, first: int, count: int) -> Floats:
-        """Rows from `first` on, as many as `count` and as there are (k, d), in the units of the variables."""
+    def make_block(self, first: int, count: int) -> Floats:
+        """Return consecutive samples (k, d) in the units of the variables.
+
+        Args:
+            first: index of the first sample.
+            count: number of samples; fewer are returned at the end.
+        """
         last = min(first + count, self.count)
         fractions = np.zeros((max(last - first, 0), len(self.variables)))
         varied = [index for index, item in enumerate(self.variables) if not item.is_fixed]
         if len(fractions) and varied:
-            fractions[:, varied] = self._fractions(first, last, varied)
-        columns = [item.at(fractions[:, index]) for index, item in enumerate(self.variables)]
+            fractions[:, varied] = self._compute_fractions(first, last, varied)
+        columns = [
+            item.interpolate(fractions[:, index]) for index, item in enumerate(self.variables)
+        ]
         return np.stack(columns, axis=1) if columns else fractions
 
-    def _fractions(self, first: int, last: int, varied: Sequence[int]) -> Floats:
+    def _compute_fractions(self, first: int, last: int, varied: Sequence[int]) -> Floats:
         if self.sampler == "grid":
-            return self._grid(first, last, varied)
+            return self._compute_grid(first, last, varied)
         if self.sampler == "sobol":
-            return self.memory.setdefault("sobol", Sobol(self.seed, len(varied))).points(
+            return self.memory.setdefault("sobol", Sobol(self.seed, len(varied))).draw_points(
                 first, last
             )
         numbers = _draw_uniform(self.seed, first, last, len(varied))
         if self.sampler == "random":
             return numbers
         layers = [
-            _shuffle(first, last, self.count, self.seed, column) for column in range(len(varied))
+            _permute_indices(first, last, self.count, self.seed, column)
+            for column in range(len(varied))
         ]
         return (np.stack(layers, axis=1) + numbers) / self.count
 
-    def _grid(self, first: int, last: int, varied: Sequence[int]) -> Floats:
-        """The last variable changes fastest."""
+    def _compute_grid(self, first: int, last: int, varied: Sequence[int]) -> Floats:
+        """Return fractions of a grid, in which the last variable changes fastest."""
         counts = [self.variables[place].count or 1 for place in varied]
         places = np.unravel_index(np.arange(first, last), counts)
         return np.stack(
@@ -79,17 +97,17 @@ def choose_samples(
     count: int | None = None,
     seed: int = 0,
 ) -> Samples:
-    """Choose the runs.
+    """Choose the samples of a sweep.
 
     Args:
-        variables: what varies.
-        sampler: by default a grid if every variable has a number of values and no `count` is given,
-            else Sobol's.
-        count: how many runs; of a grid, as many as it has.
-        seed: of random samples.
+        variables: variables.
+        sampler: one of `SAMPLERS`. The default is a grid if every variable has a number of values
+            and there is no `count`, else Sobol.
+        count: number of samples; of a grid it follows from the ranges.
+        seed: seed of random samples.
 
     Raises:
-        SettingError: what is asked for does not go together.
+        SettingError: the arguments contradict each other, or one is missing.
     """
     varied = [item for item in variables if not item.is_fixed]
     with_values = [item.name for item in varied if item.count]
@@ -120,17 +138,21 @@ def choose_samples(
         raise SettingError("say how many samples are wanted, as in --samples 1000")
     if count < 1:
         raise SettingError(f"the number of samples is above zero, not {count}")
-    if sampler == "sobol" and count > MOST_SOBOL:
+    if sampler == "sobol" and count > MAX_SOBOL_POINTS:
         raise SettingError(
-            f"Sobol's sequence has {MOST_SOBOL} points; take --sampler random for more"
+            f"Sobol's sequence has {MAX_SOBOL_POINTS} points; take --sampler random for more"
         )
     return Samples(tuple(variables), sampler, count, seed)
 
 
 class Sobol:
-    """Sobol's sequence in the cube of so many dimensions, scrambled by a seed.
+    """Scrambled Sobol sequence.
 
-    Points that follow on the last ones cost little; for others, the sequence is begun again.
+    Points that follow the last ones are cheap; for earlier ones the sequence starts again.
+
+    Args:
+        seed: seed of the scrambling.
+        width: number of dimensions.
     """
 
     def __init__(self, seed: int, width: int) -> None:
@@ -138,15 +160,20 @@ class Sobol:
         self._points: Any = None
         self._next = 0
 
-    def points(self, first: int, last: int) -> Floats:
-        """Points first ... last - 1."""
+    def draw_points(self, first: int, last: int) -> Floats:
+        """Return the points first ... last - 1 in the unit cube (last - first, width).
+
+        Args:
+            first: index of the first point.
+            last: index after the last point.
+        """
         head = np.zeros((0, self._width))
         if self._points is None or first < self._next:
             qmc: Any = require("scipy.stats.qmc", extra="sweep", purpose="Sobol's sequence")
             self._points = qmc.Sobol(
                 self._width, scramble=True, rng=np.random.default_rng(self._seed)
             )
-            # Asked for more than one at first, scipy warns of numbers that are no power of two.
+            # scipy warns if the first request is not a power of two, so request one point.
             start, self._next = self._points.random(1), 1
             head = start if first == 0 else head
         first = max(first, 1) if len(head) else first
@@ -158,8 +185,9 @@ class Sobol:
 
 
 def _draw_uniform(seed: int, first: int, last: int, width: int) -> Floats:
-    """Rows first ... last - 1 of independent numbers in [0, 1)."""
-    # Each state of this generator makes four numbers, so that a row begins at a state of its own.
+    """Return rows first ... last - 1 of independent numbers in [0, 1) (last - first, width)."""
+    # Each counter of Philox gives four numbers; a row starts at a new counter, so that it can be
+    # reached directly.
     states = -(-width // 4)
     source = np.random.Philox(seed)
     source.advance(first * states)
@@ -167,11 +195,12 @@ def _draw_uniform(seed: int, first: int, last: int, width: int) -> Floats:
     return rows[:, :width]
 
 
-def _shuffle(first: int, last: int, count: int, seed: int, column: int) -> Floats:
-    """Entries first ... last - 1 of a random order of 0 ... count - 1, the rest of which is never made.
+def _permute_indices(first: int, last: int, count: int, seed: int, column: int) -> Floats:
+    """Return entries first ... last - 1 of a random permutation of 0 ... count - 1, without
+    computing the others.
 
-    A Feistel network permutes the numbers of 2k bits; those beyond `count` go through it again
-    until they are below.
+    A Feistel network permutes the numbers of 2k bits. Results that are not below `count` pass
+    through it again until they are (cycle walking).
     """
     half = max(1, -(-(count - 1).bit_length() // 2))
     mask = np.uint64((1 << half) - 1)
@@ -188,7 +217,7 @@ def _shuffle(first: int, last: int, count: int, seed: int, column: int) -> Float
 
 
 def _mix_bits(x: Counts) -> Counts:
-    """Every bit of the result depends on every bit of x (the finalizer of SplitMix64)."""
+    """Return numbers in which each bit depends on every bit of x (finalizer of SplitMix64)."""
     x = (x ^ (x >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
     x = (x ^ (x >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
     return x ^ (x >> np.uint64(31))

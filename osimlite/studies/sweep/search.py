@@ -1,7 +1,8 @@
-"""Methods that look for the least cost, each as a function that asks for the costs of points of the unit cube.
+"""Search methods: functions that ask for the costs of points of the unit cube and approach the
+smallest.
 
-All are deterministic: with the same seed and the same answers they ask the same questions, which is
-how an interrupted search goes on.
+All are deterministic: with the same seed and the same costs they ask for the same points, so that
+an interrupted search continues where it was.
 """
 
 from __future__ import annotations
@@ -17,40 +18,51 @@ from osimlite.errors import SettingError
 from osimlite.studies.sweep.sampling import Sobol
 from osimlite.studies.sweep.variables import Floats
 
-Ask = Callable[[Floats], Floats]
-"""Costs (k,) of points (k, d); raises `BudgetExhausted` when no more are wanted."""
+CostFunction = Callable[[Floats], Floats]
+"""Function that returns the costs (k,) of points (k, d); it raises `OutOfBudget` to end the search."""
 
 
-class BudgetExhausted(Exception):
-    """There have been as many evaluations as were allowed."""
+class OutOfBudget(Exception):
+    """The search has used all evaluations that are allowed."""
 
 
 class Search(NamedTuple):
-    """How to search."""
+    """Settings of a search.
 
-    start: Floats  # first point (d,)
-    sigma: float  # how far from it to look at first, as a fraction of the ranges
-    popsize: int | None  # points that are asked for together, or None for what suits the method
-    seed: int  # what makes it the same again
-    is_bounded: bool  # whether points stay within the cube
-    budget: int  # evaluations that are allowed
-    # of cost and points, at which the search ends; None for that of the method
+    Attributes:
+        start: first point (d,), as fractions of the ranges.
+        sigma: initial step size, as a fraction of the ranges.
+        popsize: number of points per batch; None for the default of the method.
+        seed: seed of the random numbers.
+        is_bounded: whether points stay within the cube.
+        budget: number of evaluations that are allowed.
+        tolerance: change of cost and of points at which the search ends; None for the default of
+            the method.
+        gradient: function that returns the gradient (d,) of the cost at a point, or None.
+    """
+
+    start: Floats
+    sigma: float
+    popsize: int | None
+    seed: int
+    is_bounded: bool
+    budget: int
     tolerance: float | None = None
-    # derivatives (d,) of the cost at a point, if it has any
-    slopes: Callable[[Floats], Floats] | None = None
+    gradient: Callable[[Floats], Floats] | None = None
 
 
-def cma(ask: Ask, search: Search, *, keeps_best: bool = False) -> str:
-    """Covariance matrix adaptation (Hansen's pycma); why it ended.
+def run_cma(ask: CostFunction, search: Search, *, keeps_best: bool = False) -> str:
+    """Minimize with covariance matrix adaptation (CMA-ES, Hansen's pycma); return why it ended.
 
     Args:
-        ask: tells costs.
-        search: how.
-        keeps_best: let the first point be one of the first population, and the best so far a parent
-            of every other.
+        ask: cost function.
+        search: settings.
+        keeps_best: whether the first population contains the first point, and each later one the
+            best point so far as a parent.
     """
     strategy = require("cma", extra="optimize", purpose="the search by cma")
-    _needs_two(search)
+    _require_two_variables(search)
+    # A generator of its own, with seed NaN, keeps pycma from seeding the global one of numpy.
     source = np.random.RandomState(search.seed)
     options: dict[str, Any] = {
         "verbose": -9,
@@ -76,27 +88,40 @@ def cma(ask: Ask, search: Search, *, keeps_best: bool = False) -> str:
     return "converged: " + ", ".join(str(reason) for reason in es.stop())
 
 
-def sobol_cma(ask: Ask, search: Search) -> str:
-    """A look at two populations of Sobol's points and the start, then cma from the best of them; why it ended.
+def run_sobol_cma(ask: CostFunction, search: Search) -> str:
+    """Evaluate two populations of Sobol points and the start, then run CMA-ES from the best; return
+    why it ended.
 
-    Where the budget is small and the cost has many valleys, as that of a walker has, this gets
-    farther than cma from the start alone, and never ends worse than it began; with thousands of
-    runs, cma alone may get farther. The look does not depend on the budget, so that a search can go
-    on with a larger one.
+    With a small budget and a cost of many valleys, as that of a walker, this gets farther than
+    CMA-ES from the start alone, and never ends worse than it began. With thousands of evaluations
+    CMA-ES alone may get farther. The number of Sobol points does not depend on the budget, so that
+    a search can continue with a larger one.
+
+    Args:
+        ask: cost function.
+        search: settings.
     """
-    _needs_two(search)
+    _require_two_variables(search)
     size = search.popsize or 4 + int(3.0 * np.log(len(search.start)))
-    points = Sobol(search.seed, len(search.start)).points(0, LOOKS * size)
+    points = Sobol(search.seed, len(search.start)).draw_points(0, SOBOL_POPULATIONS * size)
     points[0] = search.start
     costs = np.concatenate(
         [ask(points[first : first + size]) for first in range(0, len(points), size)]
     )
     best = points[int(np.argmin(costs))]
-    return cma(ask, search._replace(start=best, popsize=size), keeps_best=True)
+    return run_cma(ask, search._replace(start=best, popsize=size), keeps_best=True)
 
 
-def differential_evolution(ask: Ask, search: Search) -> str:
-    """Differential evolution (scipy's); why it ended."""
+def run_differential_evolution(ask: CostFunction, search: Search) -> str:
+    """Minimize with differential evolution (scipy); return why it ended.
+
+    Args:
+        ask: cost function.
+        search: settings.
+
+    Raises:
+        SettingError: the search is not bounded.
+    """
     optimize = require(
         "scipy.optimize", extra="sweep", purpose="the search by differential evolution"
     )
@@ -122,8 +147,14 @@ def differential_evolution(ask: Ask, search: Search) -> str:
     return f"converged: {result.message}"
 
 
-def nelder_mead(ask: Ask, search: Search) -> str:
-    """The simplex of Nelder and Mead (scipy's); why it ended. One run at a time."""
+def run_nelder_mead(ask: CostFunction, search: Search) -> str:
+    """Minimize with the simplex method of Nelder and Mead (scipy), one point at a time; return why
+    it ended.
+
+    Args:
+        ask: cost function.
+        search: settings.
+    """
     optimize = require("scipy.optimize", extra="sweep", purpose="the search by Nelder and Mead")
     size, tolerance = len(search.start), search.tolerance if search.tolerance is not None else 1e-6
     simplex = np.tile(search.start, (size + 1, 1))
@@ -138,6 +169,7 @@ def nelder_mead(ask: Ask, search: Search) -> str:
         bounds=[(0.0, 1.0)] * size if search.is_bounded else None,
         options={
             "initial_simplex": simplex,
+            # The budget ends the search by an exception; scipy's limits are out of reach.
             "maxfev": 10**9,
             "maxiter": 10**9,
             "xatol": tolerance,
@@ -147,17 +179,21 @@ def nelder_mead(ask: Ask, search: Search) -> str:
     return f"converged: {result.message}"
 
 
-def gradient(ask: Ask, search: Search) -> str:
-    """Limited-memory quasi-Newton steps within bounds (scipy's L-BFGS-B) by exact derivatives; why it ended.
+def run_lbfgs(ask: CostFunction, search: Search) -> str:
+    """Minimize with L-BFGS-B (scipy) and exact gradients, one point at a time; return why it ended.
 
-    One run at a time; to where nothing near is better, which may be far from the best.
+    It finds a local minimum, which may be far from the global one.
+
+    Args:
+        ask: cost function.
+        search: settings with a gradient.
     """
     optimize = require("scipy.optimize", extra="sweep", purpose="the search by gradients")
     tolerance = 1e-9 if search.tolerance is None else search.tolerance
     result = optimize.minimize(
         lambda point: float(ask(point[None])[0]),
         search.start,
-        jac=search.slopes,
+        jac=search.gradient,
         method="L-BFGS-B",
         bounds=[(0.0, 1.0)] * len(search.start) if search.is_bounded else None,
         options={"ftol": tolerance, "gtol": tolerance, "maxfun": 10**9, "maxiter": 10**9},
@@ -165,30 +201,32 @@ def gradient(ask: Ask, search: Search) -> str:
     return f"converged: {result.message}"
 
 
-METHODS: dict[str, Callable[[Ask, Search], str]] = {
-    "sobol-cma": sobol_cma,
-    "cma": cma,
-    "differential-evolution": differential_evolution,
-    "nelder-mead": nelder_mead,
-    "gradient": gradient,
+METHODS: dict[str, Callable[[CostFunction, Search], str]] = {
+    "sobol-cma": run_sobol_cma,
+    "cma": run_cma,
+    "differential-evolution": run_differential_evolution,
+    "nelder-mead": run_nelder_mead,
+    "gradient": run_lbfgs,
 }
+"""Search methods by the names that users write."""
 
 
-LOOKS = 2
-"""Populations of points spread over the ranges, before cma begins."""
+SOBOL_POPULATIONS = 2
+"""Number of populations of Sobol points before CMA-ES."""
 
 
-def method_named(name: str) -> Callable[[Ask, Search], str]:
-    """A method by its name.
+def find_method(name: str) -> Callable[[CostFunction, Search], str]:
+    """Return a search method by its name.
 
     Raises:
-        SettingError: there is none.
+        SettingError: the name is unknown.
     """
     if name not in METHODS:
         raise SettingError(f"there is no method '{name}'{suggest_or_list(name, METHODS)}")
     return METHODS[name]
 
 
-def _needs_two(search: Search) -> None:
+def _require_two_variables(search: Search) -> None:
+    """Refuse a single variable, whose covariance matrix CMA-ES cannot adapt."""
     if len(search.start) < 2:
         raise SettingError("cma searches two variables or more; take --method nelder-mead for one")

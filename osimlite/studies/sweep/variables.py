@@ -1,21 +1,22 @@
-"""What a sweep varies: how it is written, and what of a model or its start it means.
+"""Variables of a sweep: their names, their ranges, and which numbers of the model or the initial
+state they are.
 
 ======================================  ==========================================================
-``RHip_rz``, ``?Hip_rz``                value at the start, by the name or the path of a coordinate, or of several
-``RHip_rz/speed``                       generalized speed at the start
+``RHip_rz``, ``?Hip_rz``                initial value of a coordinate, by name or path, or of several
+``RHip_rz/speed``                       initial generalized speed
 ``/bodyset/Pelvis/mass``                any number of the model, by the path of a component or its name
-``/forceset/*Foot*/.../stiffness``      several numbers that are the same in each run
+``/forceset/*Foot*/.../stiffness``      several numbers that are equal in each run
 ``*/max_isometric_force@scale``         factor of numbers of the model
-``BRA/control``                         control of an actuator at all times, added to what the model does
-``{*}_?/control``                       the same of each muscle, that of both legs alike
-``soleus_?/control@0.1``                and what else can be varied of :mod:`controls <osimlite.studies.sweep.controls>`
+``BRA/control``                         number that is added to the control of an actuator at all times
+``{*}_?/control``                       one for each muscle, shared by both legs
+``soleus_?/control@0.1``                other variables of :mod:`controls <osimlite.studies.sweep.controls>`
 ``thigh_length``                        parameter of the function that makes the model
 ``flexor-elbow.KP``, ``*.KV``           parameter of a controller, or several
-``slope``                               gravity tilted in the plane of x and y: a floor that falls towards +x
+``slope``                               gravity tilted in the x-y plane: a floor that falls towards +x
 ======================================  ==========================================================
 
-A parameter of that name is meant by `slope` if there is one. A locked coordinate is held at the
-value that it is given.
+If the function or the controller has a parameter `slope`, the name means this parameter. A locked
+coordinate keeps the value that a variable gives it.
 """
 
 from __future__ import annotations
@@ -43,7 +44,7 @@ from osimlite.simulation.properties import (
     list_property_paths,
     match_components,
 )
-from osimlite.studies.sweep.controls import SCALE, Control, control, nodes_of
+from osimlite.studies.sweep.controls import SCALE, Control, expand_nodes, parse_control
 
 if TYPE_CHECKING:
     from osimlite.mechanics.multibody.parts import CoordinateInfo
@@ -51,38 +52,61 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 Range = float | str | Sequence[Any]
-"""A value; ``(low, high)``, ``(low, high, count)``, each with ``"log"`` at its end; or the text for it."""
+"""Range of a variable.
+
+It is a value; `(low, high)` or `(low, high, count)`, each with `"log"` at its end; or the text for
+it.
+"""
 
 
 @dataclass(frozen=True)
 class Start:
-    """Value or speed at the start of coordinates, by their paths."""
+    """Initial value or speed of coordinates.
+
+    Attributes:
+        coordinates: paths of the coordinates.
+        is_speed: whether it is the speed.
+    """
 
     coordinates: tuple[str, ...]
     is_speed: bool
 
     @property
     def parts(self) -> tuple[Start, ...]:
-        """The same of each coordinate."""
+        """Targets of the single coordinates.
+
+        Returns:
+            One target per coordinate, so that two variables of the same one can be found.
+        """
         return tuple(Start((path,), self.is_speed) for path in self.coordinates)
 
 
 @dataclass(frozen=True)
 class Property:
-    """Numbers of the model that are the same, or are changed by the same factor."""
+    """Numbers of the model that are equal, or are multiplied by the same factor.
+
+    Attributes:
+        places: paths of the properties.
+        is_scaled: whether the variable is a factor.
+    """
 
     places: tuple[PropertyPath, ...]
     is_scaled: bool = False
 
     @property
     def parts(self) -> tuple[PropertyPath, ...]:
-        """What no other variable may be."""
+        """Properties that no other variable may change."""
         return self.places
 
 
 @dataclass(frozen=True)
-class Parameter:
-    """An argument of the function that makes the model."""
+class FunctionParameter:
+    """Argument of the function that makes the model.
+
+    Attributes:
+        name: name of the argument.
+        default: its default, or None.
+    """
 
     name: str
     default: float | None = None
@@ -90,63 +114,83 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Slope:
-    """Gravity of the same size, tilted about z, in rad."""
+    """Gravity of constant magnitude, tilted about the z axis by an angle (rad)."""
 
 
 @dataclass(frozen=True)
 class Gains:
-    """Parameters of a controller that are the same."""
+    """Parameters of a controller that are equal.
 
-    parts: tuple[str, ...]  # their names
-    present: float  # value of the first
+    Attributes:
+        parts: names of the parameters.
+        current_value: value of the first one.
+    """
+
+    parts: tuple[str, ...]
+    current_value: float
 
 
-Target = Start | Property | Control | Parameter | Slope | Gains
+Target = Start | Property | Control | FunctionParameter | Slope | Gains
+"""What a variable changes."""
 
 
 @dataclass(frozen=True)
 class Variable:
-    """A number that differs from run to run."""
+    """Number that differs from run to run.
 
-    name: str  # as it was given
-    target: Target  # what it is
-    low: float  # least value, in rad, m or the unit of the property
-    high: float  # largest value
-    count: int | None = None  # of values in a grid
-    is_log: bool = False  # whether its logarithm is what is spread evenly
-    doubt: str = ""  # a sentence about what is odd in the range, else ""
+    Attributes:
+        name: name as the user wrote it.
+        target: what it changes.
+        low: smallest value (rad, m or the unit of the property).
+        high: largest value.
+        count: number of values in a grid, or None.
+        is_log: whether the range is logarithmic.
+        warning: sentence about a suspicious range, or "".
+    """
 
-    def at(self, fraction: Floats) -> Floats:
-        """The values at fractions of the way from low to high, none of which is beyond them; exact at either end."""
-        result = np.clip(self.beyond(fraction), self.low, self.high)
+    name: str
+    target: Target
+    low: float
+    high: float
+    count: int | None = None
+    is_log: bool = False
+    warning: str = ""
+
+    def interpolate(self, fraction: Floats) -> Floats:
+        """Return the values at fractions of the range, clipped to it, and exact at either end."""
+        result = np.clip(self.extrapolate(fraction), self.low, self.high)
         return np.where(fraction <= 0.0, self.low, np.where(fraction >= 1.0, self.high, result))
 
-    def beyond(self, fraction: Floats) -> Floats:
-        """The values at fractions of the way from low to high, or farther."""
+    def extrapolate(self, fraction: Floats) -> Floats:
+        """Return the values at fractions of the range, which may be below 0 or above 1."""
         if self.is_log:
             a, b = math.log(self.low), math.log(self.high)
             return np.exp(a + fraction * (b - a))
         return self.low + fraction * (self.high - self.low)
 
-    def fraction(self, value: float) -> float:
-        """Where a value lies, 0 at low and 1 at high."""
+    def compute_fraction(self, value: float) -> float:
+        """Return the fraction of the range at which a value lies: 0 at low and 1 at high."""
         if self.is_log:
             return (math.log(value) - math.log(self.low)) / (
                 math.log(self.high) - math.log(self.low)
             )
         return (value - self.low) / (self.high - self.low)
 
-    def stretch(self, value: float) -> float:
-        """The derivative of a value by its fraction."""
+    def differentiate(self, value: float) -> float:
+        """Return the derivative of the value by its fraction, at a value."""
         return value * math.log(self.high / self.low) if self.is_log else self.high - self.low
 
     @property
     def is_fixed(self) -> bool:
-        """Whether it has one value only."""
+        """True if the range is a single value."""
         return self.low == self.high
 
     def settings(self) -> dict[str, Any]:
-        """What makes it, for comparison and for people."""
+        """Return what defines the variable, as data for JSON.
+
+        Returns:
+            Name, bounds, and count and "log" if they are set.
+        """
         row: dict[str, Any] = {"name": self.name, "low": self.low, "high": self.high}
         if self.count is not None:
             row["count"] = self.count
@@ -154,10 +198,13 @@ class Variable:
 
 
 def parse_ranges(words: Sequence[str]) -> dict[str, Range]:
-    """Ranges by name from words ``NAME=LOW:HIGH[:COUNT][:log]`` or ``NAME=VALUE``.
+    """Parse ranges from words `NAME=LOW:HIGH[:COUNT][:log]` or `NAME=VALUE`.
+
+    Returns:
+        Text of the range by name.
 
     Raises:
-        SettingError: a word is not of that form, or a name comes twice.
+        SettingError: a word is malformed, or a name occurs twice.
     """
     result: dict[str, Range] = {}
     for word in words:
@@ -177,31 +224,34 @@ def resolve_variables(
     parameters: Mapping[str, Any] = MappingProxyType({}),
     gains: Sequence[Gain] = (),
 ) -> tuple[Variable, ...]:
-    """Find what is meant by names, and read their ranges.
+    """Find what names mean, and read their ranges.
 
     Args:
-        ranges: by name.
-        model: that is varied.
-        mechanism: of it.
-        parameters: of the function that makes it, with their defaults.
-        gains: of a controller.
+        ranges: range by name.
+        model: model that varies.
+        mechanism: mechanism of the model.
+        parameters: parameters of the function that makes the model, with their defaults.
+        gains: parameters of a controller.
+
+    Returns:
+        Variables in the order of the names; a name with braces stands for several.
 
     Raises:
-        SettingError: a name means nothing (the nearest is told), a range is none, or a unit does
-            not fit.
+        SettingError: a name is unknown (the message suggests the nearest), a range is malformed, a
+            unit does not fit, or two variables are the same number.
     """
     result: list[Variable] = []
     for names, given in ranges.items():
         known = [
             (name, _resolve_target(name, model, mechanism, parameters, gains))
             for word in expand_braces(names, model)
-            for name in nodes_of(word)
+            for name in expand_nodes(word)
         ]
         for name, meaning in known:
             if meaning is not None:
                 made = _make_variable(name, *meaning, given)
                 if isinstance(made.target, Start) and not made.target.is_speed:
-                    made = replace(made, doubt=_looks_like_degrees(made, given, mechanism))
+                    made = replace(made, warning=_describe_suspect_range(made, given, mechanism))
                 result.append(made)
         if all(meaning is None for _, meaning in known):
             raise _describe_unknown_name(
@@ -210,6 +260,7 @@ def resolve_variables(
     taken: dict[object, str] = {}
     for item in result:
         for part in getattr(item.target, "parts", (item.target,)):
+            # Two variables of one number would depend on the order of application.
             if part in taken:
                 raise SettingError(
                     f"'{taken[part]}' and '{item.name}' are the same number; vary one of them"
@@ -219,7 +270,7 @@ def resolve_variables(
 
 
 def refuse_counts(found: Sequence[Variable]) -> None:
-    """Stop at ranges with a number of values, where they are searched and not divided.
+    """Refuse ranges with a number of values, which make no sense in a search.
 
     Raises:
         SettingError: a variable has a number of values.
@@ -239,7 +290,11 @@ def _resolve_target(
     parameters: Mapping[str, Any],
     gains: Sequence[Gain],
 ) -> tuple[Target, str] | None:
-    """What a name means, and in what unit; None if nothing."""
+    """Return what a name means and its unit, or None if it has no meaning.
+
+    The first match counts, in the order of the table above: coordinate, parameter of the function,
+    parameter of the controller, control, property, slope.
+    """
     front, _, last = name.rpartition("/")
     for key, is_speed in ((name, False), (front, last == "speed")):
         if (key == name or last in ("value", "speed")) and (
@@ -248,7 +303,7 @@ def _resolve_target(
             return _list_coordinates(name, meant, is_speed, model)
     if name in parameters:
         default = parameters[name]
-        return Parameter(
+        return FunctionParameter(
             name, float(default) if type(default) in (int, float) else None
         ), "parameter"
     if own := match_components(name, gains):
@@ -256,7 +311,7 @@ def _resolve_target(
     route, _, word = name.partition("@")
     front, _, last = route.rpartition("/")
     if last == "control" and (driven := match_components(front, model.components(Actuator))):
-        made = control(name, [item.path for item in driven], word)
+        made = parse_control(name, [item.path for item in driven], word)
         return made, made.unit
     if word in ("", SCALE) and (result := find_properties(model, route)):
         unit = result[0].unit
@@ -273,7 +328,7 @@ def _resolve_target(
 def _describe_unknown_name(
     name: str, model: Model, mechanism: Mechanism, parameters: Sequence[str]
 ) -> SettingError:
-    """The error for a name that means nothing."""
+    """Return the error for a name without a meaning, with a suggestion."""
     route = name.partition("@")[0]
     if match_components(route, model.components(Actuator)):
         return SettingError(
@@ -297,6 +352,7 @@ def _describe_unknown_name(
 def _list_coordinates(
     name: str, infos: Sequence[CoordinateInfo], is_speed: bool, model: Model
 ) -> tuple[Target, str]:
+    """Return the target of coordinates and its unit; locked ones are varied by their default value."""
     unit, locked = infos[0].unit or "rad | m", [info for info in infos if info.locked]
     if locked and is_speed:
         raise SettingError(
@@ -314,6 +370,14 @@ def _list_coordinates(
 
 
 def _make_variable(name: str, target: Target, unit: str, given: Range) -> Variable:
+    """Return the variable of a target with its range.
+
+    Args:
+        name: name of the variable.
+        target: what it changes.
+        unit: unit of the number.
+        given: range as the user wrote it.
+    """
     parts = (
         given.split(":")
         if isinstance(given, str)
@@ -335,7 +399,7 @@ def _make_variable(name: str, target: Target, unit: str, given: Range) -> Variab
     if len(parts) not in (1, 2):
         raise SettingError(f"'{name}' takes LOW:HIGH, LOW:HIGH:COUNT or one value, not '{given}'")
     low, high = (_parse_number(name, part, unit) for part in (parts[0], parts[-1]))
-    _refuse_mixed(name, parts, unit)
+    _refuse_mixed_units(name, parts, unit)
     if len(parts) == 1:
         count = 1
     if low > high:
@@ -355,8 +419,8 @@ def _make_variable(name: str, target: Target, unit: str, given: Range) -> Variab
     return Variable(name, target, low, high, count, is_log)
 
 
-def _refuse_mixed(name: str, ends: Sequence[object], unit: str) -> None:
-    """Stop at ``20deg:40`` of what is in rad; zero is the same in every unit."""
+def _refuse_mixed_units(name: str, ends: Sequence[object], unit: str) -> None:
+    """Refuse a range such as `20deg:40` in rad; 0 needs no unit."""
     read = [parse_quantity(str(part)) for part in ends]
     with_unit = [each.unit for each in read if each is not None and each.unit is not None]
     bare = [
@@ -371,8 +435,8 @@ def _refuse_mixed(name: str, ends: Sequence[object], unit: str) -> None:
         )
 
 
-def _looks_like_degrees(made: Variable, given: Range, mechanism: Mechanism) -> str:
-    """Whether an angle of the start was written as a number of degrees."""
+def _describe_suspect_range(made: Variable, given: Range, mechanism: Mechanism) -> str:
+    """Return a sentence if an initial angle seems to be written in degrees without a unit, else ""."""
     assert isinstance(made.target, Start)
     ends = given.split(":")[:2] if isinstance(given, str) else [made.low, made.high]
     infos = [
@@ -383,6 +447,7 @@ def _looks_like_degrees(made: Variable, given: Range, mechanism: Mechanism) -> s
 
 
 def _parse_number(name: str, part: object, unit: str) -> float:
+    """Return a number in the unit of the variable; `30deg` is converted."""
     if isinstance(part, int | float):
         given: Quantity | None = Quantity(float(part), None)
     else:

@@ -1,9 +1,9 @@
-"""The models of a sweep: those that a sample's properties and parameters make of the given one.
+"""Models of a sweep: the variants that samples make of the given model.
 
-A model is made afresh for each new set of numbers. For the compiled engine, only that is made which
-the numbers have a part in, where they belong to forces, are masses, mass centres or inertias of
-bodies, or gravity. The numbers are those of a model that is built from a file either way, since the
-same functions make them.
+Each new set of numbers needs a new model. For the compiled engine, only the parts are updated that
+depend on the numbers, if these belong to forces, to masses, mass centres or inertias of bodies, or
+to gravity. The result is the same as that of a model built from a file, because the same functions
+compute it.
 """
 
 from __future__ import annotations
@@ -28,51 +28,69 @@ from osimlite.schema.sets import Controller
 from osimlite.simulation.batches import ModelUpdater
 from osimlite.simulation.run import Simulation
 from osimlite.simulation.states import StateLayout
-from osimlite.studies.sweep.controls import Control, VariedControls, controller_of
+from osimlite.studies.sweep.controls import Control, VariedControls, make_controller
 from osimlite.studies.sweep.plan import Plan
-from osimlite.studies.sweep.registry import start_named
-from osimlite.studies.sweep.variables import Floats, Gains, Parameter, Property, Slope, Start
+from osimlite.studies.sweep.registry import find_start
+from osimlite.studies.sweep.variables import (
+    Floats,
+    FunctionParameter,
+    Gains,
+    Property,
+    Slope,
+    Start,
+)
 
 if TYPE_CHECKING:
     from osimlite.simulation.control_steps import Controller as Feedback
     from osimlite.simulation.control_steps import KernelController
 
-RENEWED = Force, Controller, Body, Model
-"""What an engine need not be made anew for."""
+UPDATABLE_TYPES = Force, Controller, Body, Model
+"""Types of components whose numbers can change without a new engine."""
 
-MOST_KEPT = 64
-"""So many models are kept: a grid asks for the same ones again and again."""
+CACHED_VARIANTS = 64
+"""Most variants in the cache: a grid requests the same ones repeatedly."""
 
 
 @dataclass
 class Variant:
-    """A model made ready."""
+    """Model of a sample, ready for simulation.
 
-    state: StateLayout  # what its states consist of
-    structure: bytes  # equal for variants that differ in numbers only
-    numbers: Floats  # all numbers of an engine that computes batches, empty for others
-    maker: Callable[[], Any]  # makes its engine
-    simulation: Simulation | None = None  # that the engine is part of; None if only forces are new
+    Attributes:
+        state: layout of its state.
+        structure: bytes that are equal for variants which differ in numbers only.
+        numbers: all numbers of a compiled engine; empty for other engines.
+        maker: function that makes its engine.
+        simulation: simulation of the engine; None if only numbers were updated.
+        controller: feedback controller of the sample.
+        held: the same, compiled.
+    """
+
+    state: StateLayout
+    structure: bytes
+    numbers: Floats
+    maker: Callable[[], Any]
+    simulation: Simulation | None = None
     controller: Feedback | None = None
-    held: KernelController | None = None  # of it
+    held: KernelController | None = None
 
     @cached_property
     def engine(self) -> Any:
-        """The engine of this very model."""
+        """Engine of this model, made at the first access."""
         return self.maker()
 
 
 class Variants:
-    """Makes the models of a plan; for one thread.
+    """Maker of the models of a plan, for one thread.
 
     Args:
-        plan: whose.
+        plan: plan of the runs.
 
     Attributes:
-        model: with the numbers of the variant that was made last.
+        model: model with the numbers of the latest variant.
+        given: variant of the model as it is, without any variable set.
 
     Raises:
-        OsimliteError: the model cannot be simulated as it is given.
+        OsimliteError: the model cannot be simulated.
     """
 
     def __init__(self, plan: Plan) -> None:
@@ -88,25 +106,27 @@ class Variants:
         self._changes = [k for k, target in enumerate(targets) if not isinstance(target, Start)]
         self._gains = [k for k, target in enumerate(targets) if isinstance(target, Gains)]
         self._controller = plan.controller
-        self._parameters = [k for k, target in enumerate(targets) if isinstance(target, Parameter)]
-        self._adopt(plan.model())
-        self.given = self._whole()
+        self._parameters = [
+            k for k, target in enumerate(targets) if isinstance(target, FunctionParameter)
+        ]
+        self._set_model(plan.model())
+        self.given = self._make_complete_variant()
         if plan.is_planted:
-            # A model without two feet is told of before any run.
-            start_named("planted")(self.given.engine, plan.feet)
+            # A model without two feet fails here, before any run.
+            find_start("planted")(self.given.engine, plan.feet)
         self._kept: dict[tuple[float, ...], Variant | OsimliteError] = {}
         self._renewal: ModelUpdater | None = None
 
     @property
     def is_fixed(self) -> bool:
-        """Whether there is one model only."""
+        """True if all samples have the same model."""
         return not self._changes
 
-    def variant(self, values: Sequence[float]) -> Variant:
-        """The model of a sample.
+    def make_variant(self, values: Sequence[float]) -> Variant:
+        """Return the model of a sample from the cache, or make it.
 
         Raises:
-            OsimliteError: there is none with these numbers.
+            OsimliteError: the model is invalid with these values.
         """
         if not self._changes:
             return self.given
@@ -114,33 +134,36 @@ class Variants:
         result = self._kept.get(key)
         if result is None:
             try:
-                result = self._make(values)
+                result = self._make_variant(values)
             except OsimliteError as error:
                 result = error
-            if len(self._kept) >= MOST_KEPT:
+            if len(self._kept) >= CACHED_VARIANTS:
                 self._kept = {}
             self._kept[key] = result
         if isinstance(result, OsimliteError):
             raise result
         return result
 
-    def start(self, variant: Variant, values: Sequence[float]) -> Floats:
-        """Initial state of a sample (y,).
+    def make_start(self, variant: Variant, values: Sequence[float]) -> Floats:
+        """Return the initial state of a sample (y,).
+
+        Args:
+            variant: model of the sample.
+            values: values of all variables.
 
         Raises:
-            OsimliteError: the model has no such coordinate, or holds it, or a muscle has no
-                equilibrium.
+            OsimliteError: a coordinate is unknown or locked, or a muscle has no equilibrium.
         """
-        # An engine of its own is only made where the coordinates may be others.
+        # A new engine is made only if the structure, and so the coordinates, may differ.
         engine = (self.given if variant.structure == self.given.structure else variant).engine
         row = np.array(variant.state.pack_defaults())
         simulation = variant.simulation or self.given.simulation
         if simulation is not None and simulation.constraints:
-            # The rest follows from what is set.
-            chosen: tuple[dict[str, float], dict[str, float]] = {}, {}
+            # Assembly computes the dependent coordinates from those that are set.
+            selected: tuple[dict[str, float], dict[str, float]] = {}, {}
             for place, path, is_speed in self._starts:
-                chosen[is_speed][path] = float(values[place])
-            row = np.array(simulation.initial_state(*chosen))
+                selected[is_speed][path] = float(values[place])
+            row = np.array(simulation.initial_state(*selected))
         else:
             for place, path, is_speed in self._starts:
                 coordinate = engine.mechanism.coordinate_index(path)
@@ -151,15 +174,16 @@ class Variants:
         return self.prepare_states(engine, [variant], row[None])[0]
 
     def prepare_states(self, engine: Any, variants: Sequence[Variant], states: Floats) -> Floats:
-        """States (k, y) of as many models, with the auxiliary ones where they start from the values and speeds.
+        """Return states (k, y) in which auxiliary states have their start values for the given
+        values and speeds.
 
         Args:
-            engine: of any model of the structure that these have.
-            variants: the models (k).
-            states: what values and speeds are taken of (k, y).
+            engine: engine of any model of this structure.
+            variants: models (k).
+            states: states with values and speeds (k, y).
 
         Raises:
-            SimulationError: they are to start in equilibrium, and a muscle has none.
+            SimulationError: the plan requests equilibrium, and a muscle has none.
         """
         rows = np.concatenate(
             [
@@ -169,8 +193,7 @@ class Variants:
         )
         if self._plan.equilibrate:
             for row, variant in zip(rows, variants, strict=True):
-                # An engine of its own is only made where it must be, and to tell why there is no
-                # equilibrium.
+                # A new engine is made only if the update fails, then also for its error message.
                 y, result = row.tolist(), None
                 if len(variant.numbers):
                     with suppress(SimulationError):
@@ -179,24 +202,24 @@ class Variants:
         return rows
 
     def place_states(self, engine: Any, variants: Sequence[Variant], starts: Floats) -> Floats:
-        """Initial states (k, y), put on their feet if the plan says so.
+        """Return initial states (k, y), with the feet on the ground if the plan requests it.
 
         Args:
-            engine: of any model of the structure that these have.
-            variants: the models (k).
-            starts: where they start (k, y).
+            engine: engine of any model of this structure.
+            variants: models (k).
+            starts: initial states (k, y).
 
         Raises:
-            OsimliteError: the model has no two feet.
+            OsimliteError: the model does not have two feet.
         """
         if not self._plan.is_planted:
             return starts
-        place = start_named("planted")(engine, self._plan.feet)
+        place = find_start("planted")(engine, self._plan.feet)
         numbers = None if self.is_fixed else np.stack([variant.numbers for variant in variants])
         return place(starts, numbers, lambda states: self.prepare_states(engine, variants, states))
 
-    def present(self) -> list[float | None]:
-        """The values of the variables in the model as it is given; None where nothing tells it."""
+    def list_current_values(self) -> list[float | None]:
+        """Return the values of the variables in the given model; None where it has no value."""
         result: list[float | None] = []
         engine = self.given.engine
         setters = dict(self._setters)
@@ -209,12 +232,14 @@ class Variants:
             elif isinstance(item.target, Property):
                 result.append(1.0 if item.target.is_scaled else setters[index][0].get_value())
             elif isinstance(item.target, Control | Gains):
-                result.append(item.target.present)
+                result.append(item.target.current_value)
             else:
-                result.append(item.target.default if isinstance(item.target, Parameter) else 0.0)
+                result.append(
+                    item.target.default if isinstance(item.target, FunctionParameter) else 0.0
+                )
         return result
 
-    def set_start(self, values: Sequence[float]) -> None:
+    def set_default_state(self, values: Sequence[float]) -> None:
         """Make the initial state of a sample the default state of `model`."""
         coordinates: Any = self.model.tree().by_path
         for place, path, is_speed in self._starts:
@@ -224,10 +249,10 @@ class Variants:
                 float(values[place]),
             )
         if self._plan.is_planted:
-            variant = self.variant(values)
+            variant = self.make_variant(values)
             engine = variant.engine
             (row,) = self.place_states(
-                engine, [variant], self.start(variant, values)[None]
+                engine, [variant], self.make_start(variant, values)[None]
             ).tolist()
             for number, place in enumerate(engine.order):
                 coordinate = coordinates[engine.mechanism.coordinates[place].path]
@@ -236,8 +261,8 @@ class Variants:
                     row[number + len(engine.order)],
                 )
 
-    def controller(self, values: Sequence[float]) -> Feedback:
-        """That of a sample."""
+    def make_controller(self, values: Sequence[float]) -> Feedback:
+        """Return the controller with the gains of a sample."""
         assert self._plan.controller is not None
         variables = self._plan.variables
         parts = (
@@ -248,27 +273,29 @@ class Variants:
         return self._plan.controller.with_values({name: float(value) for name, value in parts})
 
     def build_model(self, values: Sequence[float]) -> Model:
-        """The model of a sample, as others are to have it."""
+        """Return the model of a sample for writing: with its initial state, without the open
+        control inputs.
+        """
         self.apply_sample(values)
-        self.set_start(values)
+        self.set_default_state(values)
         if self._plan.controller is not None:
             self.model.remove(self._open)
         return self.model
 
     def apply_sample(self, values: Sequence[float]) -> None:
-        """Make `model` that of a sample, but for its initial state.
+        """Set the numbers of `model` to those of a sample, except its initial state.
 
         Raises:
-            OsimliteError: it does not take the numbers.
+            OsimliteError: the model does not accept the values.
         """
         if self._parameters:
             assert self._plan.make is not None
             names = {
                 self._plan.variables[place].name: float(values[place]) for place in self._parameters
             }
-            self._adopt(self._plan.make(names))
+            self._set_model(self._plan.make(names))
         if self._gains:
-            self._controller = self.controller(values)
+            self._controller = self.make_controller(values)
         for place, setters in self._setters:
             for setter in setters:
                 setter.set_value(float(values[place]))
@@ -278,7 +305,8 @@ class Variants:
             self.model.gravity = (g * math.sin(angle), -g * math.cos(angle), self.model.gravity[2])
 
     # ------------------------------------------------------------------------------------------------ helpers
-    def _adopt(self, model: Model) -> None:
+    def _set_model(self, model: Model) -> None:
+        """Set the model, and find the properties that variables change."""
         self.model = model
         self._gravity = math.hypot(*model.gravity[:2])
         self._slopes, self._setters = [], []
@@ -299,16 +327,19 @@ class Variants:
         self._controls = VariedControls(model, controls, self._plan.interpolation)
         owners += self._controls.controllers
         if self._plan.controller is not None:
-            # To which what it says is added, behind all else.
+            # The controller adds its controls to these constants of 0, after all other controllers.
             self._open = model.add(
-                controller_of(model, {item.path: 0.0 for item in model.components(Actuator)})
+                make_controller(model, {item.path: 0.0 for item in model.components(Actuator)})
             )
         can_renew = self._plan.engine == "compiled" and not self._parameters
         self._owners = (
-            owners if can_renew and all(isinstance(item, RENEWED) for item in owners) else None
+            owners
+            if can_renew and all(isinstance(item, UPDATABLE_TYPES) for item in owners)
+            else None
         )
 
-    def _whole(self) -> Variant:
+    def _make_complete_variant(self) -> Variant:
+        """Return a variant with a new simulation."""
         plan = self._plan
         simulation = Simulation(
             self.model,
@@ -327,6 +358,7 @@ class Variants:
         )
 
     def _add_controls(self, variant: Variant) -> Variant:
+        """Compile the controller for a variant."""
         if self._controller is not None:
             variant.controller, variant.held = (
                 self._controller,
@@ -334,20 +366,21 @@ class Variants:
             )
         return variant
 
-    def _make(self, values: Sequence[float]) -> Variant:
+    def _make_variant(self, values: Sequence[float]) -> Variant:
+        """Make the model of a sample, by an update if possible."""
         self.apply_sample(values)
         given = self.given
         if self._changes == self._gains:
             return self._add_controls(replace(given))
         if self._owners is None:
-            return self._whole()
+            return self._make_complete_variant()
         if self._renewal is None:
             self._renewal = given.engine.make_updater(
                 self.model, Path(self._plan.folder or "."), self._plan.wrapping
             )
         made = self._renewal.update(self._owners)
         if made is None:
-            return self._whole()
-        # The auxiliary states may start otherwise.
+            return self._make_complete_variant()
+        # The start values of auxiliary states may depend on the numbers.
         state = StateLayout(made.mechanism, given.state.order, made.forces.elements)
         return self._add_controls(Variant(state, given.structure, made.numbers, made.make_engine))

@@ -15,7 +15,13 @@ import pytest
 
 import osimlite
 from osimlite.errors import OsimliteError, SettingError
-from osimlite.studies.sweep.optimize import BEST, HISTORY, SUMMARY, Objective, optimize
+from osimlite.studies.sweep.optimize import (
+    BEST_FILE,
+    HISTORY_FILE,
+    SUMMARY_FILE,
+    Objective,
+    optimize,
+)
 from osimlite.studies.sweep.plan import plan
 from osimlite.studies.sweep.run import sweep
 from osimlite.studies.sweep.sampling import choose_samples
@@ -194,7 +200,7 @@ def test_a_search_finds_the_same_there(cluster, tmp_path):
             popsize=8,
             **where,
         )
-    for name in (HISTORY, BEST, SUMMARY):
+    for name in (HISTORY_FILE, BEST_FILE, SUMMARY_FILE):
         assert (tmp_path / "there" / name).read_bytes() == (tmp_path / "here" / name).read_bytes()
 
 

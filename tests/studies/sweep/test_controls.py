@@ -37,7 +37,7 @@ def runs(model, vary, *rows, **choices):
     """The ends of runs, of which only the numbers were made afresh."""
     made = plan(model, vary, measures=ENDS, to=TO, accuracy=1e-7, **choices)
     runner = Runner(made)
-    assert runner.variants.variant(rows[0]).simulation is None
+    assert runner.variants.make_variant(rows[0]).simulation is None
     block = runner.run(np.array(rows))
     assert block.status == ["done"] * len(rows), block.reasons
     return [list(row) for row in zip(*(block.measures[name] for name in ENDS), strict=True)]

@@ -9,7 +9,7 @@ import osimlite
 from osimlite.errors import OsimliteError, SettingError
 from osimlite.simulation import Simulation
 from osimlite.studies.gait.steps import walk_many
-from osimlite.studies.sweep.measures import measure_name
+from osimlite.studies.sweep.measures import get_measure_name
 from osimlite.studies.sweep.plan import plan
 from osimlite.studies.sweep.runner import Runner
 
@@ -131,13 +131,13 @@ def test_functions_of_ones_own(walker, tmp_path, monkeypatch):
         walker, drop, deepest, everything, "own.py:drop", "own:drop", to=1.0, report_interval=0.1
     )
     assert block.reasons == [None] * 3
-    first = block.measures[measure_name(drop)]
+    first = block.measures[get_measure_name(drop)]
     assert (
         first.tolist()
         == block.measures["own.py:drop"].tolist()
         == block.measures["own:drop"].tolist()
     )
-    assert (block.measures[measure_name(deepest)] <= 0.835 - np.maximum(first, 0.0)).all()
+    assert (block.measures[get_measure_name(deepest)] <= 0.835 - np.maximum(first, 0.0)).all()
 
 
 def kept_times(run):
@@ -149,7 +149,7 @@ def kept_times(run):
 
 def test_what_was_kept_ends_with_the_run(walker):
     block = block_of(walker, "steps", kept_times, to=1.5, report_interval=0.1)
-    kept = block.measures[measure_name(kept_times)]
+    kept = block.measures[get_measure_name(kept_times)]
     assert "failed" not in block.status and 2 <= kept.min() < 16
 
 
@@ -157,7 +157,7 @@ def test_a_function_that_fails_spoils_its_own_run_only(walker):
     block = block_of(walker, picky, "distance", to=0.5)
     assert block.status == ["done", "failed", "done"]
     assert "ValueError: not this one" in (block.reasons[1] or "")
-    assert block.measures[measure_name(picky)][[0, 2]].tolist() == [2.0, 2.0]
+    assert block.measures[get_measure_name(picky)][[0, 2]].tolist() == [2.0, 2.0]
     assert np.isnan(block.measures["distance"]).tolist() == [False, True, False]
 
 

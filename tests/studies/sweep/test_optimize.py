@@ -13,16 +13,16 @@ from osimlite.errors import OsimliteError, SettingError, SimulationError
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.simulation import Simulation
 from osimlite.studies.sweep.optimize import (
-    BEST,
-    HISTORY,
-    SUMMARY,
+    BEST_FILE,
+    HISTORY_FILE,
+    SUMMARY_FILE,
     Objective,
     optimize,
     read_best_values,
 )
 from osimlite.studies.sweep.plan import plan
-from osimlite.studies.sweep.run import Interrupted
-from osimlite.studies.sweep.search import METHODS, BudgetExhausted, Search
+from osimlite.studies.sweep.run import SweepInterruption
+from osimlite.studies.sweep.search import METHODS, OutOfBudget, Search
 
 # Not loaded here: that takes seconds, in each process that collects this module.
 if find_spec("cma") is None:
@@ -43,7 +43,7 @@ def test_methods_find_the_bottom_of_a_bowl(method):
 
     def ask(points):
         if len(asked) + len(points) > 2000:
-            raise BudgetExhausted
+            raise OutOfBudget
         asked.extend(points.tolist())
         return np.sum((points - bottom) ** 2 * (1.0, 10.0, 3.0), axis=1)
 
@@ -80,10 +80,10 @@ def test_the_best_model_does_what_was_found(made, tmp_path):
         trajectory = simulation.run(0.5)
     values = trajectory.values[:, list(trajectory.coordinates).index("Pelvis_tx")]
     assert values[-1] - values[0] == result.value
-    summary = json.loads((tmp_path / "new" / "folder" / SUMMARY).read_text())
+    summary = json.loads((tmp_path / "new" / "folder" / SUMMARY_FILE).read_text())
     assert summary["value"] == result.value and summary["settings"]["seed"] == 2
     assert sorted(path.name for path in (tmp_path / "new" / "folder").iterdir()) == sorted(
-        (HISTORY, BEST, SUMMARY)
+        (HISTORY_FILE, BEST_FILE, SUMMARY_FILE)
     )
 
 
@@ -136,14 +136,14 @@ def test_an_interrupted_search_goes_on(made, tmp_path, method):
 
     choices = {"method": method, "budget": 45, "popsize": 6, "seed": 4}
     whole = optimize(made, DISTANCE, tmp_path / "whole", **choices)
-    with pytest.raises(Interrupted, match="--resume"):
+    with pytest.raises(SweepInterruption, match="--resume"):
         optimize(made, DISTANCE, tmp_path / "cut", progress=stop, **choices)
     with pytest.raises(SettingError, match="go on with --resume"):
         optimize(made, DISTANCE, tmp_path / "cut", **choices)
     with pytest.raises(SettingError, match="seed"):
         optimize(made, DISTANCE, tmp_path / "cut", resume=True, **{**choices, "seed": 5})
     again = optimize(made, DISTANCE, tmp_path / "cut", resume=True, workers=1, **choices)
-    for name in (HISTORY, BEST, SUMMARY):
+    for name in (HISTORY_FILE, BEST_FILE, SUMMARY_FILE):
         assert (tmp_path / "cut" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes(), (
             name
         )
@@ -155,7 +155,9 @@ def test_a_finished_search_goes_on_with_a_larger_budget(made, tmp_path):
     optimize(made, DISTANCE, tmp_path / "two", budget=16, popsize=8)
     more = optimize(made, DISTANCE, tmp_path / "two", budget=40, popsize=8, resume=True)
     assert more.value == whole.value
-    assert (tmp_path / "two" / HISTORY).read_bytes() == (tmp_path / "whole" / HISTORY).read_bytes()
+    assert (tmp_path / "two" / HISTORY_FILE).read_bytes() == (
+        tmp_path / "whole" / HISTORY_FILE
+    ).read_bytes()
 
 
 def test_another_search_is_spared_unless_forced(made, tmp_path):
@@ -186,7 +188,9 @@ def test_every_run_that_is_allowed_is_made(made, tmp_path, method):
     )
     optimize(made, DISTANCE, tmp_path / "two", method=method, budget=11, popsize=8, resume=True)
     optimize(made, DISTANCE, tmp_path / "two", method=method, budget=20, popsize=8, resume=True)
-    assert (tmp_path / "two" / HISTORY).read_bytes() == (tmp_path / "whole" / HISTORY).read_bytes()
+    assert (tmp_path / "two" / HISTORY_FILE).read_bytes() == (
+        tmp_path / "whole" / HISTORY_FILE
+    ).read_bytes()
 
 
 def least_drop(run):
@@ -293,7 +297,7 @@ def test_what_cannot_be_is_said(made, walker, tmp_path):
         optimize(made, Objective("distanc"), tmp_path)
 
 
-@pytest.mark.parametrize("name", [BEST, SUMMARY])
+@pytest.mark.parametrize("name", [BEST_FILE, SUMMARY_FILE])
 def test_files_of_others_are_spared_unless_forced(made, tmp_path, name):
     (tmp_path / name).write_text("mine")
     with pytest.raises(SettingError, match=rf"{name}' is not from such a search; .*--force"):

@@ -19,13 +19,13 @@ from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.studies.sweep import results
 from osimlite.studies.sweep.plan import plan
 from osimlite.studies.sweep.results import (
-    Partial,
+    PartialTable,
     compute_ranges,
     describe_differences,
     make_schema,
     settings_of,
 )
-from osimlite.studies.sweep.run import Interrupted, sweep
+from osimlite.studies.sweep.run import SweepInterruption, sweep
 from osimlite.studies.sweep.sampling import choose_samples
 
 pq = pytest.importorskip("pyarrow.parquet", reason="needs pyarrow (extra 'sweep')")
@@ -46,7 +46,7 @@ def test_the_file_is_the_same_from_any_number_of_workers(made, tmp_path):
     assert [outcome.path.read_bytes() == whole for outcome in outcomes] == [True] * 3
     table = pq.read_table(outcomes[0].path).to_pydict()
     assert table["run"] == list(range(60)) and table["status"] == ["done"] * 60
-    rows = chosen.block(0, 60)
+    rows = chosen.make_block(0, 60)
     assert table["RHip_rz"] == rows[:, 0].tolist()
     assert outcomes[0].status == {"done": 60}
     assert sorted(path.name for path in tmp_path.iterdir()) == [
@@ -114,7 +114,7 @@ def test_an_interrupted_sweep_goes_on(made, tmp_path):
     whole = sweep(made, chosen, tmp_path / "whole.parquet").path.read_bytes()
     path = tmp_path / "r.parquet"
     for after in (10, 40):
-        with pytest.raises(Interrupted, match="--resume"):
+        with pytest.raises(SweepInterruption, match="--resume"):
             sweep(made, chosen, path, resume=after > 10, workers=1, progress=Stopper(after))
         assert not path.exists() and path.with_name("r.parquet.partial").exists()
     with pytest.raises(SettingError, match="go on with --resume"):
@@ -141,7 +141,7 @@ def test_a_colon_in_the_name_of_a_file_is_no_protocol(made, tmp_path, monkeypatc
 
 
 def test_interrupted_before_anything_was_saved(made, tmp_path):
-    with pytest.raises(Interrupted, match=r"^interrupted before any run was saved$"):
+    with pytest.raises(SweepInterruption, match=r"^interrupted before any run was saved$"):
         sweep(
             made,
             choose_samples(made.variables, "sobol", 80, 5),
@@ -154,7 +154,7 @@ def test_interrupted_before_anything_was_saved(made, tmp_path):
 def test_other_settings_are_told_apart(made, walker, tmp_path):
     path = tmp_path / "r.parquet"
     chosen = choose_samples(made.variables, "sobol", 40, 5)
-    with pytest.raises(Interrupted):
+    with pytest.raises(SweepInterruption):
         sweep(made, chosen, path, workers=1, progress=Stopper(8))
     with pytest.raises(SettingError, match=r"seed \(5 before, 6 now\)"):
         sweep(made, choose_samples(made.variables, "sobol", 40, 6), path, resume=True)
@@ -186,7 +186,7 @@ def test_finished_results_are_spared_unless_forced(made, tmp_path):
         and path.read_bytes() == first
     )
     assert sweep(made, few, path).path.read_bytes() == first
-    with pytest.raises(Interrupted):
+    with pytest.raises(SweepInterruption):
         sweep(made, more, path, force=True, workers=1, progress=Stopper(4))
     assert path.read_bytes() == first
     assert sweep(made, more, path, resume=True).before > 0
@@ -203,9 +203,9 @@ def test_a_torn_message_at_the_end_is_cut_off(made, tmp_path):
     chosen = choose_samples(made.variables, "sobol", 40, 5)
     whole = sweep(made, chosen, tmp_path / "whole.parquet").path.read_bytes()
     path, partial = tmp_path / "r.parquet", tmp_path / "r.parquet.partial"
-    with pytest.raises(Interrupted):
+    with pytest.raises(SweepInterruption):
         sweep(made, chosen, path, workers=1, progress=Stopper(8))
-    with pytest.raises(Interrupted):
+    with pytest.raises(SweepInterruption):
         sweep(made, chosen, path, resume=True, workers=1, progress=Stopper(30))
     good = partial.read_bytes()
     for cut in (1, 7, 100, 300):
@@ -219,8 +219,8 @@ def _ends(content: bytes) -> list[int]:
     """Where the records of a partial file end."""
     ends = [0]
     while ends[-1] < len(content):
-        head = results.HEAD.unpack_from(content, ends[-1])
-        ends.append(ends[-1] + results.HEAD.size + head[1])
+        head = results.RECORD_HEAD.unpack_from(content, ends[-1])
+        ends.append(ends[-1] + results.RECORD_HEAD.size + head[1])
     return ends
 
 
@@ -234,7 +234,7 @@ def interrupted_three_times(tmp_path_factory):
     )
     whole = sweep(made, chosen, folder / "whole.parquet").path.read_bytes()
     for count in (8, 16, 30):
-        with pytest.raises(Interrupted):
+        with pytest.raises(SweepInterruption):
             sweep(
                 made, chosen, folder / "r.parquet", resume=True, workers=1, progress=Stopper(count)
             )
@@ -311,7 +311,7 @@ def test_work_damaged_at_its_beginning_is_refused(interrupted_three_times, tmp_p
 
 
 def test_what_is_damaged_during_the_work_makes_no_results(tmp_path):
-    partial = Partial(tmp_path / "r", make_schema({"run": "int64"}, {}))
+    partial = PartialTable(tmp_path / "r", make_schema({"run": "int64"}, {}))
     for first in (0, 2):
         partial.add([[first, first + 1]])
     content = partial.partial.read_bytes()
@@ -323,7 +323,7 @@ def test_what_is_damaged_during_the_work_makes_no_results(tmp_path):
 
 
 def test_damaged_results_are_told(tmp_path):
-    partial = Partial(tmp_path / "r", make_schema({"run": "int64", "x": "float64"}, {"a": 1}))
+    partial = PartialTable(tmp_path / "r", make_schema({"run": "int64", "x": "float64"}, {"a": 1}))
     partial.add([np.arange(1000), np.random.default_rng(1).uniform(size=1000)])
     partial.finish()
     partial.close()
@@ -335,7 +335,7 @@ def test_damaged_results_are_told(tmp_path):
 
 @pytest.mark.parametrize("text", [b"[]", b"7", b"null", b'"a"', b"{", b"[" * 100_000])
 def test_settings_of_another_type_are_none(tmp_path, text):
-    table = make_schema({"run": "int64"}, {}).with_metadata({results.KEY: text})
+    table = make_schema({"run": "int64"}, {}).with_metadata({results.SETTINGS_KEY: text})
     pq.write_table(table.empty_table(), tmp_path / "r")
     with pytest.raises(OsimliteError, match="not the results of a sweep"):
         results.settings_of(tmp_path / "r")
@@ -345,7 +345,7 @@ def test_row_groups_do_not_depend_on_the_pieces(tmp_path, monkeypatch):
     monkeypatch.setattr(results, "ROWS_PER_GROUP", 10)
     table = make_schema({"run": "int64", "x": "float64", "status": "string"}, {"a": 1})
     for name, pieces in {"one": [37], "many": [1, 9, 3, 20, 4], "few": [25, 12]}.items():
-        partial = Partial(tmp_path / name, table)
+        partial = PartialTable(tmp_path / name, table)
         first = 0
         for size in pieces:
             rows = np.arange(first, first + size)
@@ -398,7 +398,7 @@ def test_one_program_at_a_time_writes(made, tmp_path):
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a full device")
 def test_a_full_disk_is_told(tmp_path):
-    partial = Partial(tmp_path / "r", make_schema({"run": "int64"}, {}))
+    partial = PartialTable(tmp_path / "r", make_schema({"run": "int64"}, {}))
     partial.add([[0, 1]])
     partial.stream.close()
     partial.stream = open("/dev/full", "ab", buffering=0)  # noqa: SIM115
@@ -412,13 +412,13 @@ def test_a_full_disk_is_told(tmp_path):
 @pytest.mark.usefixtures("windows_files")
 def test_a_table_of_results_lets_go_of_its_files_first(tmp_path):
     columns = make_schema({"run": "int64"}, {})
-    Partial(tmp_path / "empty", columns).close()
+    PartialTable(tmp_path / "empty", columns).close()
     assert not (tmp_path / "empty.partial").exists()
-    partial = Partial(tmp_path / "whole", columns)
+    partial = PartialTable(tmp_path / "whole", columns)
     partial.add([[0, 1]])
     with partial.finish().open():
         partial.close()
-        again = Partial(tmp_path / "whole", columns)
+        again = PartialTable(tmp_path / "whole", columns)
         again.add([[2]])
         again.finish()
         again.close()
@@ -472,7 +472,7 @@ def test_a_command_that_is_ended_goes_on(signum, made, tmp_path: Path, walker):
     )
     chosen = choose_samples(made.variables, None, 4000)
     before: list[float] = []
-    with pytest.raises(Interrupted):
+    with pytest.raises(SweepInterruption):
         sweep(
             made,
             chosen,
@@ -480,12 +480,12 @@ def test_a_command_that_is_ended_goes_on(signum, made, tmp_path: Path, walker):
             resume=True,
             progress=lambda n, of: _first(before, n),
         )
-    there = Partial(tmp_path / "results.parquet", schema_of(made, chosen), resume=True)
+    there = PartialTable(tmp_path / "results.parquet", schema_of(made, chosen), resume=True)
     rows = []
     there.read(lambda batch: rows.extend(batch.to_pylist()))
     there.close()
     assert [row["run"] for row in rows] == list(range(len(rows))) and len(rows) >= before[0] > 0
-    assert [row["RHip_rz"] for row in rows] == chosen.block(0, len(rows))[:, 0].tolist()
+    assert [row["RHip_rz"] for row in rows] == chosen.make_block(0, len(rows))[:, 0].tolist()
 
 
 def _first(before, number):
@@ -495,9 +495,9 @@ def _first(before, number):
 
 
 def schema_of(made, chosen):
-    from osimlite.studies.sweep.run import settings
+    from osimlite.studies.sweep.run import collect_settings
 
-    return make_schema(made.columns("run"), settings(made, chosen))
+    return make_schema(made.columns("run"), collect_settings(made, chosen))
 
 
 def test_memory_does_not_grow_with_the_number_of_runs(made, tmp_path):

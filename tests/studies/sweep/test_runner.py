@@ -147,7 +147,7 @@ def test_of_forces_masses_and_gravity_only_the_numbers_are_made_afresh(chosen):
     variants = Variants(made)
     for end in (1, 0):
         row = [NUMBERS[name][end] for name in chosen]
-        variant = variants.variant(row)
+        variant = variants.make_variant(row)
         assert variant.simulation is None and variant.structure == variants.given.structure
         model, _, _ = changed(chosen, row)
         with Simulation(model, "compiled") as simulation:
@@ -180,7 +180,7 @@ def test_controls_are_those_that_a_run_is_given():
     made = plan(model, vary, measures=tuple(STATES), to=0.3)
     rows = np.array([[2.0, 0.5, -1.0, 0.3], [-1.5, 0.3, 0.25, 0.7]])
     block = Runner(made).run(rows)
-    assert Variants(made).variant(rows[0].tolist()).simulation is None
+    assert Variants(made).make_variant(rows[0].tolist()).simulation is None
     for number, (right, hip, left, own) in enumerate(rows.tolist()):
         brain.ControlFunctions.objects[0].value = own
         with Simulation(model, "compiled") as simulation:

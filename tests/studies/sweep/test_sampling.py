@@ -35,10 +35,10 @@ THREE = (
 )
 def test_any_pieces_make_the_whole(sampler, count, seed, cuts):
     result = Samples(THREE, sampler, 12 if sampler == "grid" else count, seed)
-    whole = result.block(0, result.count)
+    whole = result.make_block(0, result.count)
     assert whole.shape == (result.count, 3)
     ends = sorted({0, result.count, *(cut for cut in cuts if cut < result.count)})
-    pieces = [result.block(a, b - a) for a, b in pairwise(ends)]
+    pieces = [result.make_block(a, b - a) for a, b in pairwise(ends)]
     assert np.array_equal(np.concatenate(pieces), whole)
     assert (whole >= [item.low for item in THREE]).all() and (
         whole <= [item.high for item in THREE]
@@ -51,15 +51,15 @@ def test_any_pieces_make_the_whole(sampler, count, seed, cuts):
 )
 def test_pieces_come_in_any_order(sampler, pieces):
     result = Samples(THREE, sampler, 12 if sampler == "grid" else 150, 1)
-    whole = Samples(THREE, sampler, result.count, 1).block(0, result.count)
+    whole = Samples(THREE, sampler, result.count, 1).make_block(0, result.count)
     for first, count in pieces:
-        assert np.array_equal(result.block(first, count), whole[first : first + count])
+        assert np.array_equal(result.make_block(first, count), whole[first : first + count])
 
 
 def test_grid_has_every_combination_and_both_ends():
     result = choose_samples(THREE)
     assert result.sampler == "grid" and result.count == 12
-    rows = result.block(0, 100)
+    rows = result.make_block(0, 100)
     assert len({tuple(row) for row in rows}) == 12
     assert sorted(set(rows[:, 0])) == [-1.0, 0.0, 1.0, 2.0]
     assert sorted(set(rows[:, 1])) == pytest.approx([1e3, 10**4.5, 1e6], rel=1e-12)
@@ -69,13 +69,13 @@ def test_grid_has_every_combination_and_both_ends():
 
 @given(st.integers(1, 3000), st.integers(0, 100))
 def test_latin_hypercube_has_one_in_every_layer(count, seed):
-    rows = Samples((variable("a"), variable("b")), "lhs", count, seed).block(0, count)
+    rows = Samples((variable("a"), variable("b")), "lhs", count, seed).make_block(0, count)
     for column in rows.T:
         assert sorted(np.floor(column * count).astype(int)) == list(range(count))
 
 
 def test_latin_hypercube_is_not_ordered():
-    rows = Samples(tuple(variable(name) for name in "abcd"), "lhs", 4096, 1).block(0, 4096)
+    rows = Samples(tuple(variable(name) for name in "abcd"), "lhs", 4096, 1).make_block(0, 4096)
     assert (
         abs(np.corrcoef(np.column_stack((np.arange(4096), rows)), rowvar=False) - np.eye(5)).max()
         < 0.06
@@ -85,14 +85,14 @@ def test_latin_hypercube_is_not_ordered():
 def test_seeds_differ_and_samples_fill_the_cube():
     for sampler in ("random", "sobol", "lhs"):
         one, two, again = (
-            Samples(THREE[:1], sampler, 1024, seed).block(0, 1024) for seed in (1, 2, 1)
+            Samples(THREE[:1], sampler, 1024, seed).make_block(0, 1024) for seed in (1, 2, 1)
         )
         assert np.array_equal(one, again) and not np.array_equal(one, two)
         assert np.histogram(one, bins=8, range=(-1.0, 2.0))[0] == pytest.approx(128, abs=45)
 
 
 def test_sobol_is_scipys_own():
-    rows = Samples((variable("a"), variable("b")), "sobol", 64, 3).block(10, 54)
+    rows = Samples((variable("a"), variable("b")), "sobol", 64, 3).make_block(10, 54)
     expected = qmc.Sobol(2, scramble=True, rng=np.random.default_rng(3)).random(64)[10:]
     assert np.array_equal(rows, expected)
 
@@ -102,7 +102,7 @@ def test_a_block_of_many_needs_no_more_memory_than_the_block():
 
     result = Samples((variable("a"), variable("b")), "lhs", 10**12)
     tracemalloc.start()
-    assert result.block(10**11, 100).shape == (100, 2)
+    assert result.make_block(10**11, 100).shape == (100, 2)
     assert tracemalloc.get_traced_memory()[1] < 1e6
     tracemalloc.stop()
 

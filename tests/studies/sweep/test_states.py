@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from osimlite.simulation import Simulation
 from osimlite.studies.sweep.plan import plan
-from osimlite.studies.sweep.run import Interrupted, sweep
+from osimlite.studies.sweep.run import SweepInterruption, sweep
 from osimlite.studies.sweep.runner import Runner
 from osimlite.studies.sweep.sampling import choose_samples
 from tests.oracle.random_models import RandomModel
@@ -49,11 +49,11 @@ def test_random_models_keep_their_states_through_an_interruption(seed, tmp_path_
     )  # fmt: skip
     chosen = choose_samples(made.variables, "sobol", 16, 1)
     whole = sweep(made, chosen, folder / "whole.parquet", workers=1).path
-    with pytest.raises(Interrupted):
+    with pytest.raises(SweepInterruption):
         sweep(made, chosen, folder / "r.parquet", workers=1, progress=interrupt)
     resumed = sweep(made, chosen, folder / "r.parquet", resume=True, workers=1)
     assert resumed.before > 0 and resumed.path.read_bytes() == whole.read_bytes()
-    table, values = pq.read_table(whole).to_pydict(), chosen.block(0, 16)
+    table, values = pq.read_table(whole).to_pydict(), chosen.make_block(0, 16)
     theirs = Runner(replace(made, engine="bullet")).run(values[3:4]).measures
     bushing = random.model.tree().by_path["/forceset/bushing"]
     x, _, z = bushing.rotational_damping

@@ -15,7 +15,7 @@ from osimlite.studies.gait.foot_contacts import find_footing
 from osimlite.studies.gait.measures import PLANTED_DEPTH_M
 from osimlite.studies.gait.starts import plant_feet
 from osimlite.studies.gait.steps import measure_along_slope, walk_many
-from osimlite.studies.sweep.measures import measure
+from osimlite.studies.sweep.measures import make_measure
 from osimlite.studies.sweep.optimize import Objective, optimize
 from osimlite.studies.sweep.plan import plan
 from osimlite.studies.sweep.runner import Runner
@@ -36,8 +36,8 @@ def walks_of(made, rows):
     """Starts of samples that are planted, and the walks from there, by the functions that do it."""
     runner, starts, walks = Runner(made), [], []
     for row in rows:
-        engine = runner.variants.variant(row.tolist()).engine
-        start = runner.variants.start(runner.variants.variant(row.tolist()), row.tolist())
+        engine = runner.variants.make_variant(row.tolist()).engine
+        start = runner.variants.make_start(runner.variants.make_variant(row.tolist()), row.tolist())
         starts.append(plant_feet(engine, find_footing(engine), start[None])[0])
         starts[-1][engine.order.index(engine.mechanism.coordinate_index("Pelvis_ty"))] -= (
             PLANTED_DEPTH_M
@@ -82,7 +82,7 @@ def test_a_planted_walker_stands_at_rest(walker):
     runner, rows = Runner(made), points(VARY)
     given = runner.variants.given
     engine = given.engine
-    bare = np.array([runner.variants.start(given, row) for row in rows.tolist()])
+    bare = np.array([runner.variants.make_start(given, row) for row in rows.tolist()])
     starts = runner.variants.place_states(engine, [given] * len(rows), bare)
     feet = [engine.contacts.index(name) for foot in find_footing(engine).feet for name in foot]
     n, which = len(engine.order), np.arange(len(rows))
@@ -150,4 +150,4 @@ def test_walking_needs_the_compiled_engine():
     with Simulation(dynamic_walker(), "bullet") as simulation:
         for name in ("steps", "scuffs", "progress", "time_to_fall"):
             with pytest.raises(SettingError, match=f"'{name}' needs --engine compiled"):
-                measure(name, simulation.engine)
+                make_measure(name, simulation.engine)
