@@ -21,7 +21,7 @@ from osimlite.simulation.robot.robot import Ball, Box, MeshFile, Shape, Visual
 from osimlite.simulation.robot.visuals import mesh_shape
 from osimlite.translate.fidelity import Fidelity
 
-SLAB = (1.0, 200.0, 200.0)
+HALF_SPACE_BOX_M = (1.0, 200.0, 200.0)
 """Size (m) of the box that stands for a half space: its thickness, and its edges along the surface."""
 
 
@@ -53,7 +53,7 @@ def collect_collisions(
                 "left out",
             )
             continue
-        made = _shape(geometry, path, fidelity, mesh_files)
+        made = _make_shape(geometry, path, fidelity, mesh_files)
         if made is None:
             continue
         shape, own = made
@@ -64,7 +64,7 @@ def collect_collisions(
     return result
 
 
-def _shape(
+def _make_shape(
     geometry: ContactGeometry, path: str, fidelity: Fidelity, mesh_files: MeshFiles
 ) -> tuple[Shape, Array] | None:
     """The shape, and its frame in the frame of the geometry."""
@@ -82,13 +82,13 @@ def _shape(
             )
             return Ball(geometry.radius), here
         case ContactHalfSpace():
-            here[0, 3] = SLAB[0] / 2.0
-            size = " x ".join(f"{edge:g}" for edge in SLAB)
+            here[0, 3] = HALF_SPACE_BOX_M[0] / 2.0
+            size = " x ".join(f"{edge:g}" for edge in HALF_SPACE_BOX_M)
             told(
                 "a half space, and its material",
                 f"a collision box of {size} m whose face is its surface",
             )
-            return Box(SLAB), here
+            return Box(HALF_SPACE_BOX_M), here
         case ContactEllipsoid() if min(geometry.radii) > 0.0:
             file = mesh_files.name_of_stretched("ellipsoid", make_ball(), geometry.radii)
             told("an ellipsoid, and its material", "a collision shape in a mesh file", file)

@@ -24,9 +24,9 @@ from osimlite.simulation.robot.visuals import Visuals, collect_visuals
 from osimlite.translate.collisions import collect_collisions
 from osimlite.translate.fidelity import Fidelity
 from osimlite.translate.files import write_files
-from osimlite.translate.sidecar import coordinates_json
-from osimlite.translate.strength import strength
-from osimlite.translate.survey import survey
+from osimlite.translate.sidecar import format_coordinates
+from osimlite.translate.strength import add_strength_limits
+from osimlite.translate.survey import record_losses
 
 Limits = Literal["none", "range"]
 Locked = Literal["fixed", "joint"]
@@ -140,8 +140,10 @@ def to_urdf(
         robot = merge_fixed(robot)
     if limits == "range":
         robot = range_limits(robot)
-    robot = strength(legal_names(robot), model, fidelity, effort=effort, velocity=velocity)
-    survey(model, robot, fidelity)
+    robot = add_strength_limits(
+        legal_names(robot), model, fidelity, effort=effort, velocity=velocity
+    )
+    record_losses(model, robot, fidelity)
     name = legal(model.name or "model") if name is None else name
-    coordinates = coordinates_json(robot, f"{name}.urdf")
+    coordinates = format_coordinates(robot, f"{name}.urdf")
     return Urdf(name, urdf_text(robot), fidelity, robot, coordinates, mesh_files.files)

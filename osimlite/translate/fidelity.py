@@ -23,7 +23,7 @@ class Error(NamedTuple):
     unit: str
 
     @classmethod
-    def of(cls, differences: Sequence[float] | Array, unit: str) -> Error:
+    def measure(cls, differences: Sequence[float] | Array, unit: str) -> Error:
         """The error that these differences are."""
         off = np.abs(differences)
         return cls(float(off.max()), float(np.sqrt(np.mean(off**2))), unit)

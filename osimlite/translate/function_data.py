@@ -11,7 +11,7 @@ from osimlite.mechanics.multibody.motions import EllipsoidPoint
 from osimlite.mechanics.multibody.smoothing_spline import PiecewisePolynomial
 
 
-def as_data(function: f.Function) -> dict[str, Any]:
+def describe_function(function: f.Function) -> dict[str, Any]:
     """A function as JSON-ready data, exact: ``type`` and what that type needs (see docs/urdf.md).
 
     Raises:
@@ -47,7 +47,7 @@ def as_data(function: f.Function) -> dict[str, Any]:
                 "powers": powers,
             }
         case f.ScaledFunction(scale, inner):
-            return {"type": "scaled", "scale": scale, "function": as_data(inner)}
+            return {"type": "scaled", "scale": scale, "function": describe_function(inner)}
         case f.PiecewiseLinear(x, y):
             return {"type": "piecewise-linear", "x": x, "y": y}
         case f.PiecewiseConstant(x, y):

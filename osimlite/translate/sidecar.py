@@ -13,12 +13,12 @@ from typing import Any
 from osimlite.mechanics.multibody.functions import IDENTITY
 from osimlite.simulation.robot.couplings import couplers, mimics
 from osimlite.simulation.robot.robot import Robot
-from osimlite.translate.function_data import as_data
+from osimlite.translate.function_data import describe_function
 
 FORMAT, VERSION = "osimlite-coordinates", 1
 
 
-def coordinates_json(robot: Robot, file: str) -> str:
+def format_coordinates(robot: Robot, file: str) -> str:
     """The text of the sidecar.
 
     Args:
@@ -29,9 +29,9 @@ def coordinates_json(robot: Robot, file: str) -> str:
         UnsupportedError: a function of the mechanism is of a class that the format does not have.
     """
     sections = {
-        "coordinates": _coordinates(robot),
-        "joints": _joints(robot),
-        "couplers": _couplers(robot),
+        "coordinates": _list_coordinates(robot),
+        "joints": _list_joints(robot),
+        "couplers": _list_couplers(robot),
         "bodies": [
             {"path": path, "link": link.name, "frame": frame.tolist()}
             for path, (link, frame) in robot.link_of.items()
@@ -51,14 +51,14 @@ def coordinates_json(robot: Robot, file: str) -> str:
         "robot": robot.name,
         "file": file,
     }
-    lines = [f'  "{name}": {_text(value)}' for name, value in head.items()]
+    lines = [f'  "{name}": {_format_json(value)}' for name, value in head.items()]
     for name, items in sections.items():
-        rows = ",\n".join(f"    {_text(item)}" for item in items)
+        rows = ",\n".join(f"    {_format_json(item)}" for item in items)
         lines.append(f'  "{name}": [\n{rows}\n  ]' if rows else f'  "{name}": []')
     return "{\n" + ",\n".join(lines) + "\n}\n"
 
 
-def _coordinates(robot: Robot) -> list[dict[str, Any]]:
+def _list_coordinates(robot: Robot) -> list[dict[str, Any]]:
     drives: dict[int, list[str]] = {}
     for joint in robot.moving:
         for place in joint.coordinates:
@@ -75,13 +75,13 @@ def _coordinates(robot: Robot) -> list[dict[str, Any]]:
             "range": info.range,
             "clamped": info.clamped,
             "locked": info.locked,
-            "prescribed": None if info.prescribed is None else as_data(info.prescribed),
+            "prescribed": None if info.prescribed is None else describe_function(info.prescribed),
         }
         for place, info in enumerate(robot.mechanism.coordinates)
     ]
 
 
-def _joints(robot: Robot) -> list[dict[str, Any]]:
+def _list_joints(robot: Robot) -> list[dict[str, Any]]:
     following, coordinates = mimics(robot), robot.mechanism.coordinates
     result: list[dict[str, Any]] = []
     for joint in robot.moving:
@@ -90,7 +90,7 @@ def _joints(robot: Robot) -> list[dict[str, Any]]:
             "of": joint.source,
             "kind": joint.kind,
             "coordinates": [coordinates[place].path for place in joint.coordinates],
-            "function": as_data(joint.function),
+            "function": describe_function(joint.function),
         }
         if joint.function == IDENTITY:
             said["identity"] = True
@@ -104,30 +104,30 @@ def _joints(robot: Robot) -> list[dict[str, Any]]:
     return result
 
 
-def _couplers(robot: Robot) -> list[dict[str, Any]]:
+def _list_couplers(robot: Robot) -> list[dict[str, Any]]:
     coordinates = robot.mechanism.coordinates
     return [
         {
             "path": coupler.name,
             "dependent": coordinates[coupler.dependent].path,
             "independent": [coordinates[place].path for place in coupler.independent],
-            "function": as_data(coupler.function),
+            "function": describe_function(coupler.function),
         }
         for coupler in couplers(robot)
     ]
 
 
-def _text(value: Any) -> str:
-    return json.dumps(finite(value), allow_nan=False)
+def _format_json(value: Any) -> str:
+    return json.dumps(replace_non_finite(value), allow_nan=False)
 
 
-def finite(value: Any) -> Any:
+def replace_non_finite(value: Any) -> Any:
     """Plain data with null for numbers that JSON has no word for."""
     match value:
         case float():
             return value if math.isfinite(value) else None
         case dict():
-            return {key: finite(item) for key, item in value.items()}
+            return {key: replace_non_finite(item) for key, item in value.items()}
         case list() | tuple():
-            return [finite(item) for item in value]
+            return [replace_non_finite(item) for item in value]
     return value

@@ -12,7 +12,7 @@ from osimlite.simulation.robot.robot import Robot, RobotJoint
 from osimlite.translate.fidelity import Fidelity
 
 
-def strength(
+def add_strength_limits(
     robot: Robot,
     model: Model,
     fidelity: Fidelity,

@@ -21,13 +21,13 @@ from osimlite.simulation.robot.couplings import Mimic, couplers, mimics
 from osimlite.simulation.robot.robot import Robot, RobotJoint, breaks_triangle_rule, principal_axes
 from osimlite.translate.fidelity import LEFT_OUT, Fidelity
 
-COMPUTE = "compute its value by the file of coordinates"
+COMPUTE_ADVICE = "compute its value by the file of coordinates"
 """What to do about a joint that the robot's file leaves free."""
 
 CONTAINERS = (ModelComponentSet, WrapObjectSet, FrameGeometry)
 """Components that say nothing of their own: sets, and the axes that a viewer may draw at a frame."""
 
-_LOST: tuple[tuple[type[Component], str, str], ...] = (
+_LOST_TYPES: tuple[tuple[type[Component], str, str], ...] = (
     (Force, "force", "a force"),
     (ContactGeometry, "contact-geometry", "a contact surface and its material"),
     (Marker, "marker", "a marker"),
@@ -38,7 +38,7 @@ _LOST: tuple[tuple[type[Component], str, str], ...] = (
 )
 
 
-def survey(model: Model, robot: Robot, fidelity: Fidelity) -> None:
+def record_losses(model: Model, robot: Robot, fidelity: Fidelity) -> None:
     """Fill `fidelity` with what became of every component of `model` in `robot`.
 
     Args:
@@ -62,7 +62,7 @@ def account_for_rest(tree: Tree, fidelity: Fidelity) -> None:
         elif path not in accounted and not isinstance(component, CONTAINERS):
             dropped.add(id(component))
             name = getattr(component, "class_name", "") or type(component).__name__
-            known = ((kind, what) for cls, kind, what in _LOST if isinstance(component, cls))
+            known = ((kind, what) for cls, kind, what in _LOST_TYPES if isinstance(component, cls))
             kind, what = next(known, ("component", f"a component of class {name}"))
             fidelity.add(kind, path, what, LEFT_OUT, name)
 
@@ -75,23 +75,23 @@ class _Survey:
 
     def run(self) -> None:
         self.fidelity.translated["/"] = f"robot {self.robot.name}"
-        self._gravity()
-        self._links()
-        self._joints()
+        self._record_gravity()
+        self._record_links()
+        self._record_joints()
         for index, info in enumerate(self.robot.mechanism.coordinates):
             result = self.tree.by_path.get(info.path)
             # Those of a joint that OpenSim adds under a loose body stand in no file.
             if isinstance(result, Coordinate):
-                self._coordinate(index, result, info.path)
+                self._record_coordinate(index, result, info.path)
         for link in self.robot.links:
             for kind, shapes in (("visual", link.visuals), ("collision", link.collisions)):
                 for shape in shapes:
                     self.fidelity.translated[shape.source] = f"{kind} of link {link.name}"
-        self._couplers()
-        self._frames()
+        self._record_couplers()
+        self._record_frames()
         account_for_rest(self.tree, self.fidelity)
 
-    def _gravity(self) -> None:
+    def _record_gravity(self) -> None:
         units = f"{self.model.length_units} {self.model.force_units}".lower().split()
         if units not in (["meters", "n"], ["m", "n"]):
             self.note(
@@ -109,7 +109,7 @@ class _Survey:
             f"({x:g}, {y:g}, {z:g}) m/s^2",
         )
 
-    def _links(self) -> None:
+    def _record_links(self) -> None:
         carriers = {body.path: body.mobilizer.joint for body in self.robot.mechanism.bodies}
         for path, (link, _) in self.robot.link_of.items():
             if path not in self.tree.by_path:
@@ -139,7 +139,7 @@ class _Survey:
                     "merged-body", path, "bodies welded together as links of their own", merged
                 )
             elif path != "/ground" and link.name != path.rsplit("/", 1)[1]:
-                self._list_renamed(path, f"link {link.name}")
+                self._record_new_name(path, f"link {link.name}")
             if link.mass == 0.0 and link.name in self._moving_ends:
                 done = "written as it is; PyBullet holds its last joint still"
                 self.note("massless-end", path, "a body without mass at the end of a chain", done)
@@ -159,7 +159,7 @@ class _Survey:
         carriers = {joint.parent for joint in self.robot.joints}
         return {joint.child for joint in self.robot.moving} - carriers
 
-    def _joints(self) -> None:
+    def _record_joints(self) -> None:
         massless = {link.name for link in self.robot.links if not link.bodies}
         for joint in self.tree.components:
             if not isinstance(joint, Joint):
@@ -189,7 +189,7 @@ class _Survey:
                     "rates of the angles",
                 )
 
-    def _coordinate(self, index: int, coordinate: Coordinate, path: str) -> None:
+    def _record_coordinate(self, index: int, coordinate: Coordinate, path: str) -> None:
         unit = (
             "m" if self.robot.mechanism.coordinates[index].motion_type == "translational" else "rad"
         )
@@ -204,8 +204,10 @@ class _Survey:
             f"joint {driven[0].name}" if joint is None else f"joint {joint.name}"
         )
         if joint is not None and joint.name != path.rsplit("/", 1)[1]:
-            self._list_renamed(path, f"joint {joint.name}")
-        self._range(coordinate, path, unit, hard=joint is not None and joint.limits is not None)
+            self._record_new_name(path, f"joint {joint.name}")
+        self._record_range(
+            coordinate, path, unit, hard=joint is not None and joint.limits is not None
+        )
         if coordinate.locked:
             self.note(
                 "locked",
@@ -216,10 +218,10 @@ class _Survey:
         if coordinate.prescribed and coordinate.prescribed_function is not None:
             done = "a joint that moves: drive it in your program"
             self.note("prescribed", path, "that a coordinate follows a function of time", done)
-        self._start(coordinate, path, unit)
-        self._functions(driven, path)
+        self._record_start(coordinate, path, unit)
+        self._record_functions(driven, path)
 
-    def _range(self, coordinate: Coordinate, path: str, unit: str, *, hard: bool) -> None:
+    def _record_range(self, coordinate: Coordinate, path: str, unit: str, *, hard: bool) -> None:
         low, high = coordinate.range
         text = f"{low:g} to {high:g} {unit}"
         self.note(
@@ -232,7 +234,7 @@ class _Survey:
         if coordinate.clamped:
             self.note("clamped", path, "clamped range in user interfaces", "left out", text)
 
-    def _start(self, coordinate: Coordinate, path: str, unit: str) -> None:
+    def _record_start(self, coordinate: Coordinate, path: str, unit: str) -> None:
         if coordinate.default_value != 0.0:
             self.note(
                 "default-pose",
@@ -250,7 +252,7 @@ class _Survey:
                 f"{coordinate.default_speed_value:g} {unit}/s",
             )
 
-    def _functions(self, driven: list[RobotJoint], path: str) -> None:
+    def _record_functions(self, driven: list[RobotJoint], path: str) -> None:
         for part in driven:
             if part.function == IDENTITY:
                 continue
@@ -259,11 +261,13 @@ class _Survey:
                 "coordinate-function",
                 path,
                 "a joint that moves by a function of a coordinate",
-                f"a free joint: {COMPUTE}" if mimic is None else "a joint that mimics another",
+                f"a free joint: {COMPUTE_ADVICE}"
+                if mimic is None
+                else "a joint that mimics another",
                 f"joint {part.name}" + ("" if mimic is None else f" follows {mimic.leader}"),
             )
 
-    def _couplers(self) -> None:
+    def _record_couplers(self) -> None:
         for coupler in couplers(self.robot):
             driven = [
                 part.name for part in self.robot.moving if coupler.dependent in part.coordinates
@@ -277,7 +281,9 @@ class _Survey:
                 "coupler",
                 coupler.name,
                 "a coordinate that is a function of others",
-                f"a free joint: {COMPUTE}" if leader is None else "a joint that mimics another",
+                f"a free joint: {COMPUTE_ADVICE}"
+                if leader is None
+                else "a joint that mimics another",
                 f"coordinate {name}" + ("" if leader is None else f" follows joint {leader}"),
             )
 
@@ -285,7 +291,7 @@ class _Survey:
     def _mimics(self) -> dict[str, Mimic]:
         return mimics(self.robot)
 
-    def _frames(self) -> None:
+    def _record_frames(self) -> None:
         mechanism = self.robot.mechanism
         for frame in self.tree.components:
             path = self.tree.path_of(frame) or ""
@@ -309,5 +315,5 @@ class _Survey:
                 f"in {owner} at ({x:g}, {y:g}, {z:g}) m",
             )
 
-    def _list_renamed(self, path: str, name: str) -> None:
+    def _record_new_name(self, path: str, name: str) -> None:
         self.note("name", path, "the name of a component as it is", "renamed", name)

@@ -21,7 +21,7 @@ from osimlite.mechanics.multibody.extremes import any_numbers
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.model import Model
-from osimlite.translate.sidecar import finite
+from osimlite.translate.sidecar import replace_non_finite
 from osimlite.view.inspect import component_tree, finding_rows, place_pins
 from osimlite.view.kernels import kernels_text, program_data, text_of
 from osimlite.view.motion import Motion, find_moving_bodies, read_activations, values_of
@@ -107,7 +107,7 @@ def page_data(
         for item in mechanism.constraints
         if not isinstance(item, Coupler | Lock | PrescribedCoordinate)
     ]
-    data: dict[str, Any] = finite(
+    data: dict[str, Any] = replace_non_finite(
         {
             "name": model.name,
             "facts": f"{len(mechanism.bodies)} bodies, {len(mechanism.coordinates)} coordinates, "

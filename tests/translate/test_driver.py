@@ -27,7 +27,7 @@ from osimlite import (
     SpringGeneralizedForce,
 )
 from osimlite.errors import OsimliteError, SimulationError
-from osimlite.translate.mjcf.driven import COMPUTED
+from osimlite.translate.mjcf.driven import COMPUTED_NOTE
 from tests.translate.mjcf.support import assert_refused, chain, coupled, on_a_function
 
 SPLINE = SimmSpline(x=(-1.0, 0.0, 0.5, 1.2, 2.0), y=(0.1, 0.3, 0.2, 0.25, 0.4))
@@ -48,7 +48,7 @@ def test_the_walker_walks_as_in_opensim(fixtures):
     np.testing.assert_allclose(
         driver.state()[0], [last[name] for name in names], rtol=0.0, atol=1e-5
     )
-    assert driver.mjcf.fidelity.translated["/forceset/RHipForce"] == COMPUTED
+    assert driver.mjcf.fidelity.translated["/forceset/RHipForce"] == COMPUTED_NOTE
     assert {record.kind for record in driver.mjcf.fidelity} == {"ellipsoid"}
 
 

@@ -46,8 +46,8 @@ from osimlite.simulation.robot.merge_fixed import merge_fixed
 from osimlite.simulation.robot.names import legal_names
 from osimlite.simulation.robot.urdf import urdf_text
 from osimlite.translate import to_urdf
-from osimlite.translate.function_data import as_data
-from osimlite.translate.sidecar import coordinates_json
+from osimlite.translate.function_data import describe_function
+from osimlite.translate.sidecar import format_coordinates
 from tests.mechanics.multibody.strategies import Case, cases
 from tests.simulation.robot.readers import mujoco_poses, worst_body, yourdfpy_poses
 from tests.simulation.robot.support import one_body
@@ -67,7 +67,7 @@ def worst(reader: Reader, mechanism: Mechanism, q) -> float:
 
 
 def sidecar(robot) -> Reader:
-    return Reader(urdf_text(robot), coordinates_json(robot, "robot.urdf"))
+    return Reader(urdf_text(robot), format_coordinates(robot, "robot.urdf"))
 
 
 # --------------------------------------------------------------------------------------------------- whole models
@@ -176,7 +176,7 @@ FUNCTIONS: list[tuple[Function, int]] = [
 
 @pytest.mark.parametrize(("function", "arguments"), FUNCTIONS, ids=lambda item: type(item).__name__)
 def test_every_function_is_written_exactly(function, arguments):
-    data = json.loads(json.dumps(as_data(function)))
+    data = json.loads(json.dumps(describe_function(function)))
     for x in np.random.default_rng(2).uniform(-2.0, 3.0, (200, arguments)):
         assert evaluate(data, x.tolist()) == pytest.approx(
             function.evaluate(x)[0], abs=1e-12, rel=1e-12
@@ -199,12 +199,12 @@ def test_no_function_is_forgotten():
             return 0.0, arguments, np.zeros((1, 1))
 
     with pytest.raises(UnsupportedError, match="class Other"):
-        as_data(Other())
+        describe_function(Other())
 
 
 def test_the_guide_describes_the_file(repo):
     guide = (repo / "docs" / "urdf.md").read_text()
-    types = {as_data(function)["type"] for function, _ in FUNCTIONS}
+    types = {describe_function(function)["type"] for function, _ in FUNCTIONS}
     assert (
         set(re.findall(r"^\| `([a-z-]+)` \| .*", guide.split("| `type` |")[1], re.MULTILINE))
         == types

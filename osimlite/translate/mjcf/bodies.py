@@ -15,13 +15,13 @@ from osimlite.schema.frames import PhysicalFrame
 from osimlite.schema.joints import Joint
 from osimlite.simulation.robot.robot import Link, RobotJoint, breaks_triangle_rule, principal_axes
 from osimlite.translate.fidelity import Error
-from osimlite.translate.mjcf.draft import Draft, add, pose, tidy
-from osimlite.translate.mjcf.scenery import FRAMES
+from osimlite.translate.mjcf.draft import Draft, add_element, clear_rounding, format_pose
+from osimlite.translate.mjcf.scenery import FRAME_GROUP
 
-LEAST_MASS = 1e-14
+MIN_MASS = 1e-14
 """Mass (kg) and principal moments (kg·m²) of a moving body without: MuJoCo wants more than 1e-15."""
 
-MOST_JOINTS = 6
+MAX_JOINTS_PER_BODY = 6
 """That MuJoCo lets one body have."""
 
 
@@ -37,7 +37,7 @@ def add_bodies(draft: Draft) -> None:
             continue
         (path,) = link.bodies
         if path == "/ground":
-            element = draft.section("worldbody")
+            element = draft.get_section("worldbody")
             draft.frames[link.name] = element, np.eye(4)
             draft.fidelity.translated[path] = "worldbody"
         else:
@@ -52,7 +52,7 @@ def add_bodies(draft: Draft) -> None:
                 draft.fidelity.translated[path] = f"body {link.name}"
                 draft.fidelity.note_name(path, "body", path.rpartition("/")[2], link.name)
         draft.bodies[bodies[path]] = element
-    for component, path in draft.components(Joint):
+    for component, path in draft.iterate_components(Joint):
         names = [part.name for part in robot.moving if part.source == path]
         draft.fidelity.translated[path] = f"joints {' '.join(names)}" if names else "welded"
         for frame in component.frames:
@@ -61,10 +61,10 @@ def add_bodies(draft: Draft) -> None:
 
 def add_frames(draft: Draft) -> None:
     """Add a site for every frame that is no body, so that it can be asked for."""
-    for _, path in draft.components(PhysicalFrame):
+    for _, path in draft.iterate_components(PhysicalFrame):
         if path in draft.mechanism.frames:
             draft.fidelity.translated[path] = (
-                f"site {draft.site(path, *draft.mechanism.frames[path], group=FRAMES)}"
+                f"site {draft.add_site(path, *draft.mechanism.frames[path], group=FRAME_GROUP)}"
             )
 
 
@@ -72,15 +72,15 @@ def _add_chain(draft: Draft, chain: list[RobotJoint], name: str) -> _Element:
     """The element of the body at the end of a chain of joints, in the body that carries it."""
     parent, start = draft.frames[chain[0].parent]
     moving = [place for place, joint in enumerate(chain) if joint.kind != "fixed"]
-    if len(moving) > MOST_JOINTS:
-        cut = moving[MOST_JOINTS]
-        carrier = _add_chain(draft, chain[:cut], draft.name("body", f"{name}_carrier"))
-        add(
+    if len(moving) > MAX_JOINTS_PER_BODY:
+        cut = moving[MAX_JOINTS_PER_BODY]
+        carrier = _add_chain(draft, chain[:cut], draft.make_name("body", f"{name}_carrier"))
+        add_element(
             carrier,
             "inertial",
             pos=np.zeros(3),
-            mass=LEAST_MASS,
-            diaginertia=np.full(3, LEAST_MASS),
+            mass=MIN_MASS,
+            diaginertia=np.full(3, MIN_MASS),
         )
         return _add_chain(draft, chain[cut:], name)
     rest = np.eye(4)
@@ -92,17 +92,17 @@ def _add_chain(draft: Draft, chain: list[RobotJoint], name: str) -> _Element:
         if joint.kind != "fixed":
             joints.append((joint, rest[:3, :3].T @ joint.axis, invert_transform(rest)[:3, 3]))
         rest = joint.origin @ rest
-    element = add(parent, "body", name=name, **pose(start @ rest))
+    element = add_element(parent, "body", name=name, **format_pose(start @ rest))
     draft.frames |= {link: (element, placed) for link, placed in ends.items()}
     for joint, axis, anchor in reversed(joints):
-        turns, place = joint.kind == "revolute", tidy(anchor)
+        turns, place = joint.kind == "revolute", clear_rounding(anchor)
         anchored = place if turns and place.any() else None
-        add(
+        add_element(
             element,
             "joint",
             name=joint.name,
             type="hinge" if turns else "slide",
-            axis=tidy(axis),
+            axis=clear_rounding(axis),
             pos=anchored,
         )
     return element
@@ -120,25 +120,32 @@ def _add_inertia(draft: Draft, element: _Element, link: Link, path: str, *, move
             "the least moment raised until it can be (MuJoCo's own option, balanceinertia, would make all three their "
             "mean); set body_inertia of the compiled model for the model's own",
             "moments " + ", ".join(f"{moment:g}" for moment in moments) + " kg m^2",
-            {"moment": Error.of(_possible(moments) - moments, "kg m^2")},
+            {"moment": Error.measure(_repair_moments(moments) - moments, "kg m^2")},
         )
-    moments = _possible(moments)
-    if moves and (mass < LEAST_MASS or moments.min() < LEAST_MASS):
-        if mass < LEAST_MASS:
+    moments = _repair_moments(moments)
+    if moves and (mass < MIN_MASS or moments.min() < MIN_MASS):
+        if mass < MIN_MASS:
             draft.fidelity.add(
                 "massless",
                 path,
                 "a moving body without mass: MuJoCo stops with 'mass and inertia of moving bodies must be larger than "
                 "mjMINVAL'",
-                f"a mass of {LEAST_MASS:g} kg",
+                f"a mass of {MIN_MASS:g} kg",
             )
-        mass, moments = max(mass, LEAST_MASS), np.maximum(moments, LEAST_MASS)
+        mass, moments = max(mass, MIN_MASS), np.maximum(moments, MIN_MASS)
     if mass > 0.0:
-        quat = tidy(quaternion_of(axes))
-        add(element, "inertial", pos=tidy(link.center), quat=quat, mass=mass, diaginertia=moments)
+        quat = clear_rounding(quaternion_of(axes))
+        add_element(
+            element,
+            "inertial",
+            pos=clear_rounding(link.center),
+            quat=quat,
+            mass=mass,
+            diaginertia=moments,
+        )
 
 
-def _possible(moments: Array) -> Array:
+def _repair_moments(moments: Array) -> Array:
     """The moments with the least one raised until none exceeds the sum of the others, in floating point too."""
     raised = moments.copy()
     least, middle, greatest = np.argsort(moments)

@@ -25,11 +25,11 @@ from osimlite.schema.muscles import Muscle
 from osimlite.simulation.paths import Paths
 from osimlite.simulation.robot.names import joint_names
 from osimlite.translate.fidelity import Error
-from osimlite.translate.mjcf.isometric import isometric_tension
+from osimlite.translate.mjcf.isometric import compute_isometric_tension
 from osimlite.translate.mjcf.muscles import Curves
-from osimlite.translate.mjcf.poses import arm_errors, free_coordinates, random_poses
+from osimlite.translate.mjcf.poses import draw_poses, list_free_coordinates, measure_arm_errors
 
-FOLLOWED = 4
+MAX_FOLLOWER_CHAIN = 4
 """So many joints may follow each other in a row."""
 
 
@@ -66,7 +66,7 @@ class Check:
 
     def to_json(self) -> str:
         """All numbers as JSON text."""
-        return format_json(_plain(asdict(self)))
+        return format_json(_convert_to_data(asdict(self)))
 
 
 def check_mjcf(model: Model, file: str | Path, *, poses: int = 50, seed: int = 7) -> Check:
@@ -91,51 +91,53 @@ def check_mjcf(model: Model, file: str | Path, *, poses: int = 50, seed: int = 7
     paths = Paths(model)
     if not paths.names:
         raise ModelError(f"'{model.name}' has no muscles or other paths to compare")
-    theirs = _Compiled(mujoco, compiled, paths)
+    theirs = _MujocoModel(mujoco, compiled, paths)
     owners = {name.rpartition("/")[2]: name for name in paths.names}
-    tendons = {name: place for name in owners if (place := theirs.tendon(name)) is not None}
+    tendons = {name: place for name in owners if (place := theirs.find_tendon(name)) is not None}
     if not tendons:
         raise ModelError(
             f"it has no tendon or actuator with the name of a muscle of the model, such as '{next(iter(owners))}'",
             file=str(file),
         )
-    known, truth = random_poses(paths, poses, seed)
+    known, truth = draw_poses(paths, poses, seed)
     lengths, arms, places = zip(*(theirs.measure_tendons(q) for q in known.q), strict=True)
     result = []
     for name, tendon in tendons.items():
         own = truth[owners[name]]
         off = np.array(lengths)[:, tendon] - own.lengths
-        turned = arm_errors(paths.mechanism, np.array(arms)[:, tendon], own)
+        turned = measure_arm_errors(paths.mechanism, np.array(arms)[:, tendon], own)
         by_coordinate = {theirs.names[place]: error for place, error in turned.items()}
         muscle = model.tree().by_path[owners[name]]
-        more = theirs.strength(name, muscle, own.lengths) if isinstance(muscle, Muscle) else {}
-        result.append(MuscleCheck(name, Error.of(off, "m"), by_coordinate, **more))
+        more = (
+            theirs.measure_strength(name, muscle, own.lengths) if isinstance(muscle, Muscle) else {}
+        )
+        result.append(MuscleCheck(name, Error.measure(off, "m"), by_coordinate, **more))
     return Check(
         tuple(result),
         tuple(name for name in owners if name not in tendons),
         tuple(theirs.names[place] for place in theirs.free if place not in theirs.joints),
-        _apart(theirs, known.origins, places),
+        _compare_bodies(theirs, known.origins, places),
     )
 
 
-def _plain(value: Any) -> Any:
+def _convert_to_data(value: Any) -> Any:
     """The value with names for the numbers of errors, which JSON would have as lists."""
     match value:
         case Error():
             return value._asdict()
         case dict():
-            return {name: _plain(item) for name, item in value.items()}
+            return {name: _convert_to_data(item) for name, item in value.items()}
         case tuple() | list():
-            return [_plain(item) for item in value]
+            return [_convert_to_data(item) for item in value]
     return value
 
 
-class _Compiled:
+class _MujocoModel:
     """A compiled model of MuJoCo's, posed by the coordinates of a model."""
 
     def __init__(self, mujoco: Any, compiled: Any, paths: Paths) -> None:
         self.mujoco, self.model, self.data = mujoco, compiled, mujoco.MjData(compiled)
-        self.names, self.free = joint_names(paths.mechanism), free_coordinates(paths.mechanism)
+        self.names, self.free = joint_names(paths.mechanism), list_free_coordinates(paths.mechanism)
         kinds = mujoco.mjtObj
         joints = (
             (k, mujoco.mj_name2id(compiled, kinds.mjOBJ_JOINT, name))
@@ -151,7 +153,7 @@ class _Compiled:
             if compiled.eq_type[k] == mujoco.mjtEq.mjEQ_JOINT and compiled.eq_active0[k]
         ]
 
-    def tendon(self, name: str) -> int | None:
+    def find_tendon(self, name: str) -> int | None:
         """The tendon of the actuator of a name, or of that name."""
         kinds = self.mujoco.mjtObj
         actuator = self.mujoco.mj_name2id(self.model, kinds.mjOBJ_ACTUATOR, name)
@@ -173,7 +175,7 @@ class _Compiled:
             if place in self.free:
                 rates[self.free.index(place), model.jnt_dofadr[joint]] = 1.0
         # A joint that follows one that follows another is right after as many rounds.
-        for _ in range(FOLLOWED):
+        for _ in range(MAX_FOLLOWER_CHAIN):
             for joint, leader, polynomial in self.followers:
                 place, dof = model.jnt_qposadr[joint], model.jnt_dofadr[joint]
                 value = (
@@ -195,7 +197,7 @@ class _Compiled:
             arms[:, column] = -data.ten_velocity
         return data.ten_length.copy(), arms, data.xpos[list(self.bodies.values())].copy()
 
-    def strength(self, name: str, muscle: Muscle, lengths: Array) -> dict[str, Any]:
+    def measure_strength(self, name: str, muscle: Muscle, lengths: Array) -> dict[str, Any]:
         """The isometric force of a muscle at lengths of its path, and the lengths that it implies."""
         actuator = self.mujoco.mj_name2id(self.model, self.mujoco.mjtObj.mjOBJ_ACTUATOR, name)
         if (
@@ -211,19 +213,19 @@ class _Compiled:
             gain[2] = gain[3] / self.model.actuator_acc0[actuator]
         curves = Curves.read(self.model.actuator_lengthrange[actuator], gain, bias)
         spread = np.sort(lengths)
-        (wanted,) = isometric_tension(muscle, spread, (1.0,))
-        off = (curves.tension(spread, 1.0) - wanted)[
+        (wanted,) = compute_isometric_tension(muscle, spread, (1.0,))
+        off = (curves.compute_tension(spread, 1.0) - wanted)[
             np.isfinite(wanted)
         ] / muscle.max_isometric_force
         along = muscle.optimal_fiber_length * np.cos(muscle.pennation_angle_at_optimal)
         return {
-            "force": Error.of(off, "Fmax") if len(off) else None,
+            "force": Error.measure(off, "Fmax") if len(off) else None,
             "fiber": float(curves.fiber / along),
             "tendon": float(curves.tendon - muscle.tendon_slack_length),
         }
 
 
-def _apart(theirs: _Compiled, origins: Array, places: Sequence[Array]) -> Error | None:
+def _compare_bodies(theirs: _MujocoModel, origins: Array, places: Sequence[Array]) -> Error | None:
     """How far bodies are from each other's places (m), if all of a pose are moved onto the model's as one."""
     if len(theirs.bodies) < 3:
         return None
@@ -234,4 +236,4 @@ def _apart(theirs: _Compiled, origins: Array, places: Sequence[Array]) -> Error 
         left, _, right = np.linalg.svd(a.T @ b)
         flip = np.diag((1.0, 1.0, np.sign(np.linalg.det(left @ right))))
         off.append(np.linalg.norm(a @ left @ flip @ right - b, axis=1))
-    return Error.of(np.concatenate(off), "m")
+    return Error.measure(np.concatenate(off), "m")

@@ -10,8 +10,8 @@ import numpy as np
 
 from osimlite.mechanics.multibody import body_constraints as b
 from osimlite.translate.fidelity import LEFT_OUT
-from osimlite.translate.mjcf.draft import SPECK, Draft, add
-from osimlite.translate.mjcf.frame_forces import straight
+from osimlite.translate.mjcf.draft import SPECK_MASS_KG, Draft, add_element
+from osimlite.translate.mjcf.frame_forces import add_straight_tendon
 
 
 def add_constraints(draft: Draft) -> None:
@@ -28,22 +28,24 @@ def add_constraints(draft: Draft) -> None:
                 draft.fidelity.translated[constraint.name] = make(draft, constraint)
 
 
-def _sites(kind: str, draft: Draft, item: b.WeldConstraint | b.PointConstraint) -> str:
+def _add_site_equality(kind: str, draft: Draft, item: b.WeldConstraint | b.PointConstraint) -> str:
     """Two sites that an equality of a kind keeps together."""
-    name = draft.name("equality", item.name)
-    sites = [draft.site(item.name, *end) for end in (item.first, item.second)]
-    add(draft.section("equality"), kind, name=name, site1=sites[0], site2=sites[1])
+    name = draft.make_name("equality", item.name)
+    sites = [draft.add_site(item.name, *end) for end in (item.first, item.second)]
+    add_element(draft.get_section("equality"), kind, name=name, site1=sites[0], site2=sites[1])
     return f"equality {name}"
 
 
-def _distance(draft: Draft, item: b.DistanceConstraint) -> str:
+def _add_distance(draft: Draft, item: b.DistanceConstraint) -> str:
     """A tendon of constant length; MuJoCo counts from its length where all joints stand at zero."""
-    name = straight(
-        draft, item.name, [draft.site(item.name, *end) for end in (item.first, item.second)]
+    name = add_straight_tendon(
+        draft, item.name, [draft.add_site(item.name, *end) for end in (item.first, item.second)]
     )
-    length = float(np.linalg.norm(draft.at_zero(item.first) - draft.at_zero(item.second)))
-    add(
-        draft.section("equality"),
+    length = float(
+        np.linalg.norm(draft.locate_at_zero(item.first) - draft.locate_at_zero(item.second))
+    )
+    add_element(
+        draft.get_section("equality"),
         "tendon",
         name=name,
         tendon1=name,
@@ -52,13 +54,13 @@ def _distance(draft: Draft, item: b.DistanceConstraint) -> str:
     return f"equality {name}"
 
 
-def _constrain_to_line(draft: Draft, item: b.PointOnLineConstraint) -> str:
+def _add_point_on_line(draft: Draft, item: b.PointOnLineConstraint) -> str:
     """A speck that slides along the line, and is connected to the follower."""
-    name = draft.name("joint", item.name)
+    name = draft.make_name("joint", item.name)
     frame = np.eye(4)
     frame[:3, 3] = item.line.location
-    speck = draft.speck(name, draft.bodies[item.line.body], frame)
-    add(speck, "joint", name=name, type="slide", axis=item.along)
+    speck = draft.add_speck(name, draft.bodies[item.line.body], frame)
+    add_element(speck, "joint", name=name, type="slide", axis=item.along)
     state = draft.mechanism.at(draft.default_state[0])
     arm = state.point(*item.follower) - state.point(*item.line)
     draft.starts[name] = float(arm @ state.transform(item.line.body)[:3, :3] @ item.along)
@@ -66,21 +68,25 @@ def _constrain_to_line(draft: Draft, item: b.PointOnLineConstraint) -> str:
         "constraint",
         item.name,
         "a point that stays on a line",
-        f"connected to a body of {SPECK:g} kg that slides along the line",
+        f"connected to a body of {SPECK_MASS_KG:g} kg that slides along the line",
         f"joint {name}",
     )
-    equality = draft.name("equality", item.name)
-    site = draft.site(item.name, *item.follower)
-    add(speck, "site", name=draft.name("site", f"{item.name}_speck"))
-    add(
-        draft.section("equality"), "connect", name=equality, site1=site, site2=speck[-1].get("name")
+    equality = draft.make_name("equality", item.name)
+    site = draft.add_site(item.name, *item.follower)
+    add_element(speck, "site", name=draft.make_name("site", f"{item.name}_speck"))
+    add_element(
+        draft.get_section("equality"),
+        "connect",
+        name=equality,
+        site1=site,
+        site2=speck[-1].get("name"),
     )
     return f"equality {equality}"
 
 
 _MAKERS: Mapping[type, Callable[[Draft, Any], str]] = {
-    b.WeldConstraint: partial(_sites, "weld"),
-    b.PointConstraint: partial(_sites, "connect"),
-    b.DistanceConstraint: _distance,
-    b.PointOnLineConstraint: _constrain_to_line,
+    b.WeldConstraint: partial(_add_site_equality, "weld"),
+    b.PointConstraint: partial(_add_site_equality, "connect"),
+    b.DistanceConstraint: _add_distance,
+    b.PointOnLineConstraint: _add_point_on_line,
 }

@@ -20,10 +20,10 @@ from osimlite.schema.contact_forces import ElasticFoundationForce, SmoothSphereH
 from osimlite.schema.forces import Force, HuntCrossleyForce
 from osimlite.schema.tree import Use
 from osimlite.simulation.robot.visuals import mesh_shape
-from osimlite.translate.collisions import SLAB
+from osimlite.translate.collisions import HALF_SPACE_BOX_M
 from osimlite.translate.fidelity import LEFT_OUT
-from osimlite.translate.mjcf.draft import Draft, Unsayable, Value, add, pose
-from osimlite.translate.mjcf.scenery import TOUCHES
+from osimlite.translate.mjcf.draft import Draft, Untranslatable, Value, add_element, format_pose
+from osimlite.translate.mjcf.scenery import CONTACT_GROUP
 
 _PLANE = np.array(
     ((0.0, 0.0, -1.0, 0.0), (0.0, 1.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
@@ -35,18 +35,26 @@ ContactForce = HuntCrossleyForce | ElasticFoundationForce | SmoothSphereHalfSpac
 
 def add_contacts(draft: Draft) -> None:
     """Add contact surfaces, and the pairs of them that touch."""
-    surfaces = list(draft.components(ContactGeometry))
+    surfaces = list(draft.iterate_components(ContactGeometry))
     if draft.options.contact == "none" or not surfaces:
         return
-    touches = add(draft.section("default"), "default", class_="touches")
-    add(touches, "geom", contype=0, conaffinity=0, group=TOUCHES, mass=0, rgba=(0.4, 0.7, 0.7, 0.4))
+    touches = add_element(draft.get_section("default"), "default", class_="touches")
+    add_element(
+        touches,
+        "geom",
+        contype=0,
+        conaffinity=0,
+        group=CONTACT_GROUP,
+        mass=0,
+        rgba=(0.4, 0.7, 0.7, 0.4),
+    )
     for geometry, path in surfaces:
         try:
             _add_surface(draft, geometry, path)
-        except (ModelError, Unsayable) as error:
+        except (ModelError, Untranslatable) as error:
             what = f"a {type(geometry).__name__}"
             draft.fidelity.add("contact-geometry", path, what, f"{LEFT_OUT}: {error}")
-    for force, path in draft.components(Force):
+    for force, path in draft.iterate_components(Force):
         if not isinstance(force, ContactForce) or not force.appliesForce:
             continue
         what = f"contact by the law of a {type(force).__name__}"
@@ -60,20 +68,22 @@ def add_contacts(draft: Draft) -> None:
 
 
 def _add_surface(draft: Draft, geometry: ContactGeometry, path: str) -> None:
-    body, placed = draft.placement(geometry, "socket_frame")
-    made = _form(
+    body, placed = draft.find_placement(geometry, "socket_frame")
+    made = _make_geom(
         draft, geometry, path, still=not draft.bodies[body].xpath("ancestor-or-self::body/joint")
     )
     if made is None:
         return
     form, own = made
-    name = draft.name("geom", path)
+    name = draft.make_name("geom", path)
     frame = placed @ make_offset(geometry.location, geometry.orientation) @ own
-    add(draft.bodies[body], "geom", class_="touches", name=name, **form, **pose(frame))
+    add_element(
+        draft.bodies[body], "geom", class_="touches", name=name, **form, **format_pose(frame)
+    )
     draft.fidelity.translated[path] = f"geom {name}"
 
 
-def _form(
+def _make_geom(
     draft: Draft, geometry: ContactGeometry, path: str, *, still: bool
 ) -> tuple[dict[str, Value], Array] | None:
     """The attributes of the geom, and its frame (4, 4) in that of the geometry; None for a mesh without a file."""
@@ -85,11 +95,11 @@ def _form(
         case ContactHalfSpace() if still:
             return {"type": "plane", "size": (0.0, 0.0, 1.0)}, _PLANE
         case ContactHalfSpace():
-            middle = make_offset((SLAB[0] / 2.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-            size = " x ".join(f"{edge:g}" for edge in SLAB)
+            middle = make_offset((HALF_SPACE_BOX_M[0] / 2.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+            size = " x ".join(f"{edge:g}" for edge in HALF_SPACE_BOX_M)
             done = f"a box of {size} m whose face is its surface"
             draft.fidelity.add("contact-geometry", path, "a half space on a body that moves", done)
-            return {"type": "box", "size": [edge / 2.0 for edge in SLAB]}, middle
+            return {"type": "box", "size": [edge / 2.0 for edge in HALF_SPACE_BOX_M]}, middle
         case ContactMesh():
             shape = mesh_shape(geometry.filename, path, draft.mesh_files, draft.fidelity.add)
             if shape is None:
@@ -97,27 +107,27 @@ def _form(
             draft.fidelity.add(
                 "contact-geometry", path, "a contact mesh", "its convex hull", shape.file
             )
-            return {"type": "mesh", "mesh": draft.mesh(shape.file, shape.scale)}, np.eye(4)
-    raise Unsayable("MuJoCo has no such surface")
+            return {"type": "mesh", "mesh": draft.add_mesh(shape.file, shape.scale)}, np.eye(4)
+    raise Untranslatable("MuJoCo has no such surface")
 
 
 def _add_pairs(draft: Draft, force: ContactForce) -> Iterator[str]:
     """Add a pair for any two surfaces of a force that are on different bodies; their names."""
-    for (one, first), (two, second) in combinations(_surfaces(draft, force), 2):
+    for (one, first), (two, second) in combinations(_iterate_surfaces(draft, force), 2):
         became = [
             draft.fidelity.translated.get(draft.tree.path_of(item) or "") for item in (one, two)
         ]
-        bodies = [draft.placement(item, "socket_frame").body for item in (one, two)]
+        bodies = [draft.find_placement(item, "socket_frame").body for item in (one, two)]
         flat = isinstance(one, ContactHalfSpace) and isinstance(two, ContactHalfSpace)
         if flat or bodies[0] == bodies[1] or None in became:
             continue
         geoms = [str(what).removeprefix("geom ") for what in became]
-        name = draft.name("pair", ".".join(geoms))
+        name = draft.make_name("pair", ".".join(geoms))
         # Simbody's rule for two materials.
         slide = 2.0 * first * second / (first + second) if first + second else 0.0
         friction = (slide, slide, 0.0, 0.0, 0.0)
-        add(
-            draft.section("contact"),
+        add_element(
+            draft.get_section("contact"),
             "pair",
             name=name,
             geom1=geoms[0],
@@ -127,7 +137,7 @@ def _add_pairs(draft: Draft, force: ContactForce) -> Iterator[str]:
         yield name
 
 
-def _surfaces(draft: Draft, force: ContactForce) -> Iterator[tuple[ContactGeometry, float]]:
+def _iterate_surfaces(draft: Draft, force: ContactForce) -> Iterator[tuple[ContactGeometry, float]]:
     """The surfaces of a force, with the dynamic friction of each."""
     if isinstance(force, SmoothSphereHalfSpaceForce):
         for socket in ("socket_sphere", "socket_half_space"):

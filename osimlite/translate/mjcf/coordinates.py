@@ -14,7 +14,7 @@ from osimlite.translate.mjcf.draft import Draft, Follower
 
 def add_coordinates(draft: Draft) -> None:
     """Write ranges, which limit nothing, to the joints that are coordinates, and hold prescribed coordinates."""
-    elements = {joint.get("name"): joint for joint in draft.section("worldbody").iter("joint")}
+    elements = {joint.get("name"): joint for joint in draft.get_section("worldbody").iter("joint")}
     note, moving = (
         draft.fidelity.add,
         {place for joint in draft.robot.moving for place in joint.coordinates},
@@ -41,7 +41,7 @@ def add_coordinates(draft: Draft) -> None:
         if info.prescribed is not None and not info.locked and lead is not None:
             start = info.prescribed.evaluate(np.zeros(1))[0]
             exact = Composed(Linear(*lead.line), info.prescribed) if draft.options.driver else None
-            draft.follow(
+            draft.add_follower(
                 lead.joint, Follower(None, (lead.line.slope * start + lead.line.start,), exact)
             )
             if exact is None:

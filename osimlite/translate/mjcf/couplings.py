@@ -22,15 +22,15 @@ from osimlite.simulation.robot.couplings import (
 from osimlite.simulation.robot.names import joint_names
 from osimlite.simulation.robot.robot import RobotJoint
 from osimlite.translate.fidelity import Error
-from osimlite.translate.mjcf.bodies import LEAST_MASS
-from osimlite.translate.mjcf.draft import SPECK, Draft, Follower, Lead, add
+from osimlite.translate.mjcf.bodies import MIN_MASS
+from osimlite.translate.mjcf.draft import SPECK_MASS_KG, Draft, Follower, Lead, add_element
 from osimlite.translate.mjcf.ellipsoids import add_ellipsoids
-from osimlite.translate.mjcf.moving import composition
-from osimlite.translate.mjcf.polynomials import Fit, quartic, sample_function, span
+from osimlite.translate.mjcf.moving import fit_composition
+from osimlite.translate.mjcf.polynomials import Fit, fit_quartic, sample_function, select_span
 
-PULLED = 0.1
+HELPER_INERTIA = 0.1
 """Inertia (kg, kg·m²) of helpers: muscles may pull at them, and the equalities that hold them are soft."""
-SHARE = 0.01
+ARGUMENT_INERTIA_PART = 0.01
 """Inertia of a joint that is nothing but an argument, as a part of that of all it moves.
 
 The less, the nearer is the motion to the model's, but the softer are the equalities that follow the
@@ -55,13 +55,13 @@ def add_couplings(draft: Draft) -> None:
         if joint.name in draft.followers:
             continue
         if driver is None:
-            _hold(draft, joint)
+            _hold_joint(draft, joint)
         elif (
             driver.coordinate is None
             or draft.leads.get(driver.coordinate, (None,))[0] != joint.name
         ):
             whose = by_coupler.get(joint.coordinates[0]) if joint.function == IDENTITY else None
-            _follow(draft, joint, driver, whose or joint.source)
+            _add_follower(draft, joint, driver, whose or joint.source)
     for place, path in by_coupler.items():
         names = " ".join(joint.name for joint in robot.moving if place in joint.coordinates)
         draft.fidelity.translated[path] = (
@@ -73,32 +73,34 @@ def add_couplings(draft: Draft) -> None:
             draft.fidelity.add("coupler", item.name, several, "left out: the coordinate is free")
 
 
-def _follow(draft: Draft, joint: RobotJoint, driver: Driver, whose: str) -> None:
+def _add_follower(draft: Draft, joint: RobotJoint, driver: Driver, whose: str) -> None:
     unit = "rad" if joint.kind == "revolute" else "m"
     if driver.coordinate is None:
-        draft.follow(joint.name, Follower(None, (driver.function.evaluate(np.zeros(1))[0],)))
+        draft.add_follower(joint.name, Follower(None, (driver.function.evaluate(np.zeros(1))[0],)))
         return
     info = draft.mechanism.coordinates[driver.coordinate]
-    lead = draft.leads.get(driver.coordinate) or _argument(draft, driver.coordinate)
+    lead = draft.leads.get(driver.coordinate) or _add_argument_joint(draft, driver.coordinate)
     own, function = lead.line.inverse(), driver.function
-    low, high = span(function, info.range, info.default_value)
+    low, high = select_span(function, info.range, info.default_value)
     first, last = sorted(lead.line.slope * end + lead.line.start for end in (low, high))
     exact = function if own == (1.0, 0.0) else Composed(function, Linear(*own))
-    fit = quartic(exact, (first, last), unit)
+    fit = fit_quartic(exact, (first, last), unit)
     follower, done = Follower(lead.joint, fit.coefficients), "a quartic, fitted"
     # The driver writes what is exact in the place of the quartic, and needs no helper.
     if fit.error is not None and draft.options.spline == "series" and not draft.options.driver:
-        drive, (outer,) = composition([function], (low, high))
-        led = helper(draft, driver.coordinate, drive)
+        drive, (outer,) = fit_composition([function], (low, high))
+        led = add_helper(draft, driver.coordinate, drive)
         assert led is not None
         follower, done = (
-            Follower(led.joint, along(led.line, outer)),
+            Follower(led.joint, compose_with_line(led.line, outer)),
             "a quartic of a quartic, fitted",
         )
         x = np.linspace(low, high, 400)
         fit = Fit(
             (),
-            Error.of(Polynomial(outer)(Polynomial(drive)(x)) - sample_function(function, x), unit),
+            Error.measure(
+                Polynomial(outer)(Polynomial(drive)(x)) - sample_function(function, x), unit
+            ),
         )
     if fit.error is not None and draft.options.driver:
         follower = follower._replace(function=exact)
@@ -111,21 +113,23 @@ def _follow(draft: Draft, joint: RobotJoint, driver: Driver, whose: str) -> None
             f"joint {joint.name} over {info.name} from {low:g} to {high:g}",
             {"value": fit.error},
         )
-    draft.follow(joint.name, follower)
+    draft.add_follower(joint.name, follower)
 
 
-def _argument(draft: Draft, place: int) -> Lead:
+def _add_argument_joint(draft: Draft, place: int) -> Lead:
     """A joint for a coordinate that is nothing but the argument of functions: it turns a speck about its own middle."""
     info = draft.mechanism.coordinates[place]
     name = joint_names(draft.mechanism)[place]
     # The driver moves joints exactly, whatever equalities make of them.
     inertia = (
-        SPECK * SPECK
+        SPECK_MASS_KG * SPECK_MASS_KG
         if draft.options.driver
-        else max(SHARE * _inertia(draft, place), SPECK * SPECK)
+        else max(
+            ARGUMENT_INERTIA_PART * _compute_inertia(draft, place), SPECK_MASS_KG * SPECK_MASS_KG
+        )
     )
-    speck = draft.speck(name, draft.bodies[GROUND], np.eye(4), inertia)
-    add(speck, "joint", name=name, type="hinge", axis="0 0 1")
+    speck = draft.add_speck(name, draft.bodies[GROUND], np.eye(4), inertia)
+    add_element(speck, "joint", name=name, type="hinge", axis="0 0 1")
     draft.fidelity.add(
         "argument",
         info.path,
@@ -137,7 +141,7 @@ def _argument(draft: Draft, place: int) -> Lead:
     return draft.leads[place]
 
 
-def _inertia(draft: Draft, place: int) -> float:
+def _compute_inertia(draft: Draft, place: int) -> float:
     """Of all that a coordinate moves in the default pose, by itself and by couplers (kg·m²)."""
     q = draft.default_state[0]
     rates = np.zeros(len(q))
@@ -149,7 +153,7 @@ def _inertia(draft: Draft, place: int) -> float:
     return float(speeds @ draft.mechanism.mass_matrix(q) @ speeds)
 
 
-def helper(draft: Draft, place: int, drive: Array) -> Lead | None:
+def add_helper(draft: Draft, place: int, drive: Array) -> Lead | None:
     """The joint, and the line of it, that is a polynomial of a coordinate; None if the coordinate is locked.
 
     Args:
@@ -160,11 +164,11 @@ def helper(draft: Draft, place: int, drive: Array) -> Lead | None:
     info = draft.mechanism.coordinates[place]
     if info.locked:
         return None
-    lead = draft.leads.get(place) or _argument(draft, place)
+    lead = draft.leads.get(place) or _add_argument_joint(draft, place)
     own = lead.line.inverse()
     if np.array_equal(drive, (0.0, 1.0, 0.0, 0.0, 0.0)):
         return Lead(lead.joint, own)
-    follower = Follower(lead.joint, along(own, drive))
+    follower = Follower(lead.joint, compose_with_line(own, drive))
     name = next(
         (
             name
@@ -174,22 +178,28 @@ def helper(draft: Draft, place: int, drive: Array) -> Lead | None:
         None,
     )
     if name is None:
-        name = draft.name("joint", f"{info.name}_helper")
+        name = draft.make_name("joint", f"{info.name}_helper")
         draft.helpers.add(name)
-        speck = add(draft.bodies[GROUND], "body", name=draft.name("body", name))
-        add(speck, "inertial", pos=np.zeros(3), mass=LEAST_MASS, diaginertia=np.full(3, PULLED))
-        add(speck, "joint", name=name, type="hinge", axis=(1.0, 0.0, 0.0))
-        draft.follow(name, follower)
+        speck = add_element(draft.bodies[GROUND], "body", name=draft.make_name("body", name))
+        add_element(
+            speck,
+            "inertial",
+            pos=np.zeros(3),
+            mass=MIN_MASS,
+            diaginertia=np.full(3, HELPER_INERTIA),
+        )
+        add_element(speck, "joint", name=name, type="hinge", axis=(1.0, 0.0, 0.0))
+        draft.add_follower(name, follower)
     return Lead(name, Line(1.0, 0.0))
 
 
-def along(line: Line, polynomial: Array) -> tuple[float, ...]:
+def compose_with_line(line: Line, polynomial: Array) -> tuple[float, ...]:
     """The polynomial of a line, in powers of what the line is of."""
     whole: Any = Polynomial(polynomial)(Polynomial((line.start, line.slope)))
     return tuple(whole.coef.tolist())
 
 
-def _hold(draft: Draft, joint: RobotJoint) -> None:
+def _hold_joint(draft: Draft, joint: RobotJoint) -> None:
     """Hold a joint that is a function of several coordinates where the default pose has it, but for the driver."""
     value = joint.value(draft.default_state[0])
     leads = [
@@ -199,9 +209,9 @@ def _hold(draft: Draft, joint: RobotJoint) -> None:
     ]
     if draft.options.driver and len(leads) == len(joint.coordinates):
         names = tuple(lead.joint for lead in leads)
-        draft.follow(joint.name, Follower(None, (value,), joint.function, names))
+        draft.add_follower(joint.name, Follower(None, (value,), joint.function, names))
         return
-    draft.follow(joint.name, Follower(None, (value,)))
+    draft.add_follower(joint.name, Follower(None, (value,)))
     places, random = list(joint.coordinates), np.random.default_rng(0)
     low, high = np.array([draft.mechanism.coordinates[place].range for place in places]).T
     off = [joint.function.evaluate(random.uniform(low, high))[0] - value for _ in range(500)]
@@ -212,5 +222,5 @@ def _hold(draft: Draft, joint: RobotJoint) -> None:
         "a joint that is a function of several coordinates",
         "held where it is in the default pose",
         f"joint {joint.name}",
-        {"value": Error.of(off, unit)},
+        {"value": Error.measure(off, unit)},
     )

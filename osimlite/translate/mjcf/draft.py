@@ -38,7 +38,7 @@ Spline = Literal["quartic", "series"]
 Value = str | bool | int | float | Sequence[float] | Array | None
 C = TypeVar("C", bound=Component)
 
-SPECK = 1e-3
+SPECK_MASS_KG = 1e-3
 """Mass (kg) of a body that is there for a constraint alone.
 
 MuJoCo makes a constraint the softer, the lighter the lighter one of its bodies; this is a
@@ -46,7 +46,7 @@ compromise.
 """
 
 
-class Unsayable(Exception):
+class Untranslatable(Exception):
     """Why a component is left out."""
 
 
@@ -86,7 +86,7 @@ class Follower(NamedTuple):
     arguments: tuple[str, ...] = ()
 
 
-class Tied(NamedTuple):
+class PathTendon(NamedTuple):
     """The tendon of a path, and its length (m) in the default pose, in random poses (P,), in others held out (R,)."""
 
     name: str
@@ -95,21 +95,25 @@ class Tied(NamedTuple):
     held_out: Array
 
 
-NOT_FINITE = frozenset(("NaN", "Inf", "-Inf"))
+NON_FINITE_WORDS = frozenset(("NaN", "Inf", "-Inf"))
 """How a number is printed that is none."""
 
 
-def add(parent: _Element, tag: str, **attributes: Value) -> _Element:
+def add_element(parent: _Element, tag: str, **attributes: Value) -> _Element:
     """Add an element; attributes that are None are left out, and ``class_`` stands for ``class``.
 
     Raises:
         UnsupportedError: a number is not finite, which MJCF cannot say.
     """
     said = {
-        name.rstrip("_"): text(value) for name, value in attributes.items() if value is not None
+        name.rstrip("_"): format_value(value)
+        for name, value in attributes.items()
+        if value is not None
     }
     for name, words in said.items():
-        if NOT_FINITE.intersection(words.split()) and not isinstance(attributes.get(name), str):
+        if NON_FINITE_WORDS.intersection(words.split()) and not isinstance(
+            attributes.get(name), str
+        ):
             raise UnsupportedError(
                 f"MJCF cannot say a number that is not finite: {name} of the {tag} '{said.get('name', '')}' is {words}"
             )
@@ -142,7 +146,7 @@ class Draft:
     # those of them that move nothing, but are what others follow
     helpers: set[str] = field(default_factory=set)
     # of paths, by the absolute path of their owners
-    tendons: dict[str, Tied] = field(default_factory=dict)
+    tendons: dict[str, PathTendon] = field(default_factory=dict)
     activations: dict[str, float] = field(
         default_factory=dict
     )  # at the start, of the actuators that have one, by name
@@ -188,7 +192,7 @@ class Draft:
             )
             return self.mechanism.values({}), self.mechanism.speeds({})
 
-    def components(self, kind: type[C]) -> Iterator[tuple[C, str]]:
+    def iterate_components(self, kind: type[C]) -> Iterator[tuple[C, str]]:
         """Components of a class that no pass has spoken of yet, with their absolute paths."""
         spoken_of = self.fidelity.translated.keys() | {
             record.component for record in self.fidelity.records
@@ -200,18 +204,18 @@ class Draft:
             ):
                 yield component, path
 
-    def account(self, path: str, became: str) -> None:
+    def record_result(self, path: str, became: str) -> None:
         """Say what a component and all below it became, but for what is spoken of already."""
         for each in self.tree.by_path:
             if each == path or each.startswith(f"{path}/"):
                 self.fidelity.translated.setdefault(each, became)
 
-    def section(self, tag: str) -> _Element:
+    def get_section(self, tag: str) -> _Element:
         """The part of the file with this tag: ``tendon``, ``actuator``, ``equality`` ..."""
         result = self.root.find(tag)
-        return add(self.root, tag) if result is None else result
+        return add_element(self.root, tag) if result is None else result
 
-    def name(self, kind: str, path: str) -> str:
+    def make_name(self, kind: str, path: str) -> str:
         """A name for a component, unlike any other of this kind: its own, or its path with dots where that is taken.
 
         Args:
@@ -230,7 +234,7 @@ class Draft:
             self.fidelity.note_name(path, kind, own, name)
         return name
 
-    def placement(self, owner: Component, socket: str) -> FramePlacement:
+    def find_placement(self, owner: Component, socket: str) -> FramePlacement:
         """The frame that a socket of a component names: index of its body, and transform (4, 4) in that.
 
         Raises:
@@ -244,7 +248,7 @@ class Draft:
             raise ModelError(f"the frame '{path}' is not fixed to a body")
         return self.mechanism.frames[path]
 
-    def site(self, path: str, body: int, place: Array, **attributes: Value) -> str:
+    def add_site(self, path: str, body: int, place: Array, **attributes: Value) -> str:
         """Add a site to a body (-1: ground).
 
         Args:
@@ -256,29 +260,29 @@ class Draft:
         Returns:
             Its name.
         """
-        name = self.name("site", path)
-        frame = pose(place) if place.shape == (4, 4) else {"pos": tidy(place)}
-        add(self.bodies[body], "site", name=name, **frame, **attributes)
+        name = self.make_name("site", path)
+        frame = format_pose(place) if place.shape == (4, 4) else {"pos": clear_rounding(place)}
+        add_element(self.bodies[body], "site", name=name, **frame, **attributes)
         return name
 
-    def find_tendon(self, path: str) -> Tied:
+    def find_tendon(self, path: str) -> PathTendon:
         """The tendon of the path of a force.
 
         Raises:
             Unsayable: it became none.
         """
         if path not in self.tendons:
-            raise Unsayable("its path is no tendon")
+            raise Untranslatable("its path is no tendon")
         return self.tendons[path]
 
-    def follow(self, joint: str, follower: Follower) -> None:
+    def add_follower(self, joint: str, follower: Follower) -> None:
         """Let a joint follow another, or keep it at a value."""
         self.followers[joint] = follower
         coefficients = np.zeros(5)
         coefficients[: len(follower.polynomial)] = follower.polynomial
-        name = self.name("equality", joint)
-        add(
-            self.section("equality"),
+        name = self.make_name("equality", joint)
+        add_element(
+            self.get_section("equality"),
             "joint",
             name=name,
             joint1=joint,
@@ -286,32 +290,42 @@ class Draft:
             polycoef=coefficients,
         )
 
-    def speck(
-        self, name: str, element: _Element, frame: Array, inertia: float = SPECK * SPECK
+    def add_speck(
+        self,
+        name: str,
+        element: _Element,
+        frame: Array,
+        inertia: float = SPECK_MASS_KG * SPECK_MASS_KG,
     ) -> _Element:
         """Add a small body, which nothing weighs down, at a frame (4, 4) in an element; `inertia` is in kg·m²."""
-        speck = add(
-            element, "body", name=self.name("body", f"{name}_speck"), gravcomp=1, **pose(frame)
+        speck = add_element(
+            element,
+            "body",
+            name=self.make_name("body", f"{name}_speck"),
+            gravcomp=1,
+            **format_pose(frame),
         )
-        add(speck, "inertial", pos=np.zeros(3), mass=SPECK, diaginertia=np.full(3, inertia))
+        add_element(
+            speck, "inertial", pos=np.zeros(3), mass=SPECK_MASS_KG, diaginertia=np.full(3, inertia)
+        )
         return speck
 
-    def at_zero(self, station: StationPlacement) -> Array:
+    def locate_at_zero(self, station: StationPlacement) -> Array:
         """Where a station is in ground (3,) when all joints stand at zero, as MuJoCo has it before a pose is set."""
         body, location = station
         link, _ = self.robot.link_of[
             "/ground" if body == GROUND else self.mechanism.bodies[body].path
         ]
-        return self._at_zero[link.name][:3] @ np.append(location, 1.0)
+        return self._transforms_at_zero[link.name][:3] @ np.append(location, 1.0)
 
     @cached_property
-    def _at_zero(self) -> dict[str, Array]:
+    def _transforms_at_zero(self) -> dict[str, Array]:
         placed = {self.robot.links[0].name: np.eye(4)}
         for joint in self.robot.joints:
             placed[joint.child] = placed[joint.parent] @ joint.across(0.0)
         return placed
 
-    def mesh(self, file: str, scale: tuple[float, float, float]) -> str:
+    def add_mesh(self, file: str, scale: tuple[float, float, float]) -> str:
         """The asset that is a mesh file at a scale.
 
         Its inertia is said to be that of its surface: MuJoCo refuses bones whose surface does not
@@ -319,35 +333,37 @@ class Draft:
         """
         key = (file, scale)
         if key not in self._meshes:
-            name = self._meshes[key] = self.name("mesh", Path(file).stem)
+            name = self._meshes[key] = self.make_name("mesh", Path(file).stem)
             size = None if scale == (1.0, 1.0, 1.0) else scale
-            add(self.section("asset"), "mesh", name=name, file=file, scale=size, inertia="shell")
+            add_element(
+                self.get_section("asset"), "mesh", name=name, file=file, scale=size, inertia="shell"
+            )
         return self._meshes[key]
 
-    def links(self) -> Iterator[tuple[Link, _Element]]:
+    def iterate_links(self) -> Iterator[tuple[Link, _Element]]:
         """Links that are bodies (or ground), with their elements."""
         for index, path in enumerate(
             ["/ground", *(body.path for body in self.mechanism.bodies)], GROUND
         ):
             yield self.robot.link_of[path][0], self.bodies[index]
 
-    def body_name(self, body: int) -> str:
+    def get_body_name(self, body: int) -> str:
         """Name of the element of a body (-1: ground)."""
         return "world" if body == GROUND else self.bodies[body].get("name", "")
 
 
-def pose(matrix: Array) -> dict[str, Value]:
+def format_pose(matrix: Array) -> dict[str, Value]:
     """The attributes that place a frame (4, 4) in that of its parent; None where it is not moved, or not turned."""
-    place, turned = tidy(matrix[:3, 3]), tidy(quaternion_of(matrix[:3, :3]))
+    place, turned = clear_rounding(matrix[:3, 3]), clear_rounding(quaternion_of(matrix[:3, :3]))
     return {"pos": place if place.any() else None, "quat": turned if turned[1:].any() else None}
 
 
-def tidy(values: Array) -> Array:
+def clear_rounding(values: Array) -> Array:
     """The numbers with zeros for those that are zero but for rounding, which nobody wants to read."""
     return np.where(np.abs(values) < 1e-16, 0.0, values)
 
 
-def text(value: str | bool | int | float | Sequence[float] | Array) -> str:
+def format_value(value: str | bool | int | float | Sequence[float] | Array) -> str:
     """An attribute as MuJoCo reads it; numbers in the shortest form that reads back equal."""
     match value:
         case str():

@@ -8,12 +8,12 @@ from osimlite.schema.sets import Controller
 from osimlite.schema.wrapping import WrapObject
 from osimlite.simulation.elements import force_elements
 from osimlite.translate.fidelity import LEFT_OUT
-from osimlite.translate.mjcf.draft import Draft, add
+from osimlite.translate.mjcf.draft import Draft, add_element
 
-STATES = "osimlite.states"
+STATES_ACTUATOR = "osimlite.states"
 """Name of the actuator whose activations are the auxiliary states of all forces."""
 
-COMPUTED = "computed by osimlite.mjcf.Driver"
+COMPUTED_NOTE = "computed by osimlite.mjcf.Driver"
 
 
 def add_driven(draft: Draft) -> None:
@@ -30,19 +30,28 @@ def add_driven(draft: Draft) -> None:
             f"{LEFT_OUT}: osimlite cannot compute it",
         )
     for element in forces.elements:
-        draft.account(element.path, COMPUTED)
-    for component, path in draft.components(ModelComponent):
+        draft.record_result(element.path, COMPUTED_NOTE)
+    for component, path in draft.iterate_components(ModelComponent):
         if isinstance(component, ContactGeometry | WrapObject | Controller):
-            draft.account(path, COMPUTED)
-    joint = draft.section("worldbody").find(".//joint")
+            draft.record_result(path, COMPUTED_NOTE)
+    joint = draft.get_section("worldbody").find(".//joint")
     if joint is None:
         return
     states, idle = (
-        draft.name("actuator", STATES),
+        draft.make_name("actuator", STATES_ACTUATOR),
         {"joint": joint.get("name"), "gainprm": 0, "gear": 0},
     )
     for path in forces.controls.names:
-        add(draft.section("actuator"), "general", name=draft.name("actuator", path), **idle)
+        add_element(
+            draft.get_section("actuator"), "general", name=draft.make_name("actuator", path), **idle
+        )
     count = sum(len(element.states) for element in forces.elements)
     if count:
-        add(draft.section("actuator"), "general", name=states, dyntype="user", actdim=count, **idle)
+        add_element(
+            draft.get_section("actuator"),
+            "general",
+            name=states,
+            dyntype="user",
+            actdim=count,
+            **idle,
+        )

@@ -31,13 +31,13 @@ from osimlite.simulation.robot.couplings import coordinate_drivers
 from osimlite.simulation.robot.robot import principal_axes
 from osimlite.simulation.system import System
 from osimlite.translate.mjcf.draft import Version
-from osimlite.translate.mjcf.driven import STATES
+from osimlite.translate.mjcf.driven import STATES_ACTUATOR
 from osimlite.translate.mjcf.export import to_mjcf
 
 Integrator = Literal["Euler", "RK4", "implicit", "implicitfast"]
 
 
-class _Followed(NamedTuple):
+class _FollowerJoint(NamedTuple):
     """A joint that follows others, or time: its equality, address and dof, addresses and dofs of what it follows."""
 
     equality: int
@@ -48,7 +48,7 @@ class _Followed(NamedTuple):
     function: Function
     fitted: bool
 
-    def at(self, data: Any) -> tuple[float, Array, float, float]:
+    def evaluate(self, data: Any) -> tuple[float, Array, float, float]:
         """Where the function has the joint, its gradient, its rate, and what its curvature adds to the acceleration."""
         x, rates = (
             (data.qpos[self.addresses], data.qvel[self.leaders])
@@ -118,7 +118,7 @@ class Driver:
         forces = force_elements(model, mechanism, skip_unsupported=True, folder=folder)
         self.system = System(mechanism, forces)
         self._equilibrate = equilibrate
-        self._open_controls()
+        self._add_controls()
         self._places = np.array(sorted(self.mjcf.leads), dtype=int)
         leads = [self.mjcf.leads[place] for place in self._places]
         joints = [self.model.joint(lead.joint) for lead in leads]
@@ -129,7 +129,7 @@ class Driver:
         self._following = {
             k: each for k, each in coordinate_drivers(self.mjcf.robot).items() if k not in led
         }
-        self._followed = [self._list_followers(name) for name in self.mjcf.followers]
+        self._followed = [self._make_follower(name) for name in self.mjcf.followers]
         self._free = np.setdiff1d(
             np.arange(self.model.nv), [followed.dof for followed in self._followed]
         )
@@ -156,13 +156,13 @@ class Driver:
         Raises:
             SimulationError: a force has no value in it.
         """
-        self._follow()
+        self._update_equalities()
         with self._call_back():
             self._mujoco.mj_forward(self.model, self.data)
 
     def state(self) -> tuple[Array, Array, Array]:
         """Values (n,) and generalized speeds (n,) of the coordinates, and the auxiliary states of the forces (z,)."""
-        return (*self._coordinates(self.data)[:2], np.array(self.data.act))
+        return (*self._read_coordinates(self.data)[:2], np.array(self.data.act))
 
     def set_state(self, q: Values, u: Values) -> None:
         """Put all joints where values and generalized speeds of the coordinates have them."""
@@ -184,7 +184,7 @@ class Driver:
         with self._call_back():
             for _ in range(count):
                 self._mujoco.mj_step(self.model, self.data)
-                self._follow()
+                self._update_equalities()
 
     # ---------------------------------------------------------------------------------------------- callbacks
     @contextmanager
@@ -195,10 +195,10 @@ class Driver:
         def push(model: Any, data: Any) -> None:
             if before[0] is not None:
                 before[0](model, data)
-            self._push(data)
+            self._apply_forces(data)
 
         mujoco.set_mjcb_control(push)
-        mujoco.set_mjcb_act_dyn(self._change)
+        mujoco.set_mjcb_act_dyn(self._compute_activation_rates)
         try:
             yield
         finally:
@@ -208,12 +208,12 @@ class Driver:
             failure, self._failure = self._failure, None
             raise failure
 
-    def _push(self, data: Any) -> None:
+    def _apply_forces(self, data: Any) -> None:
         """Add the generalized forces of the model's laws to the passive ones."""
         if self._failure is not None or not self.model.nv:
             return
         try:
-            q, u, slopes = self._coordinates(data)
+            q, u, slopes = self._read_coordinates(data)
             state = self.system.state
             if len(self._controls):
                 self.system.numbers[self._controls] = data.ctrl[: len(self._controls)]
@@ -233,9 +233,9 @@ class Driver:
         for place, (leader, slope) in slopes.items():
             forces[leader] += slope * forces[place]
         data.qfrc_passive[self._dofs] += forces[self._places] / self._slopes
-        self._hold(data)
+        self._apply_equality_forces(data)
 
-    def _hold(self, data: Any) -> None:
+    def _apply_equality_forces(self, data: Any) -> None:
         """Add the forces of all equalities, with which joints accelerate as those that they follow.
 
         MuJoCo's own leave a ten-thousandth of the difference. With these forces, and told what the
@@ -247,7 +247,7 @@ class Driver:
         # Accelerations are moves @ those of the other joints + wanted.
         moves, wanted = np.eye(self.model.nv), np.zeros(self.model.nv)
         for followed in self._followed:
-            _, gradient, _, wanted[followed.dof] = followed.at(data)
+            _, gradient, _, wanted[followed.dof] = followed.evaluate(data)
             moves[followed.dof, followed.dof] = 0.0
             if followed.leaders:
                 moves[followed.dof, followed.leaders] = gradient
@@ -283,7 +283,7 @@ class Driver:
         self._mujoco.mj_mulM(self.model, data, forces, accelerations)
         return forces
 
-    def _change(self, _: Any, data: Any, actuator: int) -> float:
+    def _compute_activation_rates(self, _: Any, data: Any, actuator: int) -> float:
         """Rates of the auxiliary states, which `_push` has computed at the same evaluation."""
         if len(self._rates) == 1:
             return self._rates[0]
@@ -291,7 +291,7 @@ class Driver:
             data.act_dot[:] = self._rates
         return 0.0
 
-    def _coordinates(self, data: Any) -> tuple[Array, Array, dict[int, tuple[int, float]]]:
+    def _read_coordinates(self, data: Any) -> tuple[Array, Array, dict[int, tuple[int, float]]]:
         """Values, speeds, and for coordinates without a joint the one that leads them and how fast."""
         q, rates = self._mechanism.values({}), np.zeros(len(self._mechanism.coordinates))
         q[self._places] = (data.qpos[self._qpos] - self._starts) / self._slopes
@@ -305,11 +305,11 @@ class Driver:
         return q, self._mechanism.speeds_from_rates(q, rates) if self._turns else rates, slopes
 
     # ----------------------------------------------------------------------------------------------- equalities
-    def _follow(self) -> None:
+    def _update_equalities(self) -> None:
         """Put joints where they must follow others, and write value, slope and curvature into the equalities."""
         for followed in self._followed:
             if followed.fitted:
-                value, gradient, rate, _ = followed.at(self.data)
+                value, gradient, rate, _ = followed.evaluate(self.data)
                 self.data.qpos[followed.own], self.data.qvel[followed.dof] = value, rate
                 polynomial = np.zeros(5)
                 polynomial[0] = value
@@ -328,11 +328,11 @@ class Driver:
                 self.model.body(link.name).inertia[:] = principal_axes(link.inertia)[0]
         self._mujoco.mj_setConst(self.model, self.data)
 
-    def _list_followers(self, name: str) -> _Followed:
+    def _make_follower(self, name: str) -> _FollowerJoint:
         follower, own = self.mjcf.followers[name], self.model.joint(name)
         names = follower.arguments or (() if follower.leader is None else (follower.leader,))
         leaders = [self.model.joint(each) for each in names]
-        return _Followed(
+        return _FollowerJoint(
             self.model.equality(name).id,
             own.qposadr[0],
             own.dofadr[0],
@@ -342,7 +342,7 @@ class Driver:
             follower.function is not None,
         )
 
-    def _open_controls(self) -> None:
+    def _add_controls(self) -> None:
         """Add MuJoCo's controls to those of the model: numbers, whose places among those of the forces are found."""
         controls = self.system.forces.controls
         none, one = (
@@ -356,4 +356,4 @@ class Driver:
             np.array(none.make_record()[1]) != np.array(one.make_record()[1])
         )
         names = [self.model.actuator(k).name for k in range(self.model.nu)]
-        self._states = names.index(STATES) if STATES in names else -1
+        self._states = names.index(STATES_ACTUATOR) if STATES_ACTUATOR in names else -1

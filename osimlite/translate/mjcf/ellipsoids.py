@@ -13,7 +13,7 @@ import numpy as np
 
 from osimlite.mechanics.multibody.motions import EllipsoidPoint
 from osimlite.simulation.robot.robot import RobotJoint
-from osimlite.translate.mjcf.draft import SPECK, Draft, Follower, add, pose
+from osimlite.translate.mjcf.draft import SPECK_MASS_KG, Draft, Follower, add_element, format_pose
 
 
 def add_ellipsoids(draft: Draft) -> None:
@@ -24,10 +24,12 @@ def add_ellipsoids(draft: Draft) -> None:
     ]
     for _, group in groupby(slides, key=lambda place: joints[place].source):
         places = list(group)
-        _add(draft, [joints[place] for place in places], joints[places[-1] + 1 : places[-1] + 4])
+        _add_mechanism(
+            draft, [joints[place] for place in places], joints[places[-1] + 1 : places[-1] + 4]
+        )
 
 
-def _add(draft: Draft, slides: list[RobotJoint], turns: tuple[RobotJoint, ...]) -> None:
+def _add_mechanism(draft: Draft, slides: list[RobotJoint], turns: tuple[RobotJoint, ...]) -> None:
     radii = {}
     for joint in slides:
         assert isinstance(joint.function, EllipsoidPoint)
@@ -43,31 +45,33 @@ def _add(draft: Draft, slides: list[RobotJoint], turns: tuple[RobotJoint, ...]) 
         return
     ahead = max(radii.values())
     path = slides[0].source
-    name = draft.name("ellipsoid", path)
+    name = draft.make_name("ellipsoid", path)
     element, frame = base
-    speck = draft.speck(name, element, frame @ slides[0].origin)
+    speck = draft.add_speck(name, element, frame @ slides[0].origin)
     state = draft.default_state[0]
     for component, axis in enumerate(np.eye(3)):
-        reader = draft.name("joint", f"{name}_{'xyz'[component]}")
-        add(speck, "joint", name=reader, type="slide", axis=axis)
+        reader = draft.make_name("joint", f"{name}_{'xyz'[component]}")
+        add_element(speck, "joint", name=reader, type="slide", axis=axis)
         radius = radii.get(component, 0.0)
         normal = EllipsoidPoint(component, 1.0).evaluate(state[list(slides[0].coordinates)])[0]
         draft.starts[reader] = (radius + ahead) * normal
         for slide in slides:
             if slide.function == EllipsoidPoint(component, radius):
-                draft.follow(slide.name, Follower(reader, (0.0, radius / (radius + ahead))))
+                draft.add_follower(slide.name, Follower(reader, (0.0, radius / (radius + ahead))))
     element, frame = end
     point = frame.copy()
     point[:3, 3] += ahead * frame[:3, 2]
-    sites = [draft.name("site", f"{name}_{word}") for word in ("ahead", "speck")]
-    add(element, "site", name=sites[0], **pose(point))
-    add(speck, "site", name=sites[1])
-    equality = draft.name("equality", path)
-    add(draft.section("equality"), "connect", name=equality, site1=sites[0], site2=sites[1])
+    sites = [draft.make_name("site", f"{name}_{word}") for word in ("ahead", "speck")]
+    add_element(element, "site", name=sites[0], **format_pose(point))
+    add_element(speck, "site", name=sites[1])
+    equality = draft.make_name("equality", path)
+    add_element(
+        draft.get_section("equality"), "connect", name=equality, site1=sites[0], site2=sites[1]
+    )
     draft.fidelity.add(
         "ellipsoid",
         path,
         "a body that stays on an ellipsoid",
-        f"slides that follow a body of {SPECK:g} kg, which is connected to a point ahead of the body",
+        f"slides that follow a body of {SPECK_MASS_KG:g} kg, which is connected to a point ahead of the body",
         f"equality {equality}",
     )

@@ -38,21 +38,21 @@ from osimlite.translate.mjcf.draft import (
     Options,
     Spline,
     Version,
-    add,
+    add_element,
 )
 from osimlite.translate.mjcf.driven import add_driven
 from osimlite.translate.mjcf.forces import add_forces
 from osimlite.translate.mjcf.keyframe import add_keyframe
 from osimlite.translate.mjcf.paths import add_paths
 from osimlite.translate.mjcf.scenery import add_camera, add_markers, add_shapes
-from osimlite.translate.mjcf.time_step import STEP, choose_step
+from osimlite.translate.mjcf.time_step import DEFAULT_STEP_S, choose_step
 from osimlite.translate.survey import account_for_rest
 
 Pass = Callable[[Draft], None]
 
-MECHANISM: tuple[Pass, ...] = (add_bodies, add_couplings, add_coordinates, add_constraints)
-LAWS: tuple[Pass, ...] = (add_contacts, add_paths, add_forces, choose_step)
-LOOKS: tuple[Pass, ...] = (add_shapes, add_camera, add_markers, add_frames, add_keyframe)
+MECHANISM_PASSES: tuple[Pass, ...] = (add_bodies, add_couplings, add_coordinates, add_constraints)
+FORCE_PASSES: tuple[Pass, ...] = (add_contacts, add_paths, add_forces, choose_step)
+SCENERY_PASSES: tuple[Pass, ...] = (add_shapes, add_camera, add_markers, add_frames, add_keyframe)
 """What makes a file of a model, in this order: bodies and joints come before what acts on them or is fixed to them."""
 
 
@@ -177,7 +177,7 @@ def to_mjcf(
     )
     _add_settings(draft)
     fidelity.translated["/"] = f"mujoco {mechanism.name}"
-    for make in (*MECHANISM, *((add_driven,) if driver else LAWS), *LOOKS):
+    for make in (*MECHANISM_PASSES, *((add_driven,) if driver else FORCE_PASSES), *SCENERY_PASSES):
         make(draft)
     account_for_rest(draft.tree, fidelity)
     for section in list(draft.root):
@@ -201,7 +201,7 @@ def _add_settings(draft: Draft) -> None:
     root = draft.root
     root.set("model", xml_name(draft.mechanism.name))
     root.append(Comment(f" Written by osimlite {__version__} for MuJoCo {draft.options.version}. "))
-    add(
+    add_element(
         root,
         "compiler",
         angle="radian",
@@ -209,10 +209,21 @@ def _add_settings(draft: Draft) -> None:
         inertiafromgeom=False,
         balanceinertia=False,
     )
-    add(root, "option", timestep=STEP, gravity=draft.mechanism.gravity, integrator="implicitfast")
+    add_element(
+        root,
+        "option",
+        timestep=DEFAULT_STEP_S,
+        gravity=draft.mechanism.gravity,
+        integrator="implicitfast",
+    )
     # Two steps is the quickest that MuJoCo lets a constraint be; the nearer to 1 the impedance, the
     # less it gives way.
-    add(add(root, "default"), "equality", solref="0.002 1", solimp="0.9999 0.9999 0.001 0.5 2")
+    add_element(
+        add_element(root, "default"),
+        "equality",
+        solref="0.002 1",
+        solimp="0.9999 0.9999 0.001 0.5 2",
+    )
     # The sections in the order in which they are best read.
     for tag in ("asset", "worldbody", "contact", "equality", "tendon", "actuator", "keyframe"):
-        draft.section(tag)
+        draft.get_section(tag)

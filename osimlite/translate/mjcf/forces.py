@@ -13,24 +13,24 @@ from osimlite.translate.fidelity import LEFT_OUT
 from osimlite.translate.mjcf import coordinate_forces as on_coordinates
 from osimlite.translate.mjcf import frame_forces as on_frames
 from osimlite.translate.mjcf import path_forces as on_paths
-from osimlite.translate.mjcf.draft import Draft, Unsayable
-from osimlite.translate.mjcf.muscles import muscle
+from osimlite.translate.mjcf.draft import Draft, Untranslatable
+from osimlite.translate.mjcf.muscles import add_muscle
 
 MAKERS: Mapping[str, Callable[[Draft, Any, str], str]] = {
-    "CoordinateActuator": on_coordinates.actuator,
-    "ActivationCoordinateActuator": on_coordinates.lagging_actuator,
-    "SpringGeneralizedForce": on_coordinates.spring,
-    "CoordinateLimitForce": on_coordinates.limit,
-    "PointToPointSpring": on_frames.point_spring,
-    "PointToPointActuator": on_frames.point_to_point_actuator,
-    "TorqueActuator": on_frames.torque_actuator,
-    "PointActuator": on_frames.point_actuator,
-    "BodyActuator": on_frames.body_actuator,
-    "BushingForce": on_frames.bushing,
-    "PathActuator": on_paths.actuator,
-    "PathSpring": on_paths.spring,
-    "Ligament": on_paths.ligament,
-    "Blankevoort1991Ligament": on_paths.ligament,
+    "CoordinateActuator": on_coordinates.add_actuator,
+    "ActivationCoordinateActuator": on_coordinates.add_lagging_actuator,
+    "SpringGeneralizedForce": on_coordinates.add_spring,
+    "CoordinateLimitForce": on_coordinates.add_limit,
+    "PointToPointSpring": on_frames.add_point_spring,
+    "PointToPointActuator": on_frames.add_point_to_point_actuator,
+    "TorqueActuator": on_frames.add_torque_actuator,
+    "PointActuator": on_frames.add_point_actuator,
+    "BodyActuator": on_frames.add_body_actuator,
+    "BushingForce": on_frames.add_bushing,
+    "PathActuator": on_paths.add_actuator,
+    "PathSpring": on_paths.add_spring,
+    "Ligament": on_paths.add_ligament,
+    "Blankevoort1991Ligament": on_paths.add_ligament,
 }
 """By class, but for muscles, what adds a force to a draft and tells what it became; it raises
 `Unsayable` where that cannot be.
@@ -39,14 +39,14 @@ MAKERS: Mapping[str, Callable[[Draft, Any, str], str]] = {
 
 def add_forces(draft: Draft) -> None:
     """Add every force that acts and that MuJoCo has the law of."""
-    for force, path in draft.components(Force):
+    for force, path in draft.iterate_components(Force):
         what = type(force).__name__
         try:
             if not force.appliesForce:
-                raise Unsayable("its appliesForce is false")
+                raise Untranslatable("its appliesForce is false")
             if isinstance(force, Muscle) and FORCE_TYPES.find(type(force)):
-                draft.fidelity.translated[path] = muscle(draft, force, path)
+                draft.fidelity.translated[path] = add_muscle(draft, force, path)
             elif what in MAKERS:
                 draft.fidelity.translated[path] = MAKERS[what](draft, force, path)
-        except (ModelError, Unsayable) as error:
+        except (ModelError, Untranslatable) as error:
             draft.fidelity.add("force", path, f"a {what}", f"{LEFT_OUT}: {error}")

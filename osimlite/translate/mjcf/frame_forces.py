@@ -15,117 +15,127 @@ from osimlite.schema.actuators import (
 from osimlite.schema.base import Component
 from osimlite.schema.fields import Vec3
 from osimlite.schema.springs import BushingForce, PointToPointSpring
-from osimlite.translate.mjcf.draft import SPECK, Draft, Unsayable, add
+from osimlite.translate.mjcf.draft import SPECK_MASS_KG, Draft, Untranslatable, add_element
 
 GROUND_FRAME = FramePlacement(GROUND, np.eye(4))
-SIX = ("rx", "ry", "rz", "tx", "ty", "tz")
+AXIS_NAMES = ("rx", "ry", "rz", "tx", "ty", "tz")
 
 
-def point_spring(draft: Draft, force: PointToPointSpring, path: str) -> str:
+def add_point_spring(draft: Draft, force: PointToPointSpring, path: str) -> str:
     """A tendon with a spring."""
     ends = [
-        _point(draft, force, path, "socket_body1", force.point1),
-        _point(draft, force, path, "socket_body2", force.point2),
+        _add_point_site(draft, force, path, "socket_body1", force.point1),
+        _add_point_site(draft, force, path, "socket_body2", force.point2),
     ]
-    return f"tendon {straight(draft, path, ends, stiffness=force.stiffness, springlength=force.rest_length)}"
+    return f"tendon {add_straight_tendon(draft, path, ends, stiffness=force.stiffness, springlength=force.rest_length)}"
 
 
-def point_to_point_actuator(draft: Draft, force: PointToPointActuator, path: str) -> str:
+def add_point_to_point_actuator(draft: Draft, force: PointToPointActuator, path: str) -> str:
     """An actuator on a tendon: MuJoCo's positive force lengthens it, too."""
     if force.points_are_global:
-        raise Unsayable("its points are given in ground, so that they wander through the bodies")
+        raise Untranslatable(
+            "its points are given in ground, so that they wander through the bodies"
+        )
     ends = [
-        _point(draft, force, path, "bodyA", force.pointA),
-        _point(draft, force, path, "bodyB", force.pointB),
+        _add_point_site(draft, force, path, "bodyA", force.pointA),
+        _add_point_site(draft, force, path, "bodyB", force.pointB),
     ]
-    name = draft.name("actuator", path)
-    add(
-        draft.section("actuator"),
+    name = draft.make_name("actuator", path)
+    add_element(
+        draft.get_section("actuator"),
         "motor",
         name=name,
-        tendon=straight(draft, path, ends),
+        tendon=add_straight_tendon(draft, path, ends),
         gear=force.optimal_force,
     )
     return f"actuator {name}"
 
 
-def torque_actuator(draft: Draft, force: TorqueActuator, path: str) -> str:
+def add_torque_actuator(draft: Draft, force: TorqueActuator, path: str) -> str:
     """A torque on a site, in the axes of a second one, whose body takes the reaction."""
-    first = draft.placement(force, "bodyA")
-    second = draft.placement(force, "bodyB") if force.bodyB else GROUND_FRAME
-    gear = np.append(np.zeros(3), _unit(force.axis) * force.optimal_force)
-    one = draft.site(path, *first)
+    first = draft.find_placement(force, "bodyA")
+    second = draft.find_placement(force, "bodyB") if force.bodyB else GROUND_FRAME
+    gear = np.append(np.zeros(3), _normalize_axis(force.axis) * force.optimal_force)
+    one = draft.add_site(path, *first)
     if not force.torque_is_global:
-        return _push(draft, path, -gear, draft.site(path, *second), one)
+        return _add_site_motor(draft, path, -gear, draft.add_site(path, *second), one)
     if second.body != GROUND:
-        raise Unsayable("its axis is fixed in ground while both its bodies move")
-    return _push(draft, path, gear, one, draft.site(path, *GROUND_FRAME))
+        raise Untranslatable("its axis is fixed in ground while both its bodies move")
+    return _add_site_motor(draft, path, gear, one, draft.add_site(path, *GROUND_FRAME))
 
 
-def point_actuator(draft: Draft, force: PointActuator, path: str) -> str:
+def add_point_actuator(draft: Draft, force: PointActuator, path: str) -> str:
     """A force on a site, in the axes of its body or of a site in ground."""
     if force.point_is_global:
-        raise Unsayable("its point is given in ground, so that it wanders through the body")
-    gear = np.append(_unit(force.direction) * force.optimal_force, np.zeros(3))
-    site = _point(draft, force, path, "body", force.point)
-    return _push(
-        draft, path, gear, site, draft.site(path, *GROUND_FRAME) if force.force_is_global else None
+        raise Untranslatable("its point is given in ground, so that it wanders through the body")
+    gear = np.append(_normalize_axis(force.direction) * force.optimal_force, np.zeros(3))
+    site = _add_point_site(draft, force, path, "body", force.point)
+    return _add_site_motor(
+        draft,
+        path,
+        gear,
+        site,
+        draft.add_site(path, *GROUND_FRAME) if force.force_is_global else None,
     )
 
 
-def straight(draft: Draft, path: str, sites: list[str], **law: float) -> str:
+def add_straight_tendon(draft: Draft, path: str, sites: list[str], **law: float) -> str:
     """A tendon through sites; its name."""
-    name = draft.name("tendon", path)
-    tendon = add(draft.section("tendon"), "spatial", name=name, **law)
+    name = draft.make_name("tendon", path)
+    tendon = add_element(draft.get_section("tendon"), "spatial", name=name, **law)
     for site in sites:
-        add(tendon, "site", site=site)
+        add_element(tendon, "site", site=site)
     return name
 
 
-def _push(draft: Draft, path: str, gear: Array, site: str, axes: str | None = None) -> str:
-    name = draft.name("actuator", path)
-    add(draft.section("actuator"), "motor", name=name, site=site, refsite=axes, gear=gear)
+def _add_site_motor(
+    draft: Draft, path: str, gear: Array, site: str, axes: str | None = None
+) -> str:
+    name = draft.make_name("actuator", path)
+    add_element(
+        draft.get_section("actuator"), "motor", name=name, site=site, refsite=axes, gear=gear
+    )
     return f"actuator {name}"
 
 
-def _point(draft: Draft, owner: Component, path: str, socket: str, point: Vec3) -> str:
+def _add_point_site(draft: Draft, owner: Component, path: str, socket: str, point: Vec3) -> str:
     """A site at a point, which OpenSim takes for one of the body itself even where the socket names a frame on it."""
-    return draft.site(path, draft.placement(owner, socket).body, np.array(point))
+    return draft.add_site(path, draft.find_placement(owner, socket).body, np.array(point))
 
 
-def _unit(axis: tuple[float, float, float]) -> Array:
+def _normalize_axis(axis: tuple[float, float, float]) -> Array:
     length = float(np.linalg.norm(axis))
     if length == 0.0:
-        raise Unsayable("its direction is zero")
+        raise Untranslatable("its direction is zero")
     return np.array(axis) / length
 
 
-def body_actuator(draft: Draft, force: BodyActuator, path: str) -> str:
+def add_body_actuator(draft: Draft, force: BodyActuator, path: str) -> str:
     """Six actuators, in the order of the controls: torque, then force."""
     if force.point_is_global:
-        raise Unsayable("its point is given in ground, so that it wanders through the body")
-    site = _point(draft, force, path, "socket_body", force.point)
-    axes = draft.site(path, *GROUND_FRAME) if force.spatial_force_is_global else None
+        raise Untranslatable("its point is given in ground, so that it wanders through the body")
+    site = _add_point_site(draft, force, path, "socket_body", force.point)
+    axes = draft.add_site(path, *GROUND_FRAME) if force.spatial_force_is_global else None
     units = np.eye(6)[[3, 4, 5, 0, 1, 2]]
     made = [
-        _push(draft, f"{path}_{word}", unit, site, axes)
-        for word, unit in zip(SIX, units, strict=True)
+        _add_site_motor(draft, f"{path}_{word}", unit, site, axes)
+        for word, unit in zip(AXIS_NAMES, units, strict=True)
     ]
     return " ".join(made)
 
 
-def bushing(draft: Draft, force: BushingForce, path: str) -> str:
+def add_bushing(draft: Draft, force: BushingForce, path: str) -> str:
     """A speck on six joints with springs and dampers in the first frame, welded to the second.
 
     The joints are the six deviations themselves, so that the law is OpenSim's; only the weld gives
     way a little.
     """
     (one, inner), second = (
-        draft.placement(force, "socket_frame1"),
-        draft.placement(force, "socket_frame2"),
+        draft.find_placement(force, "socket_frame1"),
+        draft.find_placement(force, "socket_frame2"),
     )
-    name = draft.name("bushing", path)
-    speck = draft.speck(name, draft.bodies[one], inner)
+    name = draft.make_name("bushing", path)
+    speck = draft.add_speck(name, draft.bodies[one], inner)
     state = draft.mechanism.at(draft.default_state[0])
     apart = invert_transform(state.transform(one) @ inner) @ state.transform(second[0]) @ second[1]
     starts = (*angles_xyz(apart[:3, :3]), *apart[:3, 3])
@@ -133,10 +143,10 @@ def bushing(draft: Draft, force: BushingForce, path: str) -> str:
     damping = (*force.rotational_damping, *force.translational_damping)
     # The translations are along the first frame, so they come first.
     for k in (3, 4, 5, 0, 1, 2):
-        joint = draft.name("joint", f"{name}_{SIX[k]}")
+        joint = draft.make_name("joint", f"{name}_{AXIS_NAMES[k]}")
         draft.starts[joint] = starts[k]
         kind, axis = ("hinge", "slide")[k // 3], np.eye(3)[k % 3]
-        add(
+        add_element(
             speck,
             "joint",
             name=joint,
@@ -145,15 +155,15 @@ def bushing(draft: Draft, force: BushingForce, path: str) -> str:
             stiffness=stiffness[k],
             damping=damping[k],
         )
-    add(speck, "site", name=draft.name("site", f"{name}_speck"))
-    weld = draft.name("equality", path)
-    ends = {"site1": f"{name}_speck", "site2": draft.site(path, *second)}
-    add(draft.section("equality"), "weld", name=weld, **ends)
+    add_element(speck, "site", name=draft.make_name("site", f"{name}_speck"))
+    weld = draft.make_name("equality", path)
+    ends = {"site1": f"{name}_speck", "site2": draft.add_site(path, *second)}
+    add_element(draft.get_section("equality"), "weld", name=weld, **ends)
     draft.fidelity.add(
         "bushing",
         path,
         "a spring and damper between two frames",
-        f"a body of {SPECK:g} kg on six springs, welded to the second frame",
+        f"a body of {SPECK_MASS_KG:g} kg on six springs, welded to the second frame",
         f"equality {weld}",
     )
     return f"equality {weld}"

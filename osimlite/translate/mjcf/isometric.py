@@ -22,7 +22,7 @@ from osimlite.simulation.elements import force_elements
 from osimlite.simulation.system import System
 
 
-def isometric_tension(force: Any, lengths: Array, activations: Sequence[float]) -> Array:
+def compute_isometric_tension(force: Any, lengths: Array, activations: Sequence[float]) -> Array:
     """Tension (A, L), N, of a force along a path at activations (A,) and lengths of the path (L,), m.
 
     NaN where a muscle has no equilibrium. The force is put between ground and a block on a slide,

@@ -6,7 +6,7 @@ from lxml.etree import Comment
 from numpy.polynomial.polynomial import polyder, polyval
 
 from osimlite.errors import SimulationError
-from osimlite.translate.mjcf.draft import Draft, add
+from osimlite.translate.mjcf.draft import Draft, add_element
 
 
 def add_keyframe(draft: Draft) -> None:
@@ -33,17 +33,17 @@ def add_keyframe(draft: Draft) -> None:
         value, rate = values.get(follower.leader or "", 0.0), rates.get(follower.leader or "", 0.0)
         values[joint] = float(polyval(value, follower.polynomial))
         rates.setdefault(joint, float(rate * polyval(value, polyder(follower.polynomial))))
-    if any(values.values()) and len(draft.section("equality")):
+    if any(values.values()) and len(draft.get_section("equality")):
         draft.start_note = (
             "start simulations from the keyframe 'default', with mj_resetDataKeyframe(model, data, 0): at qpos0, where "
             "a new MjData starts, the equality constraints do not hold, and their forces can throw the model apart"
         )
         # After the comment that names the program.
         draft.root.insert(1, Comment(f" {draft.start_note[0].upper()}{draft.start_note[1:]}. "))
-    names = [joint.get("name", "") for joint in draft.section("worldbody").iter("joint")]
-    actuators = [actuator.get("name", "") for actuator in draft.section("actuator")]
-    add(
-        draft.section("keyframe"),
+    names = [joint.get("name", "") for joint in draft.get_section("worldbody").iter("joint")]
+    actuators = [actuator.get("name", "") for actuator in draft.get_section("actuator")]
+    add_element(
+        draft.get_section("keyframe"),
         "key",
         name="default",
         qpos=[values[name] for name in names],

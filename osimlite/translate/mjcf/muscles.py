@@ -31,28 +31,28 @@ from osimlite.schema.muscles import Muscle
 from osimlite.schema.old_muscles import Delp1990Muscle_Deprecated, Schutte1993Muscle_Deprecated
 from osimlite.schema.states import list_states
 from osimlite.translate.fidelity import Error
-from osimlite.translate.mjcf.draft import Draft, Unsayable, add, tidy
-from osimlite.translate.mjcf.isometric import isometric_tension
+from osimlite.translate.mjcf.draft import Draft, Untranslatable, add_element, clear_rounding
+from osimlite.translate.mjcf.isometric import compute_isometric_tension
 
-ACTIVATIONS = (0.01, 0.5, 1.0)
+COMPARED_ACTIVATIONS = (0.01, 0.5, 1.0)
 """At which isometric tensions are compared."""
-LENGTHS = 24
+LENGTH_COUNT = 24
 """So many lengths, evenly spread over those that occur."""
-LEAST, GREATEST = (0.0, 1.05, 1.05, 0.0), (0.95, 4.0, 6.0, 20.0)
+LOWER_BOUNDS, UPPER_BOUNDS = (0.0, 1.05, 1.05, 0.0), (0.95, 4.0, 6.0, 20.0)
 """Bounds of the ends of the active curve, and of end and height of the passive one."""
-MOST = 3.0
+MAX_TENSION = 3.0
 """Tensions, as parts of the greatest isometric force, beyond which a pose is none that a body could take."""
-CLOSE = 1e-5
+FIT_TOLERANCE = 1e-5
 """Relative change of the curves' error, or of their numbers, at which the search for them ends."""
-STEP = 2.0**-26
+DIFFERENCE_STEP = 2.0**-26
 """Of the numbers of curves, beside 1, to find how their error changes with them."""
-SCALE = 200.0
+UNUSED_SCALE = 200.0
 """MuJoCo's default of a number that does not count where the force is given."""
-FVMAX = 1.4
+DEFAULT_FVMAX = 1.4
 """Force of lengthening fibers, as a part of the isometric one, of a muscle that does not say."""
-LEAST_RATE = 1e-12
+MIN_POSITIVE = 1e-12
 """MuJoCo takes rates and parts of forces that are positive; less than this is none."""
-FREE = 0.25
+FIT_RANGE = 0.25
 """Parts by which a fit to forces may change tendon, fibers and strength, and by which it may move the passive curve."""
 
 
@@ -69,11 +69,13 @@ class Curves(NamedTuple):
     # by so much more than 1 the normalized length is where the passive force begins
     shift: float = 0.0
 
-    def tension(self, lengths: Array, activation: float) -> Array:
+    def compute_tension(self, lengths: Array, activation: float) -> Array:
         """Tension (L,) that MuJoCo gives the muscle at lengths of its tendon (L,), m, at rest."""
-        return self.tensions(lengths, (activation,))[0]
+        return self.compute_tensions(lengths, (activation,))[0]
 
-    def tensions(self, lengths: Array, activations: Sequence[float] = ACTIVATIONS) -> Array:
+    def compute_tensions(
+        self, lengths: Array, activations: Sequence[float] = COMPARED_ACTIVATIONS
+    ) -> Array:
         """Tensions (A, L) at several activations, by default those that are compared."""
         x = (lengths - self.tendon) / self.fiber
         low, high = 0.5 * (self.lmin + 1.0), 0.5 * (1.0 + self.lmax)
@@ -97,16 +99,18 @@ class Curves(NamedTuple):
         shift = gain[0] - bias[0] if same_scale else math.nan
         return cls(low - first * fiber, fiber, gain[2], gain[4], gain[5], bias[5], bias[7], shift)
 
-    def numbers(self, vmax: float, fvmax: float) -> tuple[Array, Array]:
+    def make_parameters(self, vmax: float, fvmax: float) -> tuple[Array, Array]:
         """MuJoCo's numbers of gain and bias of an actuator whose length range is (tendon, tendon + fiber)."""
-        fpmax = max(self.fpmax, LEAST_RATE)
-        gain = np.array((0.0, 1.0, self.force, SCALE, self.lmin, self.lmax, vmax, fpmax, fvmax))
+        fpmax = max(self.fpmax, MIN_POSITIVE)
+        gain = np.array(
+            (0.0, 1.0, self.force, UNUSED_SCALE, self.lmin, self.lmax, vmax, fpmax, fvmax)
+        )
         bias = np.array(
             (
                 -self.shift,
                 1.0 - self.shift,
                 self.force,
-                SCALE,
+                UNUSED_SCALE,
                 self.lmin,
                 self.end,
                 vmax,
@@ -114,10 +118,10 @@ class Curves(NamedTuple):
                 fvmax,
             )
         )
-        return tidy(gain), tidy(bias)
+        return clear_rounding(gain), clear_rounding(bias)
 
 
-def muscle(draft: Draft, force: Muscle, path: str) -> str:
+def add_muscle(draft: Draft, force: Muscle, path: str) -> str:
     """A muscle on the tendon of its path."""
     tied = draft.find_tendon(path)
     cos = math.cos(force.pennation_angle_at_optimal)
@@ -125,34 +129,36 @@ def muscle(draft: Draft, force: Muscle, path: str) -> str:
         force.tendon_slack_length, force.optimal_fiber_length * cos, force.max_isometric_force * cos
     )
     if not (own.tendon + own.fiber > own.tendon and own.force > 0.0 and own.tendon >= 0.0):
-        raise Unsayable("its lengths or its force are not positive")
+        raise Untranslatable("its lengths or its force are not positive")
     rates = _read_rates(force)
     vmax, fvmax = rates.vmax / cos**2, rates.fvmax
-    if not min(vmax, fvmax) > LEAST_RATE:
-        raise Unsayable(
+    if not min(vmax, fvmax) > MIN_POSITIVE:
+        raise Untranslatable(
             "its greatest velocity, or what it holds while it lengthens, is not positive"
         )
     fits = draft.options.fit == "force"
     try:
         spread = [
-            np.quantile(lengths, np.linspace(0.0, 1.0, LENGTHS))
+            np.quantile(lengths, np.linspace(0.0, 1.0, LENGTH_COUNT))
             for lengths in (tied.lengths, tied.held_out)
         ]
         tensions, held_out = np.split(
-            isometric_tension(force, np.concatenate(spread), ACTIVATIONS), 2, axis=1
+            compute_isometric_tension(force, np.concatenate(spread), COMPARED_ACTIVATIONS),
+            2,
+            axis=1,
         )
     except OsimliteError as error:
-        raise Unsayable(f"its tension cannot be computed: {error.message}") from error
+        raise Untranslatable(f"its tension cannot be computed: {error.message}") from error
     curves = _fit_curves(own, spread[0], tensions, free=fits)
     name, limits = (
-        draft.name("actuator", path),
+        draft.make_name("actuator", path),
         (max(force.min_control, 0.0), min(force.max_control, 1.0)),
     )
     rise, fall = rates.rise, rates.fall
     lags = rise > 0.0 and fall > 0.0 and "activation" in list_states(force)
-    gain, bias = curves.numbers(vmax, fvmax)
-    add(
-        draft.section("actuator"),
+    gain, bias = curves.make_parameters(vmax, fvmax)
+    add_element(
+        draft.get_section("actuator"),
         "general",
         name=name,
         tendon=tied.name,
@@ -167,9 +173,9 @@ def muscle(draft: Draft, force: Muscle, path: str) -> str:
     )
     if lags:
         draft.activations[name] = getattr(force, "default_activation", 0.0)
-    draft.account(path, f"actuator {name}")
-    off = ((curves.tensions(spread[1]) - held_out) / force.max_isometric_force)[
-        _counts(held_out, own)
+    draft.record_result(path, f"actuator {name}")
+    off = ((curves.compute_tensions(spread[1]) - held_out) / force.max_isometric_force)[
+        _select_tensions(held_out, own)
     ]
     draft.fidelity.add(
         "muscle",
@@ -180,14 +186,14 @@ def muscle(draft: Draft, force: Muscle, path: str) -> str:
         + rates.note
         + ("" if lags else "; without activation dynamics: it has its full force at once"),
         f"actuator {name}",
-        {"isometric force": Error.of(off, "Fmax")} if len(off) else {},
+        {"isometric force": Error.measure(off, "Fmax")} if len(off) else {},
     )
     return f"actuator {name}"
 
 
-def _counts(tensions: Array, own: Curves) -> NDArray[np.bool_]:
+def _select_tensions(tensions: Array, own: Curves) -> NDArray[np.bool_]:
     """Which tensions (A, L) are compared."""
-    return np.nan_to_num(tensions, nan=np.inf) < MOST * own.force
+    return np.nan_to_num(tensions, nan=np.inf) < MAX_TENSION * own.force
 
 
 class Rates(NamedTuple):
@@ -214,23 +220,23 @@ def _read_rates(force: Muscle) -> Rates:
     """Return the greatest velocity and the time constants of a muscle, by the law of its class."""
     if not isinstance(force, Schutte1993Muscle_Deprecated | Delp1990Muscle_Deprecated):
         vmax, fvmax = (
-            _read_control_range(force, "vmax", 0.0),
-            _read_control_range(force, "fvmax", FVMAX),
+            _read_parameter(force, "vmax", 0.0),
+            _read_parameter(force, "fvmax", DEFAULT_FVMAX),
         )
         return Rates(
             vmax,
             fvmax,
-            _read_control_range(force, "rise", 0.0),
-            _read_control_range(force, "fall", 0.0),
+            _read_parameter(force, "rise", 0.0),
+            _read_parameter(force, "fall", 0.0),
         )
     time = force.time_scale
     if not time > 0.0:
-        return Rates(0.0, FVMAX, 0.0, 0.0)
+        return Rates(0.0, DEFAULT_FVMAX, 0.0, 0.0)
     if isinstance(force, Schutte1993Muscle_Deprecated):
         vmax = -schutte_velocity(1.0, 1.0, 0.0, force.damping) if force.damping > 0.0 else 0.0
-        fvmax = FVMAX
+        fvmax = DEFAULT_FVMAX
     else:
-        vmax, fvmax = _ends_of_velocity_curve(force)
+        vmax, fvmax = _measure_velocity_curve(force)
     quick, slow = force.activation1 + force.activation2, force.activation2
     rise = time / quick / RISE_TO_63_PERCENT if quick > 0.0 else 0.0
     fall = time / slow / FALL_TO_37_PERCENT if slow > 0.0 else 0.0
@@ -241,14 +247,14 @@ def _read_rates(force: Muscle) -> Rates:
     return Rates(vmax / time, fvmax, rise, fall, note)
 
 
-def _ends_of_velocity_curve(force: Delp1990Muscle_Deprecated) -> tuple[float, float]:
+def _measure_velocity_curve(force: Delp1990Muscle_Deprecated) -> tuple[float, float]:
     """Return the normalised velocity at which the force ends, and the greatest force, of a curve of Delp's muscle."""
     try:
         curve = convert_function(force.force_velocity_curve, 1, "the force_velocity_curve")
         velocities = np.linspace(-2.0, 2.0, 401).tolist()
         factors = [curve.evaluate((velocity,))[0] for velocity in velocities]
     except OsimliteError:
-        return 0.0, FVMAX
+        return 0.0, DEFAULT_FVMAX
     idle = [
         velocity
         for velocity, factor in zip(velocities, factors, strict=True)
@@ -257,7 +263,7 @@ def _ends_of_velocity_curve(force: Delp1990Muscle_Deprecated) -> tuple[float, fl
     return -max(idle, default=-1.0), max(max(factors), 1.0)
 
 
-def _read_control_range(force: Muscle, name: str, default: float) -> float:
+def _read_parameter(force: Muscle, name: str, default: float) -> float:
     """What MuJoCo asks of a muscle, from the property that its class names."""
     named = ChainMap(
         *(base.__dict__["facts"].mujoco for base in type(force).__mro__ if "facts" in base.__dict__)
@@ -270,7 +276,7 @@ def _read_control_range(force: Muscle, name: str, default: float) -> float:
 
 def _fit_curves(own: Curves, lengths: Array, tensions: Array, *, free: bool) -> Curves:
     """The curves nearest to tensions (A, L) at lengths (L,), with tendon, fibers and strength too if `free`."""
-    known = _counts(tensions, own)
+    known = _select_tensions(tensions, own)
     if not known.any():
         return own
     search = require("scipy.optimize", extra="sim", purpose="muscles of MuJoCo").least_squares
@@ -286,24 +292,33 @@ def _fit_curves(own: Curves, lengths: Array, tensions: Array, *, free: bool) -> 
         return Curves(*moved, lmin, lmax, end, fpmax, shift)
 
     def off(x: Array) -> Array:
-        return ((curves(x.tolist()).tensions(lengths) - tensions) / own.force)[known]
+        return ((curves(x.tolist()).compute_tensions(lengths) - tensions) / own.force)[known]
 
     def slopes(x: Array) -> Array:
         # As least_squares finds them, all at once: by steps forward, or back where that leaves the
         # bounds.
-        step = np.where(x >= 0.0, STEP, -STEP) * np.maximum(1.0, np.abs(x))
+        step = np.where(x >= 0.0, DIFFERENCE_STEP, -DIFFERENCE_STEP) * np.maximum(1.0, np.abs(x))
         step = np.where((x + step < low) | (x + step > high), -step, step)
-        moved = curves([*np.vstack((x, x + np.diag(step))).T[:, :, None]]).tensions(lengths)
+        moved = curves([*np.vstack((x, x + np.diag(step))).T[:, :, None]]).compute_tensions(lengths)
         all_off = ((moved - tensions[:, None]) / own.force).swapaxes(1, 2)[known].T.copy()
         return ((all_off[1:] - all_off[0]) / (x + step - x)[:, None]).T
 
-    start, low, high = [own.lmin, own.lmax, own.end, own.fpmax], list(LEAST), list(GREATEST)
+    start, low, high = (
+        [own.lmin, own.lmax, own.end, own.fpmax],
+        list(LOWER_BOUNDS),
+        list(UPPER_BOUNDS),
+    )
     if free:
-        start, low, high = [*start, *[0.0] * 4], [*low, *[-FREE] * 4], [*high, *[FREE] * 4]
+        start, low, high = (
+            [*start, *[0.0] * 4],
+            [*low, *[-FIT_RANGE] * 4],
+            [*high, *[FIT_RANGE] * 4],
+        )
     # The curves have kinks: the way from one start may end at one.
     starts = start, [0.2, 2.2, *start[2:]]
     result = [
-        search(off, each, slopes, bounds=(low, high), ftol=CLOSE, xtol=CLOSE) for each in starts
+        search(off, each, slopes, bounds=(low, high), ftol=FIT_TOLERANCE, xtol=FIT_TOLERANCE)
+        for each in starts
     ]
     best = min(result, key=lambda each: each.cost)
     return curves(best.x)

@@ -17,17 +17,31 @@ from osimlite.schema.paths import AbstractGeometryPath
 from osimlite.simulation.elements.geometries.paths.geometry_path import ThroughPoints
 from osimlite.simulation.paths import Paths
 from osimlite.translate.fidelity import LEFT_OUT, Error
-from osimlite.translate.mjcf.bodies import LEAST_MASS
-from osimlite.translate.mjcf.couplings import PULLED, along, helper
-from osimlite.translate.mjcf.draft import Draft, Follower, Tied, Value, add, pose, tidy
+from osimlite.translate.mjcf.bodies import MIN_MASS
+from osimlite.translate.mjcf.couplings import HELPER_INERTIA, add_helper, compose_with_line
+from osimlite.translate.mjcf.draft import (
+    Draft,
+    Follower,
+    PathTendon,
+    Value,
+    add_element,
+    clear_rounding,
+    format_pose,
+)
 from osimlite.translate.mjcf.fits import fit_tendon
-from osimlite.translate.mjcf.poses import EXACT, Poses, Truth, arm_errors, random_poses
+from osimlite.translate.mjcf.poses import (
+    EXACT_TOLERANCE_M,
+    PathSamples,
+    Poses,
+    draw_poses,
+    measure_arm_errors,
+)
 from osimlite.translate.mjcf.routes import Router
-from osimlite.translate.mjcf.tendons import Around, Spot, Tendon, measure
+from osimlite.translate.mjcf.tendons import Tendon, TendonSite, WrapGeom, measure_tendon
 
-CHOSEN, FITTED, TRIED, HELD_OUT = 100, 250, 500, 100
+SELECTION_POSES, FIT_POSES, VALIDATION_POSES, TEST_POSES = 100, 250, 500, 100
 """How many random poses a tendon is chosen by, or fitted to and tried in once more, and measured in."""
-WRAPS = 4
+WRAP_GROUP = 4
 """Group of the geoms that tendons go around, and of their sites."""
 
 
@@ -35,7 +49,7 @@ def add_paths(draft: Draft) -> None:
     """Add a tendon for every path through points."""
     owners: dict[str, AbstractGeometryPath] = {
         path: owner.geometry_path
-        for owner, path in draft.components(Force)
+        for owner, path in draft.iterate_components(Force)
         if owner.appliesForce
         and isinstance(getattr(owner, "geometry_path", None), AbstractGeometryPath)
     }
@@ -43,9 +57,9 @@ def add_paths(draft: Draft) -> None:
         return
     exact = Paths(draft.model)
     fits = draft.options.fit != "none"
-    poses, truth = random_poses(exact, FITTED if fits else CHOSEN, 0)
-    held, held_truth = random_poses(exact, HELD_OUT, 1)
-    others, other_truth = random_poses(exact, TRIED, 2) if fits else (poses, truth)
+    poses, truth = draw_poses(exact, FIT_POSES if fits else SELECTION_POSES, 0)
+    held, held_truth = draw_poses(exact, TEST_POSES, 1)
+    others, other_truth = draw_poses(exact, VALIDATION_POSES, 2) if fits else (poses, truth)
     default = exact.lengths(draft.default_state[0])
     writer = _Writer(draft)
     for path, given in owners.items():
@@ -56,23 +70,23 @@ def add_paths(draft: Draft) -> None:
             draft.fidelity.add("path", own, f"a path that is a {kind}", LEFT_OUT)
             continue
         router = Router(route, truth[path], poses, draft.options.version)
-        tendon = router.best()
+        tendon = router.find_best()
         if fits:
             # What is better only where it was fitted, snaps off elsewhere.
             judge = Router(route, other_truth[path], others, draft.options.version)
-            tendon = min(tendon, fit_tendon(router, tendon), key=judge.error)
-        name = writer.tendon(path, tendon)
-        draft.tendons[path] = Tied(
+            tendon = min(tendon, fit_tendon(router, tendon), key=judge.compute_error)
+        name = writer.write_tendon(path, tendon)
+        draft.tendons[path] = PathTendon(
             name, default[path], truth[path].lengths, held_truth[path].lengths
         )
-        draft.account(own, f"tendon {name}")
+        draft.record_result(own, f"tendon {name}")
         for wrap in given.path_wrap_set.objects:
             surface = (
                 draft.tree.path_of(draft.tree.target(wrap, "wrap_object", wrap.wrap_object)) or ""
             )
             draft.fidelity.translated[surface] = "what tendons go around, if they touch it"
-        errors = _errors(draft, tendon, held, held_truth[path])
-        if any(error.max > EXACT for error in errors.values()):
+        errors = _measure_errors(draft, tendon, held, held_truth[path])
+        if any(error.max > EXACT_TOLERANCE_M for error in errors.values()):
             how = "the nearest tendon that its own points and surfaces make"
             done = f"{how}, fitted" if fits else how
             draft.fidelity.add(
@@ -80,13 +94,15 @@ def add_paths(draft: Draft) -> None:
             )
 
 
-def _errors(draft: Draft, tendon: Tendon, poses: Poses, truth: Truth) -> dict[str, Error]:
+def _measure_errors(
+    draft: Draft, tendon: Tendon, poses: Poses, truth: PathSamples
+) -> dict[str, Error]:
     """How far lengths and moment arms are off in poses that the tendon was not chosen by."""
-    lengths, arms = measure(tendon, poses, draft.options.version)
-    about = arm_errors(draft.mechanism, arms, truth)
+    lengths, arms = measure_tendon(tendon, poses, draft.options.version)
+    about = measure_arm_errors(draft.mechanism, arms, truth)
     names = draft.mechanism.coordinate_names
     named = {f"moment arm about {names[place]}": error for place, error in about.items()}
-    return {"length": Error.of(lengths - truth.lengths, "m"), **named}
+    return {"length": Error.measure(lengths - truth.lengths, "m"), **named}
 
 
 def _describe_inexact_parts(route: ThroughPoints, router: Router) -> str:
@@ -100,13 +116,13 @@ def _describe_inexact_parts(route: ThroughPoints, router: Router) -> str:
     result = [
         *(["a point that moves with a coordinate"] if MOVING in kinds else []),
         *(["a point that comes and goes with a coordinate"] if CONDITIONAL in kinds else []),
-        *sorted({f"a {_NAMES[surface.law]}" for surface in touched}),
+        *sorted({f"a {_SURFACE_NAMES[surface.law]}" for surface in touched}),
     ]
     several = ", several at a time" if len(touched) > 1 else ""
     return "a path with " + " and ".join(result or ["surfaces"]) + several
 
 
-_NAMES = {
+_SURFACE_NAMES = {
     "wrap_cylinder": "cylinder on which it is not the shortest",
     "wrap_sphere": "sphere to wrap around",
     "wrap_ellipsoid": "ellipsoid to wrap around",
@@ -121,55 +137,63 @@ class _Writer:
     draft: Draft  # what they are written into
     _geoms: dict[tuple[Any, ...], str] = field(default_factory=dict)
 
-    def tendon(self, path: str, tendon: Tendon) -> str:
+    def write_tendon(self, path: str, tendon: Tendon) -> str:
         """Write a tendon with all that it needs; returns its name."""
-        name = self.draft.name("tendon", path)
-        element = add(
-            self.draft.section("tendon"),
+        name = self.draft.make_name("tendon", path)
+        element = add_element(
+            self.draft.get_section("tendon"),
             "spatial",
             name=name,
             width=0.005,
             rgba=(0.8, 0.1, 0.1, 1.0),
         )
         for part in tendon:
-            if isinstance(part, Spot):
-                add(element, "site", site=self._site(f"{path}/{part.name or 'between'}", part))
+            if isinstance(part, TendonSite):
+                add_element(
+                    element, "site", site=self._write_site(f"{path}/{part.name or 'between'}", part)
+                )
             else:
                 side = (
                     None
                     if part.side is None
-                    else self._site(f"{path}/{part.name or 'around'}_side", part.side)
+                    else self._write_site(f"{path}/{part.name or 'around'}_side", part.side)
                 )
-                add(element, "geom", geom=self._geom(path, part), sidesite=side)
+                add_element(element, "geom", geom=self._write_geom(path, part), sidesite=side)
         return name
 
-    def _site(self, path: str, spot: Spot) -> str:
+    def _write_site(self, path: str, spot: TendonSite) -> str:
         if spot.slides is None:
-            return self.draft.site(path, spot.body, spot.place, group=WRAPS)
+            return self.draft.add_site(path, spot.body, spot.place, group=WRAP_GROUP)
         assert spot.drive is not None
-        led = helper(self.draft, spot.coordinate, spot.drive)
+        led = add_helper(self.draft, spot.coordinate, spot.drive)
         if led is None:
             # The coordinate is locked.
             value = self.draft.mechanism.coordinates[spot.coordinate].default_value
             moved = [Polynomial(row)(Polynomial(spot.drive)(value)) for row in spot.slides]
-            return self.draft.site(path, spot.body, spot.place + np.array(moved), group=WRAPS)
+            return self.draft.add_site(
+                path, spot.body, spot.place + np.array(moved), group=WRAP_GROUP
+            )
         joint, line = led
-        name = self.draft.name("body", path)
-        where = tidy(spot.place + spot.slides[:, 0])
-        carrier = add(self.draft.bodies[spot.body], "body", name=name, pos=where, gravcomp=1)
+        name = self.draft.make_name("body", path)
+        where = clear_rounding(spot.place + spot.slides[:, 0])
+        carrier = add_element(
+            self.draft.bodies[spot.body], "body", name=name, pos=where, gravcomp=1
+        )
         # Equalities of what slides along the axes of ground MuJoCo weighs by its mass, without the
         # armature.
-        mass = PULLED if spot.body == GROUND else LEAST_MASS
-        add(carrier, "inertial", pos=np.zeros(3), mass=mass, diaginertia=np.full(3, mass))
-        for axis, polynomial in _straight(spot.slides * (0.0, 1.0, 1.0, 1.0, 1.0)):
-            slide = self.draft.name("joint", f"{name}_{len(carrier)}")
-            add(carrier, "joint", name=slide, type="slide", axis=axis, armature=PULLED)
-            self.draft.follow(slide, Follower(joint, along(line, polynomial)))
-        site = self.draft.name("site", path)
-        add(carrier, "site", name=site, group=WRAPS)
+        mass = HELPER_INERTIA if spot.body == GROUND else MIN_MASS
+        add_element(carrier, "inertial", pos=np.zeros(3), mass=mass, diaginertia=np.full(3, mass))
+        for axis, polynomial in _split_into_axes(spot.slides * (0.0, 1.0, 1.0, 1.0, 1.0)):
+            slide = self.draft.make_name("joint", f"{name}_{len(carrier)}")
+            add_element(
+                carrier, "joint", name=slide, type="slide", axis=axis, armature=HELPER_INERTIA
+            )
+            self.draft.add_follower(slide, Follower(joint, compose_with_line(line, polynomial)))
+        site = self.draft.make_name("site", path)
+        add_element(carrier, "site", name=site, group=WRAP_GROUP)
         return site
 
-    def _geom(self, path: str, around: Around) -> str:
+    def _write_geom(self, path: str, around: WrapGeom) -> str:
         key = (
             around.body,
             around.kind,
@@ -178,7 +202,9 @@ class _Writer:
             *around.frame.ravel().tolist(),
         )
         if key not in self._geoms:
-            name = self._geoms[key] = self.draft.name("geom", f"{path}/{around.name or 'around'}")
+            name = self._geoms[key] = self.draft.make_name(
+                "geom", f"{path}/{around.name or 'around'}"
+            )
             size = (
                 [around.radius] if around.kind == "sphere" else [around.radius, 0.5 * around.length]
             )
@@ -186,22 +212,22 @@ class _Writer:
             look: dict[str, Value] = {
                 "contype": 0,
                 "conaffinity": 0,
-                "group": WRAPS,
+                "group": WRAP_GROUP,
                 "rgba": (0.0, 1.0, 1.0, 0.3),
             }
-            add(
+            add_element(
                 element,
                 "geom",
                 name=name,
                 type=around.kind,
                 size=size,
-                **pose(around.frame),
+                **format_pose(around.frame),
                 **look,
             )
         return self._geoms[key]
 
 
-def _straight(slides: Array) -> Iterator[tuple[Array, Array]]:
+def _split_into_axes(slides: Array) -> Iterator[tuple[Array, Array]]:
     """Axes (3,) and polynomials along them whose sum the places (3, 5) are; a single one where all is on one line."""
     axes, sizes, rows = np.linalg.svd(slides, full_matrices=False)
     if sizes[1] <= 1e-12 * sizes[0]:

@@ -15,10 +15,10 @@ from osimlite.translate.fidelity import Error
 DEGREE = 4
 """Of the polynomials in an equality of MuJoCo."""
 
-_SAMPLES = 400
-_MOST = 1e100
+_SAMPLE_COUNT = 400
+_MAX_VALUE = 1e100
 """Of the values of functions: their squares are numbers too."""
-_WIDEST = 4.0 * np.pi
+_MAX_RANGE = 4.0 * np.pi
 """A range (rad, m) that is wider is taken for one that nobody meant."""
 
 
@@ -29,7 +29,7 @@ class Fit(NamedTuple):
     error: Error | None = None
 
 
-def as_polynomial(function: f.Function) -> Polynomial | None:
+def find_polynomial(function: f.Function) -> Polynomial | None:
     """The polynomial that a function of one argument is, or None."""
     line = as_line(function)
     if line is not None:
@@ -47,31 +47,31 @@ def as_polynomial(function: f.Function) -> Polynomial | None:
                 dense[power] += coefficient
             return Polynomial(dense).trim()
         case f.ScaledFunction(scale, inner):
-            own = as_polynomial(inner)
+            own = find_polynomial(inner)
             return None if own is None else scale * own
         case Composed(outer, inner):
-            first, second = as_polynomial(inner), as_polynomial(outer)
+            first, second = find_polynomial(inner), find_polynomial(outer)
             if first is not None and second is not None:
                 whole = second(first)
                 return whole if isinstance(whole, Polynomial) else None
     return None
 
 
-def quartic(function: f.Function, span: tuple[float, float], unit: str) -> Fit:
+def fit_quartic(function: f.Function, span: tuple[float, float], unit: str) -> Fit:
     """The polynomial of degree four that is a function of one argument, or whose greatest error is least on a span.
 
     Fitted by Lawson's algorithm: least squares, again and again, with weights that grow where the
     error is large.
     """
-    exact = as_polynomial(function)
+    exact = find_polynomial(function)
     if exact is not None and exact.degree() <= DEGREE:
         return Fit(tuple(exact.coef.tolist()))
     low, high = span
     middle, half = 0.5 * (high + low), 0.5 * (high - low)
-    x = middle + half * np.cos(np.linspace(0.0, np.pi, _SAMPLES))
+    x = middle + half * np.cos(np.linspace(0.0, np.pi, _SAMPLE_COUNT))
     y = sample_function(function, x)
     basis = np.polynomial.chebyshev.chebvander((x - middle) / half, DEGREE)
-    weights, best, least = np.full(_SAMPLES, 1.0 / _SAMPLES), np.zeros(DEGREE + 1), np.inf
+    weights, best, least = np.full(_SAMPLE_COUNT, 1.0 / _SAMPLE_COUNT), np.zeros(DEGREE + 1), np.inf
     for _ in range(60):
         root = np.sqrt(weights)
         result = np.linalg.lstsq(root[:, None] * basis, root * y, rcond=None)[0]
@@ -83,9 +83,10 @@ def quartic(function: f.Function, span: tuple[float, float], unit: str) -> Fit:
         weights *= off
         weights /= weights.sum()
     fitted = Chebyshev(best, domain=[low, high]).convert(kind=Polynomial)
-    even = np.linspace(low, high, _SAMPLES)
+    even = np.linspace(low, high, _SAMPLE_COUNT)
     return Fit(
-        tuple(fitted.coef.tolist()), Error.of(fitted(even) - sample_function(function, even), unit)
+        tuple(fitted.coef.tolist()),
+        Error.measure(fitted(even) - sample_function(function, even), unit),
     )
 
 
@@ -96,12 +97,14 @@ def sample_function(function: f.Function, x: Array) -> Array:
         FloatingPointError: they are too large to fit anything to.
     """
     values = np.array([function.evaluate(np.array((value,)))[0] for value in x])
-    if not (np.abs(values) < _MOST).all():
+    if not (np.abs(values) < _MAX_VALUE).all():
         raise FloatingPointError("a function has values that nothing can be fitted to")
     return values
 
 
-def span(function: f.Function, limits: tuple[float, float], start: float) -> tuple[float, float]:
+def select_span(
+    function: f.Function, limits: tuple[float, float], start: float
+) -> tuple[float, float]:
     """Where a function of a coordinate is wanted: in the coordinate's range, as far as that means anything.
 
     Args:
@@ -111,8 +114,8 @@ def span(function: f.Function, limits: tuple[float, float], start: float) -> tup
     """
     low, high = limits
     points = knots(function)
-    if not high - low <= _WIDEST and points:
+    if not high - low <= _MAX_RANGE and points:
         low, high = max(low, min(points)), min(high, max(points))
-    if not 0.0 < high - low <= _WIDEST:
+    if not 0.0 < high - low <= _MAX_RANGE:
         low, high = start - 1.0, start + 1.0
     return min(low, start), max(high, start)

@@ -14,9 +14,9 @@ from osimlite.mechanics.multibody.spatial import Array
 from osimlite.simulation.paths import Paths
 from osimlite.translate.fidelity import Error
 
-Places = NDArray[np.int64]
+Indices = NDArray[np.int64]
 
-EXACT = 1e-9
+EXACT_TOLERANCE_M = 1e-9
 """Errors of lengths and moment arms (m) up to which a tendon does what the path does."""
 
 
@@ -46,21 +46,21 @@ class Poses:
             self.rates[..., own],
         )
 
-    def points(self, body: int, station: Array) -> Array:
+    def locate(self, body: int, station: Array) -> Array:
         """Places in ground (P, 3) or (k, P, 3) of a station of a body, (3,) or one for each pose."""
-        return self.origins[body] + each_pose(station, self.rotations[body].swapaxes(1, 2))
+        return self.origins[body] + multiply_each_pose(station, self.rotations[body].swapaxes(1, 2))
 
-    def stations(self, body: int, places: Array) -> Array:
+    def express(self, body: int, places: Array) -> Array:
         """Stations of a body (k, P, 3) at places in ground (k, P, 3)."""
-        return each_pose(places - self.origins[body], self.rotations[body])
+        return multiply_each_pose(places - self.origins[body], self.rotations[body])
 
-    def points_at(self, body: int, stations: Array, at: Places) -> Array:
+    def locate_at(self, body: int, stations: Array, at: Indices) -> Array:
         """Places in ground (k, 3) of stations of a body (k, 3), each in one of the poses, by their places (k,)."""
         return self.origins[body][at] + np.einsum("pij,pj->pi", self.rotations[body][at], stations)
 
 
 @dataclass(frozen=True, eq=False)
-class Truth:
+class PathSamples:
     """What a path does in P poses."""
 
     lengths: Array  # (P,), m
@@ -69,33 +69,33 @@ class Truth:
     nodes: Sequence[Sequence[tuple[int, Array]]]
 
 
-def each_pose(rows: Array, matrices: Array) -> Array:
+def multiply_each_pose(rows: Array, matrices: Array) -> Array:
     """Rows (k, P, i), (P, i) or (i,) times the matrix of each pose (P, i, j). Many times as fast as `einsum`."""
     if rows.ndim < 3:
         return np.asarray((rows[..., None, :] @ matrices)[..., 0, :])
     return np.asarray((rows.swapaxes(0, 1) @ matrices).swapaxes(0, 1))
 
 
-def arm_errors(mechanism: Mechanism, arms: Array, truth: Truth) -> dict[int, Error]:
+def measure_arm_errors(mechanism: Mechanism, arms: Array, truth: PathSamples) -> dict[int, Error]:
     """How far moment arms (P, m) are off, by the place of the coordinate, where a path or its stand-in has one."""
     result = {}
     for place, off, wanted in zip(
-        free_coordinates(mechanism), (arms - truth.arms).T, truth.arms.T, strict=True
+        list_free_coordinates(mechanism), (arms - truth.arms).T, truth.arms.T, strict=True
     ):
-        if np.abs(off).max() > EXACT or np.abs(wanted).max() > EXACT:
+        if np.abs(off).max() > EXACT_TOLERANCE_M or np.abs(wanted).max() > EXACT_TOLERANCE_M:
             rotational = mechanism.coordinates[place].motion_type == "rotational"
-            result[place] = Error.of(off, "m" if rotational else "1")
+            result[place] = Error.measure(off, "m" if rotational else "1")
     return result
 
 
-def random_values(mechanism: Mechanism, count: int, seed: int) -> Array:
+def draw_values(mechanism: Mechanism, count: int, seed: int) -> Array:
     """Values (count, n) of the coordinates, spread evenly over the ranges of those that move by themselves.
 
     Where a range is none, they are within 1 of the default.
     """
     coupled = [item for item in mechanism.constraints if isinstance(item, Coupler)]
     values = np.tile(mechanism.values({}), (count, 1))
-    for place in free_coordinates(mechanism):
+    for place in list_free_coordinates(mechanism):
         info = mechanism.coordinates[place]
         low, high = info.range
         if not 0.0 <= high - low < np.inf:
@@ -108,7 +108,7 @@ def random_values(mechanism: Mechanism, count: int, seed: int) -> Array:
     return values
 
 
-def free_coordinates(mechanism: Mechanism) -> list[int]:
+def list_free_coordinates(mechanism: Mechanism) -> list[int]:
     """Places of the coordinates that are neither locked, prescribed nor coupled to others."""
     coupled = {item.dependent for item in mechanism.constraints if isinstance(item, Coupler)}
     return [
@@ -118,12 +118,12 @@ def free_coordinates(mechanism: Mechanism) -> list[int]:
     ]
 
 
-def random_poses(paths: Paths, count: int, seed: int = 0) -> tuple[Poses, Mapping[str, Truth]]:
+def draw_poses(paths: Paths, count: int, seed: int = 0) -> tuple[Poses, Mapping[str, PathSamples]]:
     """Random poses, and what each path does in them."""
     mechanism = paths.mechanism
     values, moving = (
-        random_values(mechanism, count, seed),
-        np.array(free_coordinates(mechanism), dtype=int),
+        draw_values(mechanism, count, seed),
+        np.array(list_free_coordinates(mechanism), dtype=int),
     )
     states = [mechanism.at(row) for row in values]
     couplings = [paths.compute_free_coupling(state) for state in states]
@@ -144,7 +144,7 @@ def random_poses(paths: Paths, count: int, seed: int = 0) -> tuple[Poses, Mappin
     )
     nodes = [paths.points(row) for row in values]
     truth = {
-        path: Truth(lengths[k], arms[k], [row.get(path, ()) for row in nodes])
+        path: PathSamples(lengths[k], arms[k], [row.get(path, ()) for row in nodes])
         for k, path in enumerate(paths.names)
     }
     return poses, truth

@@ -17,17 +17,23 @@ from osimlite.base.records import dataclass
 from osimlite.mechanics.kernels.paths import CONDITIONAL, MOVING
 from osimlite.mechanics.multibody.spatial import Array, make_transform, rotation_about
 from osimlite.simulation.elements.geometries.paths.geometry_path import Node, ThroughPoints
-from osimlite.translate.mjcf.moving import composition
-from osimlite.translate.mjcf.poses import Places, Poses, Truth
-from osimlite.translate.mjcf.surfaces import stand_ins, z_to
-from osimlite.translate.mjcf.tendons import Around, Spot, Tendon, measure, measure_each
+from osimlite.translate.mjcf.moving import fit_composition
+from osimlite.translate.mjcf.poses import Indices, PathSamples, Poses
+from osimlite.translate.mjcf.surfaces import make_substitutes, rotate_z_to
+from osimlite.translate.mjcf.tendons import (
+    Tendon,
+    TendonSite,
+    WrapGeom,
+    measure_tendon,
+    measure_tendons,
+)
 from osimlite.translate.mjcf.wrapping import unit
 
-DIRECTIONS = 12
+SIDE_DIRECTIONS = 12
 """So many directions around a surface are tried as sides."""
-RADII = (0.001, 0.004, 0.01, 0.015, 0.02, 0.025, 0.03, 0.04)
+CYLINDER_RADII_M = (0.001, 0.004, 0.01, 0.015, 0.02, 0.025, 0.03, 0.04)
 """Radii (m) of the cylinders that are tried for points that come and go."""
-SPECK = 1e-5
+SPECK_RADIUS_M = 1e-5
 """Radius (m) of the sphere that stands for such a point where it need not be fitted."""
 
 
@@ -39,10 +45,10 @@ Choose = Callable[[Sequence[Tendon]], Tendon]
 class Touch:
     """Where a path touches a surface, in the k of the poses in which it does."""
 
-    poses: Places  # their places (k,)
+    poses: Indices  # their places (k,)
     first: Array  # tangent points (k, 3) in the body of the surface, m
     second: Array  # the others (k, 3)
-    after: Places  # numbers of the path points before them (k,)
+    after: Indices  # numbers of the path points before them (k,)
 
 
 class Router:
@@ -55,7 +61,9 @@ class Router:
         version: of MuJoCo, 3 or 4.
     """
 
-    def __init__(self, route: ThroughPoints, truth: Truth, poses: Poses, version: int) -> None:
+    def __init__(
+        self, route: ThroughPoints, truth: PathSamples, poses: Poses, version: int
+    ) -> None:
         columns = np.flatnonzero(np.abs(truth.arms).max(0, initial=0.0) > 1e-9)
         self.route, self.truth, self.poses, self.version = (
             route,
@@ -64,17 +72,17 @@ class Router:
             version,
         )
         self.wanted = np.concatenate((truth.lengths[:, None], truth.arms[:, columns]), axis=1)
-        self.touches = [self._touch(number) for number in range(len(route.surfaces))]
+        self.touches = [self._find_touches(number) for number in range(len(route.surfaces))]
 
-    def residuals(self, tendon: Tendon) -> Array:
+    def compute_residuals(self, tendon: Tendon) -> Array:
         """What is wrong with the lengths and moment arms of a tendon: (P, 1 + m), m."""
-        return self._own(tendon) - self.wanted
+        return self._measure(tendon) - self.wanted
 
-    def error(self, tendon: Tendon) -> float:
+    def compute_error(self, tendon: Tendon) -> float:
         """One number for how wrong a tendon is: the root of the sum of the mean squares, m."""
-        return float(np.sqrt((self.residuals(tendon) ** 2).mean(0).sum()))
+        return float(np.sqrt((self.compute_residuals(tendon) ** 2).mean(0).sum()))
 
-    def best(self) -> Tendon:
+    def find_best(self) -> Tendon:
         """The tendon with the least error among those that can be made of the path's own points and surfaces."""
         slots: list[Tendon] = []
         settle: dict[int, Callable[[Choose], Tendon]] = {}
@@ -82,14 +90,14 @@ class Router:
         for comes_and_goes, group in groupby(points, lambda item: item[1].kind == CONDITIONAL):
             numbers = [number for number, _ in group]
             for run in [numbers] if comes_and_goes else [[number] for number in numbers]:
-                own = tuple(spot(self.route.points[number]) for number in run)
+                own = tuple(make_site(self.route.points[number]) for number in run)
                 if comes_and_goes:
                     each = [
-                        [(point,), (), *self._switch(number)]
+                        [(point,), (), *self._make_switches(number)]
                         for point, number in zip(own, run, strict=True)
                     ]
-                    ways = [*map(_join_pieces, product(*each)), *self._cylinder(run)]
-                    settle[len(slots)] = partial(_choose_of, ways)
+                    ways = [*map(_join_pieces, product(*each)), *self._make_cylinders(run)]
+                    settle[len(slots)] = partial(_choose_option, ways)
                 slots.append(own)
                 if between := [
                     k for k, touch in enumerate(self.touches) if np.isin(touch.after, run).any()
@@ -99,17 +107,20 @@ class Router:
         for _ in range(2 if len(settle) > 1 else 1):
             for place, choice in settle.items():
                 parts = _join_pieces(slots[:place]), slots[place], _join_pieces(slots[place + 1 :])
-                slots[place] = choice(partial(self._least, *parts))
+                slots[place] = choice(partial(self._choose_best, *parts))
         return _join_pieces(slots)
 
-    def _least(
+    def _choose_best(
         self, before: Tendon, now: Tendon, after: Tendon, options: Sequence[Tendon]
     ) -> Tendon:
         """The option for a part of a tendon with which the whole has the least error."""
-        head, tail = before[_last_spot(before) :], after[: len(after) - _last_spot(after[::-1])]
-        rest = self.residuals((*before, *now, *after)) - self._own((*head, *now, *tail))
+        head, tail = (
+            before[_find_last_site(before) :],
+            after[: len(after) - _find_last_site(after[::-1])],
+        )
+        rest = self.compute_residuals((*before, *now, *after)) - self._measure((*head, *now, *tail))
         sound = [option for option in options if _is_tendon((*head, *option, *tail))]
-        lengths, arms = measure_each(
+        lengths, arms = measure_tendons(
             [(*head, *option, *tail) for option in sound], self.poses, self.version
         )
         errors = (
@@ -118,17 +129,17 @@ class Router:
         # Of those that do the same but for rounding the first, on every machine.
         return sound[int(np.argmax(errors <= errors.min() * (1.0 + 1e-9) + 1e-24))]
 
-    def but_for(self, tendon: Tendon, piece: Tendon) -> Callable[[Tendon], Array]:
+    def make_piece_residuals(self, tendon: Tendon, piece: Tendon) -> Callable[[Tendon], Array]:
         """The residuals of a tendon, as a function of what stands in the place of a piece of it from site to site."""
-        rest = self.residuals(tendon) - self._own(piece)
-        return lambda other: rest + self._own(other)
+        rest = self.compute_residuals(tendon) - self._measure(piece)
+        return lambda other: rest + self._measure(other)
 
-    def _own(self, tendon: Tendon) -> Array:
+    def _measure(self, tendon: Tendon) -> Array:
         """Lengths and moment arms (P, 1 + m) of a tendon."""
-        lengths, arms = measure(tendon, self.poses, self.version)
+        lengths, arms = measure_tendon(tendon, self.poses, self.version)
         return np.concatenate((lengths[:, None], arms), axis=1)
 
-    def _touch(self, number: int) -> Touch:
+    def _find_touches(self, number: int) -> Touch:
         one = len(self.route.points) + 2 * number
         body, result = self.route.surfaces[number].tangent.body, []
         for pose, nodes in enumerate(self.truth.nodes):
@@ -146,7 +157,7 @@ class Router:
             np.array(before),
         )
 
-    def _express_in_body(self, body: int, at: Places, places: Array) -> Array:
+    def _express_in_body(self, body: int, at: Indices, places: Array) -> Array:
         """Places in ground (k, 3) in some of the poses, in the frame of a body."""
         return np.einsum(
             "pji,pj->pi",
@@ -157,25 +168,27 @@ class Router:
     # ----------------------------------------------------------------------------------------------- options
     def _choose_obstacles(self, numbers: Sequence[int], choose: Choose) -> Tendon:
         """What a tendon goes around between two points: nothing, a surface, or two with a site between them."""
-        best: dict[int, Around] = {}
+        best: dict[int, WrapGeom] = {}
         options: list[Tendon]
-        for number in sorted(numbers, key=lambda number: np.mean(self._turn(number, numbers))):
+        for number in sorted(
+            numbers, key=lambda number: np.mean(self._find_ranks(number, numbers))
+        ):
             options = [
                 (sided,)
-                for each in stand_ins(
+                for each in make_substitutes(
                     self.route.surfaces[number], self._find_tangent_points(number)
                 )
-                for sided in self._sides(number, each, DIRECTIONS)
+                for sided in self._vary_side(number, each, SIDE_DIRECTIONS)
             ]
             if not options:
                 continue
             (result,) = choose(options)
-            assert isinstance(result, Around)
+            assert isinstance(result, WrapGeom)
             best[number] = result
         options = [(), *((each,) for each in best.values())]
         for (one, first), (two, second) in combinations(best.items(), 2):
             for middle in self._place_sites_between(one, two):
-                sides = product(self._sides(one, first, 0), self._sides(two, second, 0))
+                sides = product(self._vary_side(one, first, 0), self._vary_side(two, second, 0))
                 options += [(sided, middle, other) for sided, other in sides]
         return choose(options)
 
@@ -184,22 +197,22 @@ class Router:
         touch, frame = self.touches[number], self.route.surfaces[number].tangent.frame
         return (np.concatenate((touch.first, touch.second)) - frame[:3, 3]) @ frame[:3, :3]
 
-    def _sides(self, number: int, around: Around, directions: int) -> Iterator[Around]:
+    def _vary_side(self, number: int, around: WrapGeom, directions: int) -> Iterator[WrapGeom]:
         """As it is, or with the side of the quadrant, the side that is touched, or one of the directions all around."""
         yield around
         surface, touch = self.route.surfaces[number], self.touches[number]
         turned = around.frame[:3, :3].T @ surface.tangent.frame[:3, :3]
         axis, sign = int(surface.numbers[0]), surface.numbers[1]
         if sign:
-            yield around.with_side(turned @ (sign * np.eye(3)[axis]))
+            yield around.replace_side(turned @ (sign * np.eye(3)[axis]))
         middles = (0.5 * (touch.first + touch.second) - around.frame[:3, 3]) @ around.frame[:3, :3]
-        yield around.with_side(unit(middles).mean(0))
+        yield around.replace_side(unit(middles).mean(0))
         for turn in np.arange(directions) * (2.0 * np.pi / max(directions, 1)):
-            yield around.with_side(np.array((np.cos(turn), np.sin(turn), 0.0)))
+            yield around.replace_side(np.array((np.cos(turn), np.sin(turn), 0.0)))
         if directions and around.kind == "sphere":
-            yield from (around.with_side(np.array((0.0, 0.0, end))) for end in (1.0, -1.0))
+            yield from (around.replace_side(np.array((0.0, 0.0, end))) for end in (1.0, -1.0))
 
-    def _turn(self, number: int, numbers: Sequence[int]) -> list[int]:
+    def _find_ranks(self, number: int, numbers: Sequence[int]) -> list[int]:
         """Where a surface stands in the order of those that the path touches, in each pose."""
         points = len(self.route.points)
         result = []
@@ -208,34 +221,36 @@ class Router:
             result.append([k for k in dict.fromkeys(order) if k in numbers].index(number))
         return result
 
-    def _place_sites_between(self, one: int, two: int) -> Iterator[Spot]:
+    def _place_sites_between(self, one: int, two: int) -> Iterator[TendonSite]:
         """Sites between two surfaces: in the body of either, halfway between the points where they are touched."""
         first, second = self.touches[one], self.touches[two]
         both, at_one, at_two = np.intersect1d(first.poses, second.poses, return_indices=True)
         if not len(both):
             return
         bodies = [self.route.surfaces[number].tangent.body for number in (one, two)]
-        leaves = self.poses.points_at(bodies[0], first.second[at_one], both)
-        enters = self.poses.points_at(bodies[1], second.first[at_two], both)
+        leaves = self.poses.locate_at(bodies[0], first.second[at_one], both)
+        enters = self.poses.locate_at(bodies[1], second.first[at_two], both)
         for body in dict.fromkeys(bodies):
-            yield Spot(body, self._express_in_body(body, both, 0.5 * (leaves + enters)).mean(0))
+            yield TendonSite(
+                body, self._express_in_body(body, both, 0.5 * (leaves + enters)).mean(0)
+            )
 
-    def _switch(self, number: int) -> Iterator[Tendon]:
+    def _make_switches(self, number: int) -> Iterator[Tendon]:
         """A speck that the path runs through while its side site is inside, which is while the coordinate is in range.
 
         The side site leaves the middle with the square of the distance of the coordinate from the
         middle of the range, in a direction in which the speck then is not in the way: to the point
         before or after.
         """
-        point, node = spot(self.route.points[number]), self.route.points[number]
+        point, node = make_site(self.route.points[number]), self.route.points[number]
         low, high = node.range
         middle, half = 0.5 * (low + high), 0.5 * (high - low)
-        parabola = SPECK / half**2 * np.array((middle**2, -2.0 * middle, 1.0, 0.0, 0.0))
+        parabola = SPECK_RADIUS_M / half**2 * np.array((middle**2, -2.0 * middle, 1.0, 0.0, 0.0))
         for other in (number - 1, number + 1):
             if not 0 <= other < len(self.route.points):
                 continue
-            at = spot(self.route.points[other])
-            there = self.poses.points(at.body, at.place)
+            at = make_site(self.route.points[other])
+            there = self.poses.locate(at.body, at.place)
             toward = (
                 self._express_in_body(point.body, np.arange(len(there)), there).mean(0)
                 - point.place
@@ -243,7 +258,7 @@ class Router:
             if not toward.any():
                 continue
             direction = toward / np.linalg.norm(toward)
-            side = Spot(
+            side = TendonSite(
                 point.body,
                 point.place,
                 node.coordinate,
@@ -251,17 +266,17 @@ class Router:
                 np.outer(direction, parabola),
             )
             yield (
-                Around(
+                WrapGeom(
                     point.body,
                     make_transform(None, point.place),
                     "sphere",
-                    SPECK,
+                    SPECK_RADIUS_M,
                     side,
                     name=point.name,
                 ),
             )
 
-    def _cylinder(self, run: Sequence[int]) -> Iterator[Tendon]:
+    def _make_cylinders(self, run: Sequence[int]) -> Iterator[Tendon]:
         """Cylinders that points which come and go are on, over whose edge the path bends."""
         ways = []
         for pose, nodes in enumerate(self.truth.nodes):
@@ -271,7 +286,7 @@ class Router:
                     nodes[k][1] for k in (at[0] - 1, at[0], at[-1], at[-1] + 1)
                 )
                 ways.append((pose, first - before, after - last))
-        points = [spot(self.route.points[number]) for number in run]
+        points = [make_site(self.route.points[number]) for number in run]
         body = points[0].body
         if not ways or any(point.body != body for point in points):
             return
@@ -283,7 +298,7 @@ class Router:
         )
         if not normal.any() or not into.any():
             return
-        frame = make_transform(z_to(normal))
+        frame = make_transform(rotate_z_to(normal))
         chord = frame[:3, :3].T @ (points[-1].place - points[0].place)
         into = np.array((*(frame[:3, :3].T @ into)[:2], 0.0))
         if len(run) > 1:
@@ -293,44 +308,48 @@ class Router:
         into /= np.linalg.norm(into)
         frame[:3, 3] = 0.5 * (points[0].place + points[-1].place)
         half = 0.5 * float(np.hypot(*chord[:2]))
-        for radius in RADII:
+        for radius in CYLINDER_RADII_M:
             if radius > half:
                 placed = frame @ make_transform(None, np.sqrt(radius**2 - half**2) * into)
-                around = Around(
+                around = WrapGeom(
                     body, placed, "cylinder", radius, length=4.0 * radius, name=points[0].name
                 )
                 for turn in np.linspace(-1.0, 1.0, 5):
                     yield (
-                        around.with_side(rotation_about(np.array((0.0, 0.0, 1.0)), turn) @ -into),
+                        around.replace_side(
+                            rotation_about(np.array((0.0, 0.0, 1.0)), turn) @ -into
+                        ),
                     )
 
 
-def spot(point: Node) -> Spot:
+def make_site(point: Node) -> TendonSite:
     """The site of a path point; where it moves, along quartics of its coordinate."""
     place = point.frame[:3, :3] @ point.location + point.frame[:3, 3]
     if point.kind != MOVING:
-        return Spot(point.body, place, name=point.name)
-    drive, slides = composition(point.functions, point.range)
-    return Spot(
+        return TendonSite(point.body, place, name=point.name)
+    drive, slides = fit_composition(point.functions, point.range)
+    return TendonSite(
         point.body, place, point.coordinate, drive, point.frame[:3, :3] @ slides, point.name
     )
 
 
-def _choose_of(options: Sequence[Tendon], choose: Choose) -> Tendon:
+def _choose_option(options: Sequence[Tendon], choose: Choose) -> Tendon:
     return choose(options)
 
 
 def _is_tendon(tendon: Tendon) -> bool:
     """Whether there is a site at both ends and between any two surfaces."""
-    ends = isinstance(tendon[0], Spot) and isinstance(tendon[-1], Spot)
+    ends = isinstance(tendon[0], TendonSite) and isinstance(tendon[-1], TendonSite)
     return ends and not any(
-        isinstance(a, Around) and isinstance(b, Around) for a, b in pairwise(tendon)
+        isinstance(a, WrapGeom) and isinstance(b, WrapGeom) for a, b in pairwise(tendon)
     )
 
 
-def _last_spot(tendon: Tendon) -> int:
+def _find_last_site(tendon: Tendon) -> int:
     """Place of the last site; 0 if there is none."""
-    return max((index for index, part in enumerate(tendon) if isinstance(part, Spot)), default=0)
+    return max(
+        (index for index, part in enumerate(tendon) if isinstance(part, TendonSite)), default=0
+    )
 
 
 def _join_pieces(slots: Sequence[Tendon]) -> Tendon:

@@ -6,9 +6,9 @@ import numpy as np
 
 from osimlite.mechanics.multibody.spatial import cross
 from osimlite.simulation.robot.robot import Ball, Box, MeshFile, Tube, Visual
-from osimlite.translate.mjcf.draft import Draft, Value, add, pose
+from osimlite.translate.mjcf.draft import Draft, Value, add_element, format_pose
 
-LOOKS, TOUCHES, MARKS, FRAMES = 2, 3, 4, 5
+SHAPE_GROUP, CONTACT_GROUP, MARKER_GROUP, FRAME_GROUP = 2, 3, 4, 5
 """Groups that MuJoCo's viewer shows and hides together: shapes, contact surfaces, markers, frames."""
 
 
@@ -16,19 +16,19 @@ def add_shapes(draft: Draft) -> None:
     """Add the shapes that bodies are drawn with."""
     if not any(link.visuals for link in draft.robot.links):
         return
-    looks = add(draft.section("default"), "default", class_="looks")
-    add(looks, "geom", contype=0, conaffinity=0, group=LOOKS, mass=0)
-    for link, element in draft.links():
+    looks = add_element(draft.get_section("default"), "default", class_="looks")
+    add_element(looks, "geom", contype=0, conaffinity=0, group=SHAPE_GROUP, mass=0)
+    for link, element in draft.iterate_links():
         for visual in link.visuals:
-            name = draft.name("geom", visual.source)
-            add(
+            name = draft.make_name("geom", visual.source)
+            add_element(
                 element,
                 "geom",
                 class_="looks",
                 name=name,
                 rgba=visual.color,
-                **pose(visual.origin),
-                **shape(draft, visual),
+                **format_pose(visual.origin),
+                **format_shape(draft, visual),
             )
             draft.fidelity.translated[visual.source] = f"geom {name}"
 
@@ -51,17 +51,26 @@ def add_camera(draft: Draft) -> None:
     right /= np.linalg.norm(right)
     place = 0.5 * (low + high) + (1.0 + float(np.linalg.norm(high - low))) * cross(right, up)
     # MuJoCo's own light, which goes with the camera, leaves bones dark.
-    add(add(draft.root, "visual"), "headlight", ambient=(0.4, 0.4, 0.4), diffuse=(0.6, 0.6, 0.6))
-    add(draft.section("worldbody"), "camera", name="side", pos=place, xyaxes=(*right, *up))
+    add_element(
+        add_element(draft.root, "visual"),
+        "headlight",
+        ambient=(0.4, 0.4, 0.4),
+        diffuse=(0.6, 0.6, 0.6),
+    )
+    add_element(
+        draft.get_section("worldbody"), "camera", name="side", pos=place, xyaxes=(*right, *up)
+    )
 
 
 def add_markers(draft: Draft) -> None:
     """Add a site for every marker and other station."""
     for path, (body, location) in draft.mechanism.stations.items():
-        draft.fidelity.translated[path] = f"site {draft.site(path, body, location, group=MARKS)}"
+        draft.fidelity.translated[path] = (
+            f"site {draft.add_site(path, body, location, group=MARKER_GROUP)}"
+        )
 
 
-def shape(draft: Draft, visual: Visual) -> dict[str, Value]:
+def format_shape(draft: Draft, visual: Visual) -> dict[str, Value]:
     """The attributes of a geom that has the shape; a mesh becomes an asset, one for each file and scale."""
     match visual.shape:
         case Box(size):
@@ -71,4 +80,4 @@ def shape(draft: Draft, visual: Visual) -> dict[str, Value]:
         case Tube(radius, length):
             return {"type": "cylinder", "size": [radius, length / 2.0]}
         case MeshFile(file, scale):
-            return {"type": "mesh", "mesh": draft.mesh(file, scale)}
+            return {"type": "mesh", "mesh": draft.add_mesh(file, scale)}

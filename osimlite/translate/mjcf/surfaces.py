@@ -9,10 +9,10 @@ import numpy as np
 from osimlite.base.records import replace
 from osimlite.mechanics.multibody.spatial import Array, make_transform
 from osimlite.simulation.elements.geometries.paths.geometry_path import Surface
-from osimlite.translate.mjcf.tendons import Around, Spot
+from osimlite.translate.mjcf.tendons import TendonSite, WrapGeom
 
 
-def stand_ins(surface: Surface, touched: Array) -> Iterator[Around]:
+def make_substitutes(surface: Surface, touched: Array) -> Iterator[WrapGeom]:
     """Spheres and cylinders in the place of a surface; none if it has no size.
 
     Args:
@@ -21,7 +21,7 @@ def stand_ins(surface: Surface, touched: Array) -> Iterator[Around]:
     """
     if min(surface.numbers[4:]) <= 0.0:
         return
-    own = Around(
+    own = WrapGeom(
         surface.tangent.body, surface.tangent.frame, "sphere", 0.0, name=surface.tangent.name
     )
     sizes = surface.numbers[4:]
@@ -35,7 +35,7 @@ def stand_ins(surface: Surface, touched: Array) -> Iterator[Around]:
                 yield replace(own, radius=radius)
             for axis in range(3):
                 across = np.delete(touched, axis, axis=1)
-                turned = own.frame @ make_transform(z_to(np.eye(3)[axis]))
+                turned = own.frame @ make_transform(rotate_z_to(np.eye(3)[axis]))
                 for radius in {
                     *np.delete(sizes, axis).tolist(),
                     float(np.linalg.norm(across, axis=1).mean()),
@@ -48,15 +48,15 @@ def stand_ins(surface: Surface, touched: Array) -> Iterator[Around]:
             tube, ring = sizes
             x, y, _ = touched.mean(0)
             out = np.array((x, y, 0.0)) / np.hypot(x, y)
-            turned = make_transform(z_to(np.cross((0.0, 0.0, 1.0), out)), ring * out)
+            turned = make_transform(rotate_z_to(np.cross((0.0, 0.0, 1.0), out)), ring * out)
             yield replace(
                 own, kind="cylinder", frame=own.frame @ turned, radius=tube, length=2.0 * tube
             )
             # Or it runs through a ball in the hole, whose side site is inside.
-            yield replace(own, radius=ring - tube, side=Spot(own.body, own.frame[:3, 3]))
+            yield replace(own, radius=ring - tube, side=TendonSite(own.body, own.frame[:3, 3]))
 
 
-def z_to(axis: Array) -> Array:
+def rotate_z_to(axis: Array) -> Array:
     """A rotation that takes z to a direction."""
     z = axis / np.linalg.norm(axis)
     x = np.cross(np.eye(3)[np.argmin(np.abs(z))], z)

@@ -25,10 +25,10 @@ from osimlite.schema.springs import BushingForce, PointToPointSpring, SpringGene
 from osimlite.simulation.elements import ElementBuilder, Forces
 from osimlite.simulation.elements.force_records import ForceElement
 from osimlite.simulation.system import System
-from osimlite.translate.mjcf.draft import Draft, text
-from osimlite.translate.mjcf.isometric import isometric_tension
+from osimlite.translate.mjcf.draft import Draft, format_value
+from osimlite.translate.mjcf.isometric import compute_isometric_tension
 
-SPRINGS = (
+SPRING_TYPES = (
     Blankevoort1991Ligament,
     BushingForce,
     CoordinateLimitForce,
@@ -37,32 +37,36 @@ SPRINGS = (
     PointToPointSpring,
     SpringGeneralizedForce,
 )
-STEP = 1e-3
+DEFAULT_STEP_S = 1e-3
 """The usual time step, s."""
-NUDGE = 1e-7
+DIFFERENCE_STEP = 1e-7
 """By which a derivative changes coordinates (rad, m) or speeds (per s)."""
 
 
 def choose_step(draft: Draft) -> None:
     """Take smaller steps where springs are stiff, and tell of muscles that are torn."""
     try:
-        rate = _fastest(draft)
+        rate = _compute_fastest_rate(draft)
     except OsimliteError as error:
         rate, cannot = 0.0, "springs that may be too stiff: how stiff they are cannot be computed"
         draft.fidelity.add(
-            "stiff", "/", cannot, f"steps of {STEP:g} s, be they too long or not", error.message
+            "stiff",
+            "/",
+            cannot,
+            f"steps of {DEFAULT_STEP_S:g} s, be they too long or not",
+            error.message,
         )
-    if rate * STEP > 2.0:
+    if rate * DEFAULT_STEP_S > 2.0:
         step = float(f"{1.0 / rate:.0e}")
-        next(draft.root.iter("option")).set("timestep", text(step))
-        cannot = f"springs too stiff for steps of {STEP:g} s, which would end in NaN"
+        next(draft.root.iter("option")).set("timestep", format_value(step))
+        cannot = f"springs too stiff for steps of {DEFAULT_STEP_S:g} s, which would end in NaN"
         detail = f"{step:g} s, for a rate of {rate:.3g} 1/s about the default pose"
         draft.fidelity.add("stiff", "/", cannot, "the file takes smaller steps", detail)
     for path, tied in draft.tendons.items():
         muscle, tension = draft.tree.by_path[path], 0.0
         if isinstance(muscle, Muscle):
             with suppress(OsimliteError):
-                (tension,) = isometric_tension(muscle, np.array((tied.default,)), (0.0,))[0]
+                (tension,) = compute_isometric_tension(muscle, np.array((tied.default,)), (0.0,))[0]
             if tension > muscle.max_isometric_force:
                 cannot = "fibers that are longer in the default pose than they can bear"
                 done = "as it is: the model may run away, in smaller steps too"
@@ -70,7 +74,7 @@ def choose_step(draft: Draft) -> None:
                 draft.fidelity.add("overstretched", path, cannot, done, detail)
 
 
-def _fastest(draft: Draft) -> float:
+def _compute_fastest_rate(draft: Draft) -> float:
     """The greatest rate (1/s) of the model's springs about its default pose."""
     mechanism, (q, u) = draft.mechanism, draft.default_state
     state = mechanism.at(q, u)
@@ -84,7 +88,7 @@ def _fastest(draft: Draft) -> float:
     if not len(mass) or np.linalg.eigvalsh(mass)[0] < SAFE_MASS:
         return 0.0
     builder = ElementBuilder(draft.model, mechanism, draft.folder or Path())
-    owners = [force for force in builder.iterate_forces() if isinstance(force, SPRINGS)]
+    owners = [force for force in builder.iterate_forces() if isinstance(force, SPRING_TYPES)]
     springs = [builder.make_element(force) for force in owners]
     bushings = [
         spring
@@ -92,8 +96,8 @@ def _fastest(draft: Draft) -> float:
         if isinstance(force, BushingForce)
     ]
     zero = np.zeros_like(free)
-    stiffness = _slopes(draft, springs, mechanism.rate_matrix(q) @ free, zero)
-    damping = _slopes(draft, bushings, zero, free)
+    stiffness = _differentiate_forces(draft, springs, mechanism.rate_matrix(q) @ free, zero)
+    damping = _differentiate_forces(draft, bushings, zero, free)
     rates = np.linalg.solve(mass, free.T @ np.hstack((stiffness, damping)))
     count = len(mass)
     return float(
@@ -101,7 +105,9 @@ def _fastest(draft: Draft) -> float:
     )
 
 
-def _slopes(draft: Draft, elements: Sequence[ForceElement], along: Array, at: Array) -> Array:
+def _differentiate_forces(
+    draft: Draft, elements: Sequence[ForceElement], along: Array, at: Array
+) -> Array:
     """Derivatives (n, f) of generalized forces by steps along coordinates and speeds, each (n, f)."""
     q, u = draft.default_state
     result = np.zeros_like(along)
@@ -118,5 +124,7 @@ def _slopes(draft: Draft, elements: Sequence[ForceElement], along: Array, at: Ar
             return row
 
         for k in range(result.shape[1]):
-            result[:, k] = (forces(NUDGE, k) - forces(-NUDGE, k)) / (2.0 * NUDGE)
+            result[:, k] = (forces(DIFFERENCE_STEP, k) - forces(-DIFFERENCE_STEP, k)) / (
+                2.0 * DIFFERENCE_STEP
+            )
     return result

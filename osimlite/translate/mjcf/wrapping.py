@@ -49,7 +49,7 @@ class Bends(NamedTuple):
     choice: NDArray[np.intp]
 
 
-def bend(
+def bend_tendon(
     kind: str,
     radius: Array,
     first: Array,
@@ -69,10 +69,10 @@ def bend(
         owners: places of these surfaces (k,).
         version: of MuJoCo, 3 or 4.
     """
-    across = None if kind == "cylinder" else _plane(first, second)
+    across = None if kind == "cylinder" else _make_plane_axes(first, second)
     p, q = _project_to_plane(across, first), _project_to_plane(across, second)
-    reach_p, reach_q = _reach(p, radius), _reach(q, radius)
-    between = _angle(p, q)
+    reach_p, reach_q = _compute_tangent_angle(p, radius), _compute_tangent_angle(q, radius)
+    between = _compute_angle(p, q)
     signs = (
         np.array((0.0, 1.0, -1.0))[:, None, None]
         if sides is not None
@@ -93,9 +93,11 @@ def bend(
     if sides is not None:
         toward = _project_to_plane(None if across is None else across[owners], sides)
         if version >= 4:
-            choice = np.where(_angle(p[owners], toward) + _angle(toward, q[owners]) < 0.0, 2, 1)
+            choice = np.where(
+                _compute_angle(p[owners], toward) + _compute_angle(toward, q[owners]) < 0.0, 2, 1
+            )
         else:
-            choice = _side(p, q, radius, at_p[1:], at_q[1:], toward, owners)
+            choice = _choose_side(p, q, radius, at_p[1:], at_q[1:], toward, owners)
         if (inside := norm(sides) < radius[owners]).any():
             through, at = _find_passage(p, q, radius)
             touches, arc = np.stack((*touches, outside & through)), np.stack((*arc, 0.0 * between))
@@ -122,7 +124,7 @@ def bend(
     )
 
 
-def _side(
+def _choose_side(
     p: Array,
     q: Array,
     radius: Array,
@@ -150,7 +152,7 @@ def _find_passage(p: Array, q: Array, radius: Array) -> tuple[Mask, Array]:
     way = q - p
     part = np.clip(-_dot(way, p) / np.maximum(_dot(way, way), TINY), 0.0, 1.0)
     passes = norm(p + part[..., None] * way) > radius
-    between = _angle(p, q)
+    between = _compute_angle(p, q)
     # At the share t of the angle from p to q the slope of the length changes its sign once.
     low, high = np.zeros(between.shape), np.ones(between.shape)
     for _ in range(50):
@@ -172,7 +174,7 @@ def _lines_cross(p: Array, one: Array, q: Array, two: Array) -> Mask:
     return (along >= 0.0) & (along <= 1.0) & (back >= 0.0) & (back <= 1.0)
 
 
-def _plane(first: Array, second: Array) -> Array:
+def _make_plane_axes(first: Array, second: Array) -> Array:
     """Two unit vectors (S, P, 2, 3) in the plane of both ends and the middle of a sphere, one toward the first end."""
     along = first / np.maximum(norm(first), TINY)[..., None]
     normal = np.cross(first, second)
@@ -203,7 +205,7 @@ def unit(a: Array) -> Array:
     return a / np.maximum(norm(a), np.finfo(float).tiny)[..., None]
 
 
-def _angle(a: Array, b: Array) -> Array:
+def _compute_angle(a: Array, b: Array) -> Array:
     """From one vector to the other (...), from -pi to pi."""
     return np.arctan2(_cross(a, b), _dot(a, b))
 
@@ -212,7 +214,7 @@ def _cross(a: Array, b: Array) -> Array:
     return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
 
 
-def _reach(p: Array, radius: Array) -> Array:
+def _compute_tangent_angle(p: Array, radius: Array) -> Array:
     """The angle between a point and where a line from it touches the circle, as seen from the middle (...)."""
     return np.arccos(np.clip(radius / np.maximum(norm(p), TINY), 0.0, 1.0))
 

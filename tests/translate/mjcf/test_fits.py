@@ -14,10 +14,10 @@ from osimlite.schema.muscles import PathActuator
 from osimlite.schema.paths import GeometryPath, PathPoint, PathWrap
 from osimlite.schema.wrapping import WrapCylinder, WrapEllipsoid, WrapTorus
 from osimlite.translate.mjcf.fits import fit_tendon
-from osimlite.translate.mjcf.moving import composition
-from osimlite.translate.mjcf.poses import random_poses
+from osimlite.translate.mjcf.moving import fit_composition
+from osimlite.translate.mjcf.poses import draw_poses
 from osimlite.translate.mjcf.routes import Router
-from osimlite.translate.mjcf.tendons import Around, Spot
+from osimlite.translate.mjcf.tendons import TendonSite, WrapGeom
 
 
 def joint_with(surface):
@@ -45,7 +45,7 @@ def joint_with(surface):
 
 def router(model, version=4):
     paths = osimlite.paths(model)
-    poses, truth = random_poses(paths, 80, 0)
+    poses, truth = draw_poses(paths, 80, 0)
     return Router(paths.routes["/forceset/cable"], truth["/forceset/cable"], poses, version)
 
 
@@ -57,9 +57,9 @@ def test_a_cylinder_that_is_crossed_squarely_is_exact(version):
         point.location = (x, y, 0.02)
     way = router(model, version)
     assert 20 < len(way.touches[0].poses) < 80
-    tendon = way.best()
-    assert [type(part) for part in tendon] == [Spot, Around, Spot]
-    assert way.error(tendon) < 1e-12
+    tendon = way.find_best()
+    assert [type(part) for part in tendon] == [TendonSite, WrapGeom, TendonSite]
+    assert way.compute_error(tendon) < 1e-12
 
 
 @pytest.mark.parametrize(
@@ -80,21 +80,21 @@ def test_a_cylinder_that_is_crossed_squarely_is_exact(version):
 def test_what_mujoco_has_not_is_near_and_nearer_if_fitted(surface, chosen, after):
     way = router(joint_with(surface))
     assert len(way.touches[0].poses) > 10
-    tendon = way.best()
-    before = way.error(tendon)
+    tendon = way.find_best()
+    before = way.compute_error(tendon)
     assert before < chosen
-    assert way.error(fit_tendon(way, tendon)) < min(after, 0.9 * before)
+    assert way.compute_error(fit_tendon(way, tendon)) < min(after, 0.9 * before)
 
 
 def test_a_quartic_of_a_quartic():
     functions = (Sine(0.03, 1.5, 0.2, 0.1), Polynomial((0.1, 0.0, 0.2)))
-    drive, slides = composition(functions, (-2.0, 0.2))
+    drive, slides = fit_composition(functions, (-2.0, 0.2))
     x = np.linspace(-2.0, 0.2, 50)
     helper = np.polynomial.polynomial.polyval(x, drive)
     for function, row in zip(functions, slides, strict=True):
         wanted = [function.derivatives(value)[0] for value in x]
         np.testing.assert_allclose(np.polynomial.polynomial.polyval(helper, row), wanted, atol=2e-4)
-    drive, slides = composition(functions[1:], (-2.0, 0.2))
+    drive, slides = fit_composition(functions[1:], (-2.0, 0.2))
     assert drive.tolist() == [0.0, 1.0, 0.0, 0.0, 0.0] and slides.tolist() == [
         [0.2, 0.0, 0.1, 0.0, 0.0]
     ]

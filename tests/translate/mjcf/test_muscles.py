@@ -12,7 +12,7 @@ import osimlite
 from osimlite.schema.path_forces import PathSpring
 from osimlite.schema.paths import GeometryPath, PathPoint
 from osimlite.translate import to_mjcf
-from osimlite.translate.mjcf.isometric import isometric_tension
+from osimlite.translate.mjcf.isometric import compute_isometric_tension
 from osimlite.translate.mjcf.muscles import Curves
 
 
@@ -43,7 +43,7 @@ def test_fibers_and_tendons_keep_their_lengths(corpus):
 @pytest.mark.parametrize("activation", [0.0, 0.3, 1.0])
 def test_tension_is_mujocos(activation):
     curves = Curves(0.2, 0.1, 500.0, 0.4, 1.7, 1.5, 1.2, 0.13)
-    gain, bias = (" ".join(map(str, row)) for row in curves.numbers(10.0, 1.4))
+    gain, bias = (" ".join(map(str, row)) for row in curves.make_parameters(10.0, 1.4))
     model = mujoco.MjModel.from_xml_string(f"""<mujoco><worldbody><site name="a"/>
         <body><joint name="x" type="slide"/><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/><site name="b"/></body>
         </worldbody><tendon><spatial name="t"><site site="a"/><site site="b"/></spatial></tendon>
@@ -54,7 +54,9 @@ def test_tension_is_mujocos(activation):
         data.qpos[0], data.ctrl[0] = length, activation
         mujoco.mj_forward(model, data)
         result.append(-data.actuator_force[0])
-    np.testing.assert_allclose(curves.tension(lengths, activation), result, rtol=1e-12, atol=1e-9)
+    np.testing.assert_allclose(
+        curves.compute_tension(lengths, activation), result, rtol=1e-12, atol=1e-9
+    )
     read = Curves.read(
         model.actuator_lengthrange[0], model.actuator_gainprm[0], model.actuator_biasprm[0]
     )
@@ -95,7 +97,9 @@ def test_a_slack_spring_pulls_nothing(corpus):
         data.qpos[:] = 0.0
         data.qpos[place] = 0.3 + stretch
         mujoco.mj_forward(compiled, data)
-        expected = isometric_tension(model["/forceset/cord"], np.array([0.3 + stretch]), (0.0,))
+        expected = compute_isometric_tension(
+            model["/forceset/cord"], np.array([0.3 + stretch]), (0.0,)
+        )
         assert -data.qfrc_spring[compiled.joint("pelvis_tx").dofadr[0]] == pytest.approx(
             expected.item(), abs=1e-9
         )

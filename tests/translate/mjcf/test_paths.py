@@ -25,7 +25,7 @@ from osimlite.schema.paths import (
 )
 from osimlite.schema.wrapping import WrapCylinder
 from osimlite.translate import to_mjcf
-from osimlite.translate.mjcf.poses import random_values
+from osimlite.translate.mjcf.poses import draw_values
 from tests.translate.mjcf.compiled import Compiled
 
 POSES = 30
@@ -36,7 +36,7 @@ def errors(model, **options):
     mjcf = to_mjcf(model, visuals=False, **options)
     compiled, paths = Compiled(mjcf), osimlite.paths(model)
     result = {name.rpartition("/")[2]: [] for name in paths.names}
-    for q in random_values(paths.mechanism, POSES, 5):
+    for q in draw_values(paths.mechanism, POSES, 5):
         compiled.place(q)
         for name, length in paths.lengths(q).items():
             muscle = name.rpartition("/")[2]

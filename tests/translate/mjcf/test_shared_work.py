@@ -11,15 +11,15 @@ from osimlite.schema.functions import LinearFunction
 from osimlite.schema.path_forces import PathSpring
 from osimlite.schema.paths import PathPoint
 from osimlite.translate.mjcf import moving
-from osimlite.translate.mjcf.poses import random_poses
+from osimlite.translate.mjcf.poses import draw_poses
 
 
 def test_the_other_side_of_a_body_takes_no_second_fit() -> None:
     right = SimmSpline((0.0, 0.4, 0.9, 1.3, 2.0), (0.1, 0.3, -0.2, 0.25, 0.2))
-    first, slides = moving.composition((right, right), (0.0, 2.0))
-    fits = moving.find_nearest.cache_info().misses
-    other, mirrored = moving.composition((right, ScaledFunction(-1.0, right)), (0.0, 2.0))
-    assert moving.find_nearest.cache_info().misses == fits
+    first, slides = moving.fit_composition((right, right), (0.0, 2.0))
+    fits = moving.fit_quartics.cache_info().misses
+    other, mirrored = moving.fit_composition((right, ScaledFunction(-1.0, right)), (0.0, 2.0))
+    assert moving.fit_quartics.cache_info().misses == fits
     assert np.array_equal(first, other)
     assert np.array_equal(mirrored, slides * [[1.0], [-1.0]])
 
@@ -51,7 +51,7 @@ def test_poses_know_what_paths_say_one_by_one() -> None:
         spring.geometry_path.path_point_set.objects.append(point)
     model.add(spring)
     paths = osimlite.paths(model)
-    poses, truth = random_poses(paths, 5)
+    poses, truth = draw_poses(paths, 5)
     names = [paths.mechanism.coordinates[place].path for place in poses.moving]
     assert names == ["/jointset/j0/q0", "/jointset/j3/q3"]
     for number, q in enumerate(poses.q):

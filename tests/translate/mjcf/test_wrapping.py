@@ -9,7 +9,7 @@ import sys
 import numpy as np
 import pytest
 
-from osimlite.translate.mjcf.wrapping import bend
+from osimlite.translate.mjcf.wrapping import bend_tendon
 
 RADIUS = 0.5
 
@@ -57,7 +57,7 @@ def test_as_mujoco(which, kind, distance, request):
     first, second = ends
     sites = None if side is None else side[None, None]
     one = np.array([0])
-    result = bend(
+    result = bend_tendon(
         kind,
         np.array([[RADIUS]]),
         first[None],
