@@ -1,4 +1,4 @@
-"""From the mechanism to the formats of other programs, with an account of what they cannot say."""
+"""Translation of models to formats of other programs, with an account of what these cannot express."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Collision shapes, made of the contact geometry of a model."""
+"""Collision shapes of a robot from the contact geometry of a model."""
 
 from __future__ import annotations
 
@@ -22,19 +22,25 @@ from osimlite.simulation.robot.visuals import mesh_shape
 from osimlite.translate.fidelity import Fidelity
 
 HALF_SPACE_BOX_M = (1.0, 200.0, 200.0)
-"""Size (m) of the box that stands for a half space: its thickness, and its edges along the surface."""
+"""Size (m) of the box that replaces a half space: thickness, and edges along the surface.
+
+URDF has no infinite plane; 200 m are more than any motion covers.
+"""
 
 
 def collect_collisions(
     model: Model, mechanism: Mechanism, fidelity: Fidelity, mesh_files: MeshFiles
 ) -> dict[str, list[Visual]]:
-    """The contact surfaces of a model by absolute path of the body (or ``"/ground"``), each placed in its frame.
+    """Collect the contact surfaces of a model as collision shapes.
 
     Args:
-        model: where the contact geometry is.
-        mechanism: of the same model; knows where frames are.
-        fidelity: is told what a collision shape does not say, and which surfaces have none.
-        mesh_files: finds mesh files, and takes them up.
+        model: model with contact geometry.
+        mechanism: mechanism of the model, which locates frames.
+        fidelity: account to which losses are added.
+        mesh_files: collection of mesh files, which finds and adds them.
+
+    Returns:
+        Shapes, placed in the frame of their body, by the absolute path of the body (or "/ground").
     """
     tree, result = model.tree(), dict[str, list[Visual]]()
     for geometry in tree.components:
@@ -67,38 +73,39 @@ def collect_collisions(
 def _make_shape(
     geometry: ContactGeometry, path: str, fidelity: Fidelity, mesh_files: MeshFiles
 ) -> tuple[Shape, Array] | None:
-    """The shape, and its frame in the frame of the geometry."""
+    """Return the shape of a contact surface and its frame in the frame of the geometry, or None."""
     here = np.eye(4)
 
-    def told(what: str, done: str, detail: str = "") -> None:
+    def report(what: str, done: str, detail: str = "") -> None:
         fidelity.add("contact-geometry", path, what, done, detail)
 
     match geometry:
         case ContactSphere() if geometry.radius > 0.0:
-            told(
+            report(
                 "the material of a contact surface",
                 "a collision shape without it",
                 f"sphere of {geometry.radius:g} m",
             )
             return Ball(geometry.radius), here
         case ContactHalfSpace():
+            # OpenSim's half space fills x > 0, so that the box lies on that side of its face.
             here[0, 3] = HALF_SPACE_BOX_M[0] / 2.0
             size = " x ".join(f"{edge:g}" for edge in HALF_SPACE_BOX_M)
-            told(
+            report(
                 "a half space, and its material",
                 f"a collision box of {size} m whose face is its surface",
             )
             return Box(HALF_SPACE_BOX_M), here
         case ContactEllipsoid() if min(geometry.radii) > 0.0:
             file = mesh_files.name_of_stretched("ellipsoid", make_ball(), geometry.radii)
-            told("an ellipsoid, and its material", "a collision shape in a mesh file", file)
+            report("an ellipsoid, and its material", "a collision shape in a mesh file", file)
             return MeshFile(file), here
         case ContactMesh():
             shape = mesh_shape(geometry.filename, path, mesh_files, fidelity.add)
             if shape is not None:
                 done = "a collision shape of the file; many programs take its convex hull"
-                told("the material of a contact mesh", done, shape.file)
+                report("the material of a contact mesh", done, shape.file)
                 return shape, here
             return None
-    told(f"a contact surface of class {type(geometry).__name__}", "left out")
+    report(f"a contact surface of class {type(geometry).__name__}", "left out")
     return None

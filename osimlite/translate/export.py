@@ -1,4 +1,6 @@
-"""The translation of a whole model: robot, text, mesh files and the account of what was lost."""
+"""Translation of a complete model to URDF: robot, text, mesh files, and the account of what was
+lost.
+"""
 
 from __future__ import annotations
 
@@ -34,15 +36,15 @@ Locked = Literal["fixed", "joint"]
 
 @dataclass(frozen=True)
 class Urdf:
-    """A model as URDF.
+    """Model as URDF.
 
     Attributes:
-        name: of the files.
-        text: the URDF.
-        fidelity: what became of every component, and what URDF cannot say.
-        robot: the neutral robot that was written, which maps links and joints to bodies and
+        name: name of the files.
+        text: URDF text.
+        fidelity: account of what became of every component, and of what URDF cannot express.
+        robot: neutral robot that was written, which maps links and joints to bodies and
             coordinates.
-        coordinates: JSON text that tells how coordinates drive joints, and which link carries which
+        coordinates: JSON text with the functions from coordinates to joints, and the link of each
             body.
         files: mesh files that the text names, by name relative to it.
     """
@@ -55,12 +57,15 @@ class Urdf:
     files: dict[str, bytes] = field(default_factory=dict)
 
     def write(self, folder: str | Path) -> list[Path]:
-        """Write ``<name>.urdf``, its meshes, ``<name>.coordinates.json`` and ``fidelity.json`` into a folder.
+        """Write `<name>.urdf`, its meshes, `<name>.coordinates.json` and `fidelity.json` into a
+        folder.
 
-        The folder is made if it is not there.
+        Args:
+            folder: output folder; created if necessary.
 
         Returns:
-            The files written, the URDF first. It is written last, when all it needs is in place.
+            Paths of the files, the URDF first. It is written last, when all files that it needs
+            exist.
 
         Raises:
             OsimliteError: a file cannot be written.
@@ -94,29 +99,28 @@ def to_urdf(
     """Translate a model to URDF.
 
     Args:
-        model: the model.
-        visuals: whether to say what bodies look like.
-        limits: ``"range"`` writes coordinate ranges as hard limits; OpenSim itself lets coordinates
-            leave them.
-        locked: whether a locked coordinate becomes a fixed joint at its default value, or a joint
-            that moves.
-        merge: make bodies that do not move relative to each other one link.
-        collision: whether contact geometry becomes collision shapes; a half space becomes a box
+        model: model to translate.
+        visuals: whether to write the shapes with which bodies are drawn.
+        limits: "range" writes the ranges of coordinates as hard limits, "none" no limits; OpenSim
+            itself lets coordinates leave their range.
+        locked: "fixed" turns a locked coordinate into a fixed joint at its default value, "joint"
+            into a joint that moves.
+        merge: whether to merge bodies that do not move relative to each other into one link.
+        collision: whether to write contact geometry as collision shapes; a half space becomes a box
             whose face is its surface.
-        effort: limit (N, N·m) for joints whose coordinate has no actuators with a greatest force.
-        velocity: limit (m/s, rad/s) for all joints.
-        folder: where the model's file is; mesh files are looked for there and in its folder
-            ``Geometry``.
-        geometry: more folders to look for mesh files in; those in the environment variable
+        effort: effort limit (N or N·m) of joints whose coordinate has no actuators with a finite
+            largest force; None for no limit.
+        velocity: velocity limit (m/s or rad/s) of all joints; None for no limit.
+        folder: folder of the model file; mesh files are searched there and in its folder
+            `Geometry`.
+        geometry: further folders for mesh files; those in the environment variable
             OSIMLITE_GEOMETRY, separated as in PATH, follow them.
-
-        name: of the files to write, without ending; that of the model if not given.
+        name: name of the files without ending; by default that of the model.
 
     Raises:
-        OsimliteError: a limit is not a positive number, or `limits` is no word of these.
-        ModelError: the model is not a mechanism: something it names is not there, or a body is not
-            connected.
-        UnsupportedError: it uses a joint or constraint that osimlite cannot compute.
+        OsimliteError: a limit is not a positive number, or `limits` has another value.
+        ModelError: the model is not a valid mechanism: a frame or body is missing or not connected.
+        UnsupportedError: a joint or constraint is not supported.
     """
     if limits not in ("none", "range"):
         raise OsimliteError(f"--limits is 'none' or 'range', not '{limits}'")

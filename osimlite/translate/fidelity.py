@@ -1,4 +1,4 @@
-"""The account of a translation: what became what, and what the target cannot say."""
+"""Account of a translation: what each component became, and what the target format cannot express."""
 
 from __future__ import annotations
 
@@ -12,11 +12,17 @@ from osimlite.base.text import format_json
 from osimlite.mechanics.multibody.spatial import Array
 
 LEFT_OUT = "left out"
-"""What `Record.done` starts with where nothing of the component is in the target."""
+"""Beginning of `Record.done` if nothing of the component is in the target."""
 
 
 class Error(NamedTuple):
-    """How far the target is from the model over the poses that were compared: the worst, and the root mean square."""
+    """Error of an approximation over the poses that were compared.
+
+    Attributes:
+        max: largest absolute error.
+        rms: root mean square error.
+        unit: unit of both.
+    """
 
     max: float
     rms: float
@@ -24,32 +30,52 @@ class Error(NamedTuple):
 
     @classmethod
     def measure(cls, differences: Sequence[float] | Array, unit: str) -> Error:
-        """The error that these differences are."""
+        """Return the error of some differences.
+
+        Args:
+            differences: differences between target and model (k,).
+            unit: their unit.
+        """
         off = np.abs(differences)
         return cls(float(off.max()), float(np.sqrt(np.mean(off**2))), unit)
 
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """One thing that the target cannot say."""
+    """Loss or approximation of one component.
 
-    kind: str  # a word for what it concerns: force, contact-geometry, coordinate-range, gravity ...
-    component: str  # absolute path in the model
-    cannot_say: str  # what the target cannot say
-    done: str  # what was done about it
-    detail: str = ""  # the numbers and names of this case; may be empty
-    # what was measured of an approximation, by the name of the quantity: length, value, force ...
+    Attributes:
+        kind: what it concerns: force, contact-geometry, coordinate-range, gravity ...
+        component: absolute path in the model.
+        cannot_say: what the target cannot express.
+        done: what was written instead.
+        detail: numbers and names of this case, or "".
+        errors: errors of an approximation by quantity: length, value, force ...
+    """
+
+    kind: str
+    component: str
+    cannot_say: str
+    done: str
+    detail: str = ""
     errors: Mapping[str, Error] = field(default_factory=dict)
 
     @property
     def how(self) -> Literal["approximate", "dropped"]:
-        """Whether something of it is left."""
+        """ "dropped" if nothing of the component is in the target, else "approximate"."""
         return "dropped" if self.done.startswith(LEFT_OUT) else "approximate"
 
 
 @dataclass(frozen=True, slots=True)
 class Group:
-    """Records that say the same of several components."""
+    """Records of one kind that say the same about several components.
+
+    Attributes:
+        kind: what they concern.
+        cannot_say: what the target cannot express.
+        done: what was written instead.
+        records: records, in the order of the model.
+    """
 
     kind: str
     cannot_say: str
@@ -58,11 +84,15 @@ class Group:
 
     @property
     def components(self) -> tuple[str, ...]:
-        """Absolute paths of the components."""
+        """Absolute paths of the components.
+
+        Returns:
+            One path per record.
+        """
         return tuple(record.component for record in self.records)
 
     def worst(self) -> list[tuple[str, Error]]:
-        """The largest error of each quantity and unit, whatever it is about."""
+        """Return the largest error of each quantity and unit, over all components and coordinates."""
         result: dict[tuple[str, str], Error] = {}
         for record in self.records:
             for what, error in record.errors.items():
@@ -73,19 +103,18 @@ class Group:
 
 @dataclass
 class Fidelity:
-    """Everything a translation has to answer for: each component of the model is in `translated` or in a record.
+    """Account of a translation: each component of the model is in `translated` or in a record.
 
-    What stands below a component that has a record shares its fate and may have none of its own;
-    containers (the sets) and the axes that viewers draw at a frame are not counted.
+    Components below a component with a record are covered by it and may have none of their own.
+    Containers (the sets) and the axes that viewers draw at a frame are not counted.
 
     Attributes:
         model: name of the model.
-        target: the format, e.g. ``"urdf"``.
-        translated: what became of a component, by absolute path: ``"link Pelvis"``, ``"joint
-            RHip_rz"``.
-        records: what the target cannot say.
-        renamed: the names of what a component became, by its path and by kind, where they are not
-            its own.
+        target: target format, for example "urdf".
+        translated: what a component became, by absolute path: "link Pelvis", "joint RHip_rz".
+        records: losses and approximations.
+        renamed: new names by path and kind of element, where they differ from those of the
+            components.
     """
 
     model: str
@@ -109,29 +138,51 @@ class Fidelity:
         detail: str = "",
         errors: Mapping[str, Error] | None = None,
     ) -> None:
-        """Add a record."""
+        """Add a record of a loss or an approximation.
+
+        Args:
+            kind: what it concerns, one word.
+            component: absolute path in the model.
+            cannot_say: what the target cannot express.
+            done: what was written instead.
+            detail: numbers and names of this case.
+            errors: errors of the approximation by quantity.
+        """
         self.records.append(Record(kind, component, cannot_say, done, detail, errors or {}))
 
     def note_name(self, component: str, kind: str, own: str, name: str) -> None:
-        """Take note of what a thing is called that a component became, if that is not the component's own name."""
+        """Note the new name of an element if it differs from the name of its component.
+
+        Args:
+            component: absolute path in the model.
+            kind: kind of element, for example "joint".
+            own: name of the component.
+            name: name of the element.
+        """
         if name != own:
             self.renamed.setdefault(component, {})[kind] = name
 
     def groups(self) -> list[Group]:
-        """The records, those of one kind that say the same together, in the order of the first of each."""
+        """Return the records in groups that say the same, in the order of their first records."""
         result: dict[tuple[str, str, str], list[Record]] = {}
         for record in self.records:
             result.setdefault((record.kind, record.cannot_say, record.done), []).append(record)
         return [Group(*key, tuple(records)) for key, records in result.items()]
 
     def counts(self) -> tuple[int, int, int]:
-        """How many components are in the target as they are, in another way, and not at all."""
+        """Count the components by outcome.
+
+        Returns:
+            Numbers of components that are translated exactly, approximately, and not at all.
+        """
         dropped = {record.component for record in self.records if record.how == "dropped"}
         changed = {record.component for record in self.records} - dropped
         return len(self.translated.keys() - changed - dropped), len(changed), len(dropped)
 
     def list_missing(self, paths: Iterable[str]) -> list[str]:
-        """Those of the paths that nothing accounts for: neither translated nor recorded, nor below a record."""
+        """Return the paths that the account does not cover: neither translated, nor recorded, nor
+        below a record.
+        """
         recorded = {record.component for record in self.records}
         missing = []
         for path in paths:
@@ -142,7 +193,7 @@ class Fidelity:
         return missing
 
     def to_json(self) -> str:
-        """The account as JSON text."""
+        """Return the account as JSON text."""
         records = [
             {
                 "kind": record.kind,

@@ -1,4 +1,4 @@
-"""The files of a translation."""
+"""Output files of a translation."""
 
 from __future__ import annotations
 
@@ -9,14 +9,15 @@ from osimlite.base.files import make_folder, write_atomically
 
 
 def write_files(folder: Path, files: Mapping[str, str | bytes]) -> list[Path]:
-    """Write files into a folder, which is made if it is not there; the first last, when all it needs is in place.
+    """Write files into a folder, in reverse order, so that the first appears when all that it needs
+    exist.
 
     Args:
-        folder: where to.
+        folder: output folder; created if necessary.
         files: contents by name relative to the folder.
 
     Returns:
-        The files written, in the order given.
+        Paths of the files, in the given order.
 
     Raises:
         OsimliteError: a file cannot be written.

@@ -1,4 +1,4 @@
-"""The functions that drive joints, as data for other programs."""
+"""Functions that drive joints, as data for other programs."""
 
 from __future__ import annotations
 
@@ -12,10 +12,16 @@ from osimlite.mechanics.multibody.smoothing_spline import PiecewisePolynomial
 
 
 def describe_function(function: f.Function) -> dict[str, Any]:
-    """A function as JSON-ready data, exact: ``type`` and what that type needs (see docs/urdf.md).
+    """Convert a function to data for JSON, without loss.
+
+    Args:
+        function: function of coordinates.
+
+    Returns:
+        `type` and the parameters of this type, see docs/urdf.md.
 
     Raises:
-        UnsupportedError: a function of another class.
+        UnsupportedError: the format does not have this class of functions.
     """
     match function:
         case f.Constant(value):
@@ -62,7 +68,7 @@ def describe_function(function: f.Function) -> dict[str, Any]:
                 "neutral": neutral,
             }
         case f.SimmSpline():
-            # The first and the last point go on in straight lines.
+            # Before the first and after the last point the spline continues linearly.
             first, *_, last = function.pieces
             return {
                 "type": "piecewise-polynomial",

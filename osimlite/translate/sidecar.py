@@ -1,7 +1,8 @@
-"""What a robot file cannot say about coordinates, as JSON beside it: enough to compute every joint from them.
+"""JSON file beside a robot file, with what the robot file cannot express about coordinates.
 
-The value of joint j is ``function(values of its coordinates)``, whatever the function; the frame of
-a body in ground is the frame of its link times ``frame``. docs/urdf.md tells the whole format.
+It suffices to compute every joint from the coordinates: the value of a joint is `function(values of
+its coordinates)`, and the frame of a body in ground is the frame of its link times `frame`.
+docs/urdf.md defines the format.
 """
 
 from __future__ import annotations
@@ -15,18 +16,21 @@ from osimlite.simulation.robot.couplings import couplers, mimics
 from osimlite.simulation.robot.robot import Robot
 from osimlite.translate.function_data import describe_function
 
-FORMAT, VERSION = "osimlite-coordinates", 1
+FORMAT = "osimlite-coordinates"
+"""Name of the format, so that a reader can recognize the file."""
+VERSION = 1
+"""Version of the format; it increases with incompatible changes."""
 
 
 def format_coordinates(robot: Robot, file: str) -> str:
-    """The text of the sidecar.
+    """Return the text of the JSON file.
 
     Args:
-        robot: as it was written, with its final names.
-        file: name of the robot's file.
+        robot: robot with its final names.
+        file: name of the robot file.
 
     Raises:
-        UnsupportedError: a function of the mechanism is of a class that the format does not have.
+        UnsupportedError: a function is of a class that the format does not have.
     """
     sections = {
         "coordinates": _list_coordinates(robot),
@@ -122,7 +126,7 @@ def _format_json(value: Any) -> str:
 
 
 def replace_non_finite(value: Any) -> Any:
-    """Plain data with null for numbers that JSON has no word for."""
+    """Return plain data in which numbers that JSON cannot express are null."""
     match value:
         case float():
             return value if math.isfinite(value) else None

@@ -1,4 +1,4 @@
-"""How strong and how fast joints are: effort limits from coordinate actuators, and numbers that the user gives."""
+"""Limits of effort and velocity of joints: from coordinate actuators, and from the user."""
 
 from __future__ import annotations
 
@@ -20,17 +20,18 @@ def add_strength_limits(
     effort: float | None = None,
     velocity: float | None = None,
 ) -> Robot:
-    """The same robot with limits of effort and velocity.
+    """Return the robot with limits of effort and velocity.
 
-    A joint that is a coordinate gets as its effort the sum of the greatest forces of the
-    coordinate's actuators (``optimal_force`` times the greatest control), if all are finite.
+    The effort limit of a joint that is a coordinate is the sum of the largest forces of the
+    coordinate's actuators (`optimal_force` times the largest absolute control), if all are finite.
 
     Args:
-        robot: made of the model.
-        model: has the actuators.
-        fidelity: gets a record for each actuator that became a limit.
-        effort: limit (N, N·m) for all other joints; None for no limit.
-        velocity: limit (m/s, rad/s) for all joints; OpenSim knows none.
+        robot: robot of the model.
+        model: model with the actuators.
+        fidelity: account that gets a record for each actuator which became a limit.
+        effort: limit (N or N·m) of all other joints; None for no limit.
+        velocity: limit (m/s or rad/s) of all joints, which OpenSim does not have; None for no
+            limit.
     """
     tree = model.tree()
     places = {info.path: place for place, info in enumerate(robot.mechanism.coordinates)}
@@ -70,9 +71,9 @@ def add_strength_limits(
                 f"{force:g} {unit} of joint {joint.name}",
             )
 
-    def limited(joint: RobotJoint) -> RobotJoint:
+    def limit_joint(joint: RobotJoint) -> RobotJoint:
         if joint.kind == "fixed":
             return joint
         return replace(joint, effort=limits.get(joint.name, effort), velocity=velocity)
 
-    return replace(robot, joints=tuple(limited(joint) for joint in robot.joints))
+    return replace(robot, joints=tuple(limit_joint(joint) for joint in robot.joints))

@@ -1,4 +1,6 @@
-"""What URDF cannot say of a model: a walk over every component, with a record for each that is lost or changed."""
+"""Account of a translation to URDF: a pass over all components, with a record for each loss and
+change.
+"""
 
 from __future__ import annotations
 
@@ -22,10 +24,10 @@ from osimlite.simulation.robot.robot import Robot, RobotJoint, breaks_triangle_r
 from osimlite.translate.fidelity import LEFT_OUT, Fidelity
 
 COMPUTE_ADVICE = "compute its value by the file of coordinates"
-"""What to do about a joint that the robot's file leaves free."""
+"""Advice for a joint that the robot file leaves free."""
 
 CONTAINERS = (ModelComponentSet, WrapObjectSet, FrameGeometry)
-"""Components that say nothing of their own: sets, and the axes that a viewer may draw at a frame."""
+"""Components without content of their own: sets, and the axes that a viewer draws at a frame."""
 
 _LOST_TYPES: tuple[tuple[type[Component], str, str], ...] = (
     (Force, "force", "a force"),
@@ -36,21 +38,28 @@ _LOST_TYPES: tuple[tuple[type[Component], str, str], ...] = (
     (Constraint, "constraint", "a constraint besides the joints"),
     (WrapObject, "wrap-object", "a surface that paths wrap around"),
 )
+"""Classes that URDF cannot express, with the kind of the record and a description."""
 
 
 def record_losses(model: Model, robot: Robot, fidelity: Fidelity) -> None:
-    """Fill `fidelity` with what became of every component of `model` in `robot`.
+    """Record what became of every component of a model in a robot.
 
     Args:
-        model: the model.
-        robot: made of it, with its final names and limits.
-        fidelity: already has the records of the geometry.
+        model: model that was translated.
+        robot: its robot, with final names and limits.
+        fidelity: account, which already has the records of the geometry.
     """
     _Survey(model, robot, fidelity).run()
 
 
 def account_for_rest(tree: Tree, fidelity: Fidelity) -> None:
-    """Record everything that nothing accounts for yet as left out, but for the parts of what is left out itself."""
+    """Record every component that is not accounted for as left out; parts of such components need
+    no record.
+
+    Args:
+        tree: components of the model.
+        fidelity: account.
+    """
     accounted = {record.component for record in fidelity.records} | fidelity.translated.keys()
     dropped: set[int] = set()
     for component in tree.components:
@@ -68,6 +77,8 @@ def account_for_rest(tree: Tree, fidelity: Fidelity) -> None:
 
 
 class _Survey:
+    """Pass over the components of a model, with one method per kind of component."""
+
     def __init__(self, model: Model, robot: Robot, fidelity: Fidelity) -> None:
         self.model, self.robot, self.fidelity = model, robot, fidelity
         self.tree = model.tree()
@@ -80,7 +91,7 @@ class _Survey:
         self._record_joints()
         for index, info in enumerate(self.robot.mechanism.coordinates):
             result = self.tree.by_path.get(info.path)
-            # Those of a joint that OpenSim adds under a loose body stand in no file.
+            # Coordinates of a joint that OpenSim adds below a loose body are not in the file.
             if isinstance(result, Coordinate):
                 self._record_coordinate(index, result, info.path)
         for link in self.robot.links:
@@ -155,7 +166,7 @@ class _Survey:
 
     @cached_property
     def _moving_ends(self) -> set[str]:
-        """Links that a moving joint carries and that carry nothing."""
+        """Links that a moving joint carries and that carry no other link."""
         carriers = {joint.parent for joint in self.robot.joints}
         return {joint.child for joint in self.robot.moving} - carriers
 

@@ -101,7 +101,7 @@ class Optimum(ResultTable):
 
     _repr_html_ = make_notebook_repr("optimum")
 
-    def _results(self) -> Path:
+    def _get_results_path(self) -> Path:
         return self.history
 
 

@@ -99,7 +99,7 @@ class Outcome(ResultTable):
 
     _repr_html_ = make_notebook_repr("runs")
 
-    def _results(self) -> Path:
+    def _get_results_path(self) -> Path:
         return self.path
 
 

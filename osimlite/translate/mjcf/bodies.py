@@ -1,8 +1,8 @@
-"""Bodies and joints: every body of the model is one element, whatever joint carries it.
+"""Bodies and joints: every body of the model is one element, with the joints that carry it.
 
 Several joints in one element of MuJoCo move it one after the other, each about an anchor and an
-axis that it carries along. So a chain of one-axis joints needs no massless bodies between them: the
-anchors and axes are those of the chain at zero, seen from its end.
+axis that the previous ones carry along. A chain of one-axis joints therefore needs no massless
+bodies between: the anchors and axes are those of the chain at zero, seen from its end.
 """
 
 from __future__ import annotations
@@ -19,14 +19,16 @@ from osimlite.translate.mjcf.draft import Draft, add_element, clear_rounding, fo
 from osimlite.translate.mjcf.scenery import FRAME_GROUP
 
 MIN_MASS = 1e-14
-"""Mass (kg) and principal moments (kg·m²) of a moving body without: MuJoCo wants more than 1e-15."""
+"""Mass (kg) and principal moments (kg·m²) of a moving body without: MuJoCo requires more than
+1e-15.
+"""
 
 MAX_JOINTS_PER_BODY = 6
-"""That MuJoCo lets one body have."""
+"""Most joints that MuJoCo allows in one body."""
 
 
 def add_bodies(draft: Draft) -> None:
-    """Add all bodies with their inertia and joints."""
+    """Add all bodies with their inertias and joints."""
     robot = draft.robot
     carriers = {joint.child: joint for joint in robot.joints}
     bodies = {
@@ -60,7 +62,7 @@ def add_bodies(draft: Draft) -> None:
 
 
 def add_frames(draft: Draft) -> None:
-    """Add a site for every frame that is no body, so that it can be asked for."""
+    """Add a site for every frame that is not a body, so that programs can read its pose."""
     for _, path in draft.iterate_components(PhysicalFrame):
         if path in draft.mechanism.frames:
             draft.fidelity.translated[path] = (
@@ -69,7 +71,7 @@ def add_frames(draft: Draft) -> None:
 
 
 def _add_chain(draft: Draft, chain: list[RobotJoint], name: str) -> _Element:
-    """The element of the body at the end of a chain of joints, in the body that carries it."""
+    """Add the element of the body at the end of a chain of joints to the body that carries it."""
     parent, start = draft.frames[chain[0].parent]
     moving = [place for place, joint in enumerate(chain) if joint.kind != "fixed"]
     if len(moving) > MAX_JOINTS_PER_BODY:
@@ -83,6 +85,7 @@ def _add_chain(draft: Draft, chain: list[RobotJoint], name: str) -> _Element:
             diaginertia=np.full(3, MIN_MASS),
         )
         return _add_chain(draft, chain[cut:], name)
+    # From the end of the chain, `rest` is the transform from a joint to the body at zero.
     rest = np.eye(4)
     joints: list[tuple[RobotJoint, Array, Array]] = []
     ends: dict[str, Array] = {}
@@ -109,6 +112,7 @@ def _add_chain(draft: Draft, chain: list[RobotJoint], name: str) -> _Element:
 
 
 def _add_inertia(draft: Draft, element: _Element, link: Link, path: str, *, moves: bool) -> None:
+    """Add mass and inertia of a body, repaired where MuJoCo rejects them."""
     moments, axes = principal_axes(link.inertia)
     mass = link.mass
     if breaks_triangle_rule(moments):
@@ -146,7 +150,9 @@ def _add_inertia(draft: Draft, element: _Element, link: Link, path: str, *, move
 
 
 def _repair_moments(moments: Array) -> Array:
-    """The moments with the least one raised until none exceeds the sum of the others, in floating point too."""
+    """Raise the smallest principal moment until none exceeds the sum of the others, also in
+    floating point.
+    """
     raised = moments.copy()
     least, middle, greatest = np.argsort(moments)
     raised[least] = max(raised[least], raised[greatest] - raised[middle], 0.0)

@@ -1,8 +1,8 @@
-"""What a file of MuJoCo's, whoever wrote it, makes of the paths, muscles and bodies of a model.
+"""Comparison of a MuJoCo file, of any origin, with a model: paths, muscles and bodies.
 
-Muscles are matched by name, joints by the names of coordinates and bodies by their own. In each of
-many random poses joints are where the coordinates are, and those that follow others by an equality
-where that puts them.
+Muscles and bodies are matched by name, joints by the names of coordinates. In each of many random
+poses, joints have the values of the coordinates; joints that follow others by an equality have the
+values that it gives.
 """
 
 from __future__ import annotations
@@ -30,58 +30,71 @@ from osimlite.translate.mjcf.muscles import Curves
 from osimlite.translate.mjcf.poses import draw_poses, list_free_coordinates, measure_arm_errors
 
 MAX_FOLLOWER_CHAIN = 4
-"""So many joints may follow each other in a row."""
+"""Longest chain of joints that follow one another; the equalities are applied this many times."""
 
 
 @dataclass(frozen=True)
 class MuscleCheck:
-    """What became of a muscle, or of another force along a path."""
+    """Errors of a muscle, or of another force along a path.
 
-    name: str  # its own
-    length: Error  # of the path, m
-    arms: Mapping[str, Error]  # moment arms by coordinate, m or 1
-    # isometric, fully active, over the greatest force; None for what is no muscle
+    Attributes:
+        name: name of the muscle.
+        length: error of the path length (m).
+        arms: errors of the moment arms by coordinate (m for rotations, 1 for translations).
+        force: error of the isometric force at full activation over the maximum isometric force;
+            None without a muscle.
+        fiber: optimal fiber length that the file implies, over that of the model.
+        tendon: tendon slack length that the file implies, minus that of the model (m).
+    """
+
+    name: str
+    length: Error
+    arms: Mapping[str, Error]
     force: Error | None = None
-    fiber: float | None = None  # optimal fiber length that the file implies, over the model's
-    tendon: float | None = None  # tendon slack length that the file implies, minus the model's, m
+    fiber: float | None = None
+    tendon: float | None = None
 
     @property
     def worst_arm(self) -> Error:
-        """The moment arm with the greatest root mean square."""
+        """Moment arm error with the largest root mean square."""
         return max(self.arms.values(), key=lambda error: error.rms, default=Error(0.0, 0.0, "m"))
 
 
 @dataclass(frozen=True)
 class Check:
-    """What a file makes of a model."""
+    """Errors of a file.
 
-    muscles: tuple[MuscleCheck, ...]  # those that both have
-    missing: tuple[str, ...] = ()  # names of forces along paths that the file does not have
-    coordinates: tuple[
-        str, ...
-    ] = ()  # names of coordinates that move by themselves and that no joint of the file has
-    # places of the bodies that both have, moved onto each other as one in every pose; None without
-    # three
+    Attributes:
+        muscles: errors of the muscles that both have.
+        missing: names of forces along paths that the file lacks.
+        coordinates: names of free coordinates that the file has no joint for.
+        bodies: error of the positions of bodies (m), after moving all bodies of each pose onto the
+            model's rigidly; None with fewer than three common bodies.
+    """
+
+    muscles: tuple[MuscleCheck, ...]
+    missing: tuple[str, ...] = ()
+    coordinates: tuple[str, ...] = ()
     bodies: Error | None = None
 
     def to_json(self) -> str:
-        """All numbers as JSON text."""
+        """Return all numbers as JSON text."""
         return format_json(_convert_to_data(asdict(self)))
 
 
 def check_mjcf(model: Model, file: str | Path, *, poses: int = 50, seed: int = 7) -> Check:
-    """Measure a file of MuJoCo's against the model that it was made of.
+    """Compare a MuJoCo file with the model from which it was made.
 
     Args:
-        model: the model.
-        file: MJCF, or any other file that MuJoCo loads.
-        poses: how many random poses are compared, spread evenly over the ranges of all coordinates.
-        seed: of the poses.
+        model: model of OpenSim.
+        file: MJCF file, or any other file that MuJoCo loads.
+        poses: number of random poses, uniform over the ranges of all coordinates.
+        seed: seed of the poses.
 
     Raises:
         MissingDependency: mujoco is not installed.
-        OsimliteError: MuJoCo does not load the file.
-        ModelError: the model has no muscles, or the two have none in common.
+        OsimliteError: MuJoCo cannot load the file.
+        ModelError: the model has no muscles, or none in common with the file.
     """
     mujoco: Any = require("mujoco", extra="mujoco", purpose="the check of a file of MuJoCo's")
     try:
@@ -121,7 +134,7 @@ def check_mjcf(model: Model, file: str | Path, *, poses: int = 50, seed: int = 7
 
 
 def _convert_to_data(value: Any) -> Any:
-    """The value with names for the numbers of errors, which JSON would have as lists."""
+    """Return plain data in which errors have named fields; JSON would write them as lists."""
     match value:
         case Error():
             return value._asdict()
@@ -133,7 +146,7 @@ def _convert_to_data(value: Any) -> Any:
 
 
 class _MujocoModel:
-    """A compiled model of MuJoCo's, posed by the coordinates of a model."""
+    """Compiled model of MuJoCo that is posed by the coordinates of a model of OpenSim."""
 
     def __init__(self, mujoco: Any, compiled: Any, paths: Paths) -> None:
         self.mujoco, self.model, self.data = mujoco, compiled, mujoco.MjData(compiled)
@@ -154,7 +167,9 @@ class _MujocoModel:
         ]
 
     def find_tendon(self, name: str) -> int | None:
-        """The tendon of the actuator of a name, or of that name."""
+        """Return the index of the tendon of an actuator with a name, or of the tendon with this
+        name, or None.
+        """
         kinds = self.mujoco.mjtObj
         actuator = self.mujoco.mj_name2id(self.model, kinds.mjOBJ_ACTUATOR, name)
         if (
@@ -166,7 +181,15 @@ class _MujocoModel:
         return tendon if tendon >= 0 else None
 
     def measure_tendons(self, q: Array) -> tuple[Array, Array, Array]:
-        """Lengths (T,) of all tendons, moment arms (T, m) about the free coordinates, places (b, 3) of bodies."""
+        """Pose the model, and measure its tendons and bodies.
+
+        Args:
+            q: values of the coordinates (n,).
+
+        Returns:
+            Lengths of all tendons (T,) (m), moment arms about the free coordinates (T, m), and
+            positions of the matched bodies (b, 3) (m).
+        """
         model, data = self.model, self.data
         data.qpos[:] = model.qpos0
         rates = np.zeros((len(self.free), model.nv))
@@ -174,7 +197,7 @@ class _MujocoModel:
             data.qpos[model.jnt_qposadr[joint]] = q[place]
             if place in self.free:
                 rates[self.free.index(place), model.jnt_dofadr[joint]] = 1.0
-        # A joint that follows one that follows another is right after as many rounds.
+        # Each round makes one more link of a chain of followers right.
         for _ in range(MAX_FOLLOWER_CHAIN):
             for joint, leader, polynomial in self.followers:
                 place, dof = model.jnt_qposadr[joint], model.jnt_dofadr[joint]
@@ -194,11 +217,22 @@ class _MujocoModel:
             data.qvel[:] = rate
             self.mujoco.mj_fwdPosition(model, data)
             self.mujoco.mj_fwdVelocity(model, data)
+            # OpenSim's moment arm is minus the change of length per change of the coordinate.
             arms[:, column] = -data.ten_velocity
         return data.ten_length.copy(), arms, data.xpos[list(self.bodies.values())].copy()
 
     def measure_strength(self, name: str, muscle: Muscle, lengths: Array) -> dict[str, Any]:
-        """The isometric force of a muscle at lengths of its path, and the lengths that it implies."""
+        """Compare the isometric force of a muscle at full activation.
+
+        Args:
+            name: name of the actuator.
+            muscle: muscle of the model.
+            lengths: lengths of its path (L,) (m).
+
+        Returns:
+            Fields `force`, `fiber` and `tendon` of a :class:`MuscleCheck`; empty without a muscle
+            in the file.
+        """
         actuator = self.mujoco.mj_name2id(self.model, self.mujoco.mjtObj.mjOBJ_ACTUATOR, name)
         if (
             actuator < 0
@@ -209,6 +243,7 @@ class _MujocoModel:
             row[actuator].copy()
             for row in (self.model.actuator_gainprm, self.model.actuator_biasprm)
         )
+        # A negative force means MuJoCo's default: scale over the acceleration at unit force.
         if gain[2] < 0.0:
             gain[2] = gain[3] / self.model.actuator_acc0[actuator]
         curves = Curves.read(self.model.actuator_lengthrange[actuator], gain, bias)
@@ -226,7 +261,9 @@ class _MujocoModel:
 
 
 def _compare_bodies(theirs: _MujocoModel, origins: Array, places: Sequence[Array]) -> Error | None:
-    """How far bodies are from each other's places (m), if all of a pose are moved onto the model's as one."""
+    """Return the error of body positions after the best rigid motion in each pose (Kabsch's
+    algorithm).
+    """
     if len(theirs.bodies) < 3:
         return None
     off = []

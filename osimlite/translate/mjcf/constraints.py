@@ -15,7 +15,9 @@ from osimlite.translate.mjcf.frame_forces import add_straight_tendon
 
 
 def add_constraints(draft: Draft) -> None:
-    """Add every constraint that is not about coordinates alone."""
+    """Add every constraint between bodies; those of coordinates only are equalities of joints, see
+    `couplings`.
+    """
     for constraint in draft.mechanism.constraints:
         if constraint.bodies:
             make = _MAKERS.get(type(constraint))
@@ -29,7 +31,7 @@ def add_constraints(draft: Draft) -> None:
 
 
 def _add_site_equality(kind: str, draft: Draft, item: b.WeldConstraint | b.PointConstraint) -> str:
-    """Two sites that an equality of a kind keeps together."""
+    """Add an equality of a kind ("weld" or "connect") between two sites."""
     name = draft.make_name("equality", item.name)
     sites = [draft.add_site(item.name, *end) for end in (item.first, item.second)]
     add_element(draft.get_section("equality"), kind, name=name, site1=sites[0], site2=sites[1])
@@ -37,7 +39,7 @@ def _add_site_equality(kind: str, draft: Draft, item: b.WeldConstraint | b.Point
 
 
 def _add_distance(draft: Draft, item: b.DistanceConstraint) -> str:
-    """A tendon of constant length; MuJoCo counts from its length where all joints stand at zero."""
+    """Add a tendon of constant length; MuJoCo measures from its length with all joints at zero."""
     name = add_straight_tendon(
         draft, item.name, [draft.add_site(item.name, *end) for end in (item.first, item.second)]
     )
@@ -55,7 +57,9 @@ def _add_distance(draft: Draft, item: b.DistanceConstraint) -> str:
 
 
 def _add_point_on_line(draft: Draft, item: b.PointOnLineConstraint) -> str:
-    """A speck that slides along the line, and is connected to the follower."""
+    """Add a light body that slides along the line, and connect it to the follower; MuJoCo has no
+    such constraint.
+    """
     name = draft.make_name("joint", item.name)
     frame = np.eye(4)
     frame[:3, 3] = item.line.location
@@ -90,3 +94,4 @@ _MAKERS: Mapping[type, Callable[[Draft, Any], str]] = {
     b.DistanceConstraint: _add_distance,
     b.PointOnLineConstraint: _add_point_on_line,
 }
+"""Functions that add a constraint, by its class."""

@@ -1,4 +1,6 @@
-"""Contact: surfaces as geoms that touch only whom a contact force of the model lets them, by MuJoCo's own law."""
+"""Contact surfaces as geoms, and pairs of geoms for the contact forces of the model, with MuJoCo's
+own law.
+"""
 
 from __future__ import annotations
 
@@ -28,13 +30,16 @@ from osimlite.translate.mjcf.scenery import CONTACT_GROUP
 _PLANE = np.array(
     ((0.0, 0.0, -1.0, 0.0), (0.0, 1.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
 )
-"""The frame (4, 4) of a plane, which faces its Z axis, in that of a half space, which faces its negative X axis."""
+"""Frame (4, 4) of a MuJoCo plane, whose outward normal is z, in that of an OpenSim half space,
+whose is -x.
+"""
 
 ContactForce = HuntCrossleyForce | ElasticFoundationForce | SmoothSphereHalfSpaceForce
+"""Contact forces that become pairs of geoms."""
 
 
 def add_contacts(draft: Draft) -> None:
-    """Add contact surfaces, and the pairs of them that touch."""
+    """Add contact surfaces, and a pair for any two surfaces that a contact force connects."""
     surfaces = list(draft.iterate_components(ContactGeometry))
     if draft.options.contact == "none" or not surfaces:
         return
@@ -86,7 +91,9 @@ def _add_surface(draft: Draft, geometry: ContactGeometry, path: str) -> None:
 def _make_geom(
     draft: Draft, geometry: ContactGeometry, path: str, *, still: bool
 ) -> tuple[dict[str, Value], Array] | None:
-    """The attributes of the geom, and its frame (4, 4) in that of the geometry; None for a mesh without a file."""
+    """Return the attributes of a geom and its frame (4, 4) in that of the geometry; None for a mesh
+    without a file.
+    """
     match geometry:
         case ContactSphere() if geometry.radius > 0.0:
             return {"type": "sphere", "size": [geometry.radius]}, np.eye(4)
@@ -112,7 +119,7 @@ def _make_geom(
 
 
 def _add_pairs(draft: Draft, force: ContactForce) -> Iterator[str]:
-    """Add a pair for any two surfaces of a force that are on different bodies; their names."""
+    """Add a pair for any two surfaces of a force that are on different bodies; yield their names."""
     for (one, first), (two, second) in combinations(_iterate_surfaces(draft, force), 2):
         became = [
             draft.fidelity.translated.get(draft.tree.path_of(item) or "") for item in (one, two)
@@ -123,7 +130,7 @@ def _add_pairs(draft: Draft, force: ContactForce) -> Iterator[str]:
             continue
         geoms = [str(what).removeprefix("geom ") for what in became]
         name = draft.make_name("pair", ".".join(geoms))
-        # Simbody's rule for two materials.
+        # Simbody combines two coefficients by their harmonic mean.
         slide = 2.0 * first * second / (first + second) if first + second else 0.0
         friction = (slide, slide, 0.0, 0.0, 0.0)
         add_element(
@@ -138,7 +145,7 @@ def _add_pairs(draft: Draft, force: ContactForce) -> Iterator[str]:
 
 
 def _iterate_surfaces(draft: Draft, force: ContactForce) -> Iterator[tuple[ContactGeometry, float]]:
-    """The surfaces of a force, with the dynamic friction of each."""
+    """Yield the surfaces of a force with the dynamic friction coefficient of each."""
     if isinstance(force, SmoothSphereHalfSpaceForce):
         for socket in ("socket_sphere", "socket_half_space"):
             surface = draft.tree.target(force, socket, getattr(force, socket))

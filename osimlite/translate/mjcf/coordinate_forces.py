@@ -1,6 +1,7 @@
-"""Forces on one coordinate: actuators on its joint, springs as tendons whose length is the coordinate.
+"""Forces on one coordinate: actuators on its joint, and springs as tendons whose length is the
+coordinate.
 
-Such a tendon is exact, has the force's own name, and leaves room for several springs on one joint.
+Such a tendon is exact, has the name of the force, and allows several springs on one joint.
 """
 
 from __future__ import annotations
@@ -19,11 +20,21 @@ from osimlite.translate.fidelity import Error
 from osimlite.translate.mjcf.draft import Draft, Lead, Untranslatable, Value, add_element
 
 UNREACHABLE_VALUE = 1e6
-"""A value that no coordinate reaches, for the side of a spring where it does nothing."""
+"""Value (rad or m) that no coordinate reaches, for the side on which a one-sided spring is slack."""
 
 
 def add_actuator(draft: Draft, force: CoordinateActuator, path: str, **dynamics: Value) -> str:
-    """A force on the joint in proportion to the control."""
+    """Add an actuator on a joint, whose force is proportional to its control.
+
+    Args:
+        draft: MJCF under construction.
+        force: actuator of the model.
+        path: absolute path of the actuator.
+        dynamics: attributes of activation dynamics.
+
+    Returns:
+        Kind and name of the element.
+    """
     lead, _ = _find_lead(draft, force)
     return add_scaled_actuator(
         draft, force, path, joint=lead.joint, gear=force.optimal_force / lead.line.slope, **dynamics
@@ -33,17 +44,36 @@ def add_actuator(draft: Draft, force: CoordinateActuator, path: str, **dynamics:
 def add_scaled_actuator(
     draft: Draft, force: CoordinateActuator | PathActuator, path: str, **on: Value
 ) -> str:
-    """An actuator whose force is its control times its gear."""
+    """Add an actuator whose force is its control times its gear.
+
+    Args:
+        draft: MJCF under construction.
+        force: actuator of the model, for the limits of its control.
+        path: absolute path of the actuator.
+        on: attributes of the transmission, with the gear.
+
+    Returns:
+        Kind and name of the element.
+    """
     name, ends = draft.make_name("actuator", path), (force.min_control, force.max_control)
     finite = all(map(math.isfinite, ends)) and ends[0] < ends[1]
-    # Only tools keep to these limits in OpenSim.
+    # In OpenSim only some tools enforce these limits; the range is written for information.
     limits: dict[str, Value] = {"ctrllimited": False, "ctrlrange": ends} if finite else {}
     add_element(draft.get_section("actuator"), "general", name=name, **on, **limits)
     return f"actuator {name}"
 
 
 def add_lagging_actuator(draft: Draft, force: ActivationCoordinateActuator, path: str) -> str:
-    """The same with an activation that follows the control."""
+    """Add an actuator whose activation follows its control by first-order dynamics.
+
+    Args:
+        draft: MJCF under construction.
+        force: actuator of the model.
+        path: absolute path of the actuator.
+
+    Returns:
+        Kind and name of the element.
+    """
     made = add_actuator(
         draft, force, path, dyntype="filterexact", dynprm=force.activation_time_constant
     )
@@ -52,7 +82,16 @@ def add_lagging_actuator(draft: Draft, force: ActivationCoordinateActuator, path
 
 
 def add_spring(draft: Draft, force: SpringGeneralizedForce, path: str) -> str:
-    """A spring and damper in the tendon that is the coordinate."""
+    """Add a spring and damper on the tendon of a coordinate.
+
+    Args:
+        draft: MJCF under construction.
+        force: spring of the model.
+        path: absolute path of the spring.
+
+    Returns:
+        Kind and name of the element.
+    """
     lead, _ = _find_lead(draft, force)
     rest = force.rest_length
     return _add_tendon(
@@ -61,7 +100,19 @@ def add_spring(draft: Draft, force: SpringGeneralizedForce, path: str) -> str:
 
 
 def add_limit(draft: Draft, force: CoordinateLimitForce, path: str) -> str:
-    """A spring beyond each limit: a tendon that is slack up to it."""
+    """Add a spring beyond each limit: a tendon that is slack between them.
+
+    Args:
+        draft: MJCF under construction.
+        force: limit force of the model.
+        path: absolute path of the force.
+
+    Returns:
+        Kind and names of the elements.
+
+    Raises:
+        Untranslatable: the lower limit is above the upper one.
+    """
     lead, place = _find_lead(draft, force)
     info = draft.mechanism.coordinates[place]
     Ku, qu, Kl, ql, D, t = read_limit_constants(force, info)
@@ -92,7 +143,9 @@ def add_limit(draft: Draft, force: CoordinateLimitForce, path: str) -> str:
 def _add_tendon(
     draft: Draft, lead: Lead, path: str, slack: tuple[float, float], **law: Value
 ) -> str:
-    """A tendon whose length is the coordinate but for a constant, with no tension between two of its values."""
+    """Add a tendon whose length is the coordinate plus a constant, slack between two values of the
+    coordinate.
+    """
     slope, start = lead.line
     ends = [end + start / slope for end in slack]
     name = draft.make_name("tendon", path)
@@ -104,7 +157,7 @@ def _add_tendon(
 def _find_lead(
     draft: Draft, force: CoordinateActuator | SpringGeneralizedForce | CoordinateLimitForce
 ) -> tuple[Lead, int]:
-    """The joint of the coordinate that a force names, and the place of the coordinate."""
+    """Return the joint of the coordinate of a force, and the index of the coordinate."""
     if not force.coordinate:
         raise Untranslatable("it names no coordinate")
     path = draft.tree.path_of(draft.tree.target(force, "coordinate", force.coordinate)) or ""

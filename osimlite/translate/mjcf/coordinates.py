@@ -1,4 +1,4 @@
-"""Coordinates: what each became, and what the model says of it besides."""
+"""Coordinates: their ranges, prescribed motions, and what each became."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from osimlite.translate.mjcf.draft import Draft, Follower
 
 
 def add_coordinates(draft: Draft) -> None:
-    """Write ranges, which limit nothing, to the joints that are coordinates, and hold prescribed coordinates."""
+    """Add ranges of coordinates to their joints, without limits, and hold prescribed coordinates."""
     elements = {joint.get("name"): joint for joint in draft.get_section("worldbody").iter("joint")}
     note, moving = (
         draft.fidelity.add,

@@ -1,4 +1,4 @@
-"""Joints that are functions of a coordinate, and coordinates that are functions of others, as equalities of joints."""
+"""Joints that are functions of coordinates, and coupled coordinates, as equalities of joints."""
 
 from __future__ import annotations
 
@@ -29,17 +29,23 @@ from osimlite.translate.mjcf.moving import fit_composition
 from osimlite.translate.mjcf.polynomials import Fit, fit_quartic, sample_function, select_span
 
 HELPER_INERTIA = 0.1
-"""Inertia (kg, kg·m²) of helpers: muscles may pull at them, and the equalities that hold them are soft."""
-ARGUMENT_INERTIA_PART = 0.01
-"""Inertia of a joint that is nothing but an argument, as a part of that of all it moves.
+"""Mass (kg) and inertia (kg·m²) of helper bodies.
 
-The less, the nearer is the motion to the model's, but the softer are the equalities that follow the
-joint.
+Muscles may pull at them, and MuJoCo's equalities are soft: lighter helpers give way more.
+"""
+ARGUMENT_INERTIA_PART = 0.01
+"""Inertia of a joint that is only the argument of functions, over the inertia that its coordinate
+moves.
+
+The smaller it is, the closer is the motion to the model's, but the softer are the equalities that
+follow the joint.
 """
 
 
 def add_couplings(draft: Draft) -> None:
-    """Add an equality for every joint whose value a function of a coordinate or a coupler decides."""
+    """Add an equality for every joint whose value follows from a function of a coordinate or from a
+    coupler.
+    """
     robot = draft.robot
     draft.leads |= {
         place: Lead(joint.name, line) for place, (joint, line) in leaders(robot).items()
@@ -74,6 +80,7 @@ def add_couplings(draft: Draft) -> None:
 
 
 def _add_follower(draft: Draft, joint: RobotJoint, driver: Driver, whose: str) -> None:
+    """Let a joint follow the coordinate that drives it, exactly or by a fitted polynomial."""
     unit = "rad" if joint.kind == "revolute" else "m"
     if driver.coordinate is None:
         draft.add_follower(joint.name, Follower(None, (driver.function.evaluate(np.zeros(1))[0],)))
@@ -86,7 +93,7 @@ def _add_follower(draft: Draft, joint: RobotJoint, driver: Driver, whose: str) -
     exact = function if own == (1.0, 0.0) else Composed(function, Linear(*own))
     fit = fit_quartic(exact, (first, last), unit)
     follower, done = Follower(lead.joint, fit.coefficients), "a quartic, fitted"
-    # The driver writes what is exact in the place of the quartic, and needs no helper.
+    # The driver replaces the quartic by the exact function, and needs no helper.
     if fit.error is not None and draft.options.spline == "series" and not draft.options.driver:
         drive, (outer,) = fit_composition([function], (low, high))
         led = add_helper(draft, driver.coordinate, drive)
@@ -117,7 +124,9 @@ def _add_follower(draft: Draft, joint: RobotJoint, driver: Driver, whose: str) -
 
 
 def _add_argument_joint(draft: Draft, place: int) -> Lead:
-    """A joint for a coordinate that is nothing but the argument of functions: it turns a speck about its own middle."""
+    """Add a joint for a coordinate that is only the argument of functions: it turns a small body
+    about its centre.
+    """
     info = draft.mechanism.coordinates[place]
     name = joint_names(draft.mechanism)[place]
     # The driver moves joints exactly, whatever equalities make of them.
@@ -142,7 +151,9 @@ def _add_argument_joint(draft: Draft, place: int) -> Lead:
 
 
 def _compute_inertia(draft: Draft, place: int) -> float:
-    """Of all that a coordinate moves in the default pose, by itself and by couplers (kg·m²)."""
+    """Return the inertia that a coordinate moves in the default pose, by itself and by couplers
+    (kg·m²).
+    """
     q = draft.default_state[0]
     rates = np.zeros(len(q))
     rates[place] = 1.0
@@ -154,12 +165,16 @@ def _compute_inertia(draft: Draft, place: int) -> float:
 
 
 def add_helper(draft: Draft, place: int, drive: Array) -> Lead | None:
-    """The joint, and the line of it, that is a polynomial of a coordinate; None if the coordinate is locked.
+    """Add a joint whose value is a polynomial of a coordinate, or return an existing one.
 
     Args:
-        draft: gets the joint, if there is none.
-        place: of the coordinate in the mechanism.
-        drive: the polynomial, constant first.
+        draft: MJCF under construction.
+        place: index of the coordinate in the mechanism.
+        drive: coefficients of the polynomial (5,), constant first.
+
+    Returns:
+        Joint, and the line from its value to that of the polynomial; None if the coordinate is
+        locked.
     """
     info = draft.mechanism.coordinates[place]
     if info.locked:
@@ -194,13 +209,23 @@ def add_helper(draft: Draft, place: int, drive: Array) -> Lead | None:
 
 
 def compose_with_line(line: Line, polynomial: Array) -> tuple[float, ...]:
-    """The polynomial of a line, in powers of what the line is of."""
+    """Compose a polynomial with a line.
+
+    Args:
+        line: inner function.
+        polynomial: coefficients of the outer function, constant first.
+
+    Returns:
+        Coefficients of the composition, constant first.
+    """
     whole: Any = Polynomial(polynomial)(Polynomial((line.start, line.slope)))
     return tuple(whole.coef.tolist())
 
 
 def _hold_joint(draft: Draft, joint: RobotJoint) -> None:
-    """Hold a joint that is a function of several coordinates where the default pose has it, but for the driver."""
+    """Hold a joint that is a function of several coordinates at its default value; the driver moves
+    it exactly.
+    """
     value = joint.value(draft.default_state[0])
     leads = [
         lead

@@ -1,4 +1,4 @@
-"""The MJCF under construction: what every pass reads, and adds to."""
+"""MJCF under construction, which every pass reads and extends."""
 
 from __future__ import annotations
 
@@ -32,52 +32,74 @@ from osimlite.simulation.robot.urdf import number, numbers
 from osimlite.translate.fidelity import Fidelity
 
 Version = Literal[3, 4]
+"""Major version of MuJoCo."""
 Contact = Literal["native", "none"]
+"""Treatment of contact: MuJoCo's own law, or no contact."""
 Fit = Literal["none", "wraps", "force"]
+"""What is fitted to the model: nothing, wrap geoms of tendons, or also the forces of muscles."""
 Spline = Literal["quartic", "series"]
+"""Form of fitted functions: a quartic, or a quartic of a quartic."""
 Value = str | bool | int | float | Sequence[float] | Array | None
+"""Value of an attribute; None leaves the attribute out."""
 C = TypeVar("C", bound=Component)
 
 SPECK_MASS_KG = 1e-3
-"""Mass (kg) of a body that is there for a constraint alone.
+"""Mass (kg) of a body that exists for a constraint only.
 
-MuJoCo makes a constraint the softer, the lighter the lighter one of its bodies; this is a
-compromise.
+MuJoCo makes a constraint softer the lighter the lighter one of its bodies is, and a heavier body
+would change the motion; this is a compromise.
 """
 
 
 class Untranslatable(Exception):
-    """Why a component is left out."""
+    """Reason for which a component is left out."""
 
 
 @dataclass(frozen=True)
 class Options:
-    """What the user chooses."""
+    """Options of a translation.
 
-    version: Version = 4  # of MuJoCo, whose first number decides what a side site means
-    visuals: bool = True  # whether to say what bodies look like
-    # whether contact forces become contacts of MuJoCo's own law, or nothing
+    Attributes:
+        version: major version of MuJoCo, which decides what a side site means.
+        visuals: whether to write the shapes with which bodies are drawn.
+        contact: "native" for contacts of MuJoCo's law, "none" for no contact.
+        fit: "none", "wraps" for fitted wrap geoms of tendons, "force" for fitted muscle forces,
+            too.
+        spline: "quartic" to approximate functions by one quartic, "series" by a quartic of a
+            quartic.
+        driver: whether `osimlite.mjcf.Driver` moves the model, which computes functions and forces
+            itself.
+    """
+
+    version: Version = 4
+    visuals: bool = True
     contact: Contact = "native"
-    # what is fitted: nothing, what tendons go around, or that and the forces of muscles
     fit: Fit = "none"
-    # what a joint follows that is no polynomial: one quartic, or a quartic of a quartic
     spline: Spline = "series"
-    # whether `osimlite.mjcf.Driver` moves the model, which computes functions and forces itself
     driver: bool = False
 
 
 class Lead(NamedTuple):
-    """A joint of the MJCF whose value (rad, m) is a straight line of a coordinate."""
+    """Joint of the MJCF whose value is a linear function of a coordinate.
+
+    Attributes:
+        joint: name of the joint.
+        line: slope and start of the function from the coordinate to the joint (rad or m).
+    """
 
     joint: str
     line: Line
 
 
 class Follower(NamedTuple):
-    """How a joint follows another: its value is the polynomial, constant first, of the leader's, or constant.
+    """Dependence of a joint on another one, on several, or on time.
 
-    Where that is fitted, or held, the driver has the `function` that it exactly is: of the leader,
-    of several joints (`arguments`), or of time.
+    Attributes:
+        leader: name of the joint that it follows; None for a constant.
+        polynomial: coefficients of its value as a function of the leader's, constant first.
+        function: exact function where the polynomial is fitted or holds the joint; only the driver
+            uses it.
+        arguments: names of the joints that the function depends on, if there are several.
     """
 
     leader: str | None
@@ -87,7 +109,14 @@ class Follower(NamedTuple):
 
 
 class PathTendon(NamedTuple):
-    """The tendon of a path, and its length (m) in the default pose, in random poses (P,), in others held out (R,)."""
+    """Tendon of a path.
+
+    Attributes:
+        name: name of the tendon.
+        default: length of the path in the default pose (m).
+        lengths: lengths of the path in the poses for fits (P,) (m).
+        held_out: lengths of the path in the poses for tests (R,) (m).
+    """
 
     name: str
     default: float
@@ -96,14 +125,19 @@ class PathTendon(NamedTuple):
 
 
 NON_FINITE_WORDS = frozenset(("NaN", "Inf", "-Inf"))
-"""How a number is printed that is none."""
+"""Texts of numbers that are not finite."""
 
 
 def add_element(parent: _Element, tag: str, **attributes: Value) -> _Element:
-    """Add an element; attributes that are None are left out, and ``class_`` stands for ``class``.
+    """Add an element; attributes that are None are left out, and `class_` means `class`.
+
+    Args:
+        parent: element to which it is added.
+        tag: tag of the element.
+        attributes: attributes of the element.
 
     Raises:
-        UnsupportedError: a number is not finite, which MJCF cannot say.
+        UnsupportedError: a number is not finite, which MJCF cannot express.
     """
     said = {
         name.rstrip("_"): format_value(value)
@@ -122,38 +156,46 @@ def add_element(parent: _Element, tag: str, **attributes: Value) -> _Element:
 
 @dataclass
 class Draft:
-    """A model on its way to MJCF."""
+    """MJCF under construction.
 
-    model: Model  # the model
-    robot: Robot  # its mechanism as one-axis joints; locked coordinates are fixed joints
-    # the account; a pass puts components into `translated`, and what is lost into records
+    Attributes:
+        model: model that is translated.
+        robot: mechanism of the model with one-axis joints; locked coordinates are fixed joints.
+        fidelity: account, to which passes add what components become and what is lost.
+        options: options of the translation.
+        folder: folder of the model file and of the files that it names.
+        mesh_files: collection of the mesh files that the text names.
+        root: element `<mujoco>`.
+        bodies: element of each body by its index in the mechanism, -1 for ground; its frame is the
+            body's.
+        frames: per name of a link of the robot that is fixed in an element, the element and the
+            frame (4, 4) in it.
+        leads: joint of a coordinate by the index of the coordinate; a locked coordinate has none.
+        followers: dependence of joints that equalities move, by name.
+        helpers: those of them that move nothing, but which others follow.
+        tendons: tendons of paths by the absolute path of their owners.
+        activations: initial activations of actuators by name.
+        starts: values (rad or m) in the default pose of joints that passes have added to those of
+            the robot, by name.
+        start_note: advice where simulations must start, or "".
+    """
+
+    model: Model
+    robot: Robot
     fidelity: Fidelity
-    options: Options  # what the user chooses
-    folder: Path | None  # where the model's file is, and the files that it names
-    mesh_files: MeshFiles  # takes up the mesh files that the text names
-    root: _Element = field(default_factory=lambda: Element("mujoco"))  # the element `<mujoco>`
-    # the element of each body by its index in the mechanism, of ground (-1) too. Its frame is the
-    # body's.
+    options: Options
+    folder: Path | None
+    mesh_files: MeshFiles
+    root: _Element = field(default_factory=lambda: Element("mujoco"))
     bodies: dict[int, _Element] = field(default_factory=dict)
-    # element and frame (4, 4) in it of those links of the robot that stand still in an element, by
-    # name
     frames: dict[str, tuple[_Element, Array]] = field(default_factory=dict)
-    # the joint that stands for a coordinate, by the coordinate's place in the mechanism; none if it
-    # is locked
     leads: dict[int, Lead] = field(default_factory=dict)
-    # what equality constraints make of joints, by name
     followers: dict[str, Follower] = field(default_factory=dict)
-    # those of them that move nothing, but are what others follow
     helpers: set[str] = field(default_factory=set)
-    # of paths, by the absolute path of their owners
     tendons: dict[str, PathTendon] = field(default_factory=dict)
-    activations: dict[str, float] = field(
-        default_factory=dict
-    )  # at the start, of the actuators that have one, by name
-    # values (rad, m) in the default pose of joints that a pass has added besides those of the
-    # robot, by name
+    activations: dict[str, float] = field(default_factory=dict)
     starts: dict[str, float] = field(default_factory=dict)
-    start_note: str = ""  # where simulations have to start, if that is not everywhere
+    start_note: str = ""
     _names: dict[str, set[str | None]] = field(default_factory=dict)
     _meshes: dict[tuple[str, tuple[float, float, float]], str] = field(default_factory=dict)
 
@@ -172,14 +214,18 @@ class Draft:
 
     @cached_property
     def tree(self) -> Tree:
-        """The components of the model, and where they are."""
+        """Components of the model with their paths."""
         return self.model.tree()
 
     @cached_property
     def default_state(self) -> tuple[Array, Array]:
-        """Values (n,) and speeds (n,) of the coordinates in the default pose, which fulfil the constraints.
+        """Values (n,) and speeds (n,) of the coordinates in the default pose, assembled to fulfil
+        the constraints.
 
-        Where no pose near the model's own does, the model's own.
+        If no pose near the model's own fulfils them, it is the model's own.
+
+        Returns:
+            Values (rad or m) and speeds (rad/s or m/s).
         """
         try:
             return self.mechanism.default_state()
@@ -193,7 +239,9 @@ class Draft:
             return self.mechanism.values({}), self.mechanism.speeds({})
 
     def iterate_components(self, kind: type[C]) -> Iterator[tuple[C, str]]:
-        """Components of a class that no pass has spoken of yet, with their absolute paths."""
+        """Yield the components of a class that no pass has accounted for, with their absolute
+        paths.
+        """
         spoken_of = self.fidelity.translated.keys() | {
             record.component for record in self.fidelity.records
         }
@@ -205,22 +253,27 @@ class Draft:
                 yield component, path
 
     def record_result(self, path: str, became: str) -> None:
-        """Say what a component and all below it became, but for what is spoken of already."""
+        """Record what a component and all components below it became, except those accounted for
+        already.
+
+        Args:
+            path: absolute path of the component.
+            became: kind and name of the element.
+        """
         for each in self.tree.by_path:
             if each == path or each.startswith(f"{path}/"):
                 self.fidelity.translated.setdefault(each, became)
 
     def get_section(self, tag: str) -> _Element:
-        """The part of the file with this tag: ``tendon``, ``actuator``, ``equality`` ..."""
+        """Return the section of the file with a tag, such as `tendon`, `actuator` or `equality`."""
         result = self.root.find(tag)
         return add_element(self.root, tag) if result is None else result
 
     def make_name(self, kind: str, path: str) -> str:
-        """A name for a component, unlike any other of this kind: its own, or its path with dots where that is taken.
+        """Return an unused name for a component: its own, or its path with dots if that is taken.
 
         Args:
-            kind: MuJoCo's name space: ``geom``, ``site``, ``tendon``, ``actuator``, ``equality``
-                ...
+            kind: name space of MuJoCo: `geom`, `site`, `tendon`, `actuator`, `equality` ...
             path: absolute path of the component, or any name.
         """
         taken = self._names.setdefault(kind, set())
@@ -235,10 +288,14 @@ class Draft:
         return name
 
     def find_placement(self, owner: Component, socket: str) -> FramePlacement:
-        """The frame that a socket of a component names: index of its body, and transform (4, 4) in that.
+        """Return the frame of a socket: index of its body, and transform (4, 4) in the body.
+
+        Args:
+            owner: component with the socket.
+            socket: name of the socket.
 
         Raises:
-            ModelError: there is no such frame, or it is not fixed to a body.
+            ModelError: the frame does not exist, or is not fixed to a body.
         """
         value = getattr(owner, socket)
         if not value:
@@ -249,16 +306,16 @@ class Draft:
         return self.mechanism.frames[path]
 
     def add_site(self, path: str, body: int, place: Array, **attributes: Value) -> str:
-        """Add a site to a body (-1: ground).
+        """Add a site to a body.
 
         Args:
-            path: of the component that it stands for, from which it has its name.
-            body: index in the mechanism.
-            place: in the frame of the body, location (3,) in m or transform (4, 4).
-            **attributes: more of the element's.
+            path: path of the component after which it is named.
+            body: index of the body, -1 for ground.
+            place: position (3,) (m) or transform (4, 4) in the body.
+            **attributes: further attributes.
 
         Returns:
-            Its name.
+            Name of the site.
         """
         name = self.make_name("site", path)
         frame = format_pose(place) if place.shape == (4, 4) else {"pos": clear_rounding(place)}
@@ -266,17 +323,22 @@ class Draft:
         return name
 
     def find_tendon(self, path: str) -> PathTendon:
-        """The tendon of the path of a force.
+        """Return the tendon of the path of a force.
 
         Raises:
-            Unsayable: it became none.
+            Untranslatable: the path has no tendon.
         """
         if path not in self.tendons:
             raise Untranslatable("its path is no tendon")
         return self.tendons[path]
 
     def add_follower(self, joint: str, follower: Follower) -> None:
-        """Let a joint follow another, or keep it at a value."""
+        """Add an equality by which a joint follows another or keeps a value.
+
+        Args:
+            joint: name of the joint.
+            follower: its dependence.
+        """
         self.followers[joint] = follower
         coefficients = np.zeros(5)
         coefficients[: len(follower.polynomial)] = follower.polynomial
@@ -297,7 +359,14 @@ class Draft:
         frame: Array,
         inertia: float = SPECK_MASS_KG * SPECK_MASS_KG,
     ) -> _Element:
-        """Add a small body, which nothing weighs down, at a frame (4, 4) in an element; `inertia` is in kg·m²."""
+        """Add a small body without weight, which a constraint needs.
+
+        Args:
+            name: name of the component that needs it.
+            element: element to which it is added.
+            frame: frame in the element (4, 4).
+            inertia: principal moments (kg·m²).
+        """
         speck = add_element(
             element,
             "body",
@@ -311,7 +380,9 @@ class Draft:
         return speck
 
     def locate_at_zero(self, station: StationPlacement) -> Array:
-        """Where a station is in ground (3,) when all joints stand at zero, as MuJoCo has it before a pose is set."""
+        """Return the position of a station in ground (3,) with all joints at zero, MuJoCo's
+        reference pose.
+        """
         body, location = station
         link, _ = self.robot.link_of[
             "/ground" if body == GROUND else self.mechanism.bodies[body].path
@@ -326,10 +397,14 @@ class Draft:
         return placed
 
     def add_mesh(self, file: str, scale: tuple[float, float, float]) -> str:
-        """The asset that is a mesh file at a scale.
+        """Return the asset of a mesh file at a scale, which is added if it is new.
 
-        Its inertia is said to be that of its surface: MuJoCo refuses bones whose surface does not
-        close otherwise.
+        Its inertia is declared to be that of its surface: otherwise MuJoCo rejects meshes with open
+        surfaces.
+
+        Args:
+            file: name of the mesh file.
+            scale: scale along x, y and z.
         """
         key = (file, scale)
         if key not in self._meshes:
@@ -341,30 +416,33 @@ class Draft:
         return self._meshes[key]
 
     def iterate_links(self) -> Iterator[tuple[Link, _Element]]:
-        """Links that are bodies (or ground), with their elements."""
+        """Yield the links that are bodies or ground, with their elements."""
         for index, path in enumerate(
             ["/ground", *(body.path for body in self.mechanism.bodies)], GROUND
         ):
             yield self.robot.link_of[path][0], self.bodies[index]
 
-    def get_body_name(self, body: int) -> str:
-        """Name of the element of a body (-1: ground)."""
-        return "world" if body == GROUND else self.bodies[body].get("name", "")
-
 
 def format_pose(matrix: Array) -> dict[str, Value]:
-    """The attributes that place a frame (4, 4) in that of its parent; None where it is not moved, or not turned."""
+    """Return the attributes that place a frame in its parent.
+
+    Args:
+        matrix: transform (4, 4).
+
+    Returns:
+        "pos" and "quat"; None for no translation or rotation.
+    """
     place, turned = clear_rounding(matrix[:3, 3]), clear_rounding(quaternion_of(matrix[:3, :3]))
     return {"pos": place if place.any() else None, "quat": turned if turned[1:].any() else None}
 
 
 def clear_rounding(values: Array) -> Array:
-    """The numbers with zeros for those that are zero but for rounding, which nobody wants to read."""
+    """Return numbers in which rounding errors around 0 are 0, so that the file is easy to read."""
     return np.where(np.abs(values) < 1e-16, 0.0, values)
 
 
 def format_value(value: str | bool | int | float | Sequence[float] | Array) -> str:
-    """An attribute as MuJoCo reads it; numbers in the shortest form that reads back equal."""
+    """Return an attribute as text; numbers have the shortest form that reads back equal."""
     match value:
         case str():
             return value

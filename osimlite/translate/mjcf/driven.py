@@ -1,4 +1,6 @@
-"""What the driver computes: a control for each of the model's, and room for the states of its forces."""
+"""Elements for the driver: a control for each control of the model, and memory for the states of
+its forces.
+"""
 
 from __future__ import annotations
 
@@ -14,10 +16,11 @@ STATES_ACTUATOR = "osimlite.states"
 """Name of the actuator whose activations are the auxiliary states of all forces."""
 
 COMPUTED_NOTE = "computed by osimlite.mjcf.Driver"
+"""Entry of the account for components that the driver computes."""
 
 
 def add_driven(draft: Draft) -> None:
-    """Add actuators that push nothing: one for each control, and one that has the auxiliary states."""
+    """Add actuators without force: one for each control, and one that stores the auxiliary states."""
     forces = force_elements(
         draft.model, draft.mechanism, skip_unsupported=True, folder=draft.folder
     )

@@ -1,14 +1,12 @@
-"""A model in MuJoCo with OpenSim's own laws: MuJoCo moves the bodies, osimlite says what follows and what pushes.
+"""Driver: a model in MuJoCo with OpenSim's own laws.
 
-MuJoCo has neither splines nor the forces of OpenSim, but it calls back. A `Driver` writes the exact
-functions of the coordinates into MuJoCo's equalities before every step, gives the generalized
-forces of all muscles, contacts, limits, springs and bushings at every evaluation, wrapped paths and
-elastic tendons included, and lets MuJoCo integrate their states among its own::
+MuJoCo has neither splines nor the forces of OpenSim, but it has callbacks. A `Driver` writes the
+exact functions of the coordinates into MuJoCo's equalities before every step, computes the
+generalized forces of all muscles, contacts, limits, springs and bushings at every evaluation,
+including wrapped paths and elastic tendons, and lets MuJoCo integrate their states with its own::
 
-    driver = osimlite.mjcf.Driver(osimlite.read("gait.osim"))
-    driver.data.actuator("soleus_r").ctrl = 0.3
-    driver.step(1000)
-    driver.data.body("pelvis").xpos
+    driver = osimlite.mjcf.Driver(osimlite.read("gait.osim")) driver.data.actuator("soleus_r").ctrl
+    = 0.3 driver.step(1000) driver.data.body("pelvis").xpos
 """
 
 from __future__ import annotations
@@ -38,7 +36,17 @@ Integrator = Literal["Euler", "RK4", "implicit", "implicitfast"]
 
 
 class _FollowerJoint(NamedTuple):
-    """A joint that follows others, or time: its equality, address and dof, addresses and dofs of what it follows."""
+    """Joint that follows other joints or time.
+
+    Attributes:
+        equality: index of the equality.
+        own: address of the joint in qpos.
+        dof: address of the joint in qvel.
+        addresses: addresses of the leaders in qpos; empty for a function of time.
+        leaders: addresses of the leaders in qvel.
+        function: exact function.
+        fitted: whether the equality of the file only approximates the function.
+    """
 
     equality: int
     own: int
@@ -49,7 +57,15 @@ class _FollowerJoint(NamedTuple):
     fitted: bool
 
     def evaluate(self, data: Any) -> tuple[float, Array, float, float]:
-        """Where the function has the joint, its gradient, its rate, and what its curvature adds to the acceleration."""
+        """Evaluate the function in a state.
+
+        Args:
+            data: MuJoCo's data.
+
+        Returns:
+            Value, gradient by the leaders, rate, and the part of the acceleration from the
+            curvature.
+        """
         x, rates = (
             (data.qpos[self.addresses], data.qvel[self.leaders])
             if self.leaders
@@ -61,31 +77,32 @@ class _FollowerJoint(NamedTuple):
 
 
 class Driver:
-    """A model that MuJoCo moves by OpenSim's laws.
+    """Model that MuJoCo moves by OpenSim's laws.
 
-    MuJoCo's callbacks are one set for the whole process: they are the driver's while it steps, and
-    put back after.
+    MuJoCo's callbacks are global in a process. They are the driver's while it steps, and are
+    restored afterwards.
 
     Args:
-        model: what moves.
-        timestep: of MuJoCo (s).
-        integrator: of MuJoCo.
-        equilibrate: start muscles in equilibrium of fibers and tendon.
-        file: what ``osimlite translate --driver`` wrote of the model, with what you added: a scene,
-            sensors, cameras.
-        folder: where the model's file is, and the files that it names.
-        geometry: more folders to look for mesh files in.
+        model: model of OpenSim.
+        timestep: time step of MuJoCo (s).
+        integrator: integrator of MuJoCo.
+        equilibrate: whether muscles start in equilibrium of fibers and tendon.
+        file: file that `osimlite translate --driver` wrote, with your additions: a scene, sensors,
+            cameras.
+        folder: folder of the model file and of the files that it names.
+        geometry: further folders for mesh files.
 
     Attributes:
-        mjcf: the translation, which has the account of what the driver does not compute.
-        model: MuJoCo's ``MjModel``; ``ctrl`` of its actuators are the controls of the model's,
-            added to what the model's controllers make of them. data: MuJoCo's ``MjData``. system:
-            the forces.
+        mjcf: translation, with the account of what the driver does not compute.
+        model: MuJoCo's `MjModel`. `ctrl` of its actuators are controls of the model, which are
+            added to those of the model's controllers.
+        data: MuJoCo's `MjData`.
+        system: forces of the model.
 
     Raises:
         MissingDependency: mujoco is not installed.
-        ModelError: the model is not a mechanism.
-        UnsupportedError: it uses a joint or constraint that osimlite cannot compute.
+        ModelError: the model is not a valid mechanism.
+        UnsupportedError: a joint or constraint is not supported.
     """
 
     def __init__(
@@ -139,8 +156,8 @@ class Driver:
 
     # ------------------------------------------------------------------------------------------------- states
     def reset(self) -> None:
-        """Go back to the default pose, and to where the states of the forces start."""
-        # Of a file without one, the state is that of no keyframe.
+        """Reset to the default pose and to the initial states of the forces."""
+        # Without a keyframe in the file, MuJoCo resets to its reference pose.
         self._mujoco.mj_resetDataKeyframe(self.model, self.data, 0)
         q, u, _ = self.state()
         y = self.system.state.pack(q.tolist(), u.tolist())
@@ -151,21 +168,31 @@ class Driver:
         self.set_state(q, u)
 
     def forward(self) -> None:
-        """Compute everything that follows from the present state, without moving.
+        """Compute all results of the present state without a step, as `mj_forward` does.
 
         Raises:
-            SimulationError: a force has no value in it.
+            SimulationError: a force has no value in this state.
         """
         self._update_equalities()
         with self._call_back():
             self._mujoco.mj_forward(self.model, self.data)
 
     def state(self) -> tuple[Array, Array, Array]:
-        """Values (n,) and generalized speeds (n,) of the coordinates, and the auxiliary states of the forces (z,)."""
+        """Return the state of the model.
+
+        Returns:
+            Values (n,) and generalized speeds (n,) of the coordinates, and the auxiliary states of
+            the forces (z,).
+        """
         return (*self._read_coordinates(self.data)[:2], np.array(self.data.act))
 
     def set_state(self, q: Values, u: Values) -> None:
-        """Put all joints where values and generalized speeds of the coordinates have them."""
+        """Set all joints to given coordinates and generalized speeds.
+
+        Args:
+            q: values of the coordinates (n,) (rad or m).
+            u: generalized speeds (n,).
+        """
         mechanism, robot = self._mechanism, self.mjcf.robot
         rates = mechanism.coordinate_rates(q, u)
         for name, value in self.mjcf.joint_values(q).items():
@@ -176,10 +203,13 @@ class Driver:
         self.forward()
 
     def step(self, count: int = 1) -> None:
-        """Go on by some time steps.
+        """Simulate some time steps.
+
+        Args:
+            count: number of steps.
 
         Raises:
-            SimulationError: a force has no value in the state that is reached.
+            SimulationError: a force has no value in a state that is reached.
         """
         with self._call_back():
             for _ in range(count):
@@ -209,7 +239,9 @@ class Driver:
             raise failure
 
     def _apply_forces(self, data: Any) -> None:
-        """Add the generalized forces of the model's laws to the passive ones."""
+        """Add the generalized forces of the model to MuJoCo's passive forces (callback of
+        controls).
+        """
         if self._failure is not None or not self.model.nv:
             return
         try:
@@ -221,7 +253,7 @@ class Driver:
                 data.time, state.pack(q.tolist(), u.tolist(), data.act.tolist())
             )
         except Exception as failure:
-            # Python's errors do not pass through MuJoCo.
+            # An exception cannot pass through MuJoCo's C code; it is raised after the step.
             self._failure = failure
             return
         count = len(state.order)
@@ -236,15 +268,19 @@ class Driver:
         self._apply_equality_forces(data)
 
     def _apply_equality_forces(self, data: Any) -> None:
-        """Add the forces of all equalities, with which joints accelerate as those that they follow.
+        """Add the constraint forces of all equalities, computed exactly.
 
-        MuJoCo's own leave a ten-thousandth of the difference. With these forces, and told what the
-        curvature asks for, which MuJoCo leaves out, nothing is left to them but to take back errors
+        MuJoCo's own equalities leave 1e-4 of the difference of accelerations, and ignore the
+        curvature of the functions. With these forces nothing is left for them but to correct errors
         of position and speed.
+
+        With follower accelerations a = B a_f + c in terms of those of the free joints a_f, and
+        further rows J a = a_ref, it solves [B' M B, (J B)'; J B, 0] [a_f; l] = [B' (f - M c); a_ref
+        - J c].
         """
         if not data.ne:
             return
-        # Accelerations are moves @ those of the other joints + wanted.
+        # Accelerations are `moves` @ those of the free joints + `wanted`.
         moves, wanted = np.eye(self.model.nv), np.zeros(self.model.nv)
         for followed in self._followed:
             _, gradient, _, wanted[followed.dof] = followed.evaluate(data)
@@ -252,7 +288,7 @@ class Driver:
             if followed.leaders:
                 moves[followed.dof, followed.leaders] = gradient
         moves = moves[:, self._free]
-        # The rows of equalities stand first, in the order of the equalities.
+        # MuJoCo puts the rows of equalities first, in their order.
         places = np.searchsorted(data.efc_id[: data.ne], [item.equality for item in self._followed])
         others = np.setdiff1d(np.arange(data.ne), places)
         rows = data.efc_J.reshape(-1, self.model.nv)[others]
@@ -269,8 +305,8 @@ class Driver:
         )
         accelerations = moves @ result[: len(self._free)] + wanted
         data.qfrc_passive += self._multiply_mass(data, accelerations) - applied
-        # What `_follow` writes is for the start of a step: within it there are no errors to take
-        # back.
+        # `_update_equalities` writes for the start of a step; within the step fitted equalities have no
+        # errors to correct.
         for place, item in zip(places, self._followed, strict=True):
             rest = 0.0 if item.fitted else data.efc_aref[place]
             data.efc_aref[place] = (
@@ -278,13 +314,15 @@ class Driver:
             )
 
     def _multiply_mass(self, data: Any, accelerations: Array) -> Array:
-        """The mass matrix times accelerations (nv,)."""
+        """Return the product of the mass matrix and accelerations (nv,)."""
         forces = np.empty(self.model.nv)
         self._mujoco.mj_mulM(self.model, data, forces, accelerations)
         return forces
 
     def _compute_activation_rates(self, _: Any, data: Any, actuator: int) -> float:
-        """Rates of the auxiliary states, which `_push` has computed at the same evaluation."""
+        """Return rates of auxiliary states, which `_apply_forces` has computed at the same
+        evaluation.
+        """
         if len(self._rates) == 1:
             return self._rates[0]
         if actuator == self._states:
@@ -292,7 +330,15 @@ class Driver:
         return 0.0
 
     def _read_coordinates(self, data: Any) -> tuple[Array, Array, dict[int, tuple[int, float]]]:
-        """Values, speeds, and for coordinates without a joint the one that leads them and how fast."""
+        """Read the coordinates of the model from MuJoCo's joints.
+
+        Args:
+            data: MuJoCo's data.
+
+        Returns:
+            Values (n,), generalized speeds (n,), and for each coordinate without a joint the
+            coordinate that leads it and the derivative by it.
+        """
         q, rates = self._mechanism.values({}), np.zeros(len(self._mechanism.coordinates))
         q[self._places] = (data.qpos[self._qpos] - self._starts) / self._slopes
         rates[self._places] = data.qvel[self._dofs] / self._slopes
@@ -306,7 +352,9 @@ class Driver:
 
     # ----------------------------------------------------------------------------------------------- equalities
     def _update_equalities(self) -> None:
-        """Put joints where they must follow others, and write value, slope and curvature into the equalities."""
+        """Move followers to their exact values, and write value, slope and curvature into the
+        equalities.
+        """
         for followed in self._followed:
             if followed.fitted:
                 value, gradient, rate, _ = followed.evaluate(self.data)
@@ -321,7 +369,7 @@ class Driver:
 
     # ------------------------------------------------------------------------------------------------ making ready
     def _restore_inertias(self) -> None:
-        """Give bodies whose inertia MuJoCo refuses in a file their own."""
+        """Set the inertias that MuJoCo rejects in a file but accepts in a compiled model."""
         for record in self.mjcf.fidelity:
             if record.kind == "inertia":
                 link, _ = self.mjcf.robot.link_of[record.component]
@@ -343,7 +391,7 @@ class Driver:
         )
 
     def _add_controls(self) -> None:
-        """Add MuJoCo's controls to those of the model: numbers, whose places among those of the forces are found."""
+        """Add MuJoCo's controls to those of the model, and find where the forces have their values."""
         controls = self.system.forces.controls
         none, one = (
             controls.add_functions(dict.fromkeys(controls.names, Constant(value)))

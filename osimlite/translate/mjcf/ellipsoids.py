@@ -1,8 +1,10 @@
-"""Bodies that slide on an ellipsoid: a mechanism that keeps them there without any function of several coordinates.
+"""Ellipsoid joints: a mechanism that keeps a body on an ellipsoid without functions of several
+coordinates.
 
-The body's origin is p = diag(r) n, where n is its own Z axis. A point ahead of it by h along n is
-at s = diag(r + h) n. A speck on three slides that is connected to that point reads s, and each p is
-r / (r + h) of its s, a straight line.
+The origin of the body is p = diag(r) n with the radii r (m) and the body's own z axis n. A point
+ahead of it by h (m) along n is s = diag(r + h) n. A small body on three slides that is connected to
+this point has the coordinates s, and each component of p is r / (r + h) times that of s: a linear
+coupling.
 """
 
 from __future__ import annotations
@@ -17,7 +19,7 @@ from osimlite.translate.mjcf.draft import SPECK_MASS_KG, Draft, Follower, add_el
 
 
 def add_ellipsoids(draft: Draft) -> None:
-    """Lead the slides of every joint whose body stays on an ellipsoid."""
+    """Add the mechanism for every joint whose body stays on an ellipsoid."""
     joints = draft.robot.joints
     slides = [
         place for place, joint in enumerate(joints) if isinstance(joint.function, EllipsoidPoint)
@@ -30,6 +32,9 @@ def add_ellipsoids(draft: Draft) -> None:
 
 
 def _add_mechanism(draft: Draft, slides: list[RobotJoint], turns: tuple[RobotJoint, ...]) -> None:
+    """Add the body on slides, its connection and the couplings of one joint, if it has the expected
+    structure.
+    """
     radii = {}
     for joint in slides:
         assert isinstance(joint.function, EllipsoidPoint)

@@ -1,4 +1,4 @@
-"""The translation of a whole model to MJCF."""
+"""Translation of a complete model to MJCF."""
 
 from __future__ import annotations
 
@@ -49,27 +49,33 @@ from osimlite.translate.mjcf.time_step import DEFAULT_STEP_S, choose_step
 from osimlite.translate.survey import account_for_rest
 
 Pass = Callable[[Draft], None]
+"""Function that adds the elements of one kind of component to a draft."""
 
 MECHANISM_PASSES: tuple[Pass, ...] = (add_bodies, add_couplings, add_coordinates, add_constraints)
+"""Passes for bodies, joints and constraints; they come first, as all others refer to bodies and
+joints.
+"""
 FORCE_PASSES: tuple[Pass, ...] = (add_contacts, add_paths, add_forces, choose_step)
+"""Passes for forces with MuJoCo's laws; the driver replaces them."""
 SCENERY_PASSES: tuple[Pass, ...] = (add_shapes, add_camera, add_markers, add_frames, add_keyframe)
-"""What makes a file of a model, in this order: bodies and joints come before what acts on them or is fixed to them."""
+"""Passes for what is fixed to bodies, and for the default pose, which needs all joints and
+actuators.
+"""
 
 
 @dataclass(frozen=True)
 class Mjcf:
-    """A model as MJCF.
+    """Model as MJCF.
 
     Attributes:
-        name: of the files.
-        text: the MJCF.
-        fidelity: what became of every component, exact where there is no record of it.
-        robot: the neutral robot that was written; its joints and links have MuJoCo's names.
-        files: mesh files that the text names, and what the driver needs, by name relative to it.
-        followers: what equality constraints make of joints, by name.
-        start_note: where simulations have to start, if that is not everywhere.
-        leads: the joint that is a straight line of a coordinate, by the coordinate's place in the
-            mechanism.
+        name: name of the files.
+        text: MJCF text.
+        fidelity: account of what became of every component; those without a record are exact.
+        robot: neutral robot that was written; its joints and links have MuJoCo's names.
+        files: mesh files that the text names, and files of the driver, by name relative to it.
+        leads: joint that is a linear function of a coordinate, by the index of the coordinate.
+        followers: dependence of joints that equalities move, by name.
+        start_note: advice where simulations must start, or "".
     """
 
     name: str
@@ -82,7 +88,14 @@ class Mjcf:
     start_note: str = ""
 
     def joint_values(self, q: Values) -> dict[str, float]:
-        """Values (rad, m) of all joints by name at coordinate values `q`, exact where equalities are fitted."""
+        """Compute the values of all joints, exactly also where equalities are fitted.
+
+        Args:
+            q: values of the coordinates.
+
+        Returns:
+            Value (rad or m) by the name of the joint.
+        """
         values = self.robot.mechanism.values(q)
         leads = {
             joint: line.slope * values[place] + line.start
@@ -95,10 +108,14 @@ class Mjcf:
         return result
 
     def write(self, folder: str | Path) -> list[Path]:
-        """Write ``<name>.xml``, its meshes and ``fidelity.json`` into a folder, which is made if it is not there.
+        """Write `<name>.xml`, its meshes and `fidelity.json` into a folder.
+
+        Args:
+            folder: output folder; created if necessary.
 
         Returns:
-            The files written, the MJCF first. It is written last, when all it needs is in place.
+            Paths of the files, the MJCF first. It is written last, when all files that it needs
+            exist.
 
         Raises:
             OsimliteError: a file cannot be written.
@@ -125,33 +142,32 @@ def to_mjcf(
 ) -> Mjcf:
     """Translate a model to MJCF, without MuJoCo and without OpenSim.
 
-    Bodies keep their names and frames. Joints are named by their coordinates, whose values are
-    theirs (rad, m).
+    Bodies keep their names and frames. Joints have the names and the values (rad or m) of their
+    coordinates.
 
     Args:
-        model: the model.
-        mujoco: the version to write for, 3 or 4.
-        visuals: whether to say what bodies look like.
-        contact: ``"native"`` writes contact forces as contacts of MuJoCo's own law, ``"none"``
-            leaves them out.
-        fit: ``"wraps"`` moves and resizes what tendons go around until they do what the paths do,
-            ``"force"`` fits the curves and lengths of muscles to their isometric forces too;
-            ``"none"`` keeps all numbers of the model.
-        spline: ``"quartic"`` fits one quartic to a function that is none, ``"series"`` a quartic of
-            a quartic, which takes a helper joint for each and is about twice as close.
-        driver: write the file that `osimlite.mjcf.Driver` moves, which has no forces: the driver
-            computes them from the model, of which a copy is among the files.
-        folder: where the model's file is; mesh files are looked for there and in its folder
-            ``Geometry``.
-        geometry: more folders to look for mesh files in; those in the environment variable
+        model: model to translate.
+        mujoco: major version of MuJoCo, 3 or 4.
+        visuals: whether to write the shapes with which bodies are drawn.
+        contact: "native" writes contact forces as contacts of MuJoCo's own law, "none" leaves them
+            out.
+        fit: "wraps" moves and resizes wrap geoms until tendons match the paths, "force" also fits
+            the curves and lengths of muscles to their isometric forces, "none" keeps all numbers of
+            the model.
+        spline: "quartic" fits one quartic to a function that is none, "series" a quartic of a
+            quartic, which needs a helper joint for each and is about twice as close.
+        driver: whether to write the file for `osimlite.mjcf.Driver`, which has no forces: the
+            driver computes them from a copy of the model, which is among the files.
+        folder: folder of the model file; mesh files are searched there and in its folder
+            `Geometry`.
+        geometry: further folders for mesh files; those in the environment variable
             OSIMLITE_GEOMETRY, separated as in PATH, follow them.
-        name: of the files to write, without ending; that of the model if not given.
+        name: name of the files without ending; by default that of the model.
 
     Raises:
-        SettingError: an option has a value that it does not take.
-        ModelError: the model is not a mechanism: something it names is not there, or a body is not
-            connected.
-        UnsupportedError: it uses a joint or constraint that osimlite cannot compute.
+        SettingError: an option has a value that it does not accept.
+        ModelError: the model is not a valid mechanism: a frame or body is missing or not connected.
+        UnsupportedError: a joint or constraint is not supported.
     """
     if mujoco not in (3, 4):
         raise SettingError(f"MJCF is written for MuJoCo 3 or 4, not {mujoco}")
@@ -216,14 +232,14 @@ def _add_settings(draft: Draft) -> None:
         gravity=draft.mechanism.gravity,
         integrator="implicitfast",
     )
-    # Two steps is the quickest that MuJoCo lets a constraint be; the nearer to 1 the impedance, the
-    # less it gives way.
+    # MuJoCo clips the time constant of a constraint to two steps; the closer the impedance is to 1,
+    # the stiffer the constraint.
     add_element(
         add_element(root, "default"),
         "equality",
         solref="0.002 1",
         solimp="0.9999 0.9999 0.001 0.5 2",
     )
-    # The sections in the order in which they are best read.
+    # Sections are created in the order that is easiest to read.
     for tag in ("asset", "worldbody", "contact", "equality", "tendon", "actuator", "keyframe"):
         draft.get_section(tag)

@@ -1,4 +1,4 @@
-"""Fits: surfaces moved, turned and resized until a tendon does what the path does."""
+"""Fits of tendons: wrap geoms are moved, turned and resized until the tendon matches the path."""
 
 from __future__ import annotations
 
@@ -14,22 +14,34 @@ from osimlite.translate.mjcf.routes import Router
 from osimlite.translate.mjcf.tendons import Tendon, TendonSite, WrapGeom
 
 ERROR_TOLERANCE_M = 1e-4
-"""An error (m) that need not become less."""
-MAX_ROUNDS, WORTHWHILE_RATIO = 4, 0.98
-"""At most so many rounds, as long as the error falls below this part of what it was."""
-SHIFT_SCALE_M, TURN_SCALE_RAD, LOG_RADIUS_SCALE = 0.01, 0.1, 0.1
-"""What the search takes for equally large: shifts (m), turns (rad), logarithms of radii."""
+"""Error (m) of a tendon that needs no fit."""
+MAX_ROUNDS = 4
+"""Most rounds of a fit; each one searches numbers and then sides."""
+WORTHWHILE_RATIO = 0.98
+"""Ratio of the error after and before a round below which another round follows."""
+SHIFT_SCALE_M = 0.01
+"""Shift (m) that the search treats as one unit."""
+TURN_SCALE_RAD = 0.1
+"""Rotation (rad) that the search treats as one unit."""
+LOG_RADIUS_SCALE = 0.1
+"""Change of the logarithm of a radius that the search treats as one unit."""
 SIDE_DIRECTIONS = 24
-"""So many directions around a surface are tried as sides."""
+"""Number of directions around a surface that are tried for its side site."""
 
 Residuals = Callable[[Tendon], Array]
-"""The residuals of a tendon with a piece of it."""
+"""Function that returns the residuals of a tendon with a piece replaced."""
 
 
 def fit_tendon(router: Router, tendon: Tendon) -> Tendon:
-    """The tendon with surfaces and sites of ours where its error is least, sought from where they are.
+    """Return the tendon whose free wrap geoms and sites have the smallest error near their present
+    pose.
 
-    Points of the path stay where they are, and so do specks that stand for such points.
+    Points of the path stay where they are, and so do the small spheres that replace conditional
+    points.
+
+    Args:
+        router: path with its poses.
+        tendon: tendon to start from.
     """
     if router.compute_error(tendon) < ERROR_TOLERANCE_M:
         return tendon
@@ -45,7 +57,9 @@ def fit_tendon(router: Router, tendon: Tendon) -> Tendon:
 
 
 def _fit_piece(piece: Tendon, wrong: Residuals) -> Tendon:
-    """The piece with the least error: all numbers are sought together, then the side of each surface, in turn."""
+    """Fit a piece of a tendon: all numbers together by least squares, then the side of each
+    surface, repeatedly.
+    """
     search = require("scipy.optimize", extra="sim", purpose="fits of tendons").least_squares
     best, least = piece, _compute_error(wrong(piece))
     for _ in range(MAX_ROUNDS):
@@ -71,7 +85,7 @@ def _compute_error(residuals: Array) -> float:
 
 
 def _choose_sides(piece: Tendon, wrong: Residuals) -> Tendon:
-    """The piece with the best side for each surface."""
+    """Return the piece with the best side for each surface."""
     turns = np.arange(SIDE_DIRECTIONS) * (2.0 * np.pi / SIDE_DIRECTIONS)
     directions = np.stack((np.cos(turns), np.sin(turns), 0.0 * turns), axis=1)
     for index, part in enumerate(piece):
@@ -91,7 +105,7 @@ def _is_free(part: TendonSite | WrapGeom) -> bool:
 
 
 def _move_free_parts(piece: Tendon, x: Array) -> Tendon:
-    """The piece with its free parts moved by numbers of the search."""
+    """Return the piece with its free parts changed by the variables of the search."""
     parts: list[TendonSite | WrapGeom] = []
     for part in piece:
         if not _is_free(part):

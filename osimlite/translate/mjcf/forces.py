@@ -1,4 +1,4 @@
-"""Forces and actuators: what each class becomes, if MuJoCo has its law."""
+"""Forces and actuators: the function that translates each class, if MuJoCo has its law."""
 
 from __future__ import annotations
 
@@ -32,13 +32,14 @@ MAKERS: Mapping[str, Callable[[Draft, Any, str], str]] = {
     "Ligament": on_paths.add_ligament,
     "Blankevoort1991Ligament": on_paths.add_ligament,
 }
-"""By class, but for muscles, what adds a force to a draft and tells what it became; it raises
-`Unsayable` where that cannot be.
+"""Functions that add a force of a class, without muscles, and return what it became.
+
+They raise `Untranslatable` if MuJoCo cannot express it.
 """
 
 
 def add_forces(draft: Draft) -> None:
-    """Add every force that acts and that MuJoCo has the law of."""
+    """Add every active force whose law MuJoCo has."""
     for force, path in draft.iterate_components(Force):
         what = type(force).__name__
         try:

@@ -1,4 +1,4 @@
-"""Forces on bodies: between two points, on one point, about an axis, between two frames."""
+"""Forces on bodies: between two points, at a point, about an axis, and between two frames."""
 
 from __future__ import annotations
 
@@ -18,11 +18,22 @@ from osimlite.schema.springs import BushingForce, PointToPointSpring
 from osimlite.translate.mjcf.draft import SPECK_MASS_KG, Draft, Untranslatable, add_element
 
 GROUND_FRAME = FramePlacement(GROUND, np.eye(4))
+"""Frame of ground."""
 AXIS_NAMES = ("rx", "ry", "rz", "tx", "ty", "tz")
+"""Names of rotations and translations, in the order of OpenSim's six numbers."""
 
 
 def add_point_spring(draft: Draft, force: PointToPointSpring, path: str) -> str:
-    """A tendon with a spring."""
+    """Add a tendon with a spring between two sites.
+
+    Args:
+        draft: MJCF under construction.
+        force: spring of the model.
+        path: absolute path of the spring.
+
+    Returns:
+        Kind and name of the element.
+    """
     ends = [
         _add_point_site(draft, force, path, "socket_body1", force.point1),
         _add_point_site(draft, force, path, "socket_body2", force.point2),
@@ -31,7 +42,19 @@ def add_point_spring(draft: Draft, force: PointToPointSpring, path: str) -> str:
 
 
 def add_point_to_point_actuator(draft: Draft, force: PointToPointActuator, path: str) -> str:
-    """An actuator on a tendon: MuJoCo's positive force lengthens it, too."""
+    """Add an actuator on a tendon between two sites; in MuJoCo, too, a positive force lengthens it.
+
+    Args:
+        draft: MJCF under construction.
+        force: actuator of the model.
+        path: absolute path of the actuator.
+
+    Returns:
+        Kind and name of the element.
+
+    Raises:
+        Untranslatable: its points are fixed in ground.
+    """
     if force.points_are_global:
         raise Untranslatable(
             "its points are given in ground, so that they wander through the bodies"
@@ -52,7 +75,19 @@ def add_point_to_point_actuator(draft: Draft, force: PointToPointActuator, path:
 
 
 def add_torque_actuator(draft: Draft, force: TorqueActuator, path: str) -> str:
-    """A torque on a site, in the axes of a second one, whose body takes the reaction."""
+    """Add a torque on a site, with axes of a second site, whose body takes the reaction.
+
+    Args:
+        draft: MJCF under construction.
+        force: actuator of the model.
+        path: absolute path of the actuator.
+
+    Returns:
+        Kind and name of the element.
+
+    Raises:
+        Untranslatable: its axis is fixed in ground while both bodies move.
+    """
     first = draft.find_placement(force, "bodyA")
     second = draft.find_placement(force, "bodyB") if force.bodyB else GROUND_FRAME
     gear = np.append(np.zeros(3), _normalize_axis(force.axis) * force.optimal_force)
@@ -65,7 +100,19 @@ def add_torque_actuator(draft: Draft, force: TorqueActuator, path: str) -> str:
 
 
 def add_point_actuator(draft: Draft, force: PointActuator, path: str) -> str:
-    """A force on a site, in the axes of its body or of a site in ground."""
+    """Add a force on a site, with the axes of its body or of a site in ground.
+
+    Args:
+        draft: MJCF under construction.
+        force: actuator of the model.
+        path: absolute path of the actuator.
+
+    Returns:
+        Kind and name of the element.
+
+    Raises:
+        Untranslatable: its point is fixed in ground.
+    """
     if force.point_is_global:
         raise Untranslatable("its point is given in ground, so that it wanders through the body")
     gear = np.append(_normalize_axis(force.direction) * force.optimal_force, np.zeros(3))
@@ -80,7 +127,17 @@ def add_point_actuator(draft: Draft, force: PointActuator, path: str) -> str:
 
 
 def add_straight_tendon(draft: Draft, path: str, sites: list[str], **law: float) -> str:
-    """A tendon through sites; its name."""
+    """Add a tendon through sites.
+
+    Args:
+        draft: MJCF under construction.
+        path: absolute path of the component after which it is named.
+        sites: names of the sites.
+        law: attributes of its spring.
+
+    Returns:
+        Name of the tendon.
+    """
     name = draft.make_name("tendon", path)
     tendon = add_element(draft.get_section("tendon"), "spatial", name=name, **law)
     for site in sites:
@@ -99,7 +156,9 @@ def _add_site_motor(
 
 
 def _add_point_site(draft: Draft, owner: Component, path: str, socket: str, point: Vec3) -> str:
-    """A site at a point, which OpenSim takes for one of the body itself even where the socket names a frame on it."""
+    """Add a site at a point of a body; OpenSim uses the body even where the socket names a frame on
+    it.
+    """
     return draft.add_site(path, draft.find_placement(owner, socket).body, np.array(point))
 
 
@@ -111,7 +170,19 @@ def _normalize_axis(axis: tuple[float, float, float]) -> Array:
 
 
 def add_body_actuator(draft: Draft, force: BodyActuator, path: str) -> str:
-    """Six actuators, in the order of the controls: torque, then force."""
+    """Add six actuators in the order of the controls: torques, then forces.
+
+    Args:
+        draft: MJCF under construction.
+        force: actuator of the model.
+        path: absolute path of the actuator.
+
+    Returns:
+        Kinds and names of the elements.
+
+    Raises:
+        Untranslatable: its point is fixed in ground.
+    """
     if force.point_is_global:
         raise Untranslatable("its point is given in ground, so that it wanders through the body")
     site = _add_point_site(draft, force, path, "socket_body", force.point)
@@ -125,10 +196,19 @@ def add_body_actuator(draft: Draft, force: BodyActuator, path: str) -> str:
 
 
 def add_bushing(draft: Draft, force: BushingForce, path: str) -> str:
-    """A speck on six joints with springs and dampers in the first frame, welded to the second.
+    """Add a small body on six joints with springs and dampers in the first frame, welded to the
+    second.
 
-    The joints are the six deviations themselves, so that the law is OpenSim's; only the weld gives
-    way a little.
+    The joints are the six deviations of OpenSim's law, so that it is exact except for the
+    compliance of the weld.
+
+    Args:
+        draft: MJCF under construction.
+        force: bushing of the model.
+        path: absolute path of the bushing.
+
+    Returns:
+        Kind and name of the element.
     """
     (one, inner), second = (
         draft.find_placement(force, "socket_frame1"),
@@ -141,7 +221,7 @@ def add_bushing(draft: Draft, force: BushingForce, path: str) -> str:
     starts = (*angles_xyz(apart[:3, :3]), *apart[:3, 3])
     stiffness = (*force.rotational_stiffness, *force.translational_stiffness)
     damping = (*force.rotational_damping, *force.translational_damping)
-    # The translations are along the first frame, so they come first.
+    # OpenSim measures translations along the axes of the first frame, so that they come first.
     for k in (3, 4, 5, 0, 1, 2):
         joint = draft.make_name("joint", f"{name}_{AXIS_NAMES[k]}")
         draft.starts[joint] = starts[k]

@@ -1,4 +1,4 @@
-"""What a force along a path pulls with while nothing moves, by its own law."""
+"""Isometric tension of forces along paths, by OpenSim's laws."""
 
 from __future__ import annotations
 
@@ -23,10 +23,17 @@ from osimlite.simulation.system import System
 
 
 def compute_isometric_tension(force: Any, lengths: Array, activations: Sequence[float]) -> Array:
-    """Tension (A, L), N, of a force along a path at activations (A,) and lengths of the path (L,), m.
+    """Compute the tension of a force along a path at rest.
 
-    NaN where a muscle has no equilibrium. The force is put between ground and a block on a slide,
-    which stands still.
+    The force is put between ground and a block on a slider that stands still.
+
+    Args:
+        force: muscle or other force along a path.
+        lengths: lengths of the path (L,) (m).
+        activations: activations (A,).
+
+    Returns:
+        Tensions (A, L) (N); NaN where a muscle has no equilibrium.
     """
     model = Model(name="bench", gravity=(0.0, 0.0, 0.0))
     block = model.add(Body(name="block", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)))
@@ -36,7 +43,7 @@ def compute_isometric_tension(force: Any, lengths: Array, activations: Sequence[
         path.path_point_set.objects.append(PathPoint(name=name, socket_parent_frame=frame))
     model.add(force.copy_deep().model_copy(update={"name": "force", "geometry_path": path}))
     if isinstance(force, Muscle):
-        # The control, which is the activation of muscles that have no state of it, is the time.
+        # The control equals the time, because it is the activation of muscles without such a state.
         brain = PrescribedController(name="brain", socket_actuators=("/forceset/force",))
         brain.ControlFunctions.objects.append(LinearFunction(coefficients=(1.0, 0.0)))
         model.add(brain)

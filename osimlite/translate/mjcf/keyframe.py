@@ -1,4 +1,4 @@
-"""The default pose."""
+"""Default pose as a keyframe."""
 
 from __future__ import annotations
 
@@ -10,7 +10,9 @@ from osimlite.translate.mjcf.draft import Draft, add_element
 
 
 def add_keyframe(draft: Draft) -> None:
-    """Add the default pose and speeds, which fulfil the constraints; joints that follow others stand where these do."""
+    """Add the default pose and speeds, which fulfil the constraints; followers are where their
+    leaders put them.
+    """
     q, u = draft.default_state
     try:
         draft.mechanism.acceleration(q, u)
@@ -38,7 +40,7 @@ def add_keyframe(draft: Draft) -> None:
             "start simulations from the keyframe 'default', with mj_resetDataKeyframe(model, data, 0): at qpos0, where "
             "a new MjData starts, the equality constraints do not hold, and their forces can throw the model apart"
         )
-        # After the comment that names the program.
+        # The first comment names the program.
         draft.root.insert(1, Comment(f" {draft.start_note[0].upper()}{draft.start_note[1:]}. "))
     names = [joint.get("name", "") for joint in draft.get_section("worldbody").iter("joint")]
     actuators = [actuator.get("name", "") for actuator in draft.get_section("actuator")]

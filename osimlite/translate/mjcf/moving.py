@@ -1,7 +1,7 @@
-"""Moving points: a quartic of the coordinate, of which the three places are quartics again.
+"""Functions of a coordinate as quartics of a quartic.
 
 MuJoCo's joints follow others by quartics. Two in a row follow a spline several times as closely as
-one, above all in its slope, which is what a moment arm is made of.
+one, above all in its slope, which determines moment arms.
 """
 
 from __future__ import annotations
@@ -18,21 +18,34 @@ from osimlite.mechanics.multibody.spatial import Array
 from osimlite.translate.mjcf.polynomials import DEGREE, find_polynomial, sample_function
 
 HELPER_RANGE_RAD = 0.02
-"""How far (rad) a helper turns: little, so that its inertia hardly weighs on the coordinate that drives it."""
+"""Rotation (rad) of a helper joint to either side: small, so that its inertia hardly loads the
+coordinate.
+"""
 SAMPLE_COUNT = 80
+"""Number of samples of a function."""
 UNIT_POINTS = np.cos(np.linspace(0.0, np.pi, SAMPLE_COUNT))
-"""Where functions are looked at, of a span from -1 to 1."""
+"""Chebyshev points from -1 to 1, at which functions are sampled."""
 INITIAL_BENDS = ((0.0, 0.0, 0.0), (0.5, 0.0, 0.0), (-0.5, 0.0, 0.0), (0.0, -0.3, 0.0))
-"""Bends of the first quartic, as powers 2, 3 and 4 beside a slope of 1, from which the best is sought."""
+"""Initial guesses of the coefficients of powers 2, 3 and 4 of the inner quartic, beside a slope of
+1.
+"""
 
 
 def fit_composition(
     functions: Sequence[Function], span: tuple[float, float]
 ) -> tuple[Array, Array]:
-    """The quartic (5,) of a coordinate, and the quartics (k, 5) of its value that are nearest to k functions on a span.
+    """Fit quartics of a common quartic to functions of a coordinate.
 
-    All are written from the constant on, the first one within -REACH and REACH. Polynomials of up
-    to degree 4 are written as they are.
+    Functions that are polynomials of degree 4 at most are exact, with the identity as inner
+    quartic.
+
+    Args:
+        functions: functions of the coordinate (k).
+        span: range of the coordinate (rad or m).
+
+    Returns:
+        Inner quartic (5,), whose values are within `HELPER_RANGE_RAD`, and outer quartics (k, 5);
+        constant first.
     """
     exact = [find_polynomial(function) for function in functions]
     known = [item for item in exact if item is not None and item.degree() <= DEGREE]
@@ -41,7 +54,7 @@ def fit_composition(
     low, high = span
     at = 0.5 * (low + high) + 0.5 * (high - low) * UNIT_POINTS
     values = np.stack([sample_function(item, at) for item in functions], axis=1)
-    # The two sides of a body have the same functions, or their negatives.
+    # The left and right sides have equal or opposite functions, and share the cached fit.
     signs = np.where(values[0] < 0.0, -1.0, 1.0)
     bent, rows = fit_quartics((values * signs).tobytes())
     normal = Polynomial((-(low + high) / (high - low), 2.0 / (high - low)))
@@ -55,28 +68,37 @@ def fit_composition(
 
 @cache
 def fit_quartics(data: bytes) -> tuple[Array, Array]:
-    """The quartic (5,), and by Chebyshev polynomials the quartics (5, k) of it, nearest to values (SAMPLES, k)."""
+    """Fit the quartics to samples of functions; cached, because both sides of a body have the same
+    functions.
+
+    Args:
+        data: bytes of the samples (SAMPLE_COUNT, k).
+
+    Returns:
+        Inner quartic (5,), constant first, and outer quartics (5, k) in Chebyshev polynomials.
+    """
     values = np.frombuffer(data).reshape(SAMPLE_COUNT, -1)
     powers = np.vander(UNIT_POINTS, DEGREE + 1, increasing=True)
 
-    def first(bends: Array) -> Array:
+    # The inner quartic is scaled to [-1, 1], so that its bends are its only free numbers.
+    def make_inner(bends: Array) -> Array:
         bent = np.array((0.0, 1.0, *bends))
         reached = powers @ bent
         middle, half = 0.5 * (reached.max() + reached.min()), 0.5 * (reached.max() - reached.min())
         bent[0] -= middle
         return bent / half
 
-    def second(bends: Array) -> tuple[Array, Array]:
-        basis = np.polynomial.chebyshev.chebvander(powers @ first(bends), DEGREE)
+    def fit_outer(bends: Array) -> tuple[Array, Array]:
+        basis = np.polynomial.chebyshev.chebvander(powers @ make_inner(bends), DEGREE)
         result: Array = np.asarray(np.linalg.lstsq(basis, values, rcond=None)[0], dtype=np.float64)
         return result, (basis @ result - values).ravel()
 
     search = require("scipy.optimize", extra="sim", purpose="fits of moving points").least_squares
     best = min(
-        (search(lambda bends: 1e3 * second(bends)[1], start) for start in INITIAL_BENDS),
+        (search(lambda bends: 1e3 * fit_outer(bends)[1], start) for start in INITIAL_BENDS),
         key=lambda each: each.cost,
     )
-    return first(best.x), second(best.x)[0]
+    return make_inner(best.x), fit_outer(best.x)[0]
 
 
 def _pad_coefficients(polynomial: Polynomial) -> Array:

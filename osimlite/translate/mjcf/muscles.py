@@ -1,11 +1,10 @@
-"""Muscles as MuJoCo's: a rigid tendon in series with fibers whose curves are parabolas.
+"""Muscles with MuJoCo's law: a rigid tendon in series with fibers whose force curves are parabolas.
 
-Length range and range say the tendon slack length LT and the optimal fiber length along the tendon
-L0, as MuJoCo reads
-them: (length - LT) / L0 is its normalized length. These stay the model's own to the last digit
-unless forces are fitted. What MuJoCo has no number for, the ends of the active curve and the height
-of the passive one, is always the best there is for the isometric tension of the muscle in
-equilibrium with its elastic tendon.
+MuJoCo's `lengthrange` and `range` express the tendon slack length LT and the optimal fiber length
+along the tendon L0 (m): (length - LT) / L0 is its normalized length. These remain the model's own
+unless forces are fitted. The ends of the active curve and the height of the passive one, for which
+OpenSim has no number, are always fitted to the isometric tension of the muscle in equilibrium with
+its elastic tendon.
 
 Source: MuJoCo's manual (Modeling, Muscles) and the public code of `mju_muscleGainLength` and
     `mju_muscleBias`.
@@ -35,48 +34,69 @@ from osimlite.translate.mjcf.draft import Draft, Untranslatable, add_element, cl
 from osimlite.translate.mjcf.isometric import compute_isometric_tension
 
 COMPARED_ACTIVATIONS = (0.01, 0.5, 1.0)
-"""At which isometric tensions are compared."""
+"""Activations at which isometric tensions are compared."""
 LENGTH_COUNT = 24
-"""So many lengths, evenly spread over those that occur."""
-LOWER_BOUNDS, UPPER_BOUNDS = (0.0, 1.05, 1.05, 0.0), (0.95, 4.0, 6.0, 20.0)
-"""Bounds of the ends of the active curve, and of end and height of the passive one."""
+"""Number of path lengths at which tensions are compared: quantiles of those that occur."""
+LOWER_BOUNDS = (0.0, 1.05, 1.05, 0.0)
+"""Smallest values of lmin, lmax, end and fpmax in a fit."""
+UPPER_BOUNDS = (0.95, 4.0, 6.0, 20.0)
+"""Largest values of lmin, lmax, end and fpmax in a fit."""
 MAX_TENSION = 3.0
-"""Tensions, as parts of the greatest isometric force, beyond which a pose is none that a body could take."""
+"""Tension over the maximum isometric force above which a pose is unrealistic and not compared."""
 FIT_TOLERANCE = 1e-5
-"""Relative change of the curves' error, or of their numbers, at which the search for them ends."""
+"""Relative change of the error or of the numbers at which a fit ends."""
 DIFFERENCE_STEP = 2.0**-26
-"""Of the numbers of curves, beside 1, to find how their error changes with them."""
+"""Relative change of a number in one-sided differences: the square root of the machine precision."""
 UNUSED_SCALE = 200.0
-"""MuJoCo's default of a number that does not count where the force is given."""
+"""MuJoCo's default of `scale`, which has no effect where `force` is given."""
 DEFAULT_FVMAX = 1.4
-"""Force of lengthening fibers, as a part of the isometric one, of a muscle that does not say."""
+"""Largest force of lengthening fibers over the isometric force, for a muscle class without such a
+number.
+"""
 MIN_POSITIVE = 1e-12
-"""MuJoCo takes rates and parts of forces that are positive; less than this is none."""
+"""Smallest rate or ratio of forces that is written, since MuJoCo requires positive ones."""
 FIT_RANGE = 0.25
-"""Parts by which a fit to forces may change tendon, fibers and strength, and by which it may move the passive curve."""
+"""Largest relative change of tendon, fibers and strength, and shift of the passive curve, in a fit
+of forces.
+"""
 
 
 class Curves(NamedTuple):
-    """What MuJoCo knows of a muscle, but for its rates."""
+    """Isometric parameters of a muscle of MuJoCo.
 
-    tendon: float  # length of the tendon, m
-    fiber: float  # optimal length of the fibers along the tendon, m
-    force: float  # at the optimal length, fully active and at rest, N
-    lmin: float = 0.5  # normalized length below which there is no active force
-    lmax: float = 1.6  # that above which there is none
-    end: float = 1.6  # the passive force is a line from halfway between 1 and here
-    fpmax: float = 1.3  # twice the passive force there, halfway, over `force`
-    # by so much more than 1 the normalized length is where the passive force begins
+    Attributes:
+        tendon: length of the tendon (m).
+        fiber: optimal length of the fibers along the tendon (m).
+        force: force at this length, fully active and at rest (N).
+        lmin: normalized length below which there is no active force.
+        lmax: normalized length above which there is no active force.
+        end: the passive force is linear from halfway between 1 and this normalized length.
+        fpmax: twice the passive force there over `force`.
+        shift: normalized length minus 1 at which the passive force begins.
+    """
+
+    tendon: float
+    fiber: float
+    force: float
+    lmin: float = 0.5
+    lmax: float = 1.6
+    end: float = 1.6
+    fpmax: float = 1.3
     shift: float = 0.0
 
     def compute_tension(self, lengths: Array, activation: float) -> Array:
-        """Tension (L,) that MuJoCo gives the muscle at lengths of its tendon (L,), m, at rest."""
+        """Return the tensions (L,) (N) at rest for lengths of the path (L,) (m) and one activation."""
         return self.compute_tensions(lengths, (activation,))[0]
 
     def compute_tensions(
         self, lengths: Array, activations: Sequence[float] = COMPARED_ACTIVATIONS
     ) -> Array:
-        """Tensions (A, L) at several activations, by default those that are compared."""
+        """Return the tensions (A, L) (N) at rest, with MuJoCo's formulas.
+
+        Args:
+            lengths: lengths of the path (L,) (m).
+            activations: activations (A,).
+        """
         x = (lengths - self.tendon) / self.fiber
         low, high = 0.5 * (self.lmin + 1.0), 0.5 * (1.0 + self.lmax)
         short = x <= 1.0
@@ -92,7 +112,13 @@ class Curves(NamedTuple):
 
     @classmethod
     def read(cls, lengthrange: Array, gain: Array, bias: Array) -> Curves:
-        """Those of an actuator by its length range (m), and its numbers of gain and bias."""
+        """Return the parameters of an actuator.
+
+        Args:
+            lengthrange: length range (2,) (m).
+            gain: MuJoCo's gain parameters.
+            bias: MuJoCo's bias parameters.
+        """
         (low, high), (first, last) = lengthrange, gain[:2]
         fiber = (high - low) / (last - first)
         same_scale = math.isclose(bias[1] - bias[0], last - first, rel_tol=1e-9)
@@ -100,7 +126,15 @@ class Curves(NamedTuple):
         return cls(low - first * fiber, fiber, gain[2], gain[4], gain[5], bias[5], bias[7], shift)
 
     def make_parameters(self, vmax: float, fvmax: float) -> tuple[Array, Array]:
-        """MuJoCo's numbers of gain and bias of an actuator whose length range is (tendon, tendon + fiber)."""
+        """Return MuJoCo's parameters of an actuator whose length range is (tendon, tendon + fiber).
+
+        Args:
+            vmax: largest shortening velocity (optimal fiber lengths per second).
+            fvmax: largest force of lengthening fibers over the isometric force.
+
+        Returns:
+            Gain and bias parameters (9,).
+        """
         fpmax = max(self.fpmax, MIN_POSITIVE)
         gain = np.array(
             (0.0, 1.0, self.force, UNUSED_SCALE, self.lmin, self.lmax, vmax, fpmax, fvmax)
@@ -122,7 +156,20 @@ class Curves(NamedTuple):
 
 
 def add_muscle(draft: Draft, force: Muscle, path: str) -> str:
-    """A muscle on the tendon of its path."""
+    """Add a muscle on the tendon of its path.
+
+    Args:
+        draft: MJCF under construction.
+        force: muscle of the model.
+        path: absolute path of the muscle.
+
+    Returns:
+        Kind and name of the element.
+
+    Raises:
+        Untranslatable: a length, a force or a velocity is not positive, or the tension cannot be
+            computed.
+    """
     tied = draft.find_tendon(path)
     cos = math.cos(force.pennation_angle_at_optimal)
     own = Curves(
@@ -192,18 +239,26 @@ def add_muscle(draft: Draft, force: Muscle, path: str) -> str:
 
 
 def _select_tensions(tensions: Array, own: Curves) -> NDArray[np.bool_]:
-    """Which tensions (A, L) are compared."""
+    """Return which tensions (A, L) are compared: finite ones below `MAX_TENSION`."""
     return np.nan_to_num(tensions, nan=np.inf) < MAX_TENSION * own.force
 
 
 class Rates(NamedTuple):
-    """What MuJoCo asks of a muscle in time."""
+    """Parameters of a muscle that concern time.
 
-    vmax: float  # greatest shortening velocity, optimal fiber lengths per second
-    fvmax: float  # force of lengthening fibers, as a part of the isometric one
-    rise: float  # time constant of rising activation, s
-    fall: float  # time constant of falling activation, s
-    note: str = ""  # what is said of them beside the muscle
+    Attributes:
+        vmax: largest shortening velocity (optimal fiber lengths per second).
+        fvmax: largest force of lengthening fibers over the isometric force.
+        rise: time constant of rising activation (s).
+        fall: time constant of falling activation (s).
+        note: text about approximations for the account.
+    """
+
+    vmax: float
+    fvmax: float
+    rise: float
+    fall: float
+    note: str = ""
 
 
 RISE_TO_63_PERCENT = 1.052
@@ -264,7 +319,7 @@ def _measure_velocity_curve(force: Delp1990Muscle_Deprecated) -> tuple[float, fl
 
 
 def _read_parameter(force: Muscle, name: str, default: float) -> float:
-    """What MuJoCo asks of a muscle, from the property that its class names."""
+    """Return a parameter of MuJoCo from the property that the muscle class declares for it."""
     named = ChainMap(
         *(base.__dict__["facts"].mujoco for base in type(force).__mro__ if "facts" in base.__dict__)
     )
@@ -275,13 +330,15 @@ def _read_parameter(force: Muscle, name: str, default: float) -> float:
 
 
 def _fit_curves(own: Curves, lengths: Array, tensions: Array, *, free: bool) -> Curves:
-    """The curves nearest to tensions (A, L) at lengths (L,), with tendon, fibers and strength too if `free`."""
+    """Return the curves nearest to tensions (A, L) at lengths (L,); if `free`, with tendon, fibers
+    and strength.
+    """
     known = _select_tensions(tensions, own)
     if not known.any():
         return own
     search = require("scipy.optimize", extra="sim", purpose="muscles of MuJoCo").least_squares
 
-    def curves(x: Sequence[Any]) -> Curves:
+    def make_curves(x: Sequence[Any]) -> Curves:
         lmin, lmax, end, fpmax, *rest = x
         tendon, fiber, strength, shift = rest or (0.0, 0.0, 0.0, 0.0)
         moved = (
@@ -291,15 +348,17 @@ def _fit_curves(own: Curves, lengths: Array, tensions: Array, *, free: bool) -> 
         )
         return Curves(*moved, lmin, lmax, end, fpmax, shift)
 
-    def off(x: Array) -> Array:
-        return ((curves(x.tolist()).compute_tensions(lengths) - tensions) / own.force)[known]
+    def compute_residuals(x: Array) -> Array:
+        return ((make_curves(x.tolist()).compute_tensions(lengths) - tensions) / own.force)[known]
 
-    def slopes(x: Array) -> Array:
-        # As least_squares finds them, all at once: by steps forward, or back where that leaves the
-        # bounds.
+    def differentiate(x: Array) -> Array:
+        # The same one-sided differences as those of least_squares, backwards at upper bounds, but all
+        # columns in one call.
         step = np.where(x >= 0.0, DIFFERENCE_STEP, -DIFFERENCE_STEP) * np.maximum(1.0, np.abs(x))
         step = np.where((x + step < low) | (x + step > high), -step, step)
-        moved = curves([*np.vstack((x, x + np.diag(step))).T[:, :, None]]).compute_tensions(lengths)
+        moved = make_curves([*np.vstack((x, x + np.diag(step))).T[:, :, None]]).compute_tensions(
+            lengths
+        )
         all_off = ((moved - tensions[:, None]) / own.force).swapaxes(1, 2)[known].T.copy()
         return ((all_off[1:] - all_off[0]) / (x + step - x)[:, None]).T
 
@@ -314,11 +373,18 @@ def _fit_curves(own: Curves, lengths: Array, tensions: Array, *, free: bool) -> 
             [*low, *[-FIT_RANGE] * 4],
             [*high, *[FIT_RANGE] * 4],
         )
-    # The curves have kinks: the way from one start may end at one.
+    # The curves have kinks, at which a search may end; a second start is tried.
     starts = start, [0.2, 2.2, *start[2:]]
     result = [
-        search(off, each, slopes, bounds=(low, high), ftol=FIT_TOLERANCE, xtol=FIT_TOLERANCE)
+        search(
+            compute_residuals,
+            each,
+            differentiate,
+            bounds=(low, high),
+            ftol=FIT_TOLERANCE,
+            xtol=FIT_TOLERANCE,
+        )
         for each in starts
     ]
     best = min(result, key=lambda each: each.cost)
-    return curves(best.x)
+    return make_curves(best.x)

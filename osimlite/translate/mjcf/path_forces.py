@@ -1,4 +1,4 @@
-"""Forces along paths other than muscles: actuators and springs on the tendons of their paths."""
+"""Forces along paths other than muscles: actuators and springs on tendons."""
 
 from __future__ import annotations
 
@@ -16,16 +16,39 @@ from osimlite.translate.mjcf.isometric import compute_isometric_tension
 
 
 def add_actuator(draft: Draft, force: PathActuator, path: str) -> str:
-    """A tension in proportion to the control."""
+    """Add an actuator whose tension is proportional to its control.
+
+    Args:
+        draft: MJCF under construction.
+        force: actuator of the model.
+        path: absolute path of the actuator.
+
+    Returns:
+        Kind and name of the element.
+    """
     made = add_scaled_actuator(
-        draft, force, path, tendon=draft.find_tendon(path).name, gear=-force.optimal_force
+        # A positive force of MuJoCo lengthens a tendon, that of a path actuator shortens it.
+        draft,
+        force,
+        path,
+        tendon=draft.find_tendon(path).name,
+        gear=-force.optimal_force,
     )
     draft.record_result(path, made)
     return made
 
 
 def add_spring(draft: Draft, force: PathSpring, path: str) -> str:
-    """A tension in proportion to the stretch."""
+    """Make the tendon a spring whose tension is proportional to its stretch.
+
+    Args:
+        draft: MJCF under construction.
+        force: spring of the model.
+        path: absolute path of the spring.
+
+    Returns:
+        Kind and name of the element.
+    """
     tied, element = _find_tendon_element(draft, path)
     element.attrib.update(
         {
@@ -43,7 +66,19 @@ def add_spring(draft: Draft, force: PathSpring, path: str) -> str:
 
 
 def add_ligament(draft: Draft, force: Ligament | Blankevoort1991Ligament, path: str) -> str:
-    """The spring that is nearest to the tension where the ligament is taut."""
+    """Make the tendon the spring that is nearest to the tension of the taut ligament.
+
+    Args:
+        draft: MJCF under construction.
+        force: ligament of the model.
+        path: absolute path of the ligament.
+
+    Returns:
+        Kind and name of the element.
+
+    Raises:
+        Untranslatable: the tension cannot be computed.
+    """
     tied, element = _find_tendon_element(draft, path)
     try:
         (tension,) = compute_isometric_tension(force, tied.lengths, (0.0,))
@@ -67,7 +102,9 @@ def add_ligament(draft: Draft, force: Ligament | Blankevoort1991Ligament, path: 
 
 
 def _fit_spring(lengths: Array, tension: Array) -> tuple[float, float]:
-    """Stiffness (N/m) and length at rest (m) of the spring nearest to tensions (N); none where nothing is taut."""
+    """Return stiffness (N/m) and rest length (m) of the spring nearest to tensions (N); zeros if it
+    is never taut.
+    """
     if len(np.unique(lengths)) < 2:
         return 0.0, 0.0
     slope, start = np.polyfit(lengths, tension, 1)
@@ -75,6 +112,6 @@ def _fit_spring(lengths: Array, tension: Array) -> tuple[float, float]:
 
 
 def _find_tendon_element(draft: Draft, path: str) -> tuple[PathTendon, _Element]:
-    """The tendon of the path of a force, and its element."""
+    """Return the tendon of the path of a force, and its element."""
     tied = draft.find_tendon(path)
     return tied, next(item for item in draft.get_section("tendon") if item.get("name") == tied.name)

@@ -1,4 +1,4 @@
-"""Paths of muscles, springs and actuators as spatial tendons, and how far these are from them."""
+"""Paths of muscles, springs and actuators as spatial tendons, with their errors."""
 
 from __future__ import annotations
 
@@ -39,10 +39,16 @@ from osimlite.translate.mjcf.poses import (
 from osimlite.translate.mjcf.routes import Router
 from osimlite.translate.mjcf.tendons import Tendon, TendonSite, WrapGeom, measure_tendon
 
-SELECTION_POSES, FIT_POSES, VALIDATION_POSES, TEST_POSES = 100, 250, 500, 100
-"""How many random poses a tendon is chosen by, or fitted to and tried in once more, and measured in."""
+SELECTION_POSES = 100
+"""Random poses in which a tendon is selected if nothing is fitted."""
+FIT_POSES = 250
+"""Random poses in which a tendon is selected and fitted."""
+VALIDATION_POSES = 500
+"""Random poses that decide whether a fitted tendon is better than the selected one."""
+TEST_POSES = 100
+"""Random poses in which the errors of the account are measured."""
 WRAP_GROUP = 4
-"""Group of the geoms that tendons go around, and of their sites."""
+"""Group of wrap geoms and their sites, which MuJoCo's viewer shows or hides together."""
 
 
 def add_paths(draft: Draft) -> None:
@@ -72,7 +78,7 @@ def add_paths(draft: Draft) -> None:
         router = Router(route, truth[path], poses, draft.options.version)
         tendon = router.find_best()
         if fits:
-            # What is better only where it was fitted, snaps off elsewhere.
+            # A fit that is better only in its own poses has jumps in others: judge it in new poses.
             judge = Router(route, other_truth[path], others, draft.options.version)
             tendon = min(tendon, fit_tendon(router, tendon), key=judge.compute_error)
         name = writer.write_tendon(path, tendon)
@@ -97,7 +103,17 @@ def add_paths(draft: Draft) -> None:
 def _measure_errors(
     draft: Draft, tendon: Tendon, poses: Poses, truth: PathSamples
 ) -> dict[str, Error]:
-    """How far lengths and moment arms are off in poses that the tendon was not chosen by."""
+    """Measure the errors of a tendon in poses by which it was not selected.
+
+    Args:
+        draft: MJCF under construction.
+        tendon: tendon to measure.
+        poses: poses for tests.
+        truth: path in these poses.
+
+    Returns:
+        Error by quantity: length, and moment arm about each coordinate.
+    """
     lengths, arms = measure_tendon(tendon, poses, draft.options.version)
     about = measure_arm_errors(draft.mechanism, arms, truth)
     names = draft.mechanism.coordinate_names
@@ -106,7 +122,7 @@ def _measure_errors(
 
 
 def _describe_inexact_parts(route: ThroughPoints, router: Router) -> str:
-    """What of a path MuJoCo has no exact words for."""
+    """Return a text about the parts of a path that MuJoCo cannot express exactly."""
     kinds = {point.kind for point in route.points}
     touched = [
         surface
@@ -128,17 +144,22 @@ _SURFACE_NAMES = {
     "wrap_ellipsoid": "ellipsoid to wrap around",
     "wrap_torus": "torus to wrap around",
 }
+"""Descriptions of surfaces that tendons only approximate, by the law of the surface."""
 
 
 @dataclass
 class _Writer:
-    """Writes tendons, each site and surface once."""
+    """Writer of tendons, which writes each wrap geom once.
 
-    draft: Draft  # what they are written into
+    Attributes:
+        draft: MJCF under construction.
+    """
+
+    draft: Draft
     _geoms: dict[tuple[Any, ...], str] = field(default_factory=dict)
 
     def write_tendon(self, path: str, tendon: Tendon) -> str:
-        """Write a tendon with all that it needs; returns its name."""
+        """Write a tendon with its sites and wrap geoms; return its name."""
         name = self.draft.make_name("tendon", path)
         element = add_element(
             self.draft.get_section("tendon"),
@@ -179,8 +200,8 @@ class _Writer:
         carrier = add_element(
             self.draft.bodies[spot.body], "body", name=name, pos=where, gravcomp=1
         )
-        # Equalities of what slides along the axes of ground MuJoCo weighs by its mass, without the
-        # armature.
+        # MuJoCo weighs equalities of bodies that slide in ground by their mass without the armature, so
+        # that the mass itself must be large there.
         mass = HELPER_INERTIA if spot.body == GROUND else MIN_MASS
         add_element(carrier, "inertial", pos=np.zeros(3), mass=mass, diaginertia=np.full(3, mass))
         for axis, polynomial in _split_into_axes(spot.slides * (0.0, 1.0, 1.0, 1.0, 1.0)):
@@ -228,7 +249,9 @@ class _Writer:
 
 
 def _split_into_axes(slides: Array) -> Iterator[tuple[Array, Array]]:
-    """Axes (3,) and polynomials along them whose sum the places (3, 5) are; a single one where all is on one line."""
+    """Yield axes (3,) and polynomials (5,) along them whose sum is a motion (3, 5); only one axis
+    for a straight line.
+    """
     axes, sizes, rows = np.linalg.svd(slides, full_matrices=False)
     if sizes[1] <= 1e-12 * sizes[0]:
         yield axes[:, 0], sizes[0] * rows[0]

@@ -1,4 +1,4 @@
-"""Functions as the quartics that MuJoCo's joint equalities hold: written exactly where they are, fitted where not."""
+"""Functions as quartics for MuJoCo's joint equalities: exact where possible, else fitted."""
 
 from __future__ import annotations
 
@@ -13,24 +13,30 @@ from osimlite.simulation.robot.couplings import Composed, as_line, knots
 from osimlite.translate.fidelity import Error
 
 DEGREE = 4
-"""Of the polynomials in an equality of MuJoCo."""
+"""Degree of the polynomials in an equality of MuJoCo."""
 
 _SAMPLE_COUNT = 400
+"""Number of samples of a function for a fit."""
 _MAX_VALUE = 1e100
-"""Of the values of functions: their squares are numbers too."""
+"""Largest value of a function that can be fitted: its square is still a finite number."""
 _MAX_RANGE = 4.0 * np.pi
-"""A range (rad, m) that is wider is taken for one that nobody meant."""
+"""Largest range (rad or m) of a coordinate that is taken seriously; two turns."""
 
 
 class Fit(NamedTuple):
-    """A polynomial, constant first, and how far it is from the function; no error where it is the function."""
+    """Polynomial for a function.
+
+    Attributes:
+        coefficients: coefficients, constant first.
+        error: error of the polynomial; None if it is exact.
+    """
 
     coefficients: tuple[float, ...]
     error: Error | None = None
 
 
 def find_polynomial(function: f.Function) -> Polynomial | None:
-    """The polynomial that a function of one argument is, or None."""
+    """Return the polynomial that a function of one argument is, or None."""
     line = as_line(function)
     if line is not None:
         return Polynomial((line.start, line.slope))
@@ -58,10 +64,16 @@ def find_polynomial(function: f.Function) -> Polynomial | None:
 
 
 def fit_quartic(function: f.Function, span: tuple[float, float], unit: str) -> Fit:
-    """The polynomial of degree four that is a function of one argument, or whose greatest error is least on a span.
+    """Return the polynomial of degree 4 that a function is, or the one with the smallest maximum
+    error.
 
-    Fitted by Lawson's algorithm: least squares, again and again, with weights that grow where the
-    error is large.
+    The fit uses Lawson's algorithm: least squares with weights that are multiplied by the error,
+    repeatedly, which converges to the minimax approximation.
+
+    Args:
+        function: function of one argument.
+        span: range of the argument.
+        unit: unit of the value, for the error.
     """
     exact = find_polynomial(function)
     if exact is not None and exact.degree() <= DEGREE:
@@ -91,10 +103,14 @@ def fit_quartic(function: f.Function, span: tuple[float, float], unit: str) -> F
 
 
 def sample_function(function: f.Function, x: Array) -> Array:
-    """Values of a function of one argument at many.
+    """Evaluate a function of one argument at many values (k,).
+
+    Args:
+        function: function of one argument.
+        x: arguments (k,).
 
     Raises:
-        FloatingPointError: they are too large to fit anything to.
+        FloatingPointError: a value is too large for a fit.
     """
     values = np.array([function.evaluate(np.array((value,)))[0] for value in x])
     if not (np.abs(values) < _MAX_VALUE).all():
@@ -105,12 +121,18 @@ def sample_function(function: f.Function, x: Array) -> Array:
 def select_span(
     function: f.Function, limits: tuple[float, float], start: float
 ) -> tuple[float, float]:
-    """Where a function of a coordinate is wanted: in the coordinate's range, as far as that means anything.
+    """Return the range in which a function of a coordinate is fitted.
+
+    It is the range of the coordinate. A range wider than `_MAX_RANGE` is replaced by that of the
+    function's knots, or by 1 to either side of the default value.
 
     Args:
-        function: of the coordinate.
-        limits: the range.
-        start: the default value of the coordinate, which belongs to the span.
+        function: function of the coordinate.
+        limits: range of the coordinate.
+        start: default value of the coordinate, which the range always includes.
+
+    Returns:
+        Lower and upper end.
     """
     low, high = limits
     points = knots(function)

@@ -1,4 +1,6 @@
-"""Random poses of a model, and what its paths do in them: what tendons are chosen by, fitted to and measured with."""
+"""Random poses of a model, and samples of its paths in them, for the selection, fits and tests of
+tendons.
+"""
 
 from __future__ import annotations
 
@@ -15,27 +17,37 @@ from osimlite.simulation.paths import Paths
 from osimlite.translate.fidelity import Error
 
 Indices = NDArray[np.int64]
+"""Array of indices."""
 
 EXACT_TOLERANCE_M = 1e-9
-"""Errors of lengths and moment arms (m) up to which a tendon does what the path does."""
+"""Errors of lengths and moment arms (m) up to which a tendon counts as exact."""
 
 
 @dataclass(frozen=True, eq=False)
 class Poses:
-    """P poses of a mechanism of b bodies and n coordinates, of which m move; arrays over bodies end with ground."""
+    """P poses of a mechanism of b bodies and n coordinates, m of which are free; ground is the last
+    body.
 
-    q: Array  # values of the coordinates (P, n)
-    # places (m,) of the coordinates that move by themselves: neither locked nor coupled
+    Attributes:
+        q: values of the coordinates (P, n).
+        moving: indices of the free coordinates (m,): neither locked, prescribed nor coupled.
+        rotations: orientations of the bodies in ground (b + 1, P, 3, 3).
+        origins: positions of the body origins in ground (b + 1, P, 3) (m).
+        jacobians: Jacobians (b + 1, P, 6, m) from the speeds of the free coordinates, with all
+            coordinates that move along, to the angular velocity of each body and the velocity of
+            its origin.
+        rates: rates of all coordinates by these speeds (P, n, m).
+    """
+
+    q: Array
     moving: Array
-    rotations: Array  # of the bodies in ground (b + 1, P, 3, 3)
-    origins: Array  # of the bodies in ground (b + 1, P, 3), m
-    # (b + 1, P, 6, m) from the speeds of those coordinates, all that must move with them included,
-    # to the angular velocity and the velocity of the origin of each body
+    rotations: Array
+    origins: Array
     jacobians: Array
-    rates: Array  # of all coordinates (P, n, m) by these speeds
+    rates: Array
 
     def select_coordinates(self, columns: Sequence[int]) -> Poses:
-        """The same with some of the moving coordinates, by their places in `moving`."""
+        """Return the poses with some of the free coordinates, by their indices in `moving`."""
         own = list(columns)
         return Poses(
             self.q,
@@ -47,37 +59,74 @@ class Poses:
         )
 
     def locate(self, body: int, station: Array) -> Array:
-        """Places in ground (P, 3) or (k, P, 3) of a station of a body, (3,) or one for each pose."""
+        """Return positions in ground (P, 3) or (k, P, 3) of a station of a body.
+
+        Args:
+            body: index of the body.
+            station: station (3,) (m), or one for each pose (P, 3) or (k, P, 3).
+        """
         return self.origins[body] + multiply_each_pose(station, self.rotations[body].swapaxes(1, 2))
 
     def express(self, body: int, places: Array) -> Array:
-        """Stations of a body (k, P, 3) at places in ground (k, P, 3)."""
+        """Return positions in the frame of a body (k, P, 3).
+
+        Args:
+            body: index of the body.
+            places: positions in ground (k, P, 3) (m).
+        """
         return multiply_each_pose(places - self.origins[body], self.rotations[body])
 
     def locate_at(self, body: int, stations: Array, at: Indices) -> Array:
-        """Places in ground (k, 3) of stations of a body (k, 3), each in one of the poses, by their places (k,)."""
+        """Return positions in ground (k, 3) of stations, each in one of the poses.
+
+        Args:
+            body: index of the body.
+            stations: stations in the body (k, 3) (m).
+            at: indices of the poses (k,).
+        """
         return self.origins[body][at] + np.einsum("pij,pj->pi", self.rotations[body][at], stations)
 
 
 @dataclass(frozen=True, eq=False)
 class PathSamples:
-    """What a path does in P poses."""
+    """Path in P poses.
 
-    lengths: Array  # (P,), m
-    arms: Array  # moment arms (P, m) about the coordinates that move by themselves, m or 1
-    # numbers and places (3,) in ground of what the path runs through, see `points`
+    Attributes:
+        lengths: lengths (P,) (m).
+        arms: moment arms about the free coordinates (P, m) (m for rotations, 1 for translations).
+        nodes: per pose the numbers of the nodes of the path and their positions in ground (3,), see
+            `Paths.points`.
+    """
+
+    lengths: Array
+    arms: Array
     nodes: Sequence[Sequence[tuple[int, Array]]]
 
 
 def multiply_each_pose(rows: Array, matrices: Array) -> Array:
-    """Rows (k, P, i), (P, i) or (i,) times the matrix of each pose (P, i, j). Many times as fast as `einsum`."""
+    """Multiply rows by the matrix of each pose; many times as fast as `einsum`.
+
+    Args:
+        rows: rows (k, P, i), (P, i) or (i,).
+        matrices: matrices (P, i, j).
+    """
     if rows.ndim < 3:
         return np.asarray((rows[..., None, :] @ matrices)[..., 0, :])
     return np.asarray((rows.swapaxes(0, 1) @ matrices).swapaxes(0, 1))
 
 
 def measure_arm_errors(mechanism: Mechanism, arms: Array, truth: PathSamples) -> dict[int, Error]:
-    """How far moment arms (P, m) are off, by the place of the coordinate, where a path or its stand-in has one."""
+    """Measure errors of moment arms.
+
+    Args:
+        mechanism: mechanism of the model.
+        arms: moment arms of a tendon about the free coordinates (P, m).
+        truth: path in the same poses.
+
+    Returns:
+        Error by the index of the coordinate, for coordinates about which path or tendon has a
+        moment arm.
+    """
     result = {}
     for place, off, wanted in zip(
         list_free_coordinates(mechanism), (arms - truth.arms).T, truth.arms.T, strict=True
@@ -89,9 +138,14 @@ def measure_arm_errors(mechanism: Mechanism, arms: Array, truth: PathSamples) ->
 
 
 def draw_values(mechanism: Mechanism, count: int, seed: int) -> Array:
-    """Values (count, n) of the coordinates, spread evenly over the ranges of those that move by themselves.
+    """Draw random values (count, n) of the coordinates, uniform over the ranges of the free ones.
 
-    Where a range is none, they are within 1 of the default.
+    Without a valid range, they are within 1 (rad or m) of the default value.
+
+    Args:
+        mechanism: mechanism of the model.
+        count: number of poses.
+        seed: seed of the random numbers.
     """
     coupled = [item for item in mechanism.constraints if isinstance(item, Coupler)]
     values = np.tile(mechanism.values({}), (count, 1))
@@ -109,7 +163,9 @@ def draw_values(mechanism: Mechanism, count: int, seed: int) -> Array:
 
 
 def list_free_coordinates(mechanism: Mechanism) -> list[int]:
-    """Places of the coordinates that are neither locked, prescribed nor coupled to others."""
+    """Return the indices of the coordinates that are neither locked, prescribed nor coupled to
+    others.
+    """
     coupled = {item.dependent for item in mechanism.constraints if isinstance(item, Coupler)}
     return [
         index
@@ -119,7 +175,16 @@ def list_free_coordinates(mechanism: Mechanism) -> list[int]:
 
 
 def draw_poses(paths: Paths, count: int, seed: int = 0) -> tuple[Poses, Mapping[str, PathSamples]]:
-    """Random poses, and what each path does in them."""
+    """Draw random poses, and sample the paths in them.
+
+    Args:
+        paths: paths of the model.
+        count: number of poses.
+        seed: seed of the random numbers.
+
+    Returns:
+        Poses, and the samples of each path by its absolute path.
+    """
     mechanism = paths.mechanism
     values, moving = (
         draw_values(mechanism, count, seed),

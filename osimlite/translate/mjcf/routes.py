@@ -1,8 +1,8 @@
-"""From the paths of a model to tendons: what MuJoCo has exactly, and the nearest that it has to the rest.
+"""Search for the tendon nearest to a path.
 
-What OpenSim decides in each pose (on which side of a surface a path passes, between which points it
-touches, whether a point counts) is decided here once: every way to say it that MuJoCo has is
-measured in many poses, and the best taken.
+OpenSim decides in each pose on which side of a surface a path passes, between which points it
+touches the surface, and whether a conditional point counts. MuJoCo needs these decisions once. All
+tendons that MuJoCo can express are measured in many poses, and the best is selected.
 """
 
 from __future__ import annotations
@@ -30,35 +30,46 @@ from osimlite.translate.mjcf.tendons import (
 from osimlite.translate.mjcf.wrapping import unit
 
 SIDE_DIRECTIONS = 12
-"""So many directions around a surface are tried as sides."""
+"""Number of directions around a surface that are tried for its side site."""
 CYLINDER_RADII_M = (0.001, 0.004, 0.01, 0.015, 0.02, 0.025, 0.03, 0.04)
-"""Radii (m) of the cylinders that are tried for points that come and go."""
+"""Radii (m) of the cylinders that are tried in place of conditional points."""
 SPECK_RADIUS_M = 1e-5
-"""Radius (m) of the sphere that stands for such a point where it need not be fitted."""
+"""Radius (m) of the sphere that replaces a conditional point: small enough not to change the path."""
 
 
 Choose = Callable[[Sequence[Tendon]], Tendon]
-"""Takes the best of several ways to say a part of a tendon."""
+"""Function that selects the best of several forms of a part of a tendon."""
 
 
 @dataclass(frozen=True, eq=False)
 class Touch:
-    """Where a path touches a surface, in the k of the poses in which it does."""
+    """Contact of a path with a surface, in the k poses in which it touches.
 
-    poses: Indices  # their places (k,)
-    first: Array  # tangent points (k, 3) in the body of the surface, m
-    second: Array  # the others (k, 3)
-    after: Indices  # numbers of the path points before them (k,)
+    Attributes:
+        poses: indices of the poses (k,).
+        first: first tangent points in the body of the surface (k, 3) (m).
+        second: second tangent points (k, 3) (m).
+        after: numbers of the path points before them (k,).
+    """
+
+    poses: Indices
+    first: Array
+    second: Array
+    after: Indices
 
 
 class Router:
-    """Finds the tendon that is nearest to a path.
+    """Search for the tendon nearest to a path.
 
     Args:
-        route: the path.
-        truth: what it does in the poses.
-        poses: many.
-        version: of MuJoCo, 3 or 4.
+        route: path.
+        truth: samples of the path in the poses.
+        poses: poses in which tendons are compared.
+        version: major version of MuJoCo.
+
+    Attributes:
+        wanted: lengths and moment arms of the path (P, 1 + m).
+        touches: contact of the path with each of its surfaces.
     """
 
     def __init__(
@@ -75,15 +86,19 @@ class Router:
         self.touches = [self._find_touches(number) for number in range(len(route.surfaces))]
 
     def compute_residuals(self, tendon: Tendon) -> Array:
-        """What is wrong with the lengths and moment arms of a tendon: (P, 1 + m), m."""
+        """Return the errors of length and moment arms of a tendon (P, 1 + m) (m)."""
         return self._measure(tendon) - self.wanted
 
     def compute_error(self, tendon: Tendon) -> float:
-        """One number for how wrong a tendon is: the root of the sum of the mean squares, m."""
+        """Return the root of the sum of the mean squares of the residuals (m)."""
         return float(np.sqrt((self.compute_residuals(tendon) ** 2).mean(0).sum()))
 
     def find_best(self) -> Tendon:
-        """The tendon with the least error among those that can be made of the path's own points and surfaces."""
+        """Return the best tendon of those with the path's own points and surfaces.
+
+        Parts that are alternatives (conditional points, surfaces between two points) are selected
+        one after the other, in two rounds if there are several, because they influence one another.
+        """
         slots: list[Tendon] = []
         settle: dict[int, Callable[[Choose], Tendon]] = {}
         points = list(enumerate(self.route.points))
@@ -113,7 +128,7 @@ class Router:
     def _choose_best(
         self, before: Tendon, now: Tendon, after: Tendon, options: Sequence[Tendon]
     ) -> Tendon:
-        """The option for a part of a tendon with which the whole has the least error."""
+        """Return the option for a part with which the complete tendon has the smallest error."""
         head, tail = (
             before[_find_last_site(before) :],
             after[: len(after) - _find_last_site(after[::-1])],
@@ -126,16 +141,22 @@ class Router:
         errors = (
             np.square(rest + np.concatenate((lengths[..., None], arms), axis=-1)).mean(1).sum(-1)
         )
-        # Of those that do the same but for rounding the first, on every machine.
+        # Options that differ by rounding only: take the first, so that all machines select the same.
         return sound[int(np.argmax(errors <= errors.min() * (1.0 + 1e-9) + 1e-24))]
 
     def make_piece_residuals(self, tendon: Tendon, piece: Tendon) -> Callable[[Tendon], Array]:
-        """The residuals of a tendon, as a function of what stands in the place of a piece of it from site to site."""
+        """Return the residuals of a tendon as a function of a replacement for a piece from site to
+        site.
+
+        Args:
+            tendon: complete tendon.
+            piece: piece of it that will be replaced.
+        """
         rest = self.compute_residuals(tendon) - self._measure(piece)
         return lambda other: rest + self._measure(other)
 
     def _measure(self, tendon: Tendon) -> Array:
-        """Lengths and moment arms (P, 1 + m) of a tendon."""
+        """Return length and moment arms of a tendon (P, 1 + m)."""
         lengths, arms = measure_tendon(tendon, self.poses, self.version)
         return np.concatenate((lengths[:, None], arms), axis=1)
 
@@ -158,7 +179,7 @@ class Router:
         )
 
     def _express_in_body(self, body: int, at: Indices, places: Array) -> Array:
-        """Places in ground (k, 3) in some of the poses, in the frame of a body."""
+        """Return positions in ground (k, 3), each in one pose, in the frame of a body (k, 3)."""
         return np.einsum(
             "pji,pj->pi",
             self.poses.rotations[body][at],
@@ -167,7 +188,9 @@ class Router:
 
     # ----------------------------------------------------------------------------------------------- options
     def _choose_obstacles(self, numbers: Sequence[int], choose: Choose) -> Tendon:
-        """What a tendon goes around between two points: nothing, a surface, or two with a site between them."""
+        """Return what a tendon wraps around between two points: nothing, a surface, or two with a
+        site between.
+        """
         best: dict[int, WrapGeom] = {}
         options: list[Tendon]
         for number in sorted(
@@ -193,12 +216,14 @@ class Router:
         return choose(options)
 
     def _find_tangent_points(self, number: int) -> Array:
-        """The tangent points (2 k, 3) on a surface, in its own frame."""
+        """Return the tangent points (2 k, 3) on a surface, in its own frame (m)."""
         touch, frame = self.touches[number], self.route.surfaces[number].tangent.frame
         return (np.concatenate((touch.first, touch.second)) - frame[:3, 3]) @ frame[:3, :3]
 
     def _vary_side(self, number: int, around: WrapGeom, directions: int) -> Iterator[WrapGeom]:
-        """As it is, or with the side of the quadrant, the side that is touched, or one of the directions all around."""
+        """Yield a geom as it is, with the side of its quadrant, with the touched side, and with
+        directions all around.
+        """
         yield around
         surface, touch = self.route.surfaces[number], self.touches[number]
         turned = around.frame[:3, :3].T @ surface.tangent.frame[:3, :3]
@@ -213,7 +238,7 @@ class Router:
             yield from (around.replace_side(np.array((0.0, 0.0, end))) for end in (1.0, -1.0))
 
     def _find_ranks(self, number: int, numbers: Sequence[int]) -> list[int]:
-        """Where a surface stands in the order of those that the path touches, in each pose."""
+        """Return the rank of a surface in the order of those that the path touches, in each pose."""
         points = len(self.route.points)
         result = []
         for pose in self.touches[number].poses:
@@ -222,7 +247,9 @@ class Router:
         return result
 
     def _place_sites_between(self, one: int, two: int) -> Iterator[TendonSite]:
-        """Sites between two surfaces: in the body of either, halfway between the points where they are touched."""
+        """Yield sites between two surfaces: in the body of either, halfway between their tangent
+        points.
+        """
         first, second = self.touches[one], self.touches[two]
         both, at_one, at_two = np.intersect1d(first.poses, second.poses, return_indices=True)
         if not len(both):
@@ -236,11 +263,13 @@ class Router:
             )
 
     def _make_switches(self, number: int) -> Iterator[Tendon]:
-        """A speck that the path runs through while its side site is inside, which is while the coordinate is in range.
+        """Yield small spheres through which the path runs only while a coordinate is in the range
+        of a point.
 
-        The side site leaves the middle with the square of the distance of the coordinate from the
-        middle of the range, in a direction in which the speck then is not in the way: to the point
-        before or after.
+        The path runs through the sphere while its side site is inside. The side site leaves the
+        centre with the square of the distance of the coordinate from the middle of its range,
+        reaching the surface at its ends, in the direction of the previous or the next point, in
+        which the sphere does not deflect the path.
         """
         point, node = make_site(self.route.points[number]), self.route.points[number]
         low, high = node.range
@@ -277,7 +306,7 @@ class Router:
             )
 
     def _make_cylinders(self, run: Sequence[int]) -> Iterator[Tendon]:
-        """Cylinders that points which come and go are on, over whose edge the path bends."""
+        """Yield cylinders that carry conditional points, over whose edge the path bends."""
         ways = []
         for pose, nodes in enumerate(self.truth.nodes):
             at = [k for k, (node, _) in enumerate(nodes) if node in run]
@@ -323,7 +352,7 @@ class Router:
 
 
 def make_site(point: Node) -> TendonSite:
-    """The site of a path point; where it moves, along quartics of its coordinate."""
+    """Return the site of a path point; a moving point slides along quartics of its coordinate."""
     place = point.frame[:3, :3] @ point.location + point.frame[:3, 3]
     if point.kind != MOVING:
         return TendonSite(point.body, place, name=point.name)
@@ -338,7 +367,7 @@ def _choose_option(options: Sequence[Tendon], choose: Choose) -> Tendon:
 
 
 def _is_tendon(tendon: Tendon) -> bool:
-    """Whether there is a site at both ends and between any two surfaces."""
+    """Return whether a sequence is valid: sites at both ends and between any two surfaces."""
     ends = isinstance(tendon[0], TendonSite) and isinstance(tendon[-1], TendonSite)
     return ends and not any(
         isinstance(a, WrapGeom) and isinstance(b, WrapGeom) for a, b in pairwise(tendon)
@@ -346,7 +375,7 @@ def _is_tendon(tendon: Tendon) -> bool:
 
 
 def _find_last_site(tendon: Tendon) -> int:
-    """Place of the last site; 0 if there is none."""
+    """Return the index of the last site; 0 if there is none."""
     return max(
         (index for index, part in enumerate(tendon) if isinstance(part, TendonSite)), default=0
     )

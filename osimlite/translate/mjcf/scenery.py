@@ -1,4 +1,4 @@
-"""What bodies look like, and points on them that are looked at: shapes as geoms without mass, markers as sites."""
+"""Shapes of bodies as geoms without mass, a camera, and markers as sites."""
 
 from __future__ import annotations
 
@@ -8,12 +8,18 @@ from osimlite.mechanics.multibody.spatial import cross
 from osimlite.simulation.robot.robot import Ball, Box, MeshFile, Tube, Visual
 from osimlite.translate.mjcf.draft import Draft, Value, add_element, format_pose
 
-SHAPE_GROUP, CONTACT_GROUP, MARKER_GROUP, FRAME_GROUP = 2, 3, 4, 5
-"""Groups that MuJoCo's viewer shows and hides together: shapes, contact surfaces, markers, frames."""
+SHAPE_GROUP = 2
+"""Group of shapes; MuJoCo's viewer shows or hides a group at a time, and shows 0 to 2 at first."""
+CONTACT_GROUP = 3
+"""Group of contact surfaces."""
+MARKER_GROUP = 4
+"""Group of markers."""
+FRAME_GROUP = 5
+"""Group of frames."""
 
 
 def add_shapes(draft: Draft) -> None:
-    """Add the shapes that bodies are drawn with."""
+    """Add the shapes with which bodies are drawn."""
     if not any(link.visuals for link in draft.robot.links):
         return
     looks = add_element(draft.get_section("default"), "default", class_="looks")
@@ -34,7 +40,9 @@ def add_shapes(draft: Draft) -> None:
 
 
 def add_camera(draft: Draft) -> None:
-    """Add a camera that sees the default pose upright: MuJoCo takes z for up, where models of OpenSim have y."""
+    """Add a camera that shows the default pose upright: up is z in MuJoCo, and y in models of
+    OpenSim.
+    """
     state = draft.mechanism.at(draft.default_state[0])
     spots = np.array(
         [
@@ -50,7 +58,7 @@ def add_camera(draft: Draft) -> None:
     right = right - (right @ up) * up
     right /= np.linalg.norm(right)
     place = 0.5 * (low + high) + (1.0 + float(np.linalg.norm(high - low))) * cross(right, up)
-    # MuJoCo's own light, which goes with the camera, leaves bones dark.
+    # MuJoCo's default headlight leaves bones dark.
     add_element(
         add_element(draft.root, "visual"),
         "headlight",
@@ -71,7 +79,16 @@ def add_markers(draft: Draft) -> None:
 
 
 def format_shape(draft: Draft, visual: Visual) -> dict[str, Value]:
-    """The attributes of a geom that has the shape; a mesh becomes an asset, one for each file and scale."""
+    """Return the attributes of a geom with a shape; a mesh is an asset, one for each file and
+    scale.
+
+    Args:
+        draft: MJCF under construction.
+        visual: shape to draw.
+
+    Returns:
+        Attributes by name.
+    """
     match visual.shape:
         case Box(size):
             return {"type": "box", "size": [edge / 2.0 for edge in size]}

@@ -1,4 +1,4 @@
-"""What MuJoCo has in the place of a surface that a path wraps around."""
+"""Wrap geoms that can replace a surface around which a path wraps."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from osimlite.translate.mjcf.tendons import TendonSite, WrapGeom
 
 
 def make_substitutes(surface: Surface, touched: Array) -> Iterator[WrapGeom]:
-    """Spheres and cylinders in the place of a surface; none if it has no size.
+    """Yield spheres and cylinders that can replace a surface; none if it has no size.
 
     Args:
-        surface: the surface.
-        touched: points (k, 3) where the path touches it, in its own frame, m.
+        surface: surface of the path.
+        touched: points at which the path touches it (k, 3), in the frame of the surface (m).
     """
     if min(surface.numbers[4:]) <= 0.0:
         return
@@ -44,7 +44,8 @@ def make_substitutes(surface: Surface, touched: Array) -> Iterator[WrapGeom]:
                         own, kind="cylinder", frame=turned, radius=radius, length=2.0 * sizes[axis]
                     )
         case "wrap_torus":
-            # OpenSim's path bends around the tube where that is nearest.
+            # OpenSim's path bends around the tube at the nearest point of the ring, where the torus is
+            # locally a cylinder.
             tube, ring = sizes
             x, y, _ = touched.mean(0)
             out = np.array((x, y, 0.0)) / np.hypot(x, y)
@@ -52,12 +53,13 @@ def make_substitutes(surface: Surface, touched: Array) -> Iterator[WrapGeom]:
             yield replace(
                 own, kind="cylinder", frame=own.frame @ turned, radius=tube, length=2.0 * tube
             )
-            # Or it runs through a ball in the hole, whose side site is inside.
+            # Alternatively it passes through a sphere in the hole: MuJoCo does so if the side site is
+            # inside the sphere.
             yield replace(own, radius=ring - tube, side=TendonSite(own.body, own.frame[:3, 3]))
 
 
 def rotate_z_to(axis: Array) -> Array:
-    """A rotation that takes z to a direction."""
+    """Return a rotation (3, 3) that takes the z axis to a direction."""
     z = axis / np.linalg.norm(axis)
     x = np.cross(np.eye(3)[np.argmin(np.abs(z))], z)
     x /= np.linalg.norm(x)

@@ -1,6 +1,6 @@
-"""Tendons: what MuJoCo pulls along, and what their lengths and moment arms are in many poses.
+"""Tendons, and their lengths and moment arms in many poses by MuJoCo's formulas.
 
-A tendon runs from site to site, around a surface between two of them at most.
+A tendon is a sequence of sites with at most one surface between two of them.
 """
 
 from __future__ import annotations
@@ -19,33 +19,55 @@ from osimlite.translate.mjcf.wrapping import bend_tendon, norm, unit
 
 @dataclass(frozen=True, eq=False)
 class TendonSite:
-    """A site."""
+    """Site of a tendon.
 
-    body: int  # that it is in
-    place: Array  # in the body (3,), m
-    coordinate: int = -1  # place in the mechanism of that which moves it, or -1
-    # if it moves: polynomial (5,) of the coordinate, constant first, which gives the value of a
-    # helper
+    Attributes:
+        body: index of the body.
+        place: position in the body (3,) (m).
+        coordinate: index of the coordinate that moves the site, or -1.
+        drive: polynomial of the coordinate (5,), constant first, whose value a helper joint has;
+            None for a fixed site.
+        slides: polynomials of the helper (3, 5), constant first, which are added to the position
+            (m); None for a fixed site.
+        name: name of the path point; "" for a site that the path does not have.
+    """
+
+    body: int
+    place: Array
+    coordinate: int = -1
     drive: Array | None = None
-    # if it moves: polynomials (3, 5) of the helper that are added to the place, constant first, m
     slides: Array | None = None
-    name: str = ""  # of the path point; empty for one that OpenSim does not know
+    name: str = ""
 
 
 @dataclass(frozen=True, eq=False)
 class WrapGeom:
-    """A surface that a tendon goes around."""
+    """Surface that a tendon wraps around.
 
-    body: int  # that it is in
-    frame: Array  # of the surface (4, 4) in the body; a cylinder is about z
-    kind: str  # `"sphere"` or `"cylinder"`
-    radius: float  # m
-    side: TendonSite | None = None  # the side site, or None
-    length: float = 0.0  # of the cylinder as it is drawn, m
-    name: str = ""  # of the wrap object; empty for one that OpenSim does not know
+    Attributes:
+        body: index of the body.
+        frame: frame of the surface in the body (4, 4); the axis of a cylinder is z.
+        kind: "sphere" or "cylinder".
+        radius: radius (m).
+        side: side site, or None.
+        length: length of the cylinder as it is drawn (m); MuJoCo wraps around an infinite one.
+        name: name of the wrap object; "" for a surface that the path does not have.
+    """
+
+    body: int
+    frame: Array
+    kind: str
+    radius: float
+    side: TendonSite | None = None
+    length: float = 0.0
+    name: str = ""
 
     def replace_side(self, direction: Array | None) -> WrapGeom:
-        """The same with the side site in a direction (3,), in the frame of the surface, well outside; or without."""
+        """Return a copy with the side site in a direction (3,) in the frame of the surface, two
+        radii from its centre.
+
+        Without a direction, or with a zero one, the copy has no side site.
+        """
         if direction is None or not direction.any():
             return replace(self, side=None)
         place = (
@@ -55,7 +77,12 @@ class WrapGeom:
         return replace(self, side=TendonSite(self.body, place))
 
     def move_to(self, frame: Array, radius: float) -> WrapGeom:
-        """The same elsewhere (4, 4) and of another radius (m), with the side site where it is as seen from there."""
+        """Return a copy with another frame and radius; the side site moves along.
+
+        Args:
+            frame: frame in the body (4, 4).
+            radius: radius (m).
+        """
         if self.side is None:
             return replace(self, frame=frame, radius=radius)
         seen = self.frame[:3, :3].T @ (self.side.place - self.frame[:3, 3])
@@ -66,22 +93,35 @@ class WrapGeom:
 
 
 Tendon = tuple[TendonSite | WrapGeom, ...]
+"""Sites and surfaces of a tendon, in its order."""
 
 
 def measure_tendon(tendon: Tendon, poses: Poses, version: int) -> tuple[Array, Array]:
-    """Lengths (P,) of a tendon (m) and its moment arms (P, m), as MuJoCo computes them.
+    """Measure a tendon with MuJoCo's formulas.
 
     Args:
-        tendon: the tendon.
-        poses: P poses of m coordinates that move.
-        version: of MuJoCo, 3 or 4.
+        tendon: tendon to measure.
+        poses: P poses with m free coordinates.
+        version: major version of MuJoCo.
+
+    Returns:
+        Lengths (P,) (m) and moment arms (P, m).
     """
     lengths, arms = measure_tendons((tendon,), poses, version)
     return lengths[0], arms[0]
 
 
 def measure_tendons(tendons: Sequence[Tendon], poses: Poses, version: int) -> tuple[Array, Array]:
-    """The same of T tendons, (T, P) and (T, P, m): what they do between the same two sites is computed at once."""
+    """Measure several tendons; sections that they share are computed once.
+
+    Args:
+        tendons: tendons to measure (T).
+        poses: P poses with m free coordinates.
+        version: major version of MuJoCo.
+
+    Returns:
+        Lengths (T, P) (m) and moment arms (T, P, m).
+    """
     lengths = np.zeros((len(tendons), len(poses.q)))
     arms = np.zeros((*lengths.shape, len(poses.moving)))
     alike: dict[Any, list[tuple[int, WrapGeom | None]]] = {}
@@ -105,10 +145,19 @@ def measure_tendons(tendons: Sequence[Tendon], poses: Poses, version: int) -> tu
 def _measure_section(
     first: TendonSite, arounds: Sequence[WrapGeom], second: TendonSite, poses: Poses, version: int
 ) -> tuple[Array, Array]:
-    """Lengths (k, P) and moment arms (k, P, m) from site to site: straight, or around each of k surfaces of a kind.
+    """Measure a section between two sites, straight or around each of k surfaces of one kind.
 
-    Surfaces that differ in their side sites only are computed once, in each way that the tendon can
-    go around them.
+    Surfaces that differ only in their side sites are computed once, for each way around them.
+
+    Args:
+        first: first site.
+        arounds: surfaces (k), all of one kind and in one body; none for a straight section.
+        second: second site.
+        poses: P poses with m free coordinates.
+        version: major version of MuJoCo.
+
+    Returns:
+        Lengths (k, P) (m) and moment arms (k, P, m).
     """
     one, two = (_locate_in_ground(spot, poses)[None] for spot in (first, second))
     way, back = two - one, one - two
@@ -131,7 +180,7 @@ def _measure_section(
         ]
         sites = (np.stack(sides) - middles[owners]) @ rotations[owners] if sides else None
         result = bend_tendon(kind, radii, start, end, sites, owners, version)
-        # Each way around each surface is one of the k, until they are chosen.
+        # The first axis has all combinations of way and surface; `choice` selects from them below.
         touches = result.touches.reshape(-1, len(poses.q))
         leaves, returns = (
             poses.locate(body, (middles + at @ rotations.swapaxes(1, 2)).reshape(*touches.shape, 3))
@@ -152,7 +201,7 @@ def _measure_section(
 
 
 def iterate_sections(tendon: Tendon) -> Iterator[tuple[TendonSite, WrapGeom | None, TendonSite]]:
-    """From site to site, with the surface between the two if there is one."""
+    """Yield first site, surface or None, and second site of each section of a tendon."""
     last, around = None, None
     for part in tendon:
         if isinstance(part, WrapGeom):
@@ -164,7 +213,7 @@ def iterate_sections(tendon: Tendon) -> Iterator[tuple[TendonSite, WrapGeom | No
 
 
 def _locate_in_ground(spot: TendonSite, poses: Poses) -> Array:
-    """Where a site is in ground (P, 3)."""
+    """Return the position of a site in ground (P, 3) (m)."""
     if spot.slides is None:
         return poses.locate(spot.body, spot.place)
     assert spot.drive is not None
@@ -173,20 +222,22 @@ def _locate_in_ground(spot: TendonSite, poses: Poses) -> Array:
 
 
 def _locate_in_body(spot: TendonSite, body: int, poses: Poses) -> Array:
-    """Where a site is in a body: (1, 3) if it is fixed there, else (P, 3)."""
+    """Return the position of a site in a body: (1, 3) if it is fixed there, else (P, 3) (m)."""
     if spot.body == body and spot.slides is None:
         return spot.place[None]
     return poses.express(body, _locate_in_ground(spot, poses))
 
 
 def _compute_generalized_forces(body: int, places: Array, force: Array, poses: Poses) -> Array:
-    """What forces (k, P, 3) on a body at places in ground do at the moving coordinates (k, P, m)."""
+    """Return the generalized forces (k, P, m) of forces (k, P, 3) on a body at positions in ground."""
     moments = np.cross(places - poses.origins[body], force)
     return multiply_each_pose(np.concatenate((moments, force), axis=-1), poses.jacobians[body])
 
 
 def _compute_sliding_forces(spot: TendonSite, force: Array, poses: Poses) -> Array:
-    """What forces (k, P, 3) on a site do at the moving coordinates (k, P, m) since the site moves in its body."""
+    """Return the generalized forces (k, P, m) of forces (k, P, 3) on a site from its motion in its
+    body.
+    """
     assert spot.slides is not None and spot.drive is not None
     value = poses.q[:, spot.coordinate]
     helper, rate = polyval(value, spot.drive), polyval(value, polyder(spot.drive))

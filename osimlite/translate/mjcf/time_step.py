@@ -1,9 +1,10 @@
-"""What is too quick for the time step, which is fixed in MuJoCo and ends in NaN where OpenSim takes smaller steps.
+"""Time step of a file: small enough for the stiffest springs of the model.
 
-The springs of a model, linearized about its default pose, swing or decay at rates w (1/s); explicit
-steps longer than 2 / w amplify that. MuJoCo takes the damping of joints and tendons implicitly, but
-that of a bushing acts through a weld. Muscles are not linearized: what is stiff in them is the
-tendon, which is rigid in MuJoCo.
+MuJoCo's step is fixed and ends in NaN where OpenSim takes smaller steps. The springs of a model,
+linearized about its default pose, oscillate or decay at rates w (1/s); explicit steps longer than 2
+/ w amplify this. MuJoCo integrates the damping of joints and tendons implicitly, but that of a
+bushing acts through a weld. Muscles are not linearized: their stiff part is the tendon, which is
+rigid in MuJoCo.
 """
 
 from __future__ import annotations
@@ -37,14 +38,15 @@ SPRING_TYPES = (
     PointToPointSpring,
     SpringGeneralizedForce,
 )
+"""Classes of forces that are linearized."""
 DEFAULT_STEP_S = 1e-3
-"""The usual time step, s."""
+"""Time step (s) if no spring is too stiff."""
 DIFFERENCE_STEP = 1e-7
-"""By which a derivative changes coordinates (rad, m) or speeds (per s)."""
+"""Change of coordinates (rad or m) or speeds in central differences."""
 
 
 def choose_step(draft: Draft) -> None:
-    """Take smaller steps where springs are stiff, and tell of muscles that are torn."""
+    """Reduce the time step where springs are stiff, and warn about overstretched muscles."""
     try:
         rate = _compute_fastest_rate(draft)
     except OsimliteError as error:
@@ -75,7 +77,11 @@ def choose_step(draft: Draft) -> None:
 
 
 def _compute_fastest_rate(draft: Draft) -> float:
-    """The greatest rate (1/s) of the model's springs about its default pose."""
+    """Return the largest rate (1/s) of the springs about the default pose.
+
+    It is the largest magnitude of the eigenvalues of the linearized motion in directions that the
+    constraints allow.
+    """
     mechanism, (q, u) = draft.mechanism, draft.default_state
     state = mechanism.at(q, u)
     rows, free = np.zeros((0, len(u))), np.eye(len(u))
@@ -108,7 +114,17 @@ def _compute_fastest_rate(draft: Draft) -> float:
 def _differentiate_forces(
     draft: Draft, elements: Sequence[ForceElement], along: Array, at: Array
 ) -> Array:
-    """Derivatives (n, f) of generalized forces by steps along coordinates and speeds, each (n, f)."""
+    """Differentiate generalized forces by changes of coordinates and speeds.
+
+    Args:
+        draft: MJCF under construction.
+        elements: forces.
+        along: directions of the coordinates (n, f).
+        at: directions of the speeds (n, f).
+
+    Returns:
+        Derivatives (n, f).
+    """
     q, u = draft.default_state
     result = np.zeros_like(along)
     if elements:

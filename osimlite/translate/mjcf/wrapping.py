@@ -1,18 +1,16 @@
-"""How MuJoCo bends a tendon around a sphere or a cylinder, in many poses at once.
+"""MuJoCo's wrapping of tendons around spheres and cylinders, in many poses at once.
 
-The tendon stays in a plane: of a sphere that of both ends and the middle, of a cylinder that normal
-to the axis, and heights above that grow in proportion to the length. In the plane it either goes
-straight or touches a circle, and what decides is the side site, whose meaning changed with MuJoCo
-4.0:
+The tendon stays in a plane: for a sphere that of both ends and the centre, for a cylinder the one
+normal to the axis, with heights that grow in proportion to the length. In the plane it is either
+straight or touches a circle. The side site decides, and its meaning changed with MuJoCo 4.0:
 
-- 4.0: the tendon goes around the middle by the angle from the first end to the side site and on to
-  the second end,
-- 3.x: a tendon that neither cuts the circle nor passes on the other side of the middle than the
-  side site goes straight; any other goes the way around whose tangent points are nearer to the side
-  site.
+- 4.0: the tendon turns about the centre by the angle from the first end to the side site, and on to
+  the second end.
+- 3.x: a tendon that neither cuts the circle nor passes the centre on the side opposite to the side
+  site is straight. Any other takes the way whose tangent points are nearer to the side site.
 
-Without a side site both go the shorter way, if the line between the ends cuts the circle. A side
-site inside of the surface makes the tendon go through the surface: by the shortest way that has a
+Without a side site both take the shorter way, if the line between the ends cuts the circle. A side
+site inside the surface makes the tendon pass through the surface: by the shortest way that has a
 point in common with the circle.
 
 Source: MuJoCo's XML reference (``spatial/geom``), its changelog for 4.0.0, and the public code of
@@ -31,21 +29,27 @@ from osimlite.mechanics.multibody.spatial import Array
 Mask = NDArray[np.bool_]
 
 TINY = 1e-15
-"""MuJoCo's own least number."""
+"""Smallest length that MuJoCo divides by (mjMINVAL)."""
 ROUNDING = 1e-9
-"""A turn that is smaller is none, and not a whole one."""
+"""Turn (rad) below which a tendon does not turn at all, instead of by a complete revolution."""
 
 
 class Bends(NamedTuple):
-    """How a tendon bends around each of S surfaces in P poses, in each of C ways; past others it goes straight on."""
+    """Course of a tendon around each of S surfaces in P poses, in each of C ways.
 
-    touches: Mask  # whether it touches (C, S, P)
-    # where the tendon leads to from the first end (C, S, P, 3), in the frame of the surface, m: a
-    # tangent point, or the second end
+    Attributes:
+        touches: whether it touches the surface (C, S, P).
+        first: first tangent point in the frame of the surface (C, S, P, 3) (m); without contact the
+            second end.
+        second: second tangent point (C, S, P, 3) (m); without contact the first end.
+        length: length on the surface (C, S, P) (m).
+        choice: way for each of k side sites (k, P); without side sites one for each surface.
+    """
+
+    touches: Mask
     first: Array
-    second: Array  # where it comes to the second end from (C, S, P, 3)
-    length: Array  # on the surface (C, S, P), m
-    # which way it goes with each of k side sites (k, P); without any, one for each surface
+    second: Array
+    length: Array
     choice: NDArray[np.intp]
 
 
@@ -58,16 +62,19 @@ def bend_tendon(
     owners: NDArray[np.intp],
     version: int,
 ) -> Bends:
-    """How a tendon bends.
+    """Bend a tendon around surfaces.
 
     Args:
-        kind: ``"sphere"`` or ``"cylinder"``, this one about z.
-        radius: m (S, 1).
-        first: one end (S, P, 3) in the frame of the surface, m.
-        second: the other end (S, P, 3).
-        sides: side sites (k, P, 3) in the frames of their surfaces, or None.
-        owners: places of these surfaces (k,).
-        version: of MuJoCo, 3 or 4.
+        kind: "sphere" or "cylinder"; the axis of a cylinder is z.
+        radius: radii (S, 1) (m).
+        first: first end in the frames of the surfaces (S, P, 3) (m).
+        second: second end (S, P, 3) (m).
+        sides: side sites in the frames of their surfaces (k, P, 3) (m), or None.
+        owners: index of the surface of each side site (k,).
+        version: major version of MuJoCo.
+
+    Returns:
+        Course of the tendon in all ways, and the way that it takes.
     """
     across = None if kind == "cylinder" else _make_plane_axes(first, second)
     p, q = _project_to_plane(across, first), _project_to_plane(across, second)
@@ -78,8 +85,7 @@ def bend_tendon(
         if sides is not None
         else np.where(between < 0.0, -1.0, 1.0)[None]
     )
-    # Of ends one behind the other, one line passes the other by, and MuJoCo 3 goes all the way
-    # around.
+    # If one end is behind the other, MuJoCo 3 with a side site winds completely around the circle.
     least = reach_p + reach_q if version < 4 and sides is not None else -ROUNDING
     winding = np.abs(signs) * (np.mod(signs * between - least, 2.0 * np.pi) + least)
     arc = radius * (winding - reach_p - reach_q)
@@ -133,7 +139,7 @@ def _choose_side(
     side: Array,
     owners: NDArray[np.intp],
 ) -> NDArray[np.intp]:
-    """Which way a tendon goes in MuJoCo 3 with each of k sides (k, P): 0 is straight."""
+    """Return the way of a tendon in MuJoCo 3 with each of k side sites (k, P): 0 is straight."""
     way = q - p
     part = np.clip(-_dot(way, p) / np.maximum(_dot(way, way), TINY), 0.0, 1.0)
     nearest = p + part[..., None] * way
@@ -145,15 +151,23 @@ def _choose_side(
 
 
 def _find_passage(p: Array, q: Array, radius: Array) -> tuple[Mask, Array]:
-    """Whether the way through a circle is not straight (P,), and the point of the circle (P, 2) that it then has.
+    """Find the shortest way through a circle.
 
-    Both lines to that point have the same angle with the radius there.
+    Both lines to its point on the circle have the same angle with the radius there.
+
+    Args:
+        p: first end in the plane (S, P, 2) (m).
+        q: second end in the plane (S, P, 2) (m).
+        radius: radii (S, 1) (m).
+
+    Returns:
+        Whether the way is not straight (S, P), and its point on the circle (S, P, 2).
     """
     way = q - p
     part = np.clip(-_dot(way, p) / np.maximum(_dot(way, way), TINY), 0.0, 1.0)
     passes = norm(p + part[..., None] * way) > radius
     between = _compute_angle(p, q)
-    # At the share t of the angle from p to q the slope of the length changes its sign once.
+    # As a function of the angle between p and q, the slope of the length changes its sign once: bisect.
     low, high = np.zeros(between.shape), np.ones(between.shape)
     for _ in range(50):
         middle = 0.5 * (low + high)
@@ -166,7 +180,7 @@ def _find_passage(p: Array, q: Array, radius: Array) -> tuple[Mask, Array]:
 
 
 def _lines_cross(p: Array, one: Array, q: Array, two: Array) -> Mask:
-    """Whether the line from p to one and that from q to two have a point in common (...)."""
+    """Return whether the segments from p to one and from q to two intersect (...)."""
     way, other, apart = one - p, two - q, q - p
     across = _cross(way, other)
     across = np.where(np.abs(across) < TINY, np.nan, across)
@@ -175,11 +189,13 @@ def _lines_cross(p: Array, one: Array, q: Array, two: Array) -> Mask:
 
 
 def _make_plane_axes(first: Array, second: Array) -> Array:
-    """Two unit vectors (S, P, 2, 3) in the plane of both ends and the middle of a sphere, one toward the first end."""
+    """Return two unit vectors (S, P, 2, 3) in the plane of both ends and the centre, the first
+    toward the first end.
+    """
     along = first / np.maximum(norm(first), TINY)[..., None]
     normal = np.cross(first, second)
     size = norm(normal)[..., None]
-    # Ends in line with the middle share no plane of their own.
+    # Ends on a line with the centre define no plane; any plane through the line will do.
     other = np.where(np.abs(along) < np.abs(along).max(-1, keepdims=True), 1.0, 0.0)
     normal = np.where(size > TINY, normal, np.cross(along, other))
     normal /= np.maximum(norm(normal), TINY)[..., None]
@@ -187,7 +203,9 @@ def _make_plane_axes(first: Array, second: Array) -> Array:
 
 
 def _project_to_plane(across: Array | None, points: Array) -> Array:
-    """Points (..., 3) in the plane (..., 2): that of two vectors (..., 2, 3), or the one normal to z."""
+    """Return coordinates (..., 2) of points (..., 3) in the plane of two vectors (..., 2, 3), or
+    the one normal to z.
+    """
     return points[..., :2] if across is None else np.einsum("...ij,...j->...i", across, points)
 
 
@@ -196,17 +214,17 @@ def _dot(a: Array, b: Array) -> Array:
 
 
 def norm(a: Array) -> Array:
-    """Lengths (...) of vectors (..., 3)."""
+    """Return the lengths (...) of vectors (..., 3)."""
     return np.sqrt(_dot(a, a))
 
 
 def unit(a: Array) -> Array:
-    """Vectors (..., 3) of length 1; zero where they are."""
+    """Return unit vectors (..., 3); zero vectors remain zero."""
     return a / np.maximum(norm(a), np.finfo(float).tiny)[..., None]
 
 
 def _compute_angle(a: Array, b: Array) -> Array:
-    """From one vector to the other (...), from -pi to pi."""
+    """Return the angle from one vector to another (...), from -pi to pi."""
     return np.arctan2(_cross(a, b), _dot(a, b))
 
 
@@ -215,11 +233,11 @@ def _cross(a: Array, b: Array) -> Array:
 
 
 def _compute_tangent_angle(p: Array, radius: Array) -> Array:
-    """The angle between a point and where a line from it touches the circle, as seen from the middle (...)."""
+    """Return the angle at the centre between a point and the tangent point of a line from it (...)."""
     return np.arccos(np.clip(radius / np.maximum(norm(p), TINY), 0.0, 1.0))
 
 
 def _turn_on_circle(p: Array, angle: Array, radius: Array) -> Array:
-    """On the circle, in the direction of a point turned by an angle (..., 2)."""
+    """Return the point on the circle (..., 2) in the direction of a point, turned by an angle."""
     direction = np.arctan2(p[..., 1], p[..., 0]) + angle
     return np.stack((radius * np.cos(direction), radius * np.sin(direction)), axis=-1)

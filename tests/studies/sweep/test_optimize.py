@@ -50,7 +50,7 @@ def test_methods_find_the_bottom_of_a_bowl(method):
     tolerance = 1e-6 if method == "differential-evolution" else 1e-9
     search = Search(
         np.array([0.5, 0.5, 0.5]), 0.25, None, 1, True, 2000, tolerance,
-        slopes=lambda point: 2.0 * (point - bottom) * (1.0, 10.0, 3.0),
+        gradient=lambda point: 2.0 * (point - bottom) * (1.0, 10.0, 3.0),
     )  # fmt: skip
     assert METHODS[method](ask, search).startswith("converged")
     rows = np.array(asked)
