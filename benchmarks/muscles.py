@@ -250,7 +250,7 @@ def sweep(path: Path | None, console: Console) -> None:
         return
     made = plan(osimlite.read(path), {"hip_flexion_r": "-0.1:0.1"}, to=TO, accuracy=ACCURACY)
     runner = Runner(made)
-    rows = choose_samples(made.variables, "sobol", RUNS).block(0, RUNS)
+    rows = choose_samples(made.variables, "sobol", RUNS).make_block(0, RUNS)
     model = opensim.Model(str(path))
     state = model.initSystem()
     hip = model.getCoordinateSet().get("hip_flexion_r")
@@ -279,7 +279,7 @@ def sweep(path: Path | None, console: Console) -> None:
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     many = choose_samples(made.variables, "sobol", 10 * RUNS)
     for first in range(0, 10 * RUNS, RUNS):
-        runner.run(many.block(first, first + RUNS))
+        runner.run(many.make_block(first, first + RUNS))
     grown = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024
     console.print(f"{10 * RUNS} runs take {grown:.1f} MB more than {RUNS}", highlight=False)
 

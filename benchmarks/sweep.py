@@ -53,14 +53,14 @@ def main() -> None:
             return
         starts = plan(osimlite.read(MODEL), VARY, to=TO)
         # What is made once, and what of machine code is not in the cache yet.
-        Runner(starts).run(choose_samples(starts.variables, "sobol", 8).block(0, 8))
+        Runner(starts).run(choose_samples(starts.variables, "sobol", 8).make_block(0, 8))
         console.print(workers(starts, path))
         if "--workers" in sys.argv:
             return
         import opensim
 
         opensim.Logger.setLevelString("off")
-        rows = choose_samples(starts.variables, "sobol", WALKERS).block(0, WALKERS)
+        rows = choose_samples(starts.variables, "sobol", WALKERS).make_block(0, WALKERS)
         theirs = run_opensim(opensim, rows)
         name = f"{WALKERS} walkers, processor time"
         report(
@@ -182,10 +182,10 @@ def walk_when_told(packed: bytes, end: Any) -> None:
     """In a process of its own: walk as many as it is told, and tell the time that this took, until it is told none."""
     made = Plan.unpack(packed)
     runner = Runner(made)
-    runner.run(choose_samples(made.variables, "sobol", 8).block(0, 8))
+    runner.run(choose_samples(made.variables, "sobol", 8).make_block(0, 8))
     end.send(0.0)
     while count := end.recv():
-        rows = choose_samples(made.variables, "sobol", count).block(0, count)
+        rows = choose_samples(made.variables, "sobol", count).make_block(0, count)
         end.send(elapsed(partial(runner.run, rows)))
 
 
@@ -201,7 +201,7 @@ def kinds(path: Path) -> Table:
         ("starts, PyBullet", VARY, BY_BULLET, "bullet"),
     ):
         made = plan(osimlite.read(MODEL), vary, to=TO, engine=engine)
-        runner, rows = Runner(made), choose_samples(made.variables, "sobol", count).block(0, count)
+        runner, rows = Runner(made), choose_samples(made.variables, "sobol", count).make_block(0, count)
         runner.run(rows[:2])
         started = time.process_time()
         runner.run(rows)
