@@ -21,7 +21,7 @@ from rich.table import Table
 
 import osimlite
 from _opensim_walks import Order, opensim_walks
-from osimlite.models.source import make_model, parameters_of
+from osimlite.models.source import list_parameters, make_model
 from osimlite.simulation import Simulation
 from osimlite.studies.gait.basin import sample_perturbed_starts, simulate_walks
 from osimlite.studies.gait.cycle import find_cycle
@@ -43,7 +43,7 @@ def main() -> None:
     console = Console()
     names = sys.argv[1:] or list(CONFIRMED)
     for part in (near, margins):
-        console.print(part([name for name in names if parameters_of(name)]))
+        console.print(part([name for name in names if list_parameters(name)]))
     console.print(confirmation(names))
 
 
@@ -129,7 +129,7 @@ def margins(names: list[str]) -> Table:
     for heading in ("model", "property", "least", "value", "most"):
         table.add_column(heading, justify="left" if heading in ("model", "property") else "right")
     for name in names:
-        for parameter, value in parameters_of(name).items():
+        for parameter, value in list_parameters(name).items():
 
             def walks(number: float, name: str = name, parameter: str = parameter) -> bool:
                 return (

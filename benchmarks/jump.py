@@ -26,7 +26,7 @@ from rich.table import Table
 import osimlite
 from _pair import pair, report
 from osimlite.io.tables.storage import write_sto
-from osimlite.models.jumper import CONTROLS, MUSCLES, drive, jumper
+from osimlite.models.jumper import CONTROLS_FILE, MUSCLES, add_jump_controller, jumper
 from osimlite.simulation import Simulation
 from osimlite.studies.sweep.optimize import Objective, optimize
 from osimlite.studies.sweep.plan import plan
@@ -163,9 +163,9 @@ def main() -> None:
     started, before = time.perf_counter(), time.process_time()
     found, runs = learn(given.o, given.seed)
     wall, busy = time.perf_counter() - started, time.process_time() - before
-    write_table(found, given.o / CONTROLS.name)
+    write_table(found, given.o / CONTROLS_FILE.name)
     model = jumper(driven=False)
-    drive(model, given.o / CONTROLS.name)
+    add_jump_controller(model, given.o / CONTROLS_FILE.name)
     file = given.o / "jumper.osim"
     osimlite.write(model, file)
     console.print(

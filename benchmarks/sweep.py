@@ -201,7 +201,10 @@ def kinds(path: Path) -> Table:
         ("starts, PyBullet", VARY, BY_BULLET, "bullet"),
     ):
         made = plan(osimlite.read(MODEL), vary, to=TO, engine=engine)
-        runner, rows = Runner(made), choose_samples(made.variables, "sobol", count).make_block(0, count)
+        runner, rows = (
+            Runner(made),
+            choose_samples(made.variables, "sobol", count).make_block(0, count),
+        )
         runner.run(rows[:2])
         started = time.process_time()
         runner.run(rows)

@@ -138,7 +138,7 @@ def _make_plan(
     from inspect import Parameter
 
     from osimlite.errors import SettingError
-    from osimlite.models.source import parameters_of
+    from osimlite.models.source import list_parameters
     from osimlite.studies.sweep.plan import plan
 
     if Path(source).suffix.lower() == ".osim":
@@ -148,10 +148,11 @@ def _make_plan(
     both = [name for name in ranges if name in given]
     if both:
         raise SettingError(f"the parameter '{both[0]}' is set and varied; do one of the two")
-    known = {name: default for name, default in parameters_of(source).items() if name not in given}
+    known = {
+        name: default for name, default in list_parameters(source).items() if name not in given
+    }
     # The nominal model needs a value for each parameter without a default; take the lower bound of its
     # range.
-    # The model as it is given needs a value of what has no default.
     needed = {
         name: str(ranges[name]).partition(":")[0]
         for name in known

@@ -87,12 +87,12 @@ def _list_models() -> None:
 
     from osimlite.cli._console import show
     from osimlite.models import BUILT_IN
-    from osimlite.models.source import describe
+    from osimlite.models.source import describe_model
 
     for name in BUILT_IN:
         show(
             textwrap.fill(
-                f"{name}  {describe(name)}", width=79, subsequent_indent=" " * (len(name) + 2)
+                f"{name}  {describe_model(name)}", width=79, subsequent_indent=" " * (len(name) + 2)
             )
             + "\n"
         )

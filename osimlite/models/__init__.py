@@ -1,4 +1,4 @@
-"""Models written in the library's own words, ready to build."""
+"""Built-in models, each written in Python with the classes of the schema."""
 
 from __future__ import annotations
 
@@ -12,6 +12,6 @@ BUILT_IN = {
     "jumper": "osimlite.models.jumper:jumper",
     "human-walks": "osimlite.models.predicted_walk:human_walks",
 }
-"""Name on the command line, and where the function is that makes the model."""
+"""Function that makes a model, by its name on the command line."""
 STUDIES = {"human-walks": "osimlite.models.predicted_walk:write_study"}
-"""Where the function is that writes what belongs to a model beside its file."""
+"""Function that writes further files of a model, such as a study, by the name of the model."""

@@ -12,8 +12,10 @@ from osimlite.schema.model import Model
 from osimlite.schema.muscles import DeGrooteFregly2016Muscle
 from osimlite.schema.paths import GeometryPath, PathPoint
 
-UPPER, FORE = 0.3, 0.25
-"""Lengths of the upper arm and the forearm, m."""
+UPPER_ARM_LENGTH_M = 0.3
+"""Length of the upper arm (m); the shoulder is 1 m above the origin of ground."""
+FOREARM_LENGTH_M = 0.25
+"""Length of the forearm (m), for its shape only."""
 
 
 def arm() -> Model:
@@ -26,13 +28,13 @@ def arm() -> Model:
         inertia=(0.02, 0.002, 0.02, 0.0, 0.0, 0.0),
     )
     fore.attached_geometry.append(
-        Cylinder(name="bone", radius=0.03, half_height=FORE / 2.0, socket_frame="..")
+        Cylinder(name="bone", radius=0.03, half_height=FOREARM_LENGTH_M / 2.0, socket_frame="..")
     )
     model.add(fore)
     elbow = Coordinate(name="elbow", range=(0.0, pi * 0.8), default_value=0.5)
     model.add(
         PinJoint(name="elbow", coordinates=[elbow]).between(
-            model.ground, fore, at=(0.0, 1.0 - UPPER, 0.0)
+            model.ground, fore, at=(0.0, 1.0 - UPPER_ARM_LENGTH_M, 0.0)
         )
     )
     for name, force, fiber, slack, points in (

@@ -1,8 +1,8 @@
-"""The exercise "Building a Dynamic Walker": a passive walker with knees on a slope.
+"""Model of the exercise "Building a Dynamic Walker": a passive walker with knees on a slope.
 
-Six rigid bodies: the platform, and on it a pelvis that carries two legs of thigh and shank, hinged
-in the sagittal plane. Nothing drives it but gravity; it stands on its feet, knees and hips through
-Hunt-Crossley contact, and coordinate limit forces stop hips and knees.
+Six rigid bodies move in the sagittal plane: the platform, and on it a pelvis that carries two legs
+of thigh and shank. Only gravity drives it. It has Hunt-Crossley contacts at feet, knees and hips,
+and coordinate limit forces at hips and knees.
 """
 
 from __future__ import annotations
@@ -18,8 +18,9 @@ from osimlite.schema.joints import PinJoint, PlanarJoint
 from osimlite.schema.model import Model
 
 RED = (0.8, 0.1, 0.1)
+"""Colour of the platform (RGB)."""
 SIDES = (("Right", 1.0, 30.0), ("Left", -1.0, -10.0))
-"""Name, side of the pelvis along +z, and starting angle of the hip (deg) of each leg."""
+"""Per leg its name, the side of the pelvis along +z, and the initial angle of the hip (deg)."""
 
 
 def dynamic_walker(
@@ -28,14 +29,15 @@ def dynamic_walker(
     shank_length: float = 0.435,
     slope: float = 10.0,
 ) -> Model:
-    """Build the walker of the exercise "Building a Dynamic Walker": passive, with knees, on a slope.
+    """Build the walker of the exercise "Building a Dynamic Walker": passive, with knees, on a
+    slope.
 
     Args:
-        pelvis_width: distance from the middle of the pelvis to each hip (m); the exercise's
-            pelvisWidth.
-        thigh_length: from hip to knee (m).
-        shank_length: from knee to foot (m).
-        slope: how far the platform falls towards +x (deg).
+        pelvis_width: distance from the middle of the pelvis to each hip (m), which the exercise
+            calls pelvisWidth.
+        thigh_length: distance from hip to knee (m).
+        shank_length: distance from knee to foot (m).
+        slope: inclination of the platform towards +x (deg).
     """
     model = Model(name="DynamicWalkerModel", gravity=(0.0, -9.80665, 0.0))
 
@@ -110,8 +112,8 @@ def dynamic_walker(
         )
         knees.append(knee)
 
-    # The exercise turns the plane by -1.57, not by a right angle, and lays it at half the brick's
-    # height.
+    # As in the exercise, the plane is rotated by -1.57 rad, not by a right angle, and lies at half the
+    # height of the brick.
     ground_plane = model.add(
         ContactHalfSpace(
             name="PlatformContact",
@@ -122,33 +124,33 @@ def dynamic_walker(
     )
     spheres = [
         *(
-            _sphere(f"{side[0]}HipContact", pelvis, (0.0, 0.0, z * pelvis_width))
+            _make_sphere(f"{side[0]}HipContact", pelvis, (0.0, 0.0, z * pelvis_width))
             for side, z, _ in SIDES
         ),
         *(
-            _sphere(f"{side[0]}KneeContact", shank, (0.0, thigh_length / 2, 0.0))
+            _make_sphere(f"{side[0]}KneeContact", shank, (0.0, thigh_length / 2, 0.0))
             for (side, _, _), shank in zip(SIDES, shanks, strict=True)
         ),
         *(
-            _sphere(f"{side[0]}FootContact", shank, (0.0, -shank_length / 2, 0.0))
+            _make_sphere(f"{side[0]}FootContact", shank, (0.0, -shank_length / 2, 0.0))
             for (side, _, _), shank in zip(SIDES, shanks, strict=True)
         ),
     ]
     model.add(*spheres)
     for sphere in spheres:
-        model.add(_contact(sphere, ground_plane))
+        model.add(_make_contact(sphere, ground_plane))
     for hip in hips:
-        model.add(_limit(hip, upper=100.0, lower=-100.0))
+        model.add(_make_limit(hip, upper=100.0, lower=-100.0))
     for knee in knees:
-        model.add(_limit(knee, upper=0.0, lower=-140.0))
+        model.add(_make_limit(knee, upper=0.0, lower=-140.0))
     return model
 
 
-def _sphere(name: str, body: Body, location: tuple[float, float, float]) -> ContactSphere:
+def _make_sphere(name: str, body: Body, location: tuple[float, float, float]) -> ContactSphere:
     return ContactSphere(name=name, socket_frame=body, location=location, radius=0.05)
 
 
-def _contact(sphere: ContactSphere, plane: ContactGeometry) -> HuntCrossleyForce:
+def _make_contact(sphere: ContactSphere, plane: ContactGeometry) -> HuntCrossleyForce:
     material = HuntCrossleyForce.ContactParameters(
         geometry=(sphere, plane),
         stiffness=1e6,
@@ -164,7 +166,7 @@ def _contact(sphere: ContactSphere, plane: ContactGeometry) -> HuntCrossleyForce
     )
 
 
-def _limit(coordinate: Coordinate, *, upper: float, lower: float) -> CoordinateLimitForce:
+def _make_limit(coordinate: Coordinate, *, upper: float, lower: float) -> CoordinateLimitForce:
     return CoordinateLimitForce(
         name=coordinate.name.replace("_rz", "LimitTorque"),
         coordinate=coordinate,

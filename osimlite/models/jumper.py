@@ -1,12 +1,12 @@
-"""A human who jumps by the muscles of both legs, in the sagittal plane.
+"""Model of a human who jumps with the muscles of both legs, in the sagittal plane.
 
-In the style of the Dynamic Jumper that comes with OpenSim, and made anew. Masses, mass centers and
-radii of gyration are near those that D. A. Winter gives for a human of 75 kg and 1.78 m
-(Biomechanics and Motor Control of Human Movement), strengths and fiber lengths near those of
-OpenSim's Gait10dof18musc. Each tendon is as long as it must be for the fibers to be at their
-optimal length in a pose from the middle of the muscle's range.
+It resembles the Dynamic Jumper that comes with OpenSim, but was built anew. Masses, mass centres
+and radii of gyration are near those of D. A. Winter for a human of 75 kg and 1.78 m (Biomechanics
+and Motor Control of Human Movement), strengths and fiber lengths near those of OpenSim's
+Gait10dof18musc. Each tendon is so long that the fibers have their optimal length in a pose from the
+middle of the muscle's range.
 
-The frame of the torso stands between the hips, those of femur, tibia and foot in hip, knee and
+The origin of the torso is between the hips, those of femur, tibia and foot are in hip, knee and
 ankle.
 """
 
@@ -38,77 +38,97 @@ from osimlite.schema.paths import (
 )
 from osimlite.schema.wrapping import WrapCylinder
 
-CONTROLS = Path(__file__).with_name("jumper_controls.sto")
-"""The excitations of the jump; ``docs/jumping.md`` tells how they were found."""
+CONTROLS_FILE = Path(__file__).with_name("jumper_controls.sto")
+"""Table with the excitations of the jump; `docs/jumping.md` describes the optimization that found
+them.
+"""
 SIDES = (("r", 0.09), ("l", -0.09))
-"""Name and place (m) to the right of each leg."""
-THIGH, SHANK, ANKLE = 0.43, 0.43, 0.075
-"""Lengths of thigh and shank, and height of the ankle above the sole (m)."""
+"""Per leg its name and its distance to the right of the sagittal plane (m)."""
+THIGH_LENGTH_M = 0.43
+"""Distance from hip to knee (m)."""
+SHANK_LENGTH_M = 0.43
+"""Distance from knee to ankle (m)."""
+ANKLE_HEIGHT_M = 0.075
+"""Height of the ankle above the sole (m)."""
 
-SQUAT = {"hip_flexion": 100.0, "knee_angle": -90.0, "ankle_angle": 29.99202}
-"""Angles of each leg at the start (deg), with which the soles stand on the ground."""
-PELVIS_TILT, PELVIS_HEIGHT = -40.0, 0.6599952
-"""Of the torso at the start (deg, m)."""
+SQUAT_DEG = {"hip_flexion": 100.0, "knee_angle": -90.0, "ankle_angle": 29.99202}
+"""Initial angles of each leg (deg), with which the soles stand on the ground."""
+PELVIS_TILT_DEG = -40.0
+"""Initial angle of the torso (deg)."""
+PELVIS_HEIGHT_M = 0.6599952
+"""Initial height of the hips (m)."""
 
 
-class Muscle(NamedTuple):
-    """A muscle of each leg."""
+class MuscleParameters(NamedTuple):
+    """Parameters of a muscle of each leg.
 
-    force: float  # maximum isometric (N)
-    fiber: float  # optimal length (m)
-    tendon: float  # slack length (m)
-    pennation: float  # at optimal fiber length (deg)
-    path: tuple[tuple[str, float, float], ...]  # body, forward and up (m) of each point
-    wrap: str  # the cylinder that the path bends around
-    activation: float  # with which all are in balance in the squat
-    length: float  # of the fibers there (m)
+    Attributes:
+        force: maximum isometric force (N).
+        fiber: optimal fiber length (m).
+        tendon: tendon slack length (m).
+        pennation: pennation angle at the optimal fiber length (deg).
+        path: points of the path: body, forward and upward position in it (m).
+        wrap: name of the cylinder around which the path wraps, or "".
+        activation: activation with which the squat is in equilibrium.
+        length: fiber length in the squat (m).
+    """
+
+    force: float
+    fiber: float
+    tendon: float
+    pennation: float
+    path: tuple[tuple[str, float, float], ...]
+    wrap: str
+    activation: float
+    length: float
 
 
 MUSCLES = {
-    "glut_max": Muscle(
+    "glut_max": MuscleParameters(
         2500.0, 0.15, 0.283, 0.0, (("torso", -0.09, 0.03), ("femur", -0.02, -0.32)), "hip_back", 0.252, 0.178267
     ),
-    "hamstrings": Muscle(
+    "hamstrings": MuscleParameters(
         2700.0, 0.11, 0.348, 0.0, (("torso", -0.06, -0.06), ("tibia", -0.02, -0.045)), "", 0.0766, 0.127993
     ),
-    "iliopsoas": Muscle(
+    "iliopsoas": MuscleParameters(
         2200.0, 0.10, 0.191, 8.0, (("torso", -0.03, 0.22), ("femur", 0.0, -0.07)), "hip_front", 0.01, 0.04441
     ),
-    "rect_fem": Muscle(
+    "rect_fem": MuscleParameters(
         1200.0, 0.10, 0.446, 5.0, (("torso", 0.04, 0.03), ("tibia", 0.04, -0.07)), "knee", 0.01826, 0.075119
     ),
-    "vasti": Muscle(
+    "vasti": MuscleParameters(
         5500.0, 0.10, 0.228, 5.0, (("femur", 0.035, -0.22), ("tibia", 0.04, -0.07)), "knee", 0.29943, 0.113474
     ),
-    "gastroc": Muscle(
+    "gastroc": MuscleParameters(
         2300.0, 0.06, 0.395, 15.0, (("femur", -0.02, -0.42), ("foot", -0.055, -0.02)), "", 0.01218, 0.061574
     ),
-    "soleus": Muscle(
+    "soleus": MuscleParameters(
         4000.0, 0.05, 0.262, 20.0, (("tibia", -0.02, -0.15), ("foot", -0.055, -0.02)), "", 0.04179, 0.062816
     ),
-    "tib_ant": Muscle(
+    "tib_ant": MuscleParameters(
         1700.0, 0.09, 0.252, 5.0, (("tibia", 0.015, -0.16), ("tibia", 0.03, -0.38), ("foot", 0.09, -0.045)),
         "", 0.01, 0.051784,
     ),
 }  # fmt: skip
+"""Muscles of each leg by name."""
 
 
 def jumper(driven: bool = True) -> Model:
     """Build a human model that squats and jumps with the muscles of its legs.
 
     Args:
-        driven: whether the controller is there that makes it jump; without it, the muscles are
-            there to be driven.
+        driven: whether to add the controller that makes it jump; without it the muscles have no
+            excitations.
     """
     model = Model(name="Jumper", gravity=(0.0, -9.80665, 0.0))
     model.model_visual_preferences.model_display_hints.show_wrap_geometry = False
-    torso = _body(model, "torso", 50.8, (0.0, 0.32, 0.0), 3.3)
-    _draw(model, torso, "trunk", (0.0, 0.28, 0.0), Ellipsoid(radii=(0.10, 0.30, 0.15)))
-    _draw(model, torso, "pelvis", (-0.02, 0.03, 0.0), Ellipsoid(radii=(0.09, 0.08, 0.13)))
-    _draw(model, torso, "head", (0.02, 0.69, 0.0), Sphere(radius=0.105))
-    turn = Coordinate(name="pelvis_tilt", range=(-pi, pi), default_value=radians(PELVIS_TILT))
+    torso = _add_body(model, "torso", 50.8, (0.0, 0.32, 0.0), 3.3)
+    _add_shape(model, torso, "trunk", (0.0, 0.28, 0.0), Ellipsoid(radii=(0.10, 0.30, 0.15)))
+    _add_shape(model, torso, "pelvis", (-0.02, 0.03, 0.0), Ellipsoid(radii=(0.09, 0.08, 0.13)))
+    _add_shape(model, torso, "head", (0.02, 0.69, 0.0), Sphere(radius=0.105))
+    turn = Coordinate(name="pelvis_tilt", range=(-pi, pi), default_value=radians(PELVIS_TILT_DEG))
     forward = Coordinate(name="pelvis_tx", range=(-5.0, 5.0))
-    up = Coordinate(name="pelvis_ty", range=(-1.0, 3.0), default_value=PELVIS_HEIGHT)
+    up = Coordinate(name="pelvis_ty", range=(-1.0, 3.0), default_value=PELVIS_HEIGHT_M)
     model.add(
         PlanarJoint(name="ground_pelvis", coordinates=[turn, forward, up]).between(
             model.ground, torso
@@ -120,15 +140,19 @@ def jumper(driven: bool = True) -> Model:
     for side, z in SIDES:
         _add_leg(model, torso, side, z, floor)
     if driven:
-        drive(model, CONTROLS)
+        add_jump_controller(model, CONTROLS_FILE)
     return model
 
 
-def drive(model: Model, file: Path) -> None:
-    """Add the controller that gives each muscle the excitation of a table, with straight lines between its rows.
+def add_jump_controller(model: Model, file: Path) -> None:
+    """Add a controller with the excitations of a table, interpolated linearly.
+
+    Args:
+        model: model with the muscles.
+        file: table with one column per muscle.
 
     Raises:
-        DocumentError: the file is no table.
+        DocumentError: the file is not a table.
     """
     with TableStream(file) as table:
         times, rows = zip(*table, strict=True)
@@ -147,33 +171,35 @@ def drive(model: Model, file: Path) -> None:
 
 def _add_leg(model: Model, torso: Body, side: str, z: float, floor: ContactHalfSpace) -> None:
     """Add a leg with its contacts, limits and muscles."""
-    femur = _body(model, f"femur_{side}", 7.5, (0.0, -0.186, 0.0), 0.145)
-    tibia = _body(model, f"tibia_{side}", 3.5, (0.0, -0.186, 0.0), 0.059)
-    foot = _body(model, f"foot_{side}", 1.1, (0.05, -0.04, 0.0), 0.005)
-    _draw(
+    femur = _add_body(model, f"femur_{side}", 7.5, (0.0, -0.186, 0.0), 0.145)
+    tibia = _add_body(model, f"tibia_{side}", 3.5, (0.0, -0.186, 0.0), 0.059)
+    foot = _add_body(model, f"foot_{side}", 1.1, (0.05, -0.04, 0.0), 0.005)
+    _add_shape(
         model,
         femur,
         f"thigh_{side}",
-        (0.0, -THIGH / 2, 0.0),
-        Ellipsoid(radii=(0.03, THIGH / 2 + 0.02, 0.03)),
+        (0.0, -THIGH_LENGTH_M / 2, 0.0),
+        Ellipsoid(radii=(0.03, THIGH_LENGTH_M / 2 + 0.02, 0.03)),
     )
-    _draw(
+    _add_shape(
         model,
         tibia,
         f"shank_{side}",
-        (0.0, -SHANK / 2, 0.0),
-        Ellipsoid(radii=(0.025, SHANK / 2 + 0.02, 0.025)),
+        (0.0, -SHANK_LENGTH_M / 2, 0.0),
+        Ellipsoid(radii=(0.025, SHANK_LENGTH_M / 2 + 0.02, 0.025)),
     )
-    _draw(model, foot, f"shoe_{side}", (0.05, -0.045, 0.0), Ellipsoid(radii=(0.13, 0.025, 0.035)))
+    _add_shape(
+        model, foot, f"shoe_{side}", (0.05, -0.045, 0.0), Ellipsoid(radii=(0.13, 0.025, 0.035))
+    )
     for name, coordinate, parent, child, at, low, high in (
         ("hip", "hip_flexion", torso, femur, (0.0, 0.0, z), -15.0, 120.0),
-        ("knee", "knee_angle", femur, tibia, (0.0, -THIGH, 0.0), -115.0, 0.0),
-        ("ankle", "ankle_angle", tibia, foot, (0.0, -SHANK, 0.0), -45.0, 35.0),
+        ("knee", "knee_angle", femur, tibia, (0.0, -THIGH_LENGTH_M, 0.0), -115.0, 0.0),
+        ("ankle", "ankle_angle", tibia, foot, (0.0, -SHANK_LENGTH_M, 0.0), -45.0, 35.0),
     ):
         angle = Coordinate(
             name=f"{coordinate}_{side}",
             range=(radians(low), radians(high)),
-            default_value=radians(SQUAT[coordinate]),
+            default_value=radians(SQUAT_DEG[coordinate]),
         )
         model.add(
             PinJoint(name=f"{name}_{side}", coordinates=[angle]).between(parent, child, at=at)
@@ -191,7 +217,7 @@ def _add_leg(model: Model, torso: Body, side: str, z: float, floor: ContactHalfS
             )
         )
     for name, x, radius in (("heel", -0.05, 0.03), ("ball", 0.15, 0.025)):
-        place = (x, radius - ANKLE, 0.0)
+        place = (x, radius - ANKLE_HEIGHT_M, 0.0)
         _add_contact(
             model,
             ContactSphere(name=f"{name}_{side}", socket_frame=foot, location=place, radius=radius),
@@ -200,7 +226,7 @@ def _add_leg(model: Model, torso: Body, side: str, z: float, floor: ContactHalfS
     for body, name, at, radius, quadrant in (
         (femur, "hip_back", (0.0, 0.0, 0.0), 0.06, "-x"),
         (torso, "hip_front", (0.0, 0.0, z), 0.035, "+x"),
-        (femur, "knee", (0.0, -THIGH, 0.0), 0.042, "+x"),
+        (femur, "knee", (0.0, -THIGH_LENGTH_M, 0.0), 0.042, "+x"),
     ):
         body.wrap_object_set.objects.append(
             WrapCylinder(
@@ -218,7 +244,11 @@ def _add_leg(model: Model, torso: Body, side: str, z: float, floor: ContactHalfS
 
 
 def _add_muscle(
-    model: Model, name: str, muscle: Muscle, places: dict[str, tuple[Body, float]], side: str
+    model: Model,
+    name: str,
+    muscle: MuscleParameters,
+    places: dict[str, tuple[Body, float]],
+    side: str,
 ) -> None:
     points: list[AbstractPathPoint] = [
         PathPoint(
@@ -247,15 +277,17 @@ def _add_muscle(
     )
 
 
-def _body(model: Model, name: str, mass: float, center: Vec3, inertia: float) -> Body:
-    """Add a body; only the inertia across the plane does something."""
+def _add_body(model: Model, name: str, mass: float, center: Vec3, inertia: float) -> Body:
+    """Add a body; only its inertia about the z axis matters, because it moves in the sagittal
+    plane.
+    """
     body = Body(
         name=name, mass=mass, mass_center=center, inertia=(inertia, inertia, inertia, 0.0, 0.0, 0.0)
     )
     return model.add(body)
 
 
-def _draw(model: Model, body: Body, name: str, at: Vec3, shape: Geometry) -> None:
+def _add_shape(model: Model, body: Body, name: str, at: Vec3, shape: Geometry) -> None:
     model.add(PhysicalOffsetFrame(name=name, socket_parent=body, translation=at)).attach(shape)
 
 

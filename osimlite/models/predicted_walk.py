@@ -1,7 +1,7 @@
-"""A human who walks because a step is cheap: the jumper's body made smooth, and the study of Moco that finds its gait.
+"""Predicted walk: the jumper's body with smooth forces, and a Moco study that finds its gait.
 
-Nothing of a walk is given but its speed, how far the trunk may lean, and that the second step
-mirrors the first.
+Only the speed, the range of the trunk angle, and the symmetry of two steps are prescribed; the rest
+follows from the least effort.
 """
 
 from __future__ import annotations
@@ -43,13 +43,21 @@ from osimlite.schema.probe_types import (
 from osimlite.schema.tools.processors import ModelProcessor
 
 NAME = "human-walks"
-SPEED = 1.2
-"""Of the mass center, m/s."""
-RANGES = {"hip_flexion": (-30.0, 50.0), "knee_angle": (-80.0, 0.0), "ankle_angle": (-30.0, 25.0)}
-"""Of a gait, deg: in these the polynomials of the paths are good."""
+"""Name of the model and of the study."""
+SPEED_M_S = 1.2
+"""Mean speed of the mass centre (m/s), a comfortable walking speed."""
+RANGES_DEG = {
+    "hip_flexion": (-30.0, 50.0),
+    "knee_angle": (-80.0, 0.0),
+    "ankle_angle": (-30.0, 25.0),
+}
+"""Ranges of the coordinates of each leg (deg): those of a gait, in which the polynomials of the
+paths are accurate.
+"""
 PELVIS = "/jointset/ground_pelvis/"
-STEP = 0.55
-"""How long the step of the guess takes, s."""
+"""Beginning of the paths of the coordinates of the pelvis."""
+GUESS_STEP_S = 0.55
+"""Duration of the step of the initial guess (s)."""
 
 
 def human_walks() -> Model:
@@ -57,12 +65,12 @@ def human_walks() -> Model:
     model = human()
     model.name = NAME
     for coordinate in model.components(Coordinate):
-        if (limits := RANGES.get(coordinate.name[:-2])) is not None:
+        if (limits := RANGES_DEG.get(coordinate.name[:-2])) is not None:
             coordinate.range = (radians(limits[0]), radians(limits[1]))
     model = modify(model, muscles="degroote", tendon="rigid", paths="polynomial", contact="smooth")
     for contact in model.components(SmoothSphereHalfSpaceForce):
-        # A shoe and the fat under the heel: softer than what bounces off the ground for a
-        # thousandth of a second.
+        # The stiffness of a shoe and a heel pad. The jumper's stiffer contact bounces within a
+        # millisecond, which the mesh of the study cannot resolve.
         contact.stiffness, contact.dissipation = 1e6, 2.0
         contact.static_friction = contact.dynamic_friction = 0.8
         contact.transition_velocity = 0.2
@@ -74,15 +82,16 @@ def human_walks() -> Model:
     return model
 
 
-def walking_study(model: Model, file: str, guess: str) -> MocoStudy:
-    """Half a stride at a given speed, over the distance cheap for the muscles and not rough.
+def make_walking_study(model: Model, file: str, guess: str) -> MocoStudy:
+    """Return a study of half a stride at a given speed, with minimal effort and roughness per
+    distance.
 
     Args:
-        model: as of :func:`human_walks`.
-        file: that it is in.
-        guess: the file to start from.
+        model: model of :func:`human_walks`.
+        file: name of the model's file.
+        guess: name of the file of the initial guess.
     """
-    states, controls = _names(model)
+    states, controls = _list_variables(model)
     pairs = {
         kind: [
             MocoPeriodicityGoalPair(initial_variable=name, final_variable=_mirror_path(name))
@@ -91,10 +100,10 @@ def walking_study(model: Model, file: str, guess: str) -> MocoStudy:
         for kind, names in (("state", states), ("control", controls))
     }
     forward = f"{PELVIS}pelvis_tx/value"
-    # A muscle that is twice as large takes twice as much energy.
+    # Weights are proportional to volume: a muscle twice as large consumes twice the energy.
     sizes = {
         f"/forceset/{m.name}": m.max_isometric_force * m.optimal_fiber_length
-        for m in _muscles(model)
+        for m in _list_muscles(model)
     }
     mean = sum(sizes.values()) / len(sizes)
     weights = [MocoWeight(name=name, weight=round(size / mean, 3)) for name, size in sizes.items()]
@@ -104,14 +113,14 @@ def walking_study(model: Model, file: str, guess: str) -> MocoStudy:
             state_pairs=[pair for pair in pairs["state"] if pair.initial_variable != forward],
             control_pairs=pairs["control"],
         ),
-        MocoAverageSpeedGoal(name="speed", desired_average_speed=SPEED),
+        MocoAverageSpeedGoal(name="speed", desired_average_speed=SPEED_M_S),
         MocoControlGoal(
             name="effort",
             weight=10.0,
             control_weights=MocoWeightSet(name="control_weights", objects=weights),
             divide_by_displacement=True,
         ),
-        # Without it the feet stamp: what a muscle does not do, the ground does.
+        # Without this goal the feet stamp: braking by an impact costs no muscle effort.
         MocoOutputGoal(
             name="roughness",
             weight=0.1,
@@ -147,14 +156,18 @@ def walking_study(model: Model, file: str, guess: str) -> MocoStudy:
     return MocoStudy(name=NAME, problem=MocoProblem(name="problem", phases=phase), solver=solver)
 
 
-def stepping(model: Model) -> MocoTrajectory:
-    """A rough step: one leg goes back straight, the other swings forward with a bent knee, and no muscle does much."""
-    states, controls = _names(model)
+def make_guess(model: Model) -> MocoTrajectory:
+    """Return a rough step as initial guess: one leg moves back straight, the other swings forward
+    with a bent knee.
+
+    All muscles have the same small activation.
+    """
+    states, controls = _list_variables(model)
     part = np.linspace(0.0, 1.0, 21)
     bump = np.sin(pi * part)
     angles: dict[str, Array] = {
         "pelvis_tilt": np.full(21, -0.05),
-        "pelvis_tx": SPEED * STEP * part,
+        "pelvis_tx": SPEED_M_S * GUESS_STEP_S * part,
         "pelvis_ty": np.full(21, 0.93),
         "hip_flexion_r": np.radians(25.0 - 40.0 * part),
         "hip_flexion_l": np.radians(40.0 * part - 15.0),
@@ -167,40 +180,47 @@ def stepping(model: Model) -> MocoTrajectory:
     for name in (*states, *controls):
         owner, _, what = name.rpartition("/")
         values = angles.get(owner.rpartition("/")[2], np.full(21, 0.05))
-        columns[name] = np.gradient(values, STEP * part) if what == "speed" else values
+        columns[name] = np.gradient(values, GUESS_STEP_S * part) if what == "speed" else values
     return MocoTrajectory(
-        STEP * part, columns, {"states": tuple(states), "controls": tuple(controls)}
+        GUESS_STEP_S * part, columns, {"states": tuple(states), "controls": tuple(controls)}
     )
 
 
 def write_study(model: Model, file: Path) -> list[Path]:
-    """Write the study and its guess beside the file of the model.
+    """Write the study and its initial guess beside the file of the model.
+
+    Args:
+        model: model of :func:`human_walks`.
+        file: path of the model's file.
+
+    Returns:
+        Paths of the study and of the guess.
 
     Raises:
-        OsimliteError: they cannot be written.
+        OsimliteError: a file cannot be written.
     """
     study, guess = file.with_suffix(".omoco"), file.with_name(f"{file.stem}_guess.sto")
-    stepping(model).write(guess)
-    write(walking_study(model, file.name, guess.name), study)
+    make_guess(model).write(guess)
+    write(make_walking_study(model, file.name, guess.name), study)
     return [study, guess]
 
 
-def _muscles(model: Model) -> list[DeGrooteFregly2016Muscle]:
+def _list_muscles(model: Model) -> list[DeGrooteFregly2016Muscle]:
     return [
         force for force in model.force_set.objects if isinstance(force, DeGrooteFregly2016Muscle)
     ]
 
 
-def _names(model: Model) -> tuple[list[str], list[str]]:
-    """Paths of the states and of the controls."""
+def _list_variables(model: Model) -> tuple[list[str], list[str]]:
+    """Return the paths of the states and of the controls."""
     paths = [info.path for info in build_mechanism(model).coordinates]
-    controls = [f"/forceset/{muscle.name}" for muscle in _muscles(model)]
+    controls = [f"/forceset/{muscle.name}" for muscle in _list_muscles(model)]
     kinematic = [f"{path}/{what}" for what in ("value", "speed") for path in paths]
     return [*kinematic, *(f"{name}/activation" for name in controls)], controls
 
 
 def _mirror_path(name: str) -> str:
-    """The path of the same on the other side."""
+    """Return the path of the same variable on the other side."""
     swap = str.maketrans("rl", "lr")
     return "/".join(
         part[:-1] + part[-1].translate(swap) if part[-2:] in ("_r", "_l") else part

@@ -1,4 +1,4 @@
-"""Where a model to build comes from: a built-in name, Python, or a data file."""
+"""Sources of models to build: built-in names, Python functions, and data files."""
 
 from __future__ import annotations
 
@@ -23,18 +23,19 @@ from osimlite.models import BUILT_IN, STUDIES
 from osimlite.schema.model import Model
 
 _WORDS = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
+"""Spellings of true and false in parameters."""
 
 
 def make_model(source: str, parameters: Mapping[str, str] | None = None) -> Model:
-    """Make the model that `source` describes.
+    """Make the model that a source describes.
 
     Args:
-        source: a built-in name (``dynamic-walker``), ``file.py``, ``file.py:function``,
-            ``package.module:function``, or a ``.yaml`` or ``.json`` model.
-        parameters: arguments of the model function, as text; a data file takes none.
+        source: a built-in name (`dynamic-walker`), `file.py`, `file.py:function`,
+            `package.module:function`, or a `.yaml` or `.json` model.
+        parameters: arguments of the model function as text; a data file has none.
 
     Raises:
-        OsimliteError: there is no such source, it has no such parameter, or it does not return a
+        OsimliteError: the source or a parameter is unknown, or the function does not return a
             Model.
     """
     if source.endswith(SUFFIXES):
@@ -43,8 +44,8 @@ def make_model(source: str, parameters: Mapping[str, str] | None = None) -> Mode
                 f"'{source}' is data and has no parameters; edit the file, or build from Python"
             )
         return read_data(source)
-    function = _function(source)
-    arguments = _arguments(function, parameters or {}, source)
+    function = _find_function(source)
+    arguments = _parse_arguments(function, parameters or {}, source)
     file = inspect.getsourcefile(function)
     with (
         locate_errors(str(file)),
@@ -57,10 +58,18 @@ def make_model(source: str, parameters: Mapping[str, str] | None = None) -> Mode
 
 
 def write_beside(source: str, model: Model, file: Path) -> list[Path]:
-    """Write what belongs to a built-in model beside its file, such as a study; the files.
+    """Write further files of a built-in model, such as a study, beside its file.
+
+    Args:
+        source: built-in name.
+        model: model that was built.
+        file: path of its file.
+
+    Returns:
+        Paths of the files.
 
     Raises:
-        OsimliteError: it cannot be written.
+        OsimliteError: a file cannot be written.
     """
     if source not in STUDIES:
         return []
@@ -68,8 +77,14 @@ def write_beside(source: str, model: Model, file: Path) -> list[Path]:
     return getattr(_import_built_in(place, source), name)(model, file)
 
 
-def parameters_of(source: str) -> dict[str, Any]:
-    """Names and defaults of the parameters of a model function; a data file has none.
+def list_parameters(source: str) -> dict[str, Any]:
+    """List the parameters of a model function.
+
+    Args:
+        source: source of the model.
+
+    Returns:
+        Default per name; a data file has no parameters.
 
     Raises:
         OsimliteError: there is no such source.
@@ -78,14 +93,14 @@ def parameters_of(source: str) -> dict[str, Any]:
         return {}
     return {
         name: parameter.default
-        for name, parameter in inspect.signature(_function(source)).parameters.items()
+        for name, parameter in inspect.signature(_find_function(source)).parameters.items()
     }
 
 
-def describe(name: str) -> str:
+def describe_model(name: str) -> str:
     """Return one line about a built-in model: its summary and its parameters, or what it needs to be built."""
     try:
-        function = _function(name)
+        function = _find_function(name)
     except MissingDependency as error:
         return error.message
     summary = (
@@ -98,7 +113,7 @@ def describe(name: str) -> str:
     return f"{summary} ({parameters})" if parameters else summary
 
 
-def _function(source: str) -> Callable[..., Any]:
+def _find_function(source: str) -> Callable[..., Any]:
     target = BUILT_IN.get(source, source)
     place, _, name = target.rpartition(":")
     if not place:
@@ -120,10 +135,10 @@ def _function(source: str) -> Callable[..., Any]:
         result = getattr(module, name, None)
         if not callable(result):
             raise OsimliteError(
-                f"'{place}' has no function '{name}'{suggest_name(name, _functions(module))}"
+                f"'{place}' has no function '{name}'{suggest_name(name, _list_functions(module))}"
             )
         return result
-    return _only_function(module, place)
+    return _select_function(module, place)
 
 
 def _import_built_in(module: str, source: str) -> ModuleType:
@@ -141,7 +156,7 @@ def _import_built_in(module: str, source: str) -> ModuleType:
         ) from error
 
 
-def _functions(module: ModuleType) -> dict[str, Callable[..., Any]]:
+def _list_functions(module: ModuleType) -> dict[str, Callable[..., Any]]:
     return {
         name: value
         for name, value in vars(module).items()
@@ -151,12 +166,14 @@ def _functions(module: ModuleType) -> dict[str, Callable[..., Any]]:
     }
 
 
-def _only_function(module: ModuleType, place: str) -> Callable[..., Any]:
-    """The function of a file that makes its model: the one annotated to return a Model, or the only one."""
+def _select_function(module: ModuleType, place: str) -> Callable[..., Any]:
+    """Return the function of a file that makes its model: the one annotated to return a Model, or
+    the only one.
+    """
     ready = getattr(module, "model", None)
     if isinstance(ready, Model):
         return lambda: ready
-    functions = _functions(module)
+    functions = _list_functions(module)
     annotated = {name: f for name, f in functions.items() if _returns_model(f)}
     candidates = annotated or functions
     if len(candidates) == 1:
@@ -176,7 +193,7 @@ def _returns_model(function: Callable[..., Any]) -> bool:
         return False
 
 
-def _arguments(
+def _parse_arguments(
     function: Callable[..., Any], parameters: Mapping[str, str], source: str
 ) -> dict[str, Any]:
     known = inspect.signature(function).parameters
@@ -185,7 +202,7 @@ def _arguments(
         if name not in known:
             hint = suggest_name(name, known) or f"; it has {join_words(known) or 'none'}"
             raise OsimliteError(f"'{source}' has no parameter '{name}'{hint}")
-        arguments[name] = _value(name, text, known[name])
+        arguments[name] = _parse_value(name, text, known[name])
     for name, parameter in known.items():
         optional = parameter.default is not parameter.empty or parameter.kind in (
             parameter.VAR_POSITIONAL,
@@ -198,7 +215,7 @@ def _arguments(
     return arguments
 
 
-def _value(name: str, text: str, parameter: inspect.Parameter) -> Any:
+def _parse_value(name: str, text: str, parameter: inspect.Parameter) -> Any:
     default = parameter.default
     kind: type | None = None if default in (inspect.Parameter.empty, None) else type(default)
     try:

@@ -1,8 +1,9 @@
-"""Walkers that walk, and the exercise's own from the start from which it gets furthest.
+"""Walkers with stable gait cycles, and the walker of the exercise with the initial state of its
+longest walk.
 
 Each is the model of the exercise (:func:`osimlite.models.dynamic_walker.dynamic_walker`) with few
-other numbers, and starts at its default values and speeds in the middle of a step.
-``docs/gaits.md`` tells how they were found.
+changed numbers, and starts from its default values and speeds in the middle of a step.
+`docs/gaits.md` describes the search that found them.
 """
 
 from __future__ import annotations
@@ -25,7 +26,9 @@ STEADY_START = {
     "RKnee_rz": (0.08302322544374824, 0.07743947068366194),
     "LKnee_rz": (-1.3832146912601972, -1.2144648371656874),
 }
-"""Value and speed of each coordinate on the cycle of the steady walker, 0.4 of a step after a heel strike."""
+"""Value and speed of each coordinate on the cycle of the steady walker, at 0.4 of a step after
+touch-down.
+"""
 
 
 HUMAN_START = {
@@ -47,31 +50,35 @@ FURTHEST_START = {
     "RKnee_rz": (-0.547171, 2.01019),
     "LKnee_rz": (-1.7308, 3.35975),
 }
-"""Value and speed of each coordinate of the best initial state of the exercise's walker that was found."""
+"""Value and speed of each coordinate of the best initial state that was found for the walker of the
+exercise.
+"""
 
 
 def furthest_walker() -> Model:
-    """Build the walker of the exercise with the initial state from which it makes four steps before it falls.
+    """Build the walker of the exercise with the initial state from which it makes four steps before
+    it falls.
 
-    It stands on its right foot, which is at rest, the left leg drawn up and swinging forward.
-
-    It has no cycle that was found: its shanks are so hard to turn that a leg swings too slowly.
+    It stands on its right foot, which is at rest, with the left leg drawn up and swinging forward.
+    No cycle was found for this walker: the inertia of its shanks is so large that a leg swings too
+    slowly.
     """
     model = dynamic_walker()
     model.name = "FurthestWalker"
-    return _ready(model, FURTHEST_START, 10.0)
+    return _set_start_and_track(model, FURTHEST_START, 10.0)
 
 
 def steady_walker(shank_inertia: float = 0.0921, foot_ahead: float = 0.0744) -> Model:
     """Build a walker that differs from that of the exercise in two properties and never stops.
 
-    Its shanks have a smaller moment of inertia about the knee's axis (1 kg·m² in the exercise), and
-    its feet stand out to the front (not at all in the exercise). It walks down the exercise's slope
-    of 10 degrees.
+    Its shanks have a smaller moment of inertia about the knee axis (1 kg·m² in the exercise), and
+    its feet are ahead of the shanks' axes (on them in the exercise). It walks down the slope of the
+    exercise, 10 degrees.
 
     Args:
-        shank_inertia: of each shank about its mass centre and the axis of the knee (kg·m²).
-        foot_ahead: how far the sphere of each foot is in front of the shank's axis (m).
+        shank_inertia: moment of inertia of each shank about its mass centre and the knee axis
+            (kg·m²).
+        foot_ahead: distance of the sphere of each foot in front of the shank's axis (m).
     """
     model = dynamic_walker()
     model.name = "SteadyWalker"
@@ -82,7 +89,7 @@ def steady_walker(shank_inertia: float = 0.0921, foot_ahead: float = 0.0744) -> 
         if sphere.name.endswith("FootContact"):
             _, y, z = sphere.location
             sphere.location = (foot_ahead, y, z)
-    return _ready(model, STEADY_START, 100.0)
+    return _set_start_and_track(model, STEADY_START, 100.0)
 
 
 def human_walker(
@@ -93,17 +100,17 @@ def human_walker(
 ) -> Model:
     """Build a walker with the mass distribution of a human, on a gentle slope.
 
-    71.3 kg: head, arms and trunk weigh 47.5 kg and stand on the hips, a thigh weighs 7.9 kg and a
-    shank with its foot 4 kg. The mass centres and the radii of gyration are near those that D. A.
-    Winter gives for humans (Biomechanics and Motor Control of Human Movement). The feet are round,
-    as McGeer's were.
+    Of 71.3 kg, head, arms and trunk weigh 47.5 kg and stand on the hips, a thigh weighs 7.9 kg and
+    a shank with its foot 4 kg. Mass centres and radii of gyration are near those of D. A. Winter
+    (Biomechanics and Motor Control of Human Movement). The feet are round, as those of McGeer's
+    walkers.
 
     Args:
-        slope: how far the platform falls towards +x (deg).
-        foot_radius: of the sphere of each foot (m); its lowest point stays where it is in the
+        slope: inclination of the platform towards +x (deg).
+        foot_radius: radius of the sphere of each foot (m); its lowest point is that of the
             exercise.
-        foot_ahead: how far the sphere is in front of the shank's axis (m).
-        knee_stiffness: of what stops the knees (N·m/deg).
+        foot_ahead: distance of the sphere in front of the shank's axis (m).
+        knee_stiffness: stiffness of the stops of the knees (N·m/deg).
     """
     model = dynamic_walker(slope=slope)
     model.name = "HumanWalker"
@@ -137,18 +144,20 @@ def human_walker(
                 20.0,
                 0.265,
             )
-    return _ready(model, HUMAN_START, 100.0)
+    return _set_start_and_track(model, HUMAN_START, 100.0)
 
 
-def _ready(model: Model, start: Mapping[str, tuple[float, float]], way: float) -> Model:
-    """Put the start in, and make room for so long a way (m)."""
+def _set_start_and_track(
+    model: Model, start: Mapping[str, tuple[float, float]], way: float
+) -> Model:
+    """Set the initial state, and extend platform and coordinate range for a distance `way` (m)."""
     for coordinate in model.components(Coordinate):
         if coordinate.name in start:
             coordinate.default_value, coordinate.default_speed_value = start[coordinate.name]
         if coordinate.name == "Pelvis_tx":
             coordinate.range = (-1.0, way)
         elif coordinate.name.endswith("Knee_rz"):
-            # The knees give way a little beyond straight.
+            # The stops of the knees are elastic, so that the knees exceed 0 a little.
             coordinate.range = (coordinate.range[0], 0.5)
     for platform in model.components(Brick):
         _, thickness, width = platform.half_lengths

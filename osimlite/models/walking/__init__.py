@@ -1,4 +1,6 @@
-"""A human who walks by reflexes: the jumper's body, standing, and a scenario whose parameters our own search found."""
+"""Reflex walk: the jumper's body standing, and a scenario of SCONE whose parameters were optimized
+with osimlite.
+"""
 
 from __future__ import annotations
 
@@ -13,15 +15,16 @@ from osimlite.schema.forces import HuntCrossleyForce
 from osimlite.schema.model import Model
 
 SCENARIO = "human-walks"
-"""Name of the scenario, and of its files beside this one: what it is, its start, and its parameters."""
+"""Name of the scenario, and of its files beside this module."""
 ENDINGS = ".scone", ".zml", ".par"
-FAR = -5.0, 1000.0
-"""How far the human may walk, m."""
+"""Endings of the files: scenario, initial state, parameters."""
+TRACK_RANGE_M = -5.0, 1000.0
+"""Range of the horizontal position of the human (m)."""
 STANDING = {
     "pelvis_tilt": -0.05, "pelvis_ty": 0.945, "hip_flexion_r": 0.1, "hip_flexion_l": 0.1, "knee_angle_r": -0.1,
     "knee_angle_l": -0.1, "ankle_angle_r": 0.05, "ankle_angle_l": 0.05,
 }  # fmt: skip
-"""Rad, m."""
+"""Initial pose (rad, m)."""
 
 
 def human() -> Model:
@@ -42,16 +45,22 @@ def human() -> Model:
     for coordinate in model.components(Coordinate):
         coordinate.default_value = STANDING.get(coordinate.name, 0.0)
         if coordinate.name == "pelvis_tx":
-            coordinate.range = FAR
+            coordinate.range = TRACK_RANGE_M
     return model
 
 
 def write_scenario(folder: Path) -> Path:
-    """Write the human and the scenario into a folder, to be run and changed; the path of the scenario.
+    """Write the human and the scenario into a folder, where they can be run and changed.
+
+    Args:
+        folder: output folder; created if necessary.
+
+    Returns:
+        Path of the scenario.
 
     Raises:
-        SettingError: a changed copy exists already.
-        OsimliteError: they cannot be written.
+        SettingError: the folder has a changed copy.
+        OsimliteError: a file cannot be written.
     """
     make_folder(folder)
     files = {folder / "human.osim": to_text(human()).encode()}
