@@ -33,7 +33,8 @@ def describe_fit(
     """
     result = motion.summary
     if "rms_marker_error" in result:
-        rms, largest = result["rms_marker_error"], result["largest_marker_error"]
+        rms = result["rms_marker_error"]
+        largest = result["largest_marker_error"]
         most = " and ".join(f"{100.0 * limit:g}" for limit in advice)
         advised = (
             ""

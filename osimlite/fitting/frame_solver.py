@@ -104,10 +104,8 @@ class FrameSolver:
             SettingError: the arrays do not fit the numbers of markers and sensors.
             SimulationError: no pose satisfies the constraints.
         """
-        marker_positions, turned = (
-            np.asarray(positions, dtype=float),
-            np.asarray(orientations, dtype=float),
-        )
+        marker_positions = np.asarray(positions, dtype=float)
+        turned = np.asarray(orientations, dtype=float)
         if marker_positions.shape != (len(self.markers), 3) and (
             self.markers or marker_positions.size
         ):

@@ -143,7 +143,8 @@ class PoseFit:
         count = len(measured)
         free = len(self.order)
         given = measured.reshape(count, -1)
-        frames, result = np.empty((count, self.width)), np.empty((count, self.found))
+        frames = np.empty((count, self.width))
+        result = np.empty((count, self.found))
         frames[:, : self.measured] = given[:, : self.measured]
         frames[:, self.measured : self.measured + len(self._goals)] = given[:, self.measured :][
             :, self._goals
@@ -231,7 +232,8 @@ class SingleFrameFit:
     def __init__(self, fit: PoseFit) -> None:
         self._fit = fit
         self._values = fit.mechanism.values({}).copy()
-        self._row, self._found = np.empty(fit.width), np.empty(fit.found)
+        self._row = np.empty(fit.width)
+        self._found = np.empty(fit.found)
         self._run = fit.bind_arrays(self._row, self._found)
         free = len(fit.order)
         end = len(fit.order) + 3 * fit.markers

@@ -132,7 +132,8 @@ def scale(
             raise SettingError(f"expected positive factors of '{name}', found {numbers}")
         by_hand.append(Scale(segment=name, scales=tuple(map(float, three))))
     measuring.apply_factors(by_hand)
-    results, mechanism = measuring.found, measuring.mechanism
+    results = measuring.found
+    mechanism = measuring.mechanism
     scale_model(
         copy,
         results.factors,
@@ -182,7 +183,9 @@ def compute_scaled_model(tool: ScaleTool, folder: Path) -> ScaledModel:
         SettingError: the setup has an unknown name or lacks a file.
         DocumentError: a file cannot be read.
     """
-    maker, scaler, placer = tool.generic_model_maker, tool.model_scaler, tool.marker_placer
+    maker = tool.generic_model_maker
+    scaler = tool.model_scaler
+    placer = tool.marker_placer
     if maker.model_file in NO_FILE:
         raise SettingError("the setup names no model; set model_file of GenericModelMaker")
     result = ScaledModel(read_copy(folder / maker.model_file, Model))
@@ -233,7 +236,8 @@ def _scale_by_setup(tool: ScaleTool, model: Model, folder: Path) -> ScaleFactors
                 f"scaling_order has '{word}'; expected {MEASUREMENTS} or {MANUAL_SCALE}{near}"
             )
     keeps = scaler.preserve_mass_distribution
-    result, mechanism = measuring.found, measuring.mechanism
+    result = measuring.found
+    mechanism = measuring.mechanism
     scale_model(
         model, result.factors, tool.mass, preserve_mass_distribution=keeps, mechanism=mechanism
     )

@@ -144,7 +144,8 @@ def scale_inertia(body: Body, factors: Array, *, scales_mass: bool) -> None:
     mass = body.mass
     volume = abs(float(np.prod(factors)))
     xx, yy, zz, xy, xz, yz = body.inertia
-    moments, products = np.array((xx, yy, zz)), np.array((xy, xz, yz))
+    moments = np.array((xx, yy, zz))
+    products = np.array((xy, xz, yz))
     if scales_mass:
         body.mass *= volume
     denser = volume if scales_mass else 1.0
@@ -152,7 +153,8 @@ def scale_inertia(body: Body, factors: Array, *, scales_mass: bool) -> None:
     if body.mass <= MASSLESS_KG:
         moments, products = np.zeros(3), np.zeros(3)
     elif _is_equal_factor(x, y) and _is_equal_factor(y, z):
-        moments, products = moments * denser * (x * x), products * denser * (x * x)
+        moments = moments * denser * (x * x)
+        products = products * denser * (x * x)
     else:
         # A cylinder of the same mass and moments: I_axis = m r²/2, I_side = m (l²/12 + r²/4).
         axis = int(np.argmin(moments))

@@ -90,7 +90,8 @@ class SelectedFrames:
                 self.notes.append(f"'{name}' is left out: no frame has three markers of the model")
         if not measured:
             raise SettingError("no frame of any trial has three markers of the model")
-        self.times, self.measured = np.array(times), np.array(measured)
+        self.times = np.array(times)
+        self.measured = np.array(measured)
         self.measured[~np.isfinite(self.measured).all(axis=2)] = np.nan
 
     def exclude_outliers(self, positions: Array) -> bool:

@@ -199,7 +199,8 @@ def write_study(model: Model, file: Path) -> list[Path]:
     Raises:
         OsimliteError: a file cannot be written.
     """
-    study, guess = file.with_suffix(".omoco"), file.with_name(f"{file.stem}_guess.sto")
+    study = file.with_suffix(".omoco")
+    guess = file.with_name(f"{file.stem}_guess.sto")
     make_guess(model).write(guess)
     write(make_walking_study(model, file.name, guess.name), study)
     return [study, guess]

@@ -118,17 +118,13 @@ def human_walker(
         if body.name == "Pelvis":
             body.mass = 47.5
         elif body.name.endswith("Thigh"):
-            body.mass, body.mass_center, body.inertia = (
-                7.9,
-                (0.0, 0.027, 0.0),
-                (2.0, 2.0, 0.11, 0.0, 0.0, 0.0),
-            )
+            body.mass = 7.9
+            body.mass_center = (0.0, 0.027, 0.0)
+            body.inertia = (2.0, 2.0, 0.11, 0.0, 0.0, 0.0)
         elif body.name.endswith("Shank"):
-            body.mass, body.mass_center, body.inertia = (
-                4.0,
-                (0.0, -0.046, 0.0),
-                (1.0, 1.0, 0.133, 0.0, 0.0, 0.0),
-            )
+            body.mass = 4.0
+            body.mass_center = (0.0, -0.046, 0.0)
+            body.inertia = (1.0, 1.0, 0.133, 0.0, 0.0, 0.0)
     for sphere in model.components(ContactSphere):
         if sphere.name.endswith("FootContact"):
             _, y, z = sphere.location
@@ -136,14 +132,13 @@ def human_walker(
             sphere.radius = foot_radius
     for contact in model.components(HuntCrossleyForce):
         for parameters in contact.contact_parameters.objects:
-            parameters.stiffness, parameters.dissipation = 1.55e7, 5.2
+            parameters.stiffness = 1.55e7
+            parameters.dissipation = 5.2
     for limit in model.components(CoordinateLimitForce):
         if limit.name.endswith("KneeLimitTorque"):
-            limit.upper_stiffness, limit.lower_stiffness, limit.damping = (
-                knee_stiffness,
-                20.0,
-                0.265,
-            )
+            limit.upper_stiffness = knee_stiffness
+            limit.lower_stiffness = 20.0
+            limit.damping = 0.265
     return _set_start_and_track(model, HUMAN_START, 100.0)
 
 

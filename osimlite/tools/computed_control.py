@@ -279,7 +279,8 @@ class ComputedControl:
         """Return the nearest state (y,) that satisfies the constraints."""
         if not self.simulation.constraints:
             return list(y)
-        state, mechanism = self.engine.state, self.simulation.mechanism
+        state = self.engine.state
+        mechanism = self.simulation.mechanism
         q = mechanism.assemble(np.array(state.values(y)), t)
         u = mechanism.project_speeds(q, np.array(state.speeds(y)), t)
         result: list[float] = state.pack(q.tolist(), u.tolist(), y[self._first :])
@@ -300,7 +301,8 @@ class ComputedControl:
             Controls (a,) at the end of the window.
         """
         state = self.engine.state
-        q, u = np.array(state.values(y)), np.array(state.speeds(y))
+        q = np.array(state.values(y))
+        u = np.array(state.speeds(y))
         now, ahead = self.desired.evaluate(np.array([t, target]))
         # The prediction adds the present deviation to the desired pose at the end of the window.
         self._corrections = np.stack([q - now[0], u - now[1]])
@@ -318,7 +320,8 @@ class ComputedControl:
         end = self._predict_state(target, z)
         # A control that hardly changes its force has no unique value: keep the lower bound.
         high = np.where(most - least < MIN_FORCE_RANGE, low, high)
-        q_end, u_end = np.array(state.values(end)), np.array(state.speeds(end))
+        q_end = np.array(state.values(end))
+        u_end = np.array(state.speeds(end))
         bounds = np.minimum(least, most), np.maximum(least, most)
         forces, lacking = self.sharing.compute_forces(
             target, q_end, u_end, requested, errors[0], bounds

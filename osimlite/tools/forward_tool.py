@@ -103,7 +103,9 @@ def _compute_start(job: Job, outcome: Outcome, simulation: Simulation) -> tuple[
 def _write_tables(job: Job, outcome: Outcome, motion: Motion) -> None:
     """Add the tables of states and controls."""
     setup: ForwardTool = job.setup
-    simulation, times, precision = motion.simulation, motion.times, setup.output_precision
+    simulation = motion.simulation
+    times = motion.times
+    precision = setup.output_precision
     turned = [
         info.path for info in motion.mechanism.coordinates if info.motion_type == "rotational"
     ]

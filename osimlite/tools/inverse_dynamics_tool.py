@@ -252,9 +252,11 @@ def _compute_hinge_load(hinge: Array, target_forces: Array) -> Array:
     """
     turning = hinge[:, :3]
     moving = hinge[:, 3:]
-    force, torque = _solve_shortest(moving, target_forces), _solve_shortest(turning, target_forces)
+    force = _solve_shortest(moving, target_forces)
+    torque = _solve_shortest(turning, target_forces)
     by_force, by_torque = moving @ force, turning @ torque
-    size_by_force, size_by_torque = np.linalg.norm(by_force), np.linalg.norm(by_torque)
+    size_by_force = np.linalg.norm(by_force)
+    size_by_torque = np.linalg.norm(by_torque)
     # Both can do some of the work: the one that does more per size comes first.
     if size_by_force > SIGNIFICANT_REAL and size_by_torque > SIGNIFICANT_REAL:
         if size_by_torque * np.linalg.norm(force) > size_by_force * np.linalg.norm(torque):

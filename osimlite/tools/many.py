@@ -366,7 +366,9 @@ class _Schedule:
         journal: _Journal,
         progress: Callable[[int, int], object] | None,
     ) -> None:
-        self.setups, self.journal, self.progress = setups, journal, progress
+        self.setups = setups
+        self.journal = journal
+        self.progress = progress
         self.trials: dict[Path, RunRecord] = {}
         self.needs = _find_needs(setups)
         self._given: set[Path] = set()

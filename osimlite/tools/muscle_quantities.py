@@ -59,7 +59,9 @@ def compute_quantities(known: Mapping[str, Array], muscles: Sequence[Any]) -> Mu
         known: rows (t, m) of `LAW_RECORDS`, and of SPRING if the law records it.
         muscles: m muscles.
     """
-    length, cos, speed = known["fiber_length"], known["cos_pennation"], known["fiber_velocity"]
+    length = known["fiber_length"]
+    cos = known["cos_pennation"]
+    speed = known["fiber_velocity"]
     active = known["active_fiber_force"]
     passive = known["passive_fiber_force"]
     tension = known["tension"]

@@ -305,7 +305,9 @@ class ForceDistribution:
     def __init__(
         self, job: Job, model: Model, mechanism: Mechanism, tasks: TrackingTasks, exact: bool
     ) -> None:
-        self.tasks, self.exact, self.mechanism = tasks, exact, mechanism
+        self.tasks = tasks
+        self.exact = exact
+        self.mechanism = mechanism
         self._unit = build_static_optimization(job, model, mechanism, muscles="isometric")
         self._strong = build_static_optimization(job, model, mechanism) if exact else None
         self.names = self._unit.names

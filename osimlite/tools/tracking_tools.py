@@ -146,11 +146,9 @@ def _compute_average_residuals(job: Job, model: Model, desired: DesiredMotion) -
         for time in (first, last)
     ]
     selected = slice(rows[0], rows[1] + 1)
-    times, values, speeds = (
-        desired.times[selected],
-        desired.values[selected],
-        desired.speeds[selected],
-    )
+    times = desired.times[selected]
+    values = desired.values[selected]
+    speeds = desired.speeds[selected]
     (wanted,) = derivatives_of_samples(desired.times, desired.speeds, times, (1,))
     forces = sharing.balance_accelerations(times, values, speeds, wanted)
     return _average_residual_columns(times, sharing.names, forces)
@@ -208,7 +206,8 @@ def _track_motion(
         if isinstance(item, Kinematics):
             item.in_degrees = True
     analyses = find_analyses(job)
-    start, end = max(setup.initial_time, desired.start), min(setup.final_time, desired.end)
+    start = max(setup.initial_time, desired.start)
+    end = min(setup.final_time, desired.end)
     if not start < end - window:
         raise job.create_error(
             f"the motion from {start:g} s to {end:g} s is shorter than a window of {window:g} s; "
@@ -275,7 +274,8 @@ def _write_tables(
     job: Job, outcome: Outcome, tracker: ComputedControl, motion: Motion, followed: TrackedMotion
 ) -> None:
     """Add the tables of states, controls and errors, and the document of the controls."""
-    name, precision = job.setup.name, job.setup.output_precision
+    name = job.setup.name
+    precision = job.setup.output_precision
 
     def add(ending: str, table: StoTable) -> None:
         outcome.add_table(job.get_results_path(f"{name}_{ending}.sto"), table, precision=precision)

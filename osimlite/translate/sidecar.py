@@ -86,7 +86,8 @@ def _list_coordinates(robot: Robot) -> list[dict[str, Any]]:
 
 
 def _list_joints(robot: Robot) -> list[dict[str, Any]]:
-    following, coordinates = mimics(robot), robot.mechanism.coordinates
+    following = mimics(robot)
+    coordinates = robot.mechanism.coordinates
     result: list[dict[str, Any]] = []
     for joint in robot.moving:
         said: dict[str, Any] = {

@@ -80,7 +80,9 @@ class _Survey:
     """Pass over the components of a model, with one method per kind of component."""
 
     def __init__(self, model: Model, robot: Robot, fidelity: Fidelity) -> None:
-        self.model, self.robot, self.fidelity = model, robot, fidelity
+        self.model = model
+        self.robot = robot
+        self.fidelity = fidelity
         self.tree = model.tree()
         self.note = fidelity.add
 

@@ -275,7 +275,8 @@ def _replace_joints_with_welds(
                 name=f"{base.name}_offset", socket_parent=tree.path_of(base) or ""
             )
             if isinstance(frame, PhysicalOffsetFrame):
-                offset.translation, offset.orientation = frame.translation, frame.orientation
+                offset.translation = frame.translation
+                offset.orientation = frame.orientation
             frames.append(offset)
         one, other = (frame.name for frame in frames)
         weld = WeldJoint(

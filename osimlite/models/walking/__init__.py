@@ -37,7 +37,8 @@ def human() -> Model:
         if isinstance(force, HuntCrossleyForce)
     }
     for side in "rl":
-        heel, ball = forces[f"heel_{side}_force"], forces[f"ball_{side}_force"]
+        heel = forces[f"heel_{side}_force"]
+        ball = forces[f"ball_{side}_force"]
         (own,), (other,) = heel.contact_parameters.objects, ball.contact_parameters.objects
         own.geometry = (*own.geometry[:1], *other.geometry)
         heel.name = f"foot_{side}"

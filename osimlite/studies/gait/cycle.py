@@ -145,7 +145,8 @@ def find_cycle(
         taken += 1
     state_found = step_map.expand(reduced)
     images = step_map(state_found[None])
-    engine, per_stride = step_map.engine, step_map.exchange is None
+    engine = step_map.engine
+    per_stride = step_map.exchange is None
     feet = [engine.contacts.index(name) for foot in step_map.footing.feet for name in foot]
     # All contacts of the feet together move by as much as the walker does in a complete cycle.
     before, after = (

@@ -289,10 +289,8 @@ class CycleSearch:
         models = rng.random((-(-count // STARTS_PER_MODEL), len(self._numbers)))
         starts = rng.random((count, len(self._starts)))
         fractions = np.repeat(models, STARTS_PER_MODEL, axis=0)[:count]
-        states, vectors = (
-            np.zeros((count, engine.state.size)),
-            np.zeros((count, len(engine.numbers))),
-        )
+        states = np.zeros((count, engine.state.size))
+        vectors = np.zeros((count, len(engine.numbers)))
         variants: list[Variant] = []
         made = np.ones(count, dtype=bool)
         for row in range(count):
@@ -311,7 +309,9 @@ class CycleSearch:
                     variant.numbers,
                 )
                 variants.append(variant)
-        states, vectors, fractions = states[made], vectors[made], fractions[made]
+        states = states[made]
+        vectors = vectors[made]
+        fractions = fractions[made]
         if not len(states):
             return []
         states = self.variants.prepare_states(
@@ -425,7 +425,8 @@ class CycleSearch:
             tolerance=CYCLE_TOLERANCE if fine else SEARCH_TOLERANCE,
             max_steps=MAX_NEWTON_STEPS if fine else 8,
         )
-        cost, walking = result.largest + SCUFF_COST * result.scuffs, 0.0
+        cost = result.largest + SCUFF_COST * result.scuffs
+        walking = 0.0
         # The basin takes as long as many cycles; it is measured only where it counts.
         if cost < self.stable or fine:
             walking = self._measure_basin(step_map, result)
@@ -542,7 +543,8 @@ class _ClosingProblem:
         decreases.
         """
         self._sizes.append(float(np.linalg.norm(intermediate_result.fun)))
-        here, before = self._sizes[-1], self._sizes[-1 - PATIENCE :][0]
+        here = self._sizes[-1]
+        before = self._sizes[-1 - PATIENCE :][0]
         if here < NEWTON_RANGE or (len(self._sizes) > PATIENCE and here > 0.5 * before):
             raise StopIteration
 

@@ -136,7 +136,8 @@ def _find_soles(engine: BatchEngine) -> list[_SoleContact]:
         if not isinstance(element, HuntCrossley):
             continue
         for index, pair in enumerate(element.pairs):
-            plane, sphere = element.surfaces[pair.first], element.surfaces[pair.second]
+            plane = element.surfaces[pair.first]
+            sphere = element.surfaces[pair.second]
             if plane.is_half_space and not sphere.radii and sphere.body != GROUND:
                 joint = engine.mechanism.bodies[sphere.body].mobilizer.child_frame[:3, 3]
                 reach = (

@@ -305,7 +305,8 @@ def choose_start(
 def _name_values(engine: Any, state: Floats) -> dict[str, tuple[float, float]]:
     """Return value and speed of each coordinate of a state by name."""
     names = [engine.mechanism.coordinates[place].name for place in engine.order]
-    values, speeds = state[: len(names)], state[len(names) : 2 * len(names)]
+    values = state[: len(names)]
+    speeds = state[len(names) : 2 * len(names)]
     return dict(zip(names, zip(values.tolist(), speeds.tolist(), strict=True), strict=True))
 
 

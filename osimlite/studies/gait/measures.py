@@ -122,9 +122,11 @@ def _compute_progress(walk: Walk, places: Sequence[float]) -> float:
     end (m).
     """
     if walk.scuffs:
-        until, lead = walk.scuffs[0].time, walk.scuffs[0].length
+        until = walk.scuffs[0].time
+        lead = walk.scuffs[0].length
     else:
-        until, last = walk.end, walk.steps[-1].foot if walk.steps else int(np.argmax(places))
+        until = walk.end
+        last = walk.steps[-1].foot if walk.steps else int(np.argmax(places))
         lead = max(place for foot, place in enumerate(places) if foot != last) - places[last]
     near = MIN_STEP_LENGTH_M / (MIN_STEP_LENGTH_M + max(MIN_STEP_LENGTH_M - lead, 0.0))
     return walk.clean_steps + 0.5 * (near + until / (until + 1.0))

@@ -43,7 +43,9 @@ class StabilityOptimization:
 
     def __init__(self, search: CycleSearch, found: ModelCycle, digits: int) -> None:
         self.cycles: list[ModelCycle] = []
-        self._search, self._first, self._digits = search, found, digits
+        self._search = search
+        self._first = found
+        self._digits = digits
         self._costs: dict[bytes, float] = {}
         self._written: list[ModelCycle] = []
 

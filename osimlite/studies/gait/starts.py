@@ -41,10 +41,8 @@ def find_carriers(engine: BatchEngine, footing: FootContacts) -> Carriers:
     contacts = _list_contacts(engine, footing)
     rng = np.random.default_rng(0)
     poses = np.hstack((rng.uniform(-0.2, 0.2, (3, n)), np.zeros((3, n))))
-    here, depths = (
-        _compute_contact_centres(engine, poses)[:, contacts],
-        measure_along_slope(engine, poses)[1][:, contacts],
-    )
+    here = _compute_contact_centres(engine, poses)[:, contacts]
+    depths = measure_along_slope(engine, poses)[1][:, contacts]
     places, lift = [], None
     for index in range(n):
         moved = poses.copy()

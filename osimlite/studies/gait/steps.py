@@ -241,7 +241,9 @@ def follow_events(
     last, first_place = -1, None
     for (time, name, begins), state, along in zip(events, states, reached, strict=True):
         if name.startswith(FALL_PREFIX) or (begins and name in footing.falls):
-            walk.end, walk.ending, walk.fell_on = time, "fell", name.removeprefix(FALL_PREFIX)
+            walk.end = time
+            walk.ending = "fell"
+            walk.fell_on = name.removeprefix(FALL_PREFIX)
             break
         if name not in foot_of:
             continue
@@ -308,7 +310,9 @@ def measure_along_slope(
         np.zeros(len(states), dtype=np.int64) if rows is None else np.array(rows, dtype=np.int64)
     )
     places = engine.locate_contacts(states, table, which)
-    origin, normal, center = places[..., :3], places[..., 3:6], places[..., 6:]
+    origin = places[..., :3]
+    normal = places[..., 3:6]
+    center = places[..., 6:]
     gravity = table[:, :3]
     pull = (
         gravity[which][:, None, :]

@@ -115,7 +115,8 @@ def _compute_effects(engine: BatchEngine, state: Floats) -> Floats:
     It consists of the derivatives of all rates of coordinates and speeds, and of its own rate, by
     the auxiliary state, and of its own rate.
     """
-    first, here = 2 * len(engine.order), np.array(engine.compute_derivative(0.0, state.tolist()))
+    first = 2 * len(engine.order)
+    here = np.array(engine.compute_derivative(0.0, state.tolist()))
     rows = []
     for index in range(first, len(state)):
         moved = state.copy()

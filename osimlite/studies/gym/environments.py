@@ -196,8 +196,10 @@ class MuscleEnv(gymnasium.Env[Any, Any]):
     ) -> None:
         self._all = _ObservedCopies(_resolve_task(task, model, reward, options), 1)
         self.render_mode = _check_render_mode(render_mode)
-        self.observation_space, self.action_space = self._all.observations, self._all.actions
-        self.labels, self.controls = self._all.labels, self._all.copies.controls
+        self.observation_space = self._all.observations
+        self.action_space = self._all.actions
+        self.labels = self._all.labels
+        self.controls = self._all.copies.controls
         self._steps = 0
 
     def reset(
@@ -281,16 +283,16 @@ class MuscleVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
         render_mode: str | None = None,
         **options: Any,
     ) -> None:
-        self.num_envs, self.render_mode = num_envs, _check_render_mode(render_mode)
+        self.num_envs = num_envs
+        self.render_mode = _check_render_mode(render_mode)
         self._all = _ObservedCopies(_resolve_task(task, model, reward, options), num_envs)
-        self.single_observation_space, self.single_action_space = (
-            self._all.observations,
-            self._all.actions,
-        )
+        self.single_observation_space = self._all.observations
+        self.single_action_space = self._all.actions
         batch = gymnasium.vector.utils.batch_space
         self.observation_space = batch(self.single_observation_space, num_envs)
         self.action_space = batch(self.single_action_space, num_envs)
-        self.labels, self.controls = self._all.labels, self._all.copies.controls
+        self.labels = self._all.labels
+        self.controls = self._all.copies.controls
         self._steps = np.zeros(num_envs, dtype=int)
         self._ended = np.zeros(num_envs, dtype=bool)
         self._random: list[np.random.Generator] = []

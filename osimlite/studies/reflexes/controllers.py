@@ -200,7 +200,8 @@ class Reflexes:
         """Read the noise of controls, as in SCONE, and of sensors, which is an addition of ours."""
         if self._is_noisy:
             raise node.error(f"there is a {NOISE} already")
-        self._is_noisy, noise = True, self._limits[:, LIMITS.SEED :]
+        self._is_noisy = True
+        noise = self._limits[:, LIMITS.SEED :]
         noise[:, 0] = seed = node.number("random_seed", 123.0)
         if not (seed.is_integer() and abs(seed) < MAX_NOISE_SEED):
             raise node.error(
@@ -223,7 +224,8 @@ class Reflexes:
         both sides.
         """
         symmetric = node.flag("symmetric", True)
-        include, exclude = node.text("include", "*"), node.text("exclude", "")
+        include = node.text("include", "*")
+        exclude = node.text("exclude", "")
         functions = [*node.select_all(*TIME_FUNCTIONS)]
         node.refuse_unread_parts(f"a {FEED_FORWARD}")
         if len(functions) != 1:
@@ -271,7 +273,8 @@ class Reflexes:
                     ("liftoff_threshold", DISABLED_THRESHOLD),
                 )
             }
-            stance, swing = of["stance_load_threshold"], node.get("swing_load_threshold")
+            stance = of["stance_load_threshold"]
+            swing = node.get("swing_load_threshold")
             loads = (
                 stance,
                 stance
@@ -384,7 +387,8 @@ class Reflexes:
                 else bare
             )
 
-        first, second = format_name(target), format_name(source)
+        first = format_name(target)
+        second = format_name(source)
         own = node.text("par_name", "")
         name = format_name(own) if own else first if first == second else f"{first}-{second}"
         number = self._find_index(node, target, self.walkers.names, leg)
@@ -498,7 +502,8 @@ class Reflexes:
         )
         # One step more for the current sensors, and one for the interpolation between two steps.
         history = int(np.ceil(max([*sensor_delays, self._limits[0, LIMITS.DELAY]]))) + 2
-        ints, more = [number for part in parts for number in part.ints], list[float]()
+        ints = [number for part in parts for number in part.ints]
+        more = list[float]()
         for source in self.sources:
             ints += (
                 source.kind,
@@ -507,7 +512,8 @@ class Reflexes:
             )
             more += source.numbers
         numbers = np.column_stack([numbers, np.tile(more, (len(numbers), 1))])
-        head, sensors = np.zeros(REFLEXES.HEAD, dtype=np.int64), len(self.sources)
+        head = np.zeros(REFLEXES.HEAD, dtype=np.int64)
+        sensors = len(self.sources)
         head[: REFLEXES.ROOM + 1] = (
             *(
                 len(self.terms),

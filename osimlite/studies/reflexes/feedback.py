@@ -63,25 +63,32 @@ class Feedback:
         values: Mapping[str, float] | str | Path = MappingProxyType({}),
     ) -> None:
         if isinstance(given, Mapping):
-            self._source_text, top, folder = "data of Python", make_node(given), Path()
+            self._source_text = "data of Python"
+            top = make_node(given)
+            folder = Path()
         else:
-            self._source_text, top, folder = str(given), read_settings(given), Path(given).parent
+            self._source_text = str(given)
+            top = read_settings(given)
+            folder = Path(given).parent
         optimizer = next((node for _, node in top.select_all(*OPTIMIZERS)), top)
         objective = optimizer.get("SimulationObjective")
         holder, model = top, top
         if objective is not None:
-            holder, model = objective, objective.get("ModelOpenSim4") or Node()
+            holder = objective
+            model = objective.get("ModelOpenSim4") or Node()
         found = holder.select_one(*CONTROLLERS)
         if found is None:
             raise holder.error(f"a controller is needed: {join_words(list(CONTROLLERS))}")
         self._kind, self._node = found
-        self.step, self._legs = read_control_step(model), read_leg_names(model)
+        self.step = read_control_step(model)
+        self._legs = read_leg_names(model)
         known = {
             name: best for name, (best, _, _) in read_initial_parameters(optimizer, folder).items()
         }
         if isinstance(values, str | Path):
             values = {name: best for name, (best, _, _) in read_par(values).items()}
-        self._initial, self._values = known, {**known, **values}
+        self._initial = known
+        self._values = {**known, **values}
         if objective is None:
             top.refuse_unread_parts("a file of a controller")
 
@@ -102,7 +109,8 @@ class Feedback:
             engine: engine of the model.
         """
         _, _, parameters = self._read(model, engine)
-        found, values = parameters.requested.values(), self._values
+        found = parameters.requested.values()
+        values = self._values
         return [
             Gain(each.name, values.get(each.name, each.mean), each.low, each.high) for each in found
         ]
@@ -121,10 +129,8 @@ class Feedback:
         )
 
     def _read(self, model: Model, engine: Any) -> tuple[SensedModel, Reflexes, Parameters]:
-        sensed, parameters = (
-            SensedModel(model, engine, 1, self.step, self._legs),
-            Parameters(self._values),
-        )
+        sensed = SensedModel(model, engine, 1, self.step, self._legs)
+        parameters = Parameters(self._values)
         reflexes = Reflexes(self._node, self._kind, sensed, parameters)
         for name in self._values:
             # The file of `init` may have more parameters than the controller uses.
@@ -149,11 +155,13 @@ class Feedback:
         plan, numbers = reflexes.pack()
         # Controls without reflexes are left to other sources, unless there is base noise, which acts
         # on all controls. Proportional noise of a control that is 0 is 0.
-        everything, is_noisy = np.arange(len(sensed.names)), numbers[0, LIMITS.CONTROL_NOISE] > 0.0
+        everything = np.arange(len(sensed.names))
+        is_noisy = numbers[0, LIMITS.CONTROL_NOISE] > 0.0
         targets = [term.ints[TERM.TARGET] for term in reflexes.terms]
         others = np.setdiff1d(everything, everything if is_noisy else targets)
         # With bounds of 0 the kernels add nothing to a control.
-        first, known = SENSOR_NUMBERS.HEAD + 2 * len(sensed.muscles), sensed.sensor_numbers.copy()
+        first = SENSOR_NUMBERS.HEAD + 2 * len(sensed.muscles)
+        known = sensed.sensor_numbers.copy()
         known[first + others] = known[first + len(sensed.names) + others] = 0.0
         return KernelController(
             tuple(sensed.paths),

@@ -110,7 +110,8 @@ def measure_gait(scenario: Scenario, walked: WalkResult) -> GaitMeasures | None:
     moments = list(zip(walked.states.times.tolist(), states.tolist(), strict=True))
     centre = locate_mass_centers(walkers.engine, moments)[:, :3]
     pelvis = locate_station(walkers.engine, moments, walkers.legs[0].base, np.zeros(3))[:, :3]
-    far, times = centre[-1, 0] - centre[0, 0], walked.states.times
+    far = centre[-1, 0] - centre[0, 0]
+    times = walked.states.times
     upper, lower = (
         (float(y.mean()), float(y.min()), float(y.max())) for y in (centre[:, 1], pelvis[:, 1])
     )
@@ -147,14 +148,17 @@ def measure_strides(times: Array, way: Array, loads: Array) -> Strides | None:
         for first, last in pairwise(begins):
             there = load[first:last][on[first:last]]
             middle = len(there) // 2
-            one, two = int(np.argmax(there[: middle or 1])), middle + int(np.argmax(there[middle:]))
+            one = int(np.argmax(there[: middle or 1]))
+            two = middle + int(np.argmax(there[middle:]))
             humps.append((there[one], there[one : two + 1].min(), there[two]))
-    start, end = min(begins[0] for begins in spans), max(begins[-1] for begins in spans)
+    start = min(begins[0] for begins in spans)
+    end = max(begins[-1] for begins in spans)
     count = sum(len(begins) - 1 for begins in spans)
     time, length = (
         sum(row[begins[-1]] - row[begins[0]] for begins in spans) / count for row in (times, way)
     )
-    both, peak = float(touches[start:end].all(axis=1).mean()), float(loads[start:end].max())
+    both = float(touches[start:end].all(axis=1).mean())
+    peak = float(loads[start:end].max())
     found = tuple(np.mean(humps, axis=0).tolist())
     return Strides(
         count, float(time), float(length), tuple(stance), both, found, peak, count + 2 * len(spans)

@@ -129,16 +129,20 @@ class Measure(ABC):
         self.count = walkers.count
         self.name = node.text("name", "") or self.default_name()
         self.weight = node.number("weight", 1.0)
-        threshold, soft = node.get("threshold"), node.get("soft_threshold")
+        threshold = node.get("threshold")
+        soft = node.get("soft_threshold")
         self.offset = node.number("result_offset", 0.0)
         self.threshold = None if threshold is None else node.number("threshold")
         # SCONE's soft threshold subtracts the threshold from the value, then cuts at zero.
         if soft is not None:
-            self.offset, self.threshold = -node.number("soft_threshold"), 0.0
+            self.offset = -node.number("soft_threshold")
+            self.threshold = 0.0
         self.transition = node.number("threshold_transition", 0.0)
-        self.start, self.stop = node.number("start_time", 0.0), node.number("stop_time", 0.0) or inf
+        self.start = node.number("start_time", 0.0)
+        self.stop = node.number("stop_time", 0.0) or inf
         if above is not None:
-            self.start, self.stop = max(self.start, above.start), min(self.stop, above.stop)
+            self.start = max(self.start, above.start)
+            self.stop = min(self.stop, above.stop)
         self.minimize = node.flag("minimize", self.minimize)
         self.report: dict[str, Array] = {}
         self.terms: dict[str, Array] = {}
@@ -212,10 +216,8 @@ class GaitMeasure(Measure):
 
     def read(self, node: Node) -> None:
         """Read the speed range and what counts as a step and a fall."""
-        self.low, self.high = (
-            node.number("min_velocity", 0.0),
-            node.number("max_velocity", SPEED_OF_LIGHT_M_S),
-        )
+        self.low = node.number("min_velocity", 0.0)
+        self.high = node.number("max_velocity", SPEED_OF_LIGHT_M_S)
         self.first_steps = int(node.number("initiation_steps", 2.0))
         self.least_speed = node.number("min_norm_velocity", 0.1)
         self.always = node.flag("always_apply_early_termination_penalty", False)
@@ -238,7 +240,9 @@ class GaitMeasure(Measure):
             times: times at which the walks ended (w,) (s).
             duration: longest duration (s); the time after a fall counts as steps of no value.
         """
-        result, speeds, counts = np.ones(self.count), np.zeros(self.count), np.zeros(self.count)
+        result = np.ones(self.count)
+        speeds = np.zeros(self.count)
+        counts = np.zeros(self.count)
         target = max(min(abs(self.low), abs(self.high)), self.least_speed)
         for k, room in enumerate(self.walkers.criteria_work[:, self._first :]):
             row = room[: GAIT_WORK.STEPS + 2 * int(room[GAIT_WORK.COUNT])].tolist()
@@ -282,10 +286,8 @@ class JumpMeasure(Measure):
             if node.get(key) is not None:
                 raise node.error(f"'{key}' of a JumpMeasure is not done here")
         self.walkers.expect_legs()
-        self.negates, at_peak = (
-            node.flag("negate_result", False),
-            node.flag("terminate_on_peak", True),
-        )
+        self.negates = node.flag("negate_result", False)
+        at_peak = node.flag("terminate_on_peak", True)
         numbers = (
             node.number("termination_height", 0.5),
             node.number("prepare_time", 0.2),
@@ -329,10 +331,8 @@ class EffortMeasure(Measure):
         self.by_distance = node.flag("use_cost_of_transport", False)
         self.least_distance = node.number("min_distance", 1.0)
         self.by_muscle = node.flag("use_average_per_muscle", False)
-        tension, density = (
-            node.number("specific_tension", 0.25e6),
-            node.number("muscle_density", 1059.7),
-        )
+        tension = node.number("specific_tension", 0.25e6)
+        density = node.number("muscle_density", 1059.7)
         slow = node.number("default_muscle_slow_twitch_ratio", 0.5)
         masses = walkers.strengths / tension * density * walkers.optimal
         # These change no result here: all muscles have the same ratio, and there is only a total.
@@ -404,14 +404,8 @@ class Penalty(Measure):
             times: times at which the walks ended (w,) (s).
             duration: longest duration (s).
         """
-        places, total = (
-            {
-                "sum": SAMPLE_WORK.TOTAL,
-                "highest": SAMPLE_WORK.HIGHEST,
-                "lowest": SAMPLE_WORK.LOWEST,
-            },
-            np.zeros(self.count),
-        )
+        places = {"sum": SAMPLE_WORK.TOTAL, "highest": SAMPLE_WORK.HIGHEST, "lowest": SAMPLE_WORK.LOWEST}
+        total = np.zeros(self.count)
         for mode, first in self._statistics:
             total += (
                 self.read_recorded(first, places[mode])
@@ -426,7 +420,8 @@ class DofMeasure(Penalty):
 
     def read(self, node: Node) -> None:
         """Read the coordinate and the ranges; rotations are in degrees unless `in_degrees` is false."""
-        name, senses = node.text("dof"), self.walkers.sensor_plan
+        name = node.text("dof")
+        senses = self.walkers.sensor_plan
         names = self.walkers.coordinates
         if name not in names and name + self.side in names:
             name += self.side

@@ -122,10 +122,13 @@ class Scenario:
         if isinstance(given, Mapping):
             self.folder, top = Path(), make_node(given)
         else:
-            self.folder, top = Path(given).parent, read_settings(given)
+            self.folder = Path(given).parent
+            top = read_settings(given)
         found = next(iter(top.select_all(*OPTIMIZERS)), None)
         self.optimizer = top if found is None else found[1]
-        self.population, self.generations, self.seed = DEFAULT_POPULATION, DEFAULT_GENERATIONS, 0
+        self.population = DEFAULT_POPULATION
+        self.generations = DEFAULT_GENERATIONS
+        self.seed = 0
         objective = self.optimizer.get("SimulationObjective")
         if objective is None:
             raise self.optimizer.error("a scenario needs a SimulationObjective in a CmaOptimizer")
@@ -188,7 +191,8 @@ class Scenario:
         ):
             settings.get(key)
         settings.refuse_unread_parts("a ModelOpenSim4")
-        controller, measure = objective.select_one(*CONTROLLERS), objective.select_one(*MEASURES)
+        controller = objective.select_one(*CONTROLLERS)
+        measure = objective.select_one(*MEASURES)
         if controller is None:
             other = next(
                 (name for name, _ in objective.parts if name.endswith("Controller")), "none"
@@ -305,7 +309,9 @@ class Candidates:
     """
 
     def __init__(self, scenario: Scenario, parameters: Parameters, duration: float) -> None:
-        self.scenario, self.parameters, self.duration = scenario, parameters, duration
+        self.scenario = scenario
+        self.parameters = parameters
+        self.duration = duration
         self.walkers = walkers = scenario.get_walkers(parameters.count)
         self._set_initial_states()
         kind, controller = scenario.controller
@@ -328,7 +334,9 @@ class Candidates:
         """Set the initial states: default of the model, then the file, then offsets that may be
         parameters.
         """
-        walkers, node, scenario = self.walkers, self.scenario.settings, self.scenario
+        walkers = self.walkers
+        node = self.scenario.settings
+        scenario = self.scenario
         states = walkers.copies.states
         walkers.copies.set_states(slice(None), np.tile(walkers.copies.start, (walkers.count, 1)))
         file = node.text("state_init_file", "")
@@ -443,7 +451,8 @@ def read_initial_parameters(optimizer: Node, folder: Path) -> dict[str, tuple[fl
     result: dict[str, tuple[float, float, float]] = {}
     for _, init in optimizer.select_all("init"):
         own = read_par(find_file(init.text("file"), folder))
-        factor, best = init.number("std_factor", 1.0), init.flag("use_best_as_mean", False)
+        factor = init.number("std_factor", 1.0)
+        best = init.flag("use_best_as_mean", False)
         result |= {name: (v[0], v[0] if best else v[1], factor * v[2]) for name, v in own.items()}
         init.refuse_unread_parts("an init")
     return result

@@ -94,9 +94,11 @@ def search_parameters(
         raise SettingError(
             f"'{path}' exists already: continue it with --resume, or name another folder"
         )
-    best, least = np.array([each.mean for each in own]), np.inf
+    best = np.array([each.mean for each in own])
+    least = np.inf
     if resume:
-        known, names = read_par(path), [each.name for each in own]
+        known = read_par(path)
+        names = [each.name for each in own]
         for name in sorted({*known} ^ {*names}):
             whose = "the scenario" if name in known else f"'{path}'"
             raise SettingError(f"{whose} has no parameter '{name}': they are of different searches")
@@ -137,7 +139,8 @@ def search_parameters(
             es.tell(list(points), walked.results.tolist())
             index = int(np.argmin(walked.results))
             if walked.results[index] < least:
-                best, least = values[index], float(walked.results[index])
+                best = values[index]
+                least = float(walked.results[index])
                 # SCONE continues from mean and standard deviation in the file, not from the best.
                 mean = middle + scale * es.result.xfavorite
                 stds = scale * es.sigma * np.sqrt(np.diag(es.C))

@@ -175,7 +175,8 @@ def _select_point_factory(what: str, kind: int) -> SourceFactory:
     """
 
     def feel(sensed: SensedModel, node: Node, number: int, side: str) -> Source:
-        offset, direction = node.vector("offset", "0 0 0"), node.vector("direction")
+        offset = node.vector("offset", "0 0 0")
+        direction = node.vector("direction")
         if not direction.any():
             raise node.error("'direction' is 0 0 0, along which nothing is sensed")
         # The offset is in the frame of the body, the kernels know its link only.

@@ -99,7 +99,8 @@ class SensedModel:
         self.step = step
         self.engine = engine
         self.mechanism: Mechanism = engine.mechanism
-        tree, known = model.tree(), engine.forces.controls.names
+        tree = model.tree()
+        known = engine.forces.controls.names
         # A control of an actuator with several has the path of the actuator, "_" and a number.
         owners: list[Any] = [
             tree.by_path.get(path) or tree.by_path[path.rpartition("_")[0]] for path in known
@@ -128,7 +129,10 @@ class SensedModel:
             if item.appliesForce and str(item.coordinate) in self.coordinates:
                 places = engine.find_offsets(model.tree().path_of(item), ("force",))
                 limits += self.coordinates.index(str(item.coordinate)), *places
-        m, n, b, legs = len(self.muscles), len(self.coordinates), len(bodies), len(self.legs)
+        m = len(self.muscles)
+        n = len(self.coordinates)
+        b = len(bodies)
+        legs = len(self.legs)
         # The kernels work on links, into which several bodies may be merged.
         centres = []
         for placement, body in zip(engine.placements, bodies, strict=True):
@@ -269,7 +273,8 @@ class Walkers(SensedModel):
             raise ModelError(
                 f"{join_words(others)} are no muscles, and efforts of muscles alone are known"
             )
-        state, size = self.copies.simulation.state, len(self.coordinates)
+        state = self.copies.simulation.state
+        size = len(self.coordinates)
         infos = self.mechanism.coordinates
         self.offsets = {
             **{f"{infos[k].path}/value": n for n, k in enumerate(state.order)},

@@ -274,10 +274,8 @@ class VariedControls:
             self._puts.append((function, "value", lambda values: values[places[0]]))
         elif kind == SWITCH:
             # A search may move one switch past another: sorting keeps the function defined.
-            x, y = (
-                (BEFORE_START_S, *(0.0 for _ in places)),
-                (float(k % 2) for k in range(len(places) + 1)),
-            )
+            x = (BEFORE_START_S, *(0.0 for _ in places))
+            y = (float(k % 2) for k in range(len(places) + 1))
             function = PiecewiseConstantFunction(x=x, y=tuple(y))
             self._puts.append(
                 (function, "x", lambda values: (BEFORE_START_S, *sorted(values[k] for k in places)))
@@ -291,7 +289,8 @@ class VariedControls:
                     if interpolation == "linear"
                     else PiecewiseConstantFunction
                 )
-                function, places = made(x=_extend_times(times)), (places[0], *places, places[-1])
+                function = made(x=_extend_times(times))
+                places = (places[0], *places, places[-1])
             function.y = (0.0,) * len(places)
             self._puts.append((function, "y", lambda values: tuple(values[k] for k in places)))
         return function

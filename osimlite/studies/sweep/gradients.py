@@ -128,17 +128,16 @@ class Gradients:
             result: Array = (both[:, 0] - both[:, 1]) / (2.0 * np.array(sizes)[:, None])
             return result
 
-        dy, dx = (
-            differentiate([item.start for item in near]).T,
-            differentiate([item.variant.numbers for item in near]).T,
-        )
+        dy = differentiate([item.start for item in near]).T
+        dx = differentiate([item.variant.numbers for item in near]).T
         runs = self._run(here)
         steps, (times, states) = self._get_tangent_steps(here.variant), self._record_motion(here)
         steps.take(here.variant.numbers, dx)
         moved = integrate_sensitivities(
             steps, times, states, dy, self._times, self._plan.accuracy, here.variant.state.names
         )
-        count, by = len(near), np.repeat(np.arange(len(free)), 2)
+        count = len(near)
+        by = np.repeat(np.arange(len(free)), 2)
         reports = np.repeat(runs.reports, count, axis=0)
         if self._plan.interval is not None:
             reports += changes[:, None, None] * moved[:, :, by].transpose(2, 0, 1)

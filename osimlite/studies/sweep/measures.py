@@ -333,7 +333,8 @@ def _find_state(engine: Any, name: str) -> tuple[int | None, float]:
     front, _, last = name.rpartition("/")
     if last not in ("value", "speed"):
         front, last = name, "value"
-    place, count = engine.mechanism.coordinate_index(front), len(engine.order)
+    place = engine.mechanism.coordinate_index(front)
+    count = len(engine.order)
     if place not in engine.order:
         return None, 0.0 if last == "speed" else engine.mechanism.coordinates[place].default_value
     return engine.order.index(place) + (count if last == "speed" else 0), 0.0

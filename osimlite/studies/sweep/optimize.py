@@ -330,8 +330,13 @@ class _Evaluations:
         workforce: Pool,
         progress: Progress | None,
     ) -> None:
-        self.plan, self.free, self.sign, self.is_bounded = plan, list(free), sign, is_bounded
-        self.budget, self.pool, self.progress = budget, workforce, progress
+        self.plan = plan
+        self.free = list(free)
+        self.sign = sign
+        self.is_bounded = is_bounded
+        self.budget = budget
+        self.pool = workforce
+        self.progress = progress
         self.objective = get_measure_name(plan.measures[0])
         self.count = self.batches = 0
         self.worst = 0.0
@@ -364,7 +369,8 @@ class _Evaluations:
                 evaluated.
             SettingError: a resumed search requests other points than before.
         """
-        requested, points = len(points), points[: self.budget - self.count]
+        requested = len(points)
+        points = points[: self.budget - self.count]
         if len(points) == 0:
             raise OutOfBudget
         values = self._compute_values(points)

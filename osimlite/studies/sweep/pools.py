@@ -88,5 +88,6 @@ def run_packed(packed: bytes, values: Floats) -> Block:
         OsimliteError: the plan cannot be run.
     """
     if getattr(_local, "packed", None) != packed:
-        _local.packed, _local.plan = packed, Plan.unpack(packed)
+        _local.packed = packed
+        _local.plan = Plan.unpack(packed)
     return _thread_runner(_local.plan).run(values)

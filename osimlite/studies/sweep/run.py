@@ -200,7 +200,10 @@ class _Dispatcher:
         outcome: Outcome,
         progress: Progress | None,
     ) -> None:
-        self.samples, self.pool, self.partial, self.outcome = samples, workforce, partial, outcome
+        self.samples = samples
+        self.pool = workforce
+        self.partial = partial
+        self.outcome = outcome
         self.progress = progress
         self.next = self.saved = partial.rows
         self.under_way = 0

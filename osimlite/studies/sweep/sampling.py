@@ -208,7 +208,8 @@ def _permute_indices(first: int, last: int, count: int, seed: int, column: int) 
     result: Counts = np.arange(first, last, dtype=np.uint64)
     beyond = np.ones(len(result), dtype=bool)
     while beyond.any():
-        left, right = result[beyond] >> np.uint64(half), result[beyond] & mask
+        left = result[beyond] >> np.uint64(half)
+        right = result[beyond] & mask
         for key in keys:
             left, right = right, left ^ (_mix_bits(right + key) & mask)
         result[beyond] = (left << np.uint64(half)) | right

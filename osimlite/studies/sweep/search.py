@@ -129,7 +129,8 @@ def run_differential_evolution(ask: CostFunction, search: Search) -> str:
         raise SettingError(
             "differential evolution stays within the ranges; take --method cma to leave them"
         )
-    rng, size = np.random.default_rng(search.seed), len(search.start)
+    rng = np.random.default_rng(search.seed)
+    size = len(search.start)
     first = rng.random((max(5, search.popsize or 10 * size), size))
     first[0] = search.start
     result = optimize.differential_evolution(
@@ -156,7 +157,8 @@ def run_nelder_mead(ask: CostFunction, search: Search) -> str:
         search: settings.
     """
     optimize = require("scipy.optimize", extra="sweep", purpose="the search by Nelder and Mead")
-    size, tolerance = len(search.start), search.tolerance if search.tolerance is not None else 1e-6
+    size = len(search.start)
+    tolerance = search.tolerance if search.tolerance is not None else 1e-6
     simplex = np.tile(search.start, (size + 1, 1))
     for k in range(size):
         simplex[k + 1, k] += (

@@ -353,7 +353,8 @@ def _list_coordinates(
     name: str, infos: Sequence[CoordinateInfo], is_speed: bool, model: Model
 ) -> tuple[Target, str]:
     """Return the target of coordinates and its unit; locked ones are varied by their default value."""
-    unit, locked = infos[0].unit or "rad | m", [info for info in infos if info.locked]
+    unit = infos[0].unit or "rad | m"
+    locked = [info for info in infos if info.locked]
     if locked and is_speed:
         raise SettingError(
             f"the coordinate '{locked[0].name}' is locked, so that it has no speed; unlock it in the model"

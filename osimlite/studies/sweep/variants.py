@@ -256,10 +256,8 @@ class Variants:
             ).tolist()
             for number, place in enumerate(engine.order):
                 coordinate = coordinates[engine.mechanism.coordinates[place].path]
-                coordinate.default_value, coordinate.default_speed_value = (
-                    row[number],
-                    row[number + len(engine.order)],
-                )
+                coordinate.default_value = row[number]
+                coordinate.default_speed_value = row[number + len(engine.order)]
 
     def make_controller(self, values: Sequence[float]) -> Feedback:
         """Return the controller with the gains of a sample."""
@@ -360,10 +358,8 @@ class Variants:
     def _add_controls(self, variant: Variant) -> Variant:
         """Compile the controller for a variant."""
         if self._controller is not None:
-            variant.controller, variant.held = (
-                self._controller,
-                self._controller.compile_for(self.model, variant.engine),
-            )
+            variant.controller = self._controller
+            variant.held = self._controller.compile_for(self.model, variant.engine)
         return variant
 
     def _make_variant(self, values: Sequence[float]) -> Variant:

@@ -266,7 +266,8 @@ def _plan_tracking(
         claimed: receives the files that are measured.
     """
     folder = tool.folder
-    force, error = _find_result(tool, "_Actuation_force.sto"), _find_result(tool, "_pErr.sto")
+    force = _find_result(tool, "_Actuation_force.sto")
+    error = _find_result(tool, "_pErr.sto")
     claimed.update(file for file in (force, error) if file is not None)
     if force is None:
         gone = MissingInput(

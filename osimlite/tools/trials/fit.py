@@ -90,7 +90,8 @@ def measure_marker_errors(tool: TrialTool) -> Numbers:
         return
     found = motion.summary
     of = "the errors of the markers"
-    rms, peak = 100.0 * found["rms_marker_error"], 100.0 * found["largest_marker_error"]
+    rms = 100.0 * found["rms_marker_error"]
+    peak = 100.0 * found["largest_marker_error"]
     time = found["worst_time"]
     at = folder.locate_time(file, time)
     where = f"{found['worst_marker']} at {time:g} s"

@@ -98,7 +98,8 @@ def _add_chain(draft: Draft, chain: list[RobotJoint], name: str) -> _Element:
     element = add_element(parent, "body", name=name, **format_pose(start @ rest))
     draft.frames |= {link: (element, placed) for link, placed in ends.items()}
     for joint, axis, anchor in reversed(joints):
-        turns, place = joint.kind == "revolute", clear_rounding(anchor)
+        turns = joint.kind == "revolute"
+        place = clear_rounding(anchor)
         anchored = place if turns and place.any() else None
         add_element(
             element,
@@ -136,7 +137,8 @@ def _add_inertia(draft: Draft, element: _Element, link: Link, path: str, *, move
                 "mjMINVAL'",
                 f"a mass of {MIN_MASS:g} kg",
             )
-        mass, moments = max(mass, MIN_MASS), np.maximum(moments, MIN_MASS)
+        mass = max(mass, MIN_MASS)
+        moments = np.maximum(moments, MIN_MASS)
     if mass > 0.0:
         quat = clear_rounding(quaternion_of(axes))
         add_element(

@@ -149,8 +149,11 @@ class _MujocoModel:
     """Compiled model of MuJoCo that is posed by the coordinates of a model of OpenSim."""
 
     def __init__(self, mujoco: Any, compiled: Any, paths: Paths) -> None:
-        self.mujoco, self.model, self.data = mujoco, compiled, mujoco.MjData(compiled)
-        self.names, self.free = joint_names(paths.mechanism), list_free_coordinates(paths.mechanism)
+        self.mujoco = mujoco
+        self.model = compiled
+        self.data = mujoco.MjData(compiled)
+        self.names = joint_names(paths.mechanism)
+        self.free = list_free_coordinates(paths.mechanism)
         kinds = mujoco.mjtObj
         joints = (
             (k, mujoco.mj_name2id(compiled, kinds.mjOBJ_JOINT, name))
@@ -200,7 +203,8 @@ class _MujocoModel:
         # Each round makes one more link of a chain of followers right.
         for _ in range(MAX_FOLLOWER_CHAIN):
             for joint, leader, polynomial in self.followers:
-                place, dof = model.jnt_qposadr[joint], model.jnt_dofadr[joint]
+                place = model.jnt_qposadr[joint]
+                dof = model.jnt_dofadr[joint]
                 value = (
                     0.0
                     if leader < 0

@@ -55,7 +55,8 @@ def add_scaled_actuator(
     Returns:
         Kind and name of the element.
     """
-    name, ends = draft.make_name("actuator", path), (force.min_control, force.max_control)
+    name = draft.make_name("actuator", path)
+    ends = (force.min_control, force.max_control)
     finite = all(map(math.isfinite, ends)) and ends[0] < ends[1]
     # In OpenSim only some tools enforce these limits; the range is written for information.
     limits: dict[str, Value] = {"ctrllimited": False, "ctrlrange": ends} if finite else {}

@@ -15,10 +15,8 @@ from osimlite.translate.mjcf.draft import Draft, Follower
 def add_coordinates(draft: Draft) -> None:
     """Add ranges of coordinates to their joints, without limits, and hold prescribed coordinates."""
     elements = {joint.get("name"): joint for joint in draft.get_section("worldbody").iter("joint")}
-    note, moving = (
-        draft.fidelity.add,
-        {place for joint in draft.robot.moving for place in joint.coordinates},
-    )
+    note = draft.fidelity.add
+    moving = {place for joint in draft.robot.moving for place in joint.coordinates}
     for place, info in enumerate(draft.mechanism.coordinates):
         lead = draft.leads.get(place)
         done = (

@@ -92,16 +92,15 @@ def _add_follower(draft: Draft, joint: RobotJoint, driver: Driver, whose: str) -
     first, last = sorted(lead.line.slope * end + lead.line.start for end in (low, high))
     exact = function if own == (1.0, 0.0) else Composed(function, Linear(*own))
     fit = fit_quartic(exact, (first, last), unit)
-    follower, done = Follower(lead.joint, fit.coefficients), "a quartic, fitted"
+    follower = Follower(lead.joint, fit.coefficients)
+    done = "a quartic, fitted"
     # The driver replaces the quartic by the exact function, and needs no helper.
     if fit.error is not None and draft.options.spline == "series" and not draft.options.driver:
         drive, (outer,) = fit_composition([function], (low, high))
         led = add_helper(draft, driver.coordinate, drive)
         assert led is not None
-        follower, done = (
-            Follower(led.joint, compose_with_line(led.line, outer)),
-            "a quartic of a quartic, fitted",
-        )
+        follower = Follower(led.joint, compose_with_line(led.line, outer))
+        done = "a quartic of a quartic, fitted"
         x = np.linspace(low, high, 400)
         fit = Fit(
             (),
@@ -237,7 +236,8 @@ def _hold_joint(draft: Draft, joint: RobotJoint) -> None:
         draft.add_follower(joint.name, Follower(None, (value,), joint.function, names))
         return
     draft.add_follower(joint.name, Follower(None, (value,)))
-    places, random = list(joint.coordinates), np.random.default_rng(0)
+    places = list(joint.coordinates)
+    random = np.random.default_rng(0)
     low, high = np.array([draft.mechanism.coordinates[place].range for place in places]).T
     off = [joint.function.evaluate(random.uniform(low, high))[0] - value for _ in range(500)]
     unit = "rad" if joint.kind == "revolute" else "m"

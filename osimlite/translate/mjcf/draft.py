@@ -432,7 +432,8 @@ def format_pose(matrix: Array) -> dict[str, Value]:
     Returns:
         "pos" and "quat"; None for no translation or rotation.
     """
-    place, turned = clear_rounding(matrix[:3, 3]), clear_rounding(quaternion_of(matrix[:3, :3]))
+    place = clear_rounding(matrix[:3, 3])
+    turned = clear_rounding(quaternion_of(matrix[:3, :3]))
     return {"pos": place if place.any() else None, "quat": turned if turned[1:].any() else None}
 
 

@@ -40,10 +40,8 @@ def add_driven(draft: Draft) -> None:
     joint = draft.get_section("worldbody").find(".//joint")
     if joint is None:
         return
-    states, idle = (
-        draft.make_name("actuator", STATES_ACTUATOR),
-        {"joint": joint.get("name"), "gainprm": 0, "gear": 0},
-    )
+    states = draft.make_name("actuator", STATES_ACTUATOR)
+    idle = {"joint": joint.get("name"), "gainprm": 0, "gear": 0}
     for path in forces.controls.names:
         add_element(
             draft.get_section("actuator"), "general", name=draft.make_name("actuator", path), **idle

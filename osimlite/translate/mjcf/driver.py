@@ -281,7 +281,8 @@ class Driver:
         if not data.ne:
             return
         # Accelerations are `moves` @ those of the free joints + `wanted`.
-        moves, wanted = np.eye(self.model.nv), np.zeros(self.model.nv)
+        moves = np.eye(self.model.nv)
+        wanted = np.zeros(self.model.nv)
         for followed in self._followed:
             _, gradient, _, wanted[followed.dof] = followed.evaluate(data)
             moves[followed.dof, followed.dof] = 0.0
@@ -339,7 +340,8 @@ class Driver:
             Values (n,), generalized speeds (n,), and for each coordinate without a joint the
             coordinate that leads it and the derivative by it.
         """
-        q, rates = self._mechanism.values({}), np.zeros(len(self._mechanism.coordinates))
+        q = self._mechanism.values({})
+        rates = np.zeros(len(self._mechanism.coordinates))
         q[self._places] = (data.qpos[self._qpos] - self._starts) / self._slopes
         rates[self._places] = data.qvel[self._dofs] / self._slopes
         slopes = {}
@@ -362,7 +364,8 @@ class Driver:
                 polynomial = np.zeros(5)
                 polynomial[0] = value
                 if len(followed.leaders) == 1:
-                    x, slope = self.data.qpos[followed.addresses[0]], gradient[0]
+                    x = self.data.qpos[followed.addresses[0]]
+                    slope = gradient[0]
                     bend = 0.5 * followed.function.evaluate((x,))[2][0][0]
                     polynomial[:3] = value + x * (bend * x - slope), slope - 2.0 * bend * x, bend
                 self.model.eq_data[followed.equality, :5] = polynomial
@@ -377,7 +380,8 @@ class Driver:
         self._mujoco.mj_setConst(self.model, self.data)
 
     def _make_follower(self, name: str) -> _FollowerJoint:
-        follower, own = self.mjcf.followers[name], self.model.joint(name)
+        follower = self.mjcf.followers[name]
+        own = self.model.joint(name)
         names = follower.arguments or (() if follower.leader is None else (follower.leader,))
         leaders = [self.model.joint(each) for each in names]
         return _FollowerJoint(

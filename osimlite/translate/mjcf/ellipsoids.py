@@ -41,10 +41,8 @@ def _add_mechanism(draft: Draft, slides: list[RobotJoint], turns: tuple[RobotJoi
         axis = np.eye(3)[joint.function.component]
         if np.array_equal(joint.axis, axis):
             radii[joint.function.component] = joint.function.radius
-    base, end = (
-        draft.frames.get(slides[0].parent),
-        draft.frames.get(turns[-1].child) if turns else None,
-    )
+    base = draft.frames.get(slides[0].parent)
+    end = draft.frames.get(turns[-1].child) if turns else None
     whole = {place for joint in turns for place in joint.coordinates} == set(slides[0].coordinates)
     if len(radii) < len(slides) or base is None or end is None or not whole:
         return

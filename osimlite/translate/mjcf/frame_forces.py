@@ -225,7 +225,8 @@ def add_bushing(draft: Draft, force: BushingForce, path: str) -> str:
     for k in (3, 4, 5, 0, 1, 2):
         joint = draft.make_name("joint", f"{name}_{AXIS_NAMES[k]}")
         draft.starts[joint] = starts[k]
-        kind, axis = ("hinge", "slide")[k // 3], np.eye(3)[k % 3]
+        kind = ("hinge", "slide")[k // 3]
+        axis = np.eye(3)[k % 3]
         add_element(
             speck,
             "joint",

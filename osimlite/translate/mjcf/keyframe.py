@@ -32,7 +32,8 @@ def add_keyframe(draft: Draft) -> None:
         values[joint], rates[joint] = line.slope * q[place] + line.start, line.slope * qdot[place]
     values |= draft.starts
     for joint, follower in draft.followers.items():
-        value, rate = values.get(follower.leader or "", 0.0), rates.get(follower.leader or "", 0.0)
+        value = values.get(follower.leader or "", 0.0)
+        rate = rates.get(follower.leader or "", 0.0)
         values[joint] = float(polyval(value, follower.polynomial))
         rates.setdefault(joint, float(rate * polyval(value, polyder(follower.polynomial))))
     if any(values.values()) and len(draft.get_section("equality")):

@@ -84,7 +84,8 @@ def fit_quartics(data: bytes) -> tuple[Array, Array]:
     def make_inner(bends: Array) -> Array:
         bent = np.array((0.0, 1.0, *bends))
         reached = powers @ bent
-        middle, half = 0.5 * (reached.max() + reached.min()), 0.5 * (reached.max() - reached.min())
+        middle = 0.5 * (reached.max() + reached.min())
+        half = 0.5 * (reached.max() - reached.min())
         bent[0] -= middle
         return bent / half
 

@@ -98,7 +98,8 @@ class Curves(NamedTuple):
             activations: activations (A,).
         """
         x = (lengths - self.tendon) / self.fiber
-        low, high = 0.5 * (self.lmin + 1.0), 0.5 * (1.0 + self.lmax)
+        low = 0.5 * (self.lmin + 1.0)
+        high = 0.5 * (1.0 + self.lmax)
         short = x <= 1.0
         inner = np.where(short, (1.0 - x) / (1.0 - low), (x - 1.0) / (high - 1.0))
         outer = np.where(
@@ -197,10 +198,8 @@ def add_muscle(draft: Draft, force: Muscle, path: str) -> str:
     except OsimliteError as error:
         raise Untranslatable(f"its tension cannot be computed: {error.message}") from error
     curves = _fit_curves(own, spread[0], tensions, free=fits)
-    name, limits = (
-        draft.make_name("actuator", path),
-        (max(force.min_control, 0.0), min(force.max_control, 1.0)),
-    )
+    name = draft.make_name("actuator", path)
+    limits = (max(force.min_control, 0.0), min(force.max_control, 1.0))
     rise, fall = rates.rise, rates.fall
     lags = rise > 0.0 and fall > 0.0 and "activation" in list_states(force)
     gain, bias = curves.make_parameters(vmax, fvmax)
@@ -274,10 +273,8 @@ without excitation: the integral of 1 / (a (0.5 + 1.5 a)).
 def _read_rates(force: Muscle) -> Rates:
     """Return the greatest velocity and the time constants of a muscle, by the law of its class."""
     if not isinstance(force, Schutte1993Muscle_Deprecated | Delp1990Muscle_Deprecated):
-        vmax, fvmax = (
-            _read_parameter(force, "vmax", 0.0),
-            _read_parameter(force, "fvmax", DEFAULT_FVMAX),
-        )
+        vmax = _read_parameter(force, "vmax", 0.0)
+        fvmax = _read_parameter(force, "fvmax", DEFAULT_FVMAX)
         return Rates(
             vmax,
             fvmax,
@@ -292,7 +289,8 @@ def _read_rates(force: Muscle) -> Rates:
         fvmax = DEFAULT_FVMAX
     else:
         vmax, fvmax = _measure_velocity_curve(force)
-    quick, slow = force.activation1 + force.activation2, force.activation2
+    quick = force.activation1 + force.activation2
+    slow = force.activation2
     rise = time / quick / RISE_TO_63_PERCENT if quick > 0.0 else 0.0
     fall = time / slow / FALL_TO_37_PERCENT if slow > 0.0 else 0.0
     note = (
@@ -368,11 +366,9 @@ def _fit_curves(own: Curves, lengths: Array, tensions: Array, *, free: bool) -> 
         list(UPPER_BOUNDS),
     )
     if free:
-        start, low, high = (
-            [*start, *[0.0] * 4],
-            [*low, *[-FIT_RANGE] * 4],
-            [*high, *[FIT_RANGE] * 4],
-        )
+        start = [*start, *[0.0] * 4]
+        low = [*low, *[-FIT_RANGE] * 4]
+        high = [*high, *[FIT_RANGE] * 4]
     # The curves have kinks, at which a search may end; a second start is tried.
     starts = start, [0.2, 2.2, *start[2:]]
     result = [

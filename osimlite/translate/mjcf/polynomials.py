@@ -56,7 +56,8 @@ def find_polynomial(function: f.Function) -> Polynomial | None:
             own = find_polynomial(inner)
             return None if own is None else scale * own
         case Composed(outer, inner):
-            first, second = find_polynomial(inner), find_polynomial(outer)
+            first = find_polynomial(inner)
+            second = find_polynomial(outer)
             if first is not None and second is not None:
                 whole = second(first)
                 return whole if isinstance(whole, Polynomial) else None
@@ -83,7 +84,9 @@ def fit_quartic(function: f.Function, span: tuple[float, float], unit: str) -> F
     x = middle + half * np.cos(np.linspace(0.0, np.pi, _SAMPLE_COUNT))
     y = sample_function(function, x)
     basis = np.polynomial.chebyshev.chebvander((x - middle) / half, DEGREE)
-    weights, best, least = np.full(_SAMPLE_COUNT, 1.0 / _SAMPLE_COUNT), np.zeros(DEGREE + 1), np.inf
+    weights = np.full(_SAMPLE_COUNT, 1.0 / _SAMPLE_COUNT)
+    best = np.zeros(DEGREE + 1)
+    least = np.inf
     for _ in range(60):
         root = np.sqrt(weights)
         result = np.linalg.lstsq(root[:, None] * basis, root * y, rcond=None)[0]
@@ -137,7 +140,8 @@ def select_span(
     low, high = limits
     points = knots(function)
     if not high - low <= _MAX_RANGE and points:
-        low, high = max(low, min(points)), min(high, max(points))
+        low = max(low, min(points))
+        high = min(high, max(points))
     if not 0.0 < high - low <= _MAX_RANGE:
         low, high = start - 1.0, start + 1.0
     return min(low, start), max(high, start)

@@ -153,7 +153,8 @@ def draw_values(mechanism: Mechanism, count: int, seed: int) -> Array:
         info = mechanism.coordinates[place]
         low, high = info.range
         if not 0.0 <= high - low < np.inf:
-            low, high = info.default_value - 1.0, info.default_value + 1.0
+            low = info.default_value - 1.0
+            high = info.default_value + 1.0
         values[:, place] = np.random.default_rng((seed, place)).uniform(low, high, count)
     for item in coupled:
         values[:, item.dependent] = [
@@ -186,10 +187,8 @@ def draw_poses(paths: Paths, count: int, seed: int = 0) -> tuple[Poses, Mapping[
         Poses, and the samples of each path by its absolute path.
     """
     mechanism = paths.mechanism
-    values, moving = (
-        draw_values(mechanism, count, seed),
-        np.array(list_free_coordinates(mechanism), dtype=int),
-    )
+    values = draw_values(mechanism, count, seed)
+    moving = np.array(list_free_coordinates(mechanism), dtype=int)
     states = [mechanism.at(row) for row in values]
     couplings = [paths.compute_free_coupling(state) for state in states]
     rates = np.nan_to_num(np.stack([coupling[:, moving] for coupling in couplings]))

@@ -76,12 +76,10 @@ class Router:
         self, route: ThroughPoints, truth: PathSamples, poses: Poses, version: int
     ) -> None:
         columns = np.flatnonzero(np.abs(truth.arms).max(0, initial=0.0) > 1e-9)
-        self.route, self.truth, self.poses, self.version = (
-            route,
-            truth,
-            poses.select_coordinates(columns.tolist()),
-            version,
-        )
+        self.route = route
+        self.truth = truth
+        self.poses = poses.select_coordinates(columns.tolist())
+        self.version = version
         self.wanted = np.concatenate((truth.lengths[:, None], truth.arms[:, columns]), axis=1)
         self.touches = [self._find_touches(number) for number in range(len(route.surfaces))]
 
@@ -129,10 +127,8 @@ class Router:
         self, before: Tendon, now: Tendon, after: Tendon, options: Sequence[Tendon]
     ) -> Tendon:
         """Return the option for a part with which the complete tendon has the smallest error."""
-        head, tail = (
-            before[_find_last_site(before) :],
-            after[: len(after) - _find_last_site(after[::-1])],
-        )
+        head = before[_find_last_site(before) :]
+        tail = after[: len(after) - _find_last_site(after[::-1])]
         rest = self.compute_residuals((*before, *now, *after)) - self._measure((*head, *now, *tail))
         sound = [option for option in options if _is_tendon((*head, *option, *tail))]
         lengths, arms = measure_tendons(
@@ -162,7 +158,8 @@ class Router:
 
     def _find_touches(self, number: int) -> Touch:
         one = len(self.route.points) + 2 * number
-        body, result = self.route.surfaces[number].tangent.body, []
+        body = self.route.surfaces[number].tangent.body
+        result = []
         for pose, nodes in enumerate(self.truth.nodes):
             last = 0
             for (node, place), (_, after) in pairwise(nodes):
@@ -217,7 +214,8 @@ class Router:
 
     def _find_tangent_points(self, number: int) -> Array:
         """Return the tangent points (2 k, 3) on a surface, in its own frame (m)."""
-        touch, frame = self.touches[number], self.route.surfaces[number].tangent.frame
+        touch = self.touches[number]
+        frame = self.route.surfaces[number].tangent.frame
         return (np.concatenate((touch.first, touch.second)) - frame[:3, 3]) @ frame[:3, :3]
 
     def _vary_side(self, number: int, around: WrapGeom, directions: int) -> Iterator[WrapGeom]:
@@ -225,9 +223,11 @@ class Router:
         directions all around.
         """
         yield around
-        surface, touch = self.route.surfaces[number], self.touches[number]
+        surface = self.route.surfaces[number]
+        touch = self.touches[number]
         turned = around.frame[:3, :3].T @ surface.tangent.frame[:3, :3]
-        axis, sign = int(surface.numbers[0]), surface.numbers[1]
+        axis = int(surface.numbers[0])
+        sign = surface.numbers[1]
         if sign:
             yield around.replace_side(turned @ (sign * np.eye(3)[axis]))
         middles = (0.5 * (touch.first + touch.second) - around.frame[:3, 3]) @ around.frame[:3, :3]
@@ -271,7 +271,8 @@ class Router:
         reaching the surface at its ends, in the direction of the previous or the next point, in
         which the sphere does not deflect the path.
         """
-        point, node = make_site(self.route.points[number]), self.route.points[number]
+        point = make_site(self.route.points[number])
+        node = self.route.points[number]
         low, high = node.range
         middle, half = 0.5 * (low + high), 0.5 * (high - low)
         parabola = SPECK_RADIUS_M / half**2 * np.array((middle**2, -2.0 * middle, 1.0, 0.0, 0.0))

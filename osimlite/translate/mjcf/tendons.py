@@ -171,7 +171,8 @@ def _measure_section(
         of_each = np.unique(owners, return_index=True)[1]
         frames = np.stack([arounds[place].frame for place in of_each])
         radii = np.array([[arounds[place].radius] for place in of_each])
-        rotations, middles = frames[:, :3, :3], frames[:, None, :3, 3]
+        rotations = frames[:, :3, :3]
+        middles = frames[:, None, :3, 3]
         start, end = ((poses.express(body, at) - middles) @ rotations for at in (one, two))
         sides = [
             _locate_in_body(around.side, body, poses)
@@ -240,7 +241,8 @@ def _compute_sliding_forces(spot: TendonSite, force: Array, poses: Poses) -> Arr
     """
     assert spot.slides is not None and spot.drive is not None
     value = poses.q[:, spot.coordinate]
-    helper, rate = polyval(value, spot.drive), polyval(value, polyder(spot.drive))
+    helper = polyval(value, spot.drive)
+    rate = polyval(value, polyder(spot.drive))
     rates = np.einsum(
         "pij,jp->pi", poses.rotations[spot.body], polyval(helper, polyder(spot.slides.T)) * rate
     )

@@ -50,7 +50,8 @@ def choose_step(draft: Draft) -> None:
     try:
         rate = _compute_fastest_rate(draft)
     except OsimliteError as error:
-        rate, cannot = 0.0, "springs that may be too stiff: how stiff they are cannot be computed"
+        rate = 0.0
+        cannot = "springs that may be too stiff: how stiff they are cannot be computed"
         draft.fidelity.add(
             "stiff",
             "/",

@@ -77,8 +77,10 @@ def bend_tendon(
         Course of the tendon in all ways, and the way that it takes.
     """
     across = None if kind == "cylinder" else _make_plane_axes(first, second)
-    p, q = _project_to_plane(across, first), _project_to_plane(across, second)
-    reach_p, reach_q = _compute_tangent_angle(p, radius), _compute_tangent_angle(q, radius)
+    p = _project_to_plane(across, first)
+    q = _project_to_plane(across, second)
+    reach_p = _compute_tangent_angle(p, radius)
+    reach_q = _compute_tangent_angle(q, radius)
     between = _compute_angle(p, q)
     signs = (
         np.array((0.0, 1.0, -1.0))[:, None, None]
@@ -89,10 +91,8 @@ def bend_tendon(
     least = reach_p + reach_q if version < 4 and sides is not None else -ROUNDING
     winding = np.abs(signs) * (np.mod(signs * between - least, 2.0 * np.pi) + least)
     arc = radius * (winding - reach_p - reach_q)
-    at_p, at_q = (
-        _turn_on_circle(p, signs * reach_p, radius),
-        _turn_on_circle(q, -signs * reach_q, radius),
-    )
+    at_p = _turn_on_circle(p, signs * reach_p, radius)
+    at_q = _turn_on_circle(q, -signs * reach_q, radius)
     outside = (norm(p) >= radius) & (norm(q) >= radius)
     touches = outside & (arc > 0.0)
     choice = np.zeros((len(owners), len(p[0])), dtype=int)
@@ -106,8 +106,10 @@ def bend_tendon(
             choice = _choose_side(p, q, radius, at_p[1:], at_q[1:], toward, owners)
         if (inside := norm(sides) < radius[owners]).any():
             through, at = _find_passage(p, q, radius)
-            touches, arc = np.stack((*touches, outside & through)), np.stack((*arc, 0.0 * between))
-            at_p, at_q = np.stack((*at_p, at)), np.stack((*at_q, at))
+            touches = np.stack((*touches, outside & through))
+            arc = np.stack((*arc, 0.0 * between))
+            at_p = np.stack((*at_p, at))
+            at_q = np.stack((*at_q, at))
             choice = np.where(inside, 3, choice)
     if across is None:
         lines = np.stack((norm(at_p - p), arc, norm(at_q - q)))
@@ -168,14 +170,16 @@ def _find_passage(p: Array, q: Array, radius: Array) -> tuple[Mask, Array]:
     passes = norm(p + part[..., None] * way) > radius
     between = _compute_angle(p, q)
     # As a function of the angle between p and q, the slope of the length changes its sign once: bisect.
-    low, high = np.zeros(between.shape), np.ones(between.shape)
+    low = np.zeros(between.shape)
+    high = np.ones(between.shape)
     for _ in range(50):
         middle = 0.5 * (low + high)
         at = _turn_on_circle(p, middle * between, radius)
         slope = sum(
             _cross(at, at - end) / np.maximum(norm(at - end), TINY) for end in (p, q)
         ) * np.sign(between)
-        low, high = np.where(slope < 0.0, middle, low), np.where(slope < 0.0, high, middle)
+        low = np.where(slope < 0.0, middle, low)
+        high = np.where(slope < 0.0, high, middle)
     return passes, _turn_on_circle(p, 0.5 * (low + high) * between, radius)
 
 
@@ -184,7 +188,8 @@ def _lines_cross(p: Array, one: Array, q: Array, two: Array) -> Mask:
     way, other, apart = one - p, two - q, q - p
     across = _cross(way, other)
     across = np.where(np.abs(across) < TINY, np.nan, across)
-    along, back = _cross(apart, other) / across, _cross(apart, way) / across
+    along = _cross(apart, other) / across
+    back = _cross(apart, way) / across
     return (along >= 0.0) & (along <= 1.0) & (back >= 0.0) & (back <= 1.0)
 
 
