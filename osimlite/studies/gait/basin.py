@@ -85,6 +85,7 @@ def sample_perturbed_starts(
     change = np.random.default_rng(seed).uniform(-part, part, (count, len(here))) * here
     engine, footing = step_map.engine, step_map.footing
     _, depths = measure_along_slope(engine, here[None])
+    # In single support only the stance foot penetrates the ground; its penetration is kept.
     deepest = [
         max(float(depths[0, engine.contacts.index(name)]) for name in foot) for foot in footing.feet
     ]
@@ -175,8 +176,11 @@ def find_basin(
         for place in places
     ]
     columns, rows = np.meshgrid(axes[0].values, axes[1].values)
+    # Other entries of the state remain those of the cycle.
     states = np.tile(cycle.state, (grid * grid, 1))
     states[:, places[0]], states[:, places[1]] = columns.ravel(), rows.ravel()
+    # A changed angle would push the foot into the ground or lift it, so that the height is
+    # corrected.
     starts = lift_to_depth(step_map.engine, step_map.footing, states)
     walks = simulate_walks(
         step_map, cycle, starts, target_steps, accuracy=accuracy, progress=progress
@@ -198,6 +202,8 @@ def _find_leg_speeds(step_map: StepMap) -> tuple[int, int]:
         raise OsimliteError(
             "the legs are not alike; name what the basin is drawn over with --basin-x and --basin-y"
         )
+    # The first coordinate that the exchange moves is the hip: coordinates are ordered from the root
+    # outwards.
     first = next(k for k in range(n) if step_map.exchange[k] != k)
     return n + first, n + int(step_map.exchange[first])
 

@@ -82,6 +82,7 @@ def differentiate_step_map(
     """
     reduced = step_map.reduce(state)
     moves = difference * np.eye(len(reduced))
+    # All perturbed walkers are simulated in one call.
     images = step_map(step_map.expand(np.concatenate((reduced + moves, reduced - moves)))).states
     ahead, back = np.split(step_map.reduce(images), 2)
     return (ahead - back).T / (2.0 * difference)
@@ -111,6 +112,7 @@ def find_cycle(
     """
     here = np.array(step_map.start if state is None else state, dtype=float)
     name = step_map.engine.mechanism.name
+    # A stable cycle often attracts walkers from farther away than Newton's method converges.
     for _ in range(warm_up_steps):
         there = step_map(here[None]).states[0]
         if np.isnan(there).any():
@@ -129,6 +131,7 @@ def find_cycle(
             raise OsimliteError(
                 f"'{name}' makes no step from near the start; give a start that walks"
             )
+        # Newton's method for P(x) - x = 0, whose Jacobian is dP/dx - I.
         move = np.linalg.solve(slope - np.eye(len(reduced)), -miss)
         # Halve the step until the residual decreases; a change of 1e-4 of it is hopeless.
         part, last = 1.0, size
@@ -154,6 +157,7 @@ def find_cycle(
         .mean(axis=1)
         .tolist()
     )
+    # Floquet multipliers are the eigenvalues of the Jacobian of the map at the fixed point.
     values = np.linalg.eigvals(differentiate_step_map(step_map, state_found)).astype(np.complex128)
     return Cycle(
         state_found,

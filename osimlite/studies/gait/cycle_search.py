@@ -182,6 +182,7 @@ class CycleSearch:
         free = [(place, item) for place, item in enumerate(plan.variables) if not item.is_fixed]
         self._starts = [place for place, item in free if isinstance(item.target, Start)]
         self._numbers = [place for place, item in free if not isinstance(item.target, Start)]
+        # Without varied initial values all random walkers of a model would be the same.
         if not self._starts:
             raise SettingError(
                 "walkers are drawn at random; vary some values and speeds of coordinates at the start"
@@ -259,6 +260,7 @@ class CycleSearch:
             OsimliteError: the model is invalid, or has another structure.
         """
         variant = self.variants.make_variant(self.make_sample(fractions))
+        # Step maps of models with other coordinates or contacts cannot be compared.
         if variant.structure != self.variants.given.structure:
             raise OsimliteError("the numbers change the structure of the model; vary others")
         return variant.engine
@@ -302,6 +304,7 @@ class CycleSearch:
             except OsimliteError:
                 made[row] = False
                 continue
+            # Walkers of one call share the structure of the engine.
             made[row] = variant.structure == self.variants.given.structure
             if made[row]:
                 states[row], vectors[row] = (
@@ -315,7 +318,10 @@ class CycleSearch:
         if not len(states):
             return []
         states = self.variants.prepare_states(
-            engine, variants, plant_feet(engine, self.footing, states, numbers=vectors)
+            # A walker that starts above or in the ground falls or bounces at once.
+            engine,
+            variants,
+            plant_feet(engine, self.footing, states, numbers=vectors),
         )
         walks = walk_many(
             engine,
@@ -356,6 +362,7 @@ class CycleSearch:
         ]
         for (start, one), (end, two) in pairwise(strikes):
             miss = self._compute_distance(self._first, one, two)
+            # A step with a scuff is not a smooth function of the state.
             if (best is None or miss < best.miss) and not any(
                 start < scuff.time < end for scuff in walk.scuffs
             ):
@@ -391,6 +398,7 @@ class CycleSearch:
                 problem.compute_residual,
                 problem.start,
                 problem.differentiate_residual,
+                # Rectangular trust regions handle the bounds of the fractions well.
                 method="dogbox",
                 bounds=problem.bounds,
                 x_scale=problem.scale,
@@ -400,10 +408,12 @@ class CycleSearch:
                 gtol=1e-14,
                 callback=problem.check_progress,
             )
+            # Too far from a cycle for Newton's method, which would diverge.
             if np.linalg.norm(solved.fun) > NEWTON_RANGE:
                 return None
             fractions, _, state = problem.unpack(solved.x)
             return self.find_cycle(fractions, state)
+        # A candidate that leads nowhere is normal; the next one is tried.
         except (OsimliteError, np.linalg.LinAlgError):
             return None
 
@@ -430,6 +440,8 @@ class CycleSearch:
         # The basin takes as long as many cycles; it is measured only where it counts.
         if cost < self.stable or fine:
             walking = self._measure_basin(step_map, result)
+        # Below `stable` the cost measures robustness, so that it remains below all costs of less
+        # stable cycles.
         if cost < self.stable:
             cost = self.stable - walking
         return ModelCycle(np.array(fractions), self.get_numbers(fractions), result, walking, cost)

@@ -109,6 +109,7 @@ def _find_feet(mechanism: Mechanism, soles: Sequence[_SoleContact]) -> tuple[tup
         raise OsimliteError(
             f"no sphere of '{mechanism.name}' touches a half space; feet are spheres on the ground"
         )
+    # A walk alternates between two feet.
     if len(ends) != 2:
         names = join_words(mechanism.bodies[end].name for end in ends)
         raise OsimliteError(
@@ -119,6 +120,7 @@ def _find_feet(mechanism: Mechanism, soles: Sequence[_SoleContact]) -> tuple[tup
     for end in ends:
         own = [sole for sole in soles if sole.body == end]
         farthest = max(sole.reach for sole in own)
+        # A contact much closer to the joint, such as a knee, is no part of the foot.
         likely = [sole for sole in own if sole.reach >= 0.5 * farthest]
         named = [sole for sole in likely if _FOOT_WORDS.search(sole.words)]
         # A heel may be on another body than the toes, farther up the same leg.
@@ -138,6 +140,7 @@ def _find_soles(engine: BatchEngine) -> list[_SoleContact]:
         for index, pair in enumerate(element.pairs):
             plane = element.surfaces[pair.first]
             sphere = element.surfaces[pair.second]
+            # Only spheres on moving bodies against half spaces can be feet; ellipsoids have radii.
             if plane.is_half_space and not sphere.radii and sphere.body != GROUND:
                 joint = engine.mechanism.bodies[sphere.body].mobilizer.child_frame[:3, 3]
                 reach = (

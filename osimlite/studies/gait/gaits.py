@@ -159,6 +159,7 @@ def find_gait(
             search, candidates[:tries], enough, lambda done, of: report("closing cycles", done, of)
         )
         improvement = StabilityOptimization(search, min(cycles, key=get_cost), digits)
+        # Without numbers to vary there is nothing to optimize, and the best cycle is final.
         if search.names:
             improvement.run(budget, seed, lambda done, of: report("making it stable", done, of))
         best = round_cycle(search, improvement.best, digits)
@@ -279,6 +280,7 @@ def choose_start(
     """
     step_map = search.make_step_map(found.fractions, found.cycle.state, TIGHT_ACCURACY)
     engine, ordered = step_map.engine, sorted(START_PHASES)
+    # States are sampled in the order of time, and then sorted by preference.
     states = sample_states_of_step(step_map, found.cycle, ordered)[
         [ordered.index(part) for part in START_PHASES]
     ]
@@ -298,6 +300,7 @@ def choose_start(
         accuracy=PROOF_ACCURACY,
         threads=search.threads,
     )
+    # The first walk in the order of preference that neither falls nor scuffs.
     best = max(range(len(walks)), key=lambda k: (walks[k].walks and not walks[k].scuffs, -k))
     return _name_values(engine, states[best]), walks[best]
 

@@ -127,7 +127,9 @@ def _compute_progress(walk: Walk, places: Sequence[float]) -> float:
     else:
         until = walk.end
         last = walk.steps[-1].foot if walk.steps else int(np.argmax(places))
+        # How far the swing foot is ahead of the foot of the last step.
         lead = max(place for foot, place in enumerate(places) if foot != last) - places[last]
+    # The fraction stays below 1, so that another step always counts more.
     near = MIN_STEP_LENGTH_M / (MIN_STEP_LENGTH_M + max(MIN_STEP_LENGTH_M - lead, 0.0))
     return walk.clean_steps + 0.5 * (near + until / (until + 1.0))
 

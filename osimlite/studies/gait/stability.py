@@ -99,6 +99,7 @@ class StabilityOptimization:
         if rounds:
             fractions = self._search.round_fractions(fractions, self._digits)
         key = fractions.tobytes()
+        # Rounding maps many points of the search to the same numbers.
         if key not in self._costs:
             near = min(
                 (self._first, *self.cycles), key=lambda each: _compute_distance(each, fractions)

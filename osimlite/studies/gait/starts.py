@@ -138,6 +138,7 @@ def plant_feet(
     feet = np.array([engine.contacts.index(name) for names in footing.feet for name in names])
     deepest = feet[measure_along_slope(engine, placed, numbers, rows)[1][:, feet].argmax(axis=1)]
     ahead, back = placed.copy(), placed.copy()
+    # Speeds are rates of coordinates here, so that a small step in time moves the values by them.
     ahead[:, :n] += PROBE_TIME_S * placed[:, n:]
     back[:, :n] -= PROBE_TIME_S * placed[:, n:]
     motions = _compute_contact_centres(engine, ahead, numbers, rows) - _compute_contact_centres(
@@ -153,6 +154,8 @@ def plant_feet(
             (_compute_contact_centres(engine, moved, numbers, rows) - here)[count, deepest]
             / PROBE_STEP
         )
+    # The least-squares solution for the speeds of the carriers that cancel the velocity of the
+    # contact.
     needed = np.einsum("wi,wij->wj", speeds, np.linalg.pinv(np.stack(carried, axis=1)))
     placed[:, [n + place for place in result.places]] -= needed
     return placed

@@ -114,6 +114,8 @@ class StepMap:
         step, moments = self._simulate_first_step(here)
         self.exchange = find_leg_exchange(engine, self.footing, moments)
         self.neutral = find_neutral_directions(engine, moments)
+        # The QR decomposition completes the neutral directions to an orthonormal basis of the state
+        # space.
         full, _ = np.linalg.qr(np.hstack((self.neutral, np.eye(len(here)))))
         self.basis: Floats = full[:, self.neutral.shape[1] :]
         self.start = self.move_to_strike(step.state, step.foot)
@@ -202,6 +204,8 @@ class StepMap:
         _, depths = measure_along_slope(self.engine, np.array([state, state + dt * rate]))
         touching = contacts[int(np.argmin(np.abs(depths[0, contacts])))]
         speed = (depths[1, touching] - depths[0, touching]) / dt
+        # The contact depth is zero on the section; its rate gives the time by which the event is
+        # off.
         return state - depths[0, touching] / speed * rate
 
     # ----------------------------------------------------------------------------------------------- images

@@ -193,6 +193,8 @@ def extract_walks(
     rows = np.concatenate([row_of, np.repeat(row_of, counts)]).astype(np.int64)
     reached, depths = measure_along_slope(engine, moments, vectors, rows)
     fatal = np.array([engine.contacts.index(contact) for contact in footing.falls], dtype=np.int64)
+    # Events of all runs follow the initial states in one array, so that one call locates all
+    # contacts.
     ends = np.cumsum([len(starts), *counts])
     result = []
     for k, events in enumerate(runs.events):
@@ -209,6 +211,7 @@ def extract_walks(
             ending = ENDINGS[int(runs.endings[k])]
             walk.end = float(runs.times[k])
             walk.ending = "walking" if ending == "done" else ending
+            # With a full memory of events, later steps would be missing.
             if room is not None and counts[k] >= room:
                 walk.ending = "too many events"
         result.append(walk)
@@ -248,6 +251,7 @@ def follow_events(
         if name not in foot_of:
             continue
         number = foot_of[name]
+        # A foot is in the air from the end of its last contact.
         if not begins:
             down[number].discard(name)
             if not down[number]:

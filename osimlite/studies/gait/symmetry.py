@@ -50,8 +50,10 @@ def find_leg_exchange(engine: BatchEngine, footing: FootContacts, states: ArrayL
         while mechanism.bodies[chain[-1]].parent != GROUND:
             chain.append(mechanism.bodies[chain[-1]].parent)
         legs.append(chain[::-1])
+    # Feet on one body are not two legs.
     if len(legs) != 2 or legs[0][-1] == legs[1][-1]:
         return None
+    # Bodies that both legs share, such as the pelvis, are not exchanged.
     own = [[body for body in leg if body not in other] for leg, other in (legs, legs[::-1])]
     places = list(engine.order)
     freedoms = [
@@ -105,6 +107,7 @@ def exchange_auxiliary(engine: BatchEngine, source: Ints, states: Floats) -> Non
     tolerances = RELATIVE_TOLERANCE * np.abs(before).max(axis=(0, 1))
     for index, effects in enumerate(after):
         alike = np.flatnonzero((np.abs(before - effects) <= tolerances).all(axis=(1, 2)))
+        # A state that keeps its effect under the exchange is not exchanged.
         if len(alike) and index not in alike:
             source[first + index] = first + alike[0]
 
@@ -154,6 +157,7 @@ def find_neutral_directions(engine: BatchEngine, states: ArrayLike) -> Floats:
         rest = np.eye(size) - result @ result.T
         rows = np.concatenate([rest @ slope for slope in slopes])
         sizes = np.linalg.norm(rows, axis=1)
+        # Rows of different units are scaled to length 1 before singular values are compared.
         rows = rows[sizes > RELATIVE_TOLERANCE] / sizes[sizes > RELATIVE_TOLERANCE, None]
         # The factor R of a QR decomposition has the same singular values and right singular vectors,
         # and is much smaller.

@@ -63,6 +63,7 @@ class _ObservedCopies:
         paths = self.copies.controls
         tree = simulation.model.tree()
         limits = [(tree.find(path).min_control, tree.find(path).max_control) for path in paths]
+        # Learners need bounded actions; controls without bounds are limited to -1 to 1.
         low, high = self._limits = np.clip(
             np.array(limits, dtype=np.float32).reshape(-1, 2).T, -1.0, 1.0
         )
@@ -146,6 +147,7 @@ def _resolve_task(
     for name in options:
         if name not in known:
             raise gymnasium.error.Error(f"a task has no '{name}'{suggest_or_list(name, known)}")
+    # A registered environment has a task, whose attributes may be overridden but not its model.
     if task is not None:
         if model is not None:
             raise gymnasium.error.Error(
@@ -310,6 +312,7 @@ class MuscleVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
         Returns:
             Observations (w, o), and an empty dictionary.
         """
+        # Without a seed, the generators continue, as gymnasium requires.
         if seed is not None or not self._random:
             seeds = (
                 seed
@@ -339,7 +342,10 @@ class MuscleVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
         for k, state in initial.items():
             self._all.copies.set_states(k, state)
         self._steps += 1
+        # gymnasium's NEXT_STEP mode: the step after an end returns the first observation and no
+        # reward.
         self._steps[again], rewards[again], over[again] = 0, 0.0, False
+        # Truncation by time differs from termination: the learner may still expect future rewards.
         late = self._steps >= self._all.max_steps
         self._ended = over | late
         return self._all.flatten_observations(), rewards, over, late, {}

@@ -29,10 +29,12 @@ def draw_pose(simulation: Simulation, q: Array, size: tuple[int, int] = IMAGE_SI
     Returns:
         Pixels (height, width, 3).
     """
+    # Loading the geometry takes much longer than drawing it.
     scene: Scene = simulation.__dict__.setdefault(
         "_shown", build_scene(simulation.model, simulation.mechanism)
     )
     pose = simulation.mechanism.at(q)
     points = pose.origins[0] + VIEW_BOX_M
+    # Almost from the side, a little from above and in front, so that both legs are visible.
     camera = Camera.around(points, scene.up, np.array([0.15, 0.1, 1.0]), size[0] / size[1])
     return np.asarray(draw_scene(scene, q, camera, size, (), Style(scene.floor(q))).convert("RGB"))

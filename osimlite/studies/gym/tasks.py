@@ -95,6 +95,7 @@ def _perturb_state(scale: float) -> Callable[[Array, tuple[str, ...], np.random.
     """Return a function that adds uniform random numbers up to `scale` to all values and speeds."""
 
     def start(y: Array, names: tuple[str, ...], rng: np.random.Generator) -> Array:
+        # Muscle states are left alone: they depend on the pose.
         moving = np.array([name.endswith(("/value", "/speed")) for name in names])
         result = y.copy()
         result[moving] += scale * rng.uniform(-1.0, 1.0, int(moving.sum()))
@@ -113,9 +114,11 @@ def walk2d() -> Task:
 
     def reward(before: Observation, after: Observation) -> Array:
         speed = (after["pelvis_tx"] - before["pelvis_tx"]) / after.step
+        # Speed is rewarded, 0.2 is for each step without a fall, and effort is penalized.
         return np.exp(-4.0 * (speed - 1.2) ** 2) + 0.2 - 0.1 * _compute_effort(after)
 
     def is_over(observation: Observation) -> NDArray[np.bool_]:
+        # The hips are low or the trunk leans so far that a recovery is unlikely.
         return (observation["pelvis_ty"] < 0.7) | (np.abs(observation["pelvis_tilt"]) > 0.8)
 
     return Task(
@@ -132,6 +135,7 @@ def jump() -> Task:
     """Return the task of the same human in a squat to jump as high as possible within one second."""
 
     def reward(before: Observation, after: Observation) -> Array:
+        # Rewards of all steps add up to ten times the rise of the hips.
         return 10.0 * (after["pelvis_ty"] - before["pelvis_ty"]) - 0.01 * _compute_effort(after)
 
     def is_over(observation: Observation) -> NDArray[np.bool_]:

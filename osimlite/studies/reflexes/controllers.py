@@ -89,6 +89,7 @@ def _read_integer(node: Node, key: str, least: int) -> int:
 def _read_control_points(node: Node, parameters: Parameters, before: str) -> tuple[Array, Array]:
     """Return times (n, w) (s) and values (n, w) of the control points of a function."""
     count = _read_integer(node, "control_points", 1)
+    # The value is required, although `get_number` would accept a default.
     node.text("control_point_y")
     if node.get("control_point_dt") is None and count > 1:
         raise node.error("several control points need 'control_point_dt'")
@@ -101,11 +102,13 @@ def _read_control_points(node: Node, parameters: Parameters, before: str) -> tup
     ]
     if np.any(np.array(spans) <= 0.0):
         raise node.error("'control_point_dt' must be positive")
+    # Scenarios give intervals between points, of which each may be a parameter.
     return np.cumsum([np.zeros_like(values[0]), *spans], axis=0), np.array(values)
 
 
 def _read_piecewise_constant(node: Node, parameters: Parameters, before: str) -> PowerTerms:
     times, values = _read_control_points(node, parameters, before)
+    # Steps of constants: each point adds the difference to the previous value from its time on.
     return [(0, *each) for each in zip(times, np.diff(values, axis=0, prepend=0.0), strict=True)]
 
 
@@ -115,6 +118,8 @@ def _read_piecewise_linear(node: Node, parameters: Parameters, before: str) -> P
     After the last point the last slope continues, unless `flat_extrapolation` is set.
     """
     times, values = _read_control_points(node, parameters, before)
+    # A broken line is its first value plus ramps that start at each point with the change of slope
+    # there; a last ramp of slope 0 ends it flat.
     slopes = np.diff(values, axis=0) / np.diff(times, axis=0)
     ends = [np.zeros_like(values[:1])] if node.flag("flat_extrapolation", False) else []
     bends = np.diff(np.concatenate([np.zeros_like(values[:1]), slopes, *ends]), axis=0)
@@ -170,6 +175,7 @@ class Reflexes:
         self._has_states = False
         self._is_noisy = False
         parts = [(kind, node)]
+        # Noise is the last part: it is added to what all other parts compute.
         if kind == COMPOSITE:
             parts = [*node.select_all(*CONTROLLERS[:-1]), *node.select_all(NOISE)]
             node.refuse_unread_parts(f"a {COMPOSITE}", (*CONTROLLERS[:-1], NOISE))
@@ -184,10 +190,13 @@ class Reflexes:
             elif name == FEED_FORWARD:
                 self._read_functions(part, parameters)
             elif name == "ReflexController":
+                # A ReflexController alone is not symmetric by default, one within a
+                # GaitStateController is.
                 self.symmetric = part.flag("symmetric", False)
                 self._is_sided = part.flag("dual_sided", True)
                 for leg in (0, 1) if self._is_sided else (0,):
                     self._add_reflexes(part, parameters, "", leg, ALL_LEG_STATES)
+            # The kernels store one state per leg, so that two gait state machines cannot coexist.
             elif self._has_states:
                 raise part.error(
                     "legs are in the states of one GaitStateController, and this is another one"
@@ -203,6 +212,7 @@ class Reflexes:
         self._is_noisy = True
         noise = self._limits[:, LIMITS.SEED :]
         noise[:, 0] = seed = node.number("random_seed", 123.0)
+        # Numbers of the kernels are doubles, and the seed is one of them.
         if not (seed.is_integer() and abs(seed) < MAX_NOISE_SEED):
             raise node.error(
                 f"'random_seed' must be a whole number of up to 15 digits, not {seed:g}"
@@ -214,6 +224,8 @@ class Reflexes:
             if width < 0.0:
                 raise node.error(f"'{key}' must not be negative, and is {width:g}")
         node.refuse_unread_parts(f"a {NOISE}")
+        # Python data and YAML are written for osimlite, so that only users of SCONE may expect its
+        # noise.
         if node.file.endswith(".scone"):
             warn_caller(
                 "noise is as large as SCONE's, but not the same: its numbers depend on the compiler of SCONE"
@@ -241,6 +253,7 @@ class Reflexes:
         if not names:
             raise node.error(f"no actuator is in '{include}' and not in '{exclude}'")
         for target, name in names.items():
+            # Without its side the name of a parameter is the same for both legs.
             before = name[:-2] if symmetric and name.endswith(SIDES) else name
             for power, start, gain in TIME_FUNCTIONS[kind](function, parameters, f"{before}."):
                 term = target, -1, power, 0, ALL_LEG_STATES, -1
@@ -262,6 +275,7 @@ class Reflexes:
             node.number("leg_load_sensor_delay", 0.0) / self.walkers.step
         )
         for leg, side in enumerate(SIDES):
+            # Thresholds of foot positions are relative to the length of the leg.
             length = node.number("override_leg_length", self.walkers.legs[leg].length)
             prefix = "" if self.symmetric else f"leg{leg}{side}."
             of = {
@@ -275,6 +289,8 @@ class Reflexes:
             }
             stance = of["stance_load_threshold"]
             swing = node.get("swing_load_threshold")
+            # One load threshold serves both transitions unless the scenario sets a second one for
+            # swing, which makes a hysteresis.
             loads = (
                 stance,
                 stance
@@ -365,6 +381,7 @@ class Reflexes:
         Returns:
             Index of the actuator, index of the source, and prefix of the parameters.
         """
+        # Refused explicitly, as ignoring them would change the walk silently.
         for key in ("min_control_value", "max_control_value", *kind.refused):
             if node.get(key) is not None:
                 raise node.error(f"'{key}' of reflexes is not done here")
@@ -457,6 +474,7 @@ class Reflexes:
                     TermOrGate(term, delay, -gain if kind.corrects else gain, numbers[f"{letter}0"])
                 )
         constant = parameters.get_number(node, "C0", 0.0, f"{before}C0")
+        # A constant excitation is a function of time of degree 0 that starts at once.
         if np.any(constant != 0.0) or f"{before}C0" in parameters.requested:
             zero = np.zeros_like(constant)
             self.terms.append(TermOrGate((target, -1, FREE, leg, states, -1), zero, constant, zero))
@@ -469,9 +487,11 @@ class Reflexes:
         name = node.text("dof")
         number = self._find_index(node, name, self.walkers.coordinates, leg)
         start = f"{before[:-1]}-{name}."
+        # Names of the gate's parameters contain the coordinate.
         delay = self._read_delay(node, parameters, start)
         low, high = (
             parameters.get_number(node, f"pos_{end}", limit, f"{start}pos_{end}")
+            # A limit beyond any value leaves the range open at this end.
             for end, limit in (("min", -1e12), ("max", 1e12))
         )
         value, speed = (
@@ -490,6 +510,7 @@ class Reflexes:
         """
         # Terms with sensors come first; sums are rounded in this order.
         parts = [*sorted(self.terms, key=lambda term: term.ints[TERM.SENSOR] < 0), *self._gates]
+        # The kernels interpolate the history in units of control steps.
         delays = [part.delay / self.walkers.step for part in parts]
         each = [(delay, part.first, part.second) for delay, part in zip(delays, parts, strict=True)]
         numbers = np.column_stack(
@@ -510,6 +531,8 @@ class Reflexes:
                 source.place,
                 numbers.shape[1] + len(more) if source.numbers else source.more,
             )
+            # Numbers of sensors follow those of all terms and gates, and are the same for all
+            # candidates.
             more += source.numbers
         numbers = np.column_stack([numbers, np.tile(more, (len(numbers), 1))])
         head = np.zeros(REFLEXES.HEAD, dtype=np.int64)

@@ -70,6 +70,7 @@ class Feedback:
             self._source_text = str(given)
             top = read_settings(given)
             folder = Path(given).parent
+        # The controller may stand alone, in an objective, or in a complete scenario.
         optimizer = next((node for _, node in top.select_all(*OPTIMIZERS)), top)
         objective = optimizer.get("SimulationObjective")
         holder, model = top, top
@@ -87,8 +88,10 @@ class Feedback:
         }
         if isinstance(values, str | Path):
             values = {name: best for name, (best, _, _) in read_par(values).items()}
+        # Values of the user override those of `init`.
         self._initial = known
         self._values = {**known, **values}
+        # Other parts of a scenario, such as measures, are not needed here and may remain unread.
         if objective is None:
             top.refuse_unread_parts("a file of a controller")
 

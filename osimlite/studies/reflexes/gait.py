@@ -147,6 +147,7 @@ def measure_strides(times: Array, way: Array, loads: Array) -> Strides | None:
         stance.append(float(on[begins[0] : begins[-1]].mean()))
         for first, last in pairwise(begins):
             there = load[first:last][on[first:last]]
+            # The ground reaction of walking has two humps: at loading and at push-off.
             middle = len(there) // 2
             one = int(np.argmax(there[: middle or 1]))
             two = middle + int(np.argmax(there[middle:]))
@@ -157,6 +158,7 @@ def measure_strides(times: Array, way: Array, loads: Array) -> Strides | None:
     time, length = (
         sum(row[begins[-1]] - row[begins[0]] for begins in spans) / count for row in (times, way)
     )
+    # Double support and peak cover the time in which both legs have complete strides.
     both = float(touches[start:end].all(axis=1).mean())
     peak = float(loads[start:end].max())
     found = tuple(np.mean(humps, axis=0).tolist())

@@ -139,6 +139,7 @@ class Measure(ABC):
             self.threshold = 0.0
         self.transition = node.number("threshold_transition", 0.0)
         self.start = node.number("start_time", 0.0)
+        # SCONE's default of 0 means no end.
         self.stop = node.number("stop_time", 0.0) or inf
         if above is not None:
             self.start = max(self.start, above.start)
@@ -177,8 +178,10 @@ class Measure(ABC):
             duration: longest duration (s).
         """
         value = self.compute_result(times, duration) + self.offset
+        # Thresholds apply only to measures that are minimized.
         if self.minimize and self.threshold is not None:
             least, over = self.threshold, self.transition
+            # In the transition the value rises from 0 at the threshold to its full size at the end.
             between = value * (value - least) / over if over > 0.0 else value
             value = np.where(value < least, 0.0, np.where(value < least + over, between, value))
         found: Array = self.weight * value
@@ -244,6 +247,7 @@ class GaitMeasure(Measure):
         speeds = np.zeros(self.count)
         counts = np.zeros(self.count)
         target = max(min(abs(self.low), abs(self.high)), self.least_speed)
+        # Candidates differ in their number of steps, so that they are scored one by one.
         for k, room in enumerate(self.walkers.criteria_work[:, self._first :]):
             row = room[: GAIT_WORK.STEPS + 2 * int(room[GAIT_WORK.COUNT])].tolist()
             numbers = row[GAIT_WORK.STEPS :]
@@ -266,6 +270,8 @@ class GaitMeasure(Measure):
                     off = 0.0
                 good += dt * min(max(1.0 - abs(off) / target, -1.0), 1.0)
                 time, length = time + dt, length + far
+            # The time after a fall counts as time without progress, so that longer walks score
+            # better.
             if times[k] < duration and (row[GAIT_WORK.FALLEN] or self.always):
                 time += duration - float(times[k])
             result[k] = 1.0 - good / time if time else 1.0
@@ -308,6 +314,7 @@ class JumpMeasure(Measure):
             self.read_recorded(self._first, getattr(JUMP_WORK, name))
             for name in ("START", "HERE", "PEAK", "PREPARED", "DOES")
         )
+        # Rising before the take-off is subtracted: otherwise standing up would count as a jump.
         early = 100.0 * np.maximum(prepared - start, 0.0)
         self.report = {"jump height": 100.0 * peak, "early rise": early}
         found = np.where(
@@ -334,6 +341,8 @@ class EffortMeasure(Measure):
         tension = node.number("specific_tension", 0.25e6)
         density = node.number("muscle_density", 1059.7)
         slow = node.number("default_muscle_slow_twitch_ratio", 0.5)
+        # Muscle mass from strength (N), specific tension (N/m²), density (kg/m³) and fiber length
+        # (m).
         masses = walkers.strengths / tension * density * walkers.optimal
         # These change no result here: all muscles have the same ratio, and there is only a total.
         for key in ("use_symmetric_fiber_ratios", "store_individual_muscle_efforts"):
@@ -354,6 +363,8 @@ class EffortMeasure(Measure):
             self.read_recorded(self._first, k)
             for k in (SAMPLE_WORK.TOTAL, SAMPLE_WORK.START, SAMPLE_WORK.HERE)
         )
+        # A smallest distance keeps walkers that fall at once from having an infinite cost of
+        # transport.
         far = np.maximum(self.least_distance, np.abs(here - start))
         if self._kind == WANG:
             mass = self.walkers.mass
@@ -423,11 +434,13 @@ class DofMeasure(Penalty):
         name = node.text("dof")
         senses = self.walkers.sensor_plan
         names = self.walkers.coordinates
+        # In a dual-sided composite the side completes the name of the coordinate.
         if name not in names and name + self.side in names:
             name += self.side
         if name not in names:
             raise node.error(f"the model has no coordinate '{name}'{suggest_or_list(name, names)}")
         infos = {info.name: info for info in self.walkers.mechanism.coordinates}
+        # Ranges of rotations are in degrees by default, the sensor row is in radians.
         factor = 180.0 / np.pi if node.flag("in_degrees", infos[name].unit == "rad") else 1.0
         for what, first, scale in (
             ("position", SENSES.VALUES, factor),
@@ -461,6 +474,7 @@ class CompositeMeasure(Measure):
         """Read the parts; with `dual_sided` or `symmetric` there is one of each part for either side."""
         if node.flag("use_first_non_zero_result", False):
             raise node.error("use_first_non_zero_result is not done here")
+        # `symmetric` applies where `dual_sided` is not set.
         both = node.flag("dual_sided", node.flag("symmetric", False))
         blocks = [node, *(block for _, block in node.select_all("Measures"))]
         self.parts: list[Measure] = [
@@ -469,6 +483,7 @@ class CompositeMeasure(Measure):
             for name, part in block.select_all(*MEASURES)
             for side in (SIDES if both else (self.side,))
         ]
+        # As in SCONE, a composite follows its first part.
         self.minimize = node.flag("minimize", not self.parts or self.parts[0].minimize)
 
     def compute_result(self, times: Array, duration: float) -> Array:

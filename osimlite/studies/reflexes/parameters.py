@@ -131,9 +131,11 @@ class Parameters:
             raise part.error(
                 f"the parameter '{name}' begins at {mean:g}, which is not from {low:g} to {high:g}"
             )
+        # NaN stands for a parameter that states no standard deviation.
         std = self.auto_std_factor * abs(mean) if np.isnan(std) else std
         # Both legs of a symmetric controller read one parameter; its first definition counts.
         self.requested.setdefault(name, Parameter(name, mean, std, low, high))
+        # Values of a file or of a caller may be beyond the bounds.
         value = self.values.get(name, mean)
         return np.clip(np.broadcast_to(np.asarray(value, dtype=float), (self.count,)), low, high)
 

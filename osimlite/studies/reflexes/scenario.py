@@ -258,6 +258,7 @@ class Scenario:
                 f"a walk of {duration:g} s is shorter than a control step of {self.step:g} s"
             )
         length = self.duration if duration is None else duration
+        # The record of the first candidate is allocated for the complete walk.
         if not length <= MAX_CONTROL_STEPS * self.step:
             message = f"a walk of {length:g} s has more than {MAX_CONTROL_STEPS} control steps of {self.step:g} s"
             raise SettingError(message)
@@ -326,6 +327,8 @@ class Candidates:
         height = walkers.offsets.get(
             node.text("initial_load_dof", "/jointset/ground_pelvis/pelvis_ty/value")
         )
+        # A model without this vertical coordinate, or a load of 0, starts at the height of its
+        # file.
         if load > 0.0 and height is not None:
             for k in range(walkers.count):
                 _settle_on_ground(walkers, k, height, load)
@@ -346,6 +349,7 @@ class Candidates:
         if offset is not None:
             included = node.text("initial_state_offset_include", "*")
             excluded = (
+                # Offsets of muscle states would be overwritten by the equilibrium.
                 node.text("initial_state_offset_exclude", "") + ";*/activation;*/fiber_length"
             )
             symmetric = node.flag("initial_state_offset_symmetric", False)
@@ -400,6 +404,7 @@ class Candidates:
         rows, going = [], list(range(walkers.count))
         for first in range(0, self._steps, STEPS_PER_CALL):
             rows.append(walkers.advance(min(STEPS_PER_CALL, self._steps - first), going))
+            # Candidates that have fallen are not simulated any further.
             going = np.flatnonzero(walkers.progress[:, GOING]).tolist()
             if not going:
                 break

@@ -99,6 +99,7 @@ def search_parameters(
     if resume:
         known = read_par(path)
         names = [each.name for each in own]
+        # A parameter that only one side has would silently start from its mean, or be lost.
         for name in sorted({*known} ^ {*names}):
             whose = "the scenario" if name in known else f"'{path}'"
             raise SettingError(f"{whose} has no parameter '{name}': they are of different searches")
@@ -142,6 +143,8 @@ def search_parameters(
                 best = values[index]
                 least = float(walked.results[index])
                 # SCONE continues from mean and standard deviation in the file, not from the best.
+                # The mean of the distribution is a better start for a later search than the best
+                # sample.
                 mean = middle + scale * es.result.xfavorite
                 stds = scale * es.sigma * np.sqrt(np.diag(es.C))
                 found = [
@@ -161,6 +164,7 @@ def search_parameters(
                 )
             if es.stop():
                 break
+    # The best parameters are already in the file; the caller goes on with them.
     except KeyboardInterrupt:
         pass
     return dict(zip((each.name for each in own), best.tolist(), strict=True))

@@ -78,6 +78,7 @@ class Node:
         self.read_keys.add(key)
         found = [node for name, node in self.parts if name == key]
         if len(found) > 1:
+            # Which of the two the author meant cannot be known.
             raise found[1].error(f"'{key}' stands here again; it counts once only")
         return found[0] if found else None
 
@@ -116,6 +117,7 @@ class Node:
             number = float(text)
         except ValueError:
             number = math.nan
+        # "nan" parses as a number, but no setting may be undefined.
         if math.isnan(number):
             raise (found or self).error(f"'{key}' must be a number, not '{text}'")
         return number
@@ -150,6 +152,7 @@ class Node:
             DocumentError: the part is neither true nor false.
         """
         text = self.text(key, "1" if default else "0")
+        # A misspelt flag must not count as false.
         if text.lower() not in FLAGS:
             raise (self.get(key) or self).error(f"'{key}' must be 0 or 1, not '{text}'")
         return FLAGS[text.lower()]
@@ -357,6 +360,7 @@ def _fill_from_yaml(
             continue
         several = value.value if value.id == "sequence" else [value]
         if value.id == "sequence" and all(item.id == "scalar" for item in several):
+            # A list of plain values is one value of several words, such as a vector.
             words = " ".join(item.value for item in several)
             node.parts.append(
                 (key.value, Node(words, file=node.file, line=value.start_mark.line + 1))

@@ -204,6 +204,7 @@ def _read_axis(sensed: SensedModel, node: Node, number: int, side: str) -> Array
     axis = node.vector("axis", "0 0 1")
     if not axis.any():
         raise node.error("'axis' has no direction")
+    # A body with a side counts as of this side, else the side of the reflex decides.
     own = next((end for end in SIDES if _list_bodies(sensed)[number].endswith(end)), side)
     return axis / np.linalg.norm(axis) * ((-1.0, -1.0, 1.0) if own == SIDES[0] else (1.0, 1.0, 1.0))
 
@@ -211,6 +212,7 @@ def _read_axis(sensed: SensedModel, node: Node, number: int, side: str) -> Array
 def _make_angle_source(sensed: SensedModel, node: Node, number: int, side: str) -> Source:
     """Return the sensor of the rotation of a body about one of the axes x, y and z of ground."""
     axis, (link, frame) = _read_axis(sensed, node, number, side), sensed.engine.placements[number]
+    # A rotation about a general axis has no angle that is a function of the orientation alone.
     if np.count_nonzero(axis) != 1:
         raise node.error(
             "angles are about [ 1 0 0 ], [ 0 1 0 ] or [ 0 0 1 ]; about another 'axis' there is only KV"

@@ -126,6 +126,7 @@ class SensedModel:
         engine, bodies = self.engine, self.mechanism.bodies
         limits: list[int] = []
         for item in model.components(CoordinateLimitForce):
+            # Locked coordinates are not in the state and have no sensor.
             if item.appliesForce and str(item.coordinate) in self.coordinates:
                 places = engine.find_offsets(model.tree().path_of(item), ("force",))
                 limits += self.coordinates.index(str(item.coordinate)), *places
@@ -182,12 +183,14 @@ class SensedModel:
         legs = []
         for side in SIDES:
             top = f"{upper}{side}"
+            # SCONE's legs are femur, tibia and foot: the foot is two bodies below the upper leg.
             below = {name: parents.get(parents.get(name, ""), "") for name in names}
             foot = (
                 f"{lower}{side}"
                 if lower
                 else next((name for name, far in below.items() if far == top), "")
             )
+            # A model without legs is allowed; measures and reflexes that need them refuse it.
             if top not in names or foot not in names or f"{contact}{side}" not in pairs:
                 continue
             length, here = 0.0, foot

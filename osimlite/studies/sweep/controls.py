@@ -169,10 +169,12 @@ def check_nodes(controls: Mapping[int, Control], interpolation: str, to: float) 
         raise SettingError(
             f"there is no interpolation '{interpolation}'{suggest_or_list(interpolation, INTERPOLATIONS)}"
         )
+    # Lines and steps are defined for any number of nodes.
     if interpolation != "cubic":
         return
     for actuator, parts in _group_by_actuator(controls, NODE).items():
         times = [time for time, _ in parts]
+        # Beyond its nodes a cubic would be extrapolated.
         if len(times) < MIN_CUBIC_NODES or times[0] > 0.0 or times[-1] < to * (1.0 - 1e-9):
             raise SettingError(
                 f"a cubic needs {MIN_CUBIC_NODES} nodes or more, the first at 0 and the last at the end of the runs, "
@@ -202,6 +204,8 @@ def make_controller(model: Model, controls: Mapping[str, Any]) -> PrescribedCont
             )
         if isinstance(given, tuple):
             times, values = (np.asarray(numbers, dtype=float).tolist() for numbers in given)
+            # OpenSim extrapolates a PiecewiseLinearFunction linearly; equal outer values hold the
+            # ends.
             y = (values[0], *values, values[-1])
             made.ControlFunctions.objects.append(
                 PiecewiseLinearFunction(x=_extend_times(times), y=y)
@@ -251,6 +255,7 @@ class VariedControls:
         self._puts: list[tuple[Function, str, Callable[[Values], Any]]] = []
         for actuator, ((_, place),) in _group_by_actuator(controls, SCALE).items():
             self._add_multiplier(model, actuator, place)
+        # One controller per kind: OpenSim adds the controls of all controllers.
         for kind in (OFFSET, NODE, SWITCH):
             if parts := _group_by_actuator(controls, kind):
                 made = _make_empty_controller(model, kind, list(parts))
@@ -309,6 +314,7 @@ class VariedControls:
                     functions[number] = multiplier = MultiplierFunction(name=own.name, function=own)
                     self._puts.append((multiplier, "scale", lambda values: values[place]))
                     self.controllers.append(controller)
+        # Scaling nothing would leave all runs equal, without a message.
         if len(self._puts) == before:
             raise SettingError(
                 f"no function of a PrescribedController makes the control of '{actuator}', so that there is nothing to "

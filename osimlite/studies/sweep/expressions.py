@@ -79,6 +79,7 @@ class Expression:
 
     def __init__(self, text: str, engine: Any) -> None:
         self._text, known = text, list_quantities(engine)
+        # Longer names first, so that "knee_r/speed" is not read as "knee_r" divided by "speed".
         names = sorted(map(re.escape, known), key=len, reverse=True)
         calls = "|".join([*REDUCTIONS, *FUNCTIONS])
         self._quantities: list[Quantity] = []
@@ -127,6 +128,7 @@ class Expression:
         )
 
     def _evaluate_columns(self, times: Floats, columns: Sequence[Floats]) -> Any:
+        # A division by zero gives NaN or infinity, which counts as a run without a result.
         with np.errstate(all="ignore"):
             return self._evaluate_node(self._tree, times, columns)
 
@@ -205,6 +207,7 @@ def list_quantities(engine: Any) -> Mapping[str, Quantity]:
         (label, partial(_compute_probe, number))
         for number, label in enumerate(list_probe_labels(engine.probes))
     ]
+    # Reversed, so that of equal names the first one remains; coordinates have precedence.
     return dict(reversed(more)) | result
 
 
@@ -232,6 +235,7 @@ def _read_constant(place: int | None, engine: Any, moments: Moments) -> Floats:
 def _compute_control(place: int, engine: Any, moments: Moments) -> Floats:
     result = []
     for t, y in moments:
+        # Controls are computed with the forces.
         engine.compute_applied_forces(t, y)
         result.append(engine.read_controls()[place])
     return np.array(result)

@@ -113,6 +113,7 @@ class Gradients:
             for place in free
         ]
         changes = np.array([by for size in sizes for by in (size, -size)])
+        # Two neighbours per variable, above and below.
         near = [
             self._make_neighbour([x + by * (number == place) for number, x in enumerate(values)])
             for by, place in zip(changes.tolist(), np.repeat(free, 2).tolist(), strict=True)
@@ -133,6 +134,8 @@ class Gradients:
         runs = self._run(here)
         steps, (times, states) = self._get_tangent_steps(here.variant), self._record_motion(here)
         steps.take(here.variant.numbers, dx)
+        # Exact derivatives of the states at the report times, given those of the initial state and
+        # the numbers.
         moved = integrate_sensitivities(
             steps, times, states, dy, self._times, self._plan.accuracy, here.variant.state.names
         )
@@ -150,6 +153,7 @@ class Gradients:
             np.repeat(runs.counts, count, axis=0),
             reports,
             [_UnknownEvents() for _ in near],
+            # Largest contact forces have no derivatives.
             np.full((count, *runs.peaks.shape[1:]), np.nan),
         )
         batch = Batch(
@@ -165,6 +169,7 @@ class Gradients:
         result: Array = differentiate(
             np.asarray(self._measure.compute(batch), dtype=float)[:, None]
         )[:, 0]
+        # Largest contact forces are NaN above; measures of them end here.
         if not np.isfinite(result).all():
             worst = self._plan.variables[free[int(np.argmin(np.isfinite(result)))]].name
             raise SimulationError(

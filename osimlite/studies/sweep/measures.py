@@ -181,6 +181,7 @@ def make_measure(spec: Any, engine: Any, feet: Sequence[str] | None = None) -> R
         )
     if (known := registry.find_measure(name)) is not None:
         return known.make(engine, feet)
+    # Expressions contain no colon, paths of Python functions do.
     if ":" in name:
         return RunMeasure(
             name,
@@ -272,6 +273,7 @@ def energy(engine: Any, feet: Sequence[str] | None = None) -> RunMeasure:
         result = []
         for number, (t, start, end) in enumerate(ends):
             one = batch.engine_of(number)
+            # Each run has its own masses and springs.
             result.append(sum(one.compute_energies(t, end)) - sum(one.compute_energies(0.0, start)))
         return np.array(result)
 
@@ -286,6 +288,7 @@ def _measure_expression(expression: Expression, batch: Batch) -> list[float]:
     result = []
     runs, times = batch.runs, batch.report_times
     for k, (end, state) in enumerate(zip(runs.times.tolist(), runs.states.tolist(), strict=True)):
+        # The state at the end is appended, so that a report at the same time is left out.
         kept = int(np.searchsorted(times, end))
         moments = [
             *zip(times[:kept].tolist(), runs.reports[k, :kept].tolist(), strict=True),

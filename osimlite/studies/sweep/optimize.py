@@ -170,6 +170,7 @@ def optimize(
     if not (isfinite(sigma) and sigma > 0.0):
         raise SettingError(f"the first search distance is positive, not {sigma:g}")
     names = [get_measure_name(spec) for spec in (objective.measure, *plan.measures)]
+    # The objective comes first, and only once if the plan has it, too.
     measures = tuple(dict(zip(names, (objective.measure, *plan.measures), strict=True)).values())
     plan = replace(plan, measures=measures)
     variants = Variants(plan)
@@ -210,6 +211,7 @@ def optimize(
                 )
                 search = Search(point, sigma, popsize, seed, is_bounded, budget, tolerance, slopes)
                 ended = minimize(evaluations.evaluate, search)
+            # The table becomes a Parquet file only when the search has ended by itself.
             partial.finish()
         except KeyboardInterrupt:
             raise describe_interruption(partial, format_count(partial.rows, "run")) from None
@@ -286,6 +288,7 @@ def _open_history(
                 partial.add(batch.columns)
                 evaluations.add_history(batch)
             return partial
+        # A smaller budget must not discard finished evaluations.
         if before.num_rows > evaluations.budget:
             raise SettingError(
                 f"'{path}' has {before.num_rows} runs of this search, more than are asked for now; keep them with "
@@ -376,6 +379,7 @@ class _Evaluations:
         values = self._compute_values(points)
         # A deterministic method requests the same points again when it is resumed.
         known = self._history[self.count : self.count + len(points)]
+        # Even a rounding difference means that the method takes another course than in the history.
         if any(row != list(new) for (row, _, _), new in zip(known, values.tolist(), strict=False)):
             raise SettingError(
                 "the search takes another way than before, so that it cannot go on; another version of its library "
@@ -387,6 +391,7 @@ class _Evaluations:
         costs = [self._compute_cost(status, value) for _, status, value in known]
         for number, (cost, row) in enumerate(zip(costs, values.tolist(), strict=True)):
             _, status, value = known[number]
+            # Only finished runs can be the best; penalties of failures only guide the method.
             if status != FAILED and isfinite(value) and (self.best is None or cost < self.best[0]):
                 self.best = cost, self.count + number, row
         self.count += len(points)
@@ -417,6 +422,7 @@ class _Evaluations:
 
     def _compute_values(self, points: Floats) -> Floats:
         """Return the values of all variables (k, v) at points (k, d) of the cube of the free ones."""
+        # Fixed variables have equal bounds.
         values = np.tile([item.low for item in self.plan.variables], (len(points), 1))
         for column, place in enumerate(self.free):
             item = self.plan.variables[place]

@@ -140,6 +140,7 @@ class Plan(IntegrationOptions):
         """
         try:
             return zlib.compress(pickle.dumps(self))
+        # Lambdas and local functions raise one of these, depending on the version of Python.
         except (pickle.PicklingError, AttributeError, TypeError):
             raise SettingError(
                 "a function of the sweep cannot be sent to other processes; put it into a module and name it "
@@ -235,6 +236,7 @@ def plan(
         SettingError: a name is unknown, or a number is out of bounds.
         ModelError: the model is not a valid mechanism.
     """
+    # The wrapper adds the controller also to models that a function makes anew.
     if controls:
         maker = partial(_parse_model, to_text(source)) if isinstance(source, Model) else source
         source = partial(_make_controlled_model, maker, controls)
@@ -253,6 +255,7 @@ def plan(
                 "say what to vary; the controller has no parameters, which are written as ~2<0,20>"
             )
     result = resolve_variables(vary, model, mechanism, parameters, gains)
+    # Nothing varies by name: all other parameters of the controller do.
     if all(item.is_fixed for item in result):
         held = {
             name for item in result if isinstance(item.target, Gains) for name in item.target.parts
@@ -261,6 +264,7 @@ def plan(
         result = resolve_variables({**vary, **rest}, model, mechanism, parameters, gains)
     for item in result:
         warn_of_unit(item.warning)
+    # The function is pickled only if needed: those of scripts often cannot be.
     needs_maker = any(isinstance(item.target, FunctionParameter) for item in result)
     make = source if needs_maker and not isinstance(source, Model) else None
     made = Plan(to_text(model), result, make=make)

@@ -32,6 +32,7 @@ def make_pool(
         OsimliteError: the cluster cannot be reached.
         MissingDependency: dask.distributed is not installed.
     """
+    # Other engines hold Python's lock, so that threads would not run in parallel.
     if cluster is None and plan.engine == "compiled":
         with closing(ThreadPool(plan, count_workers(workers))) as threads:
             yield threads
@@ -72,6 +73,7 @@ _local = threading.local()
 def _thread_runner(plan: Plan) -> Runner:
     """Return the runner of this thread, which is cached."""
     kept: Runner | None = getattr(_local, "runner", None)
+    # A thread of a process may serve another plan later.
     if kept is None or kept.plan is not plan:
         kept = _local.runner = Runner(plan)
     return kept
@@ -87,6 +89,7 @@ def run_packed(packed: bytes, values: Floats) -> Block:
     Raises:
         OsimliteError: the plan cannot be run.
     """
+    # Unpacking and compiling a plan takes longer than most runs.
     if getattr(_local, "packed", None) != packed:
         _local.packed = packed
         _local.plan = Plan.unpack(packed)

@@ -67,6 +67,7 @@ def register_start(make: F) -> F:
 
 def find_measure(name: str) -> RegisteredMeasure | None:
     """Return the measure of a name, or None."""
+    # An expression or a path cannot be a registered name, and need not load any provider.
     return _load_provider(_MEASURES, name) if name.isidentifier() else None
 
 
@@ -86,6 +87,7 @@ def find_start(name: str) -> Callable[[Any, Sequence[str] | None], Place]:
 
 def list_measure_names() -> list[str]:
     """Return the names of all measures."""
+    # An unknown name makes all providers load.
     _load_provider(_MEASURES, "")
     return list(_MEASURES)
 

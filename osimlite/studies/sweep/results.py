@@ -54,6 +54,7 @@ def make_schema(columns: Mapping[str, str], settings: Mapping[str, Any]) -> Any:
     """
     pa = _load_arrow()
     fields = [
+        # Numbers of runs are always known; measures of failed runs are missing.
         pa.field(name, getattr(pa, kind)(), nullable=kind != "int64")
         for name, kind in columns.items()
     ]
@@ -116,6 +117,7 @@ def describe_differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> list
     for name in {**old, **new}:
         a, b = old.get(name), new.get(name)
         if a != b:
+            # Lists, and the digest of the model, are too long for a message.
             is_brief = (
                 not isinstance(a, list | dict)
                 and not isinstance(b, list | dict)
@@ -211,6 +213,8 @@ class PartialTable:
                 if is_there:
                     self._reopen()
                 else:
+                    # The schema is the first record, so that a resumed sweep can check its
+                    # settings.
                     self._write_batch(table)
             except BaseException:
                 self._release()
@@ -228,6 +232,7 @@ class PartialTable:
             for column, field in zip(columns, self.schema, strict=True)
         ]
         batch = pa.record_batch(arrays, schema=self.schema)
+        # Ctrl-C in the middle of a record would leave it damaged.
         with defer_sigint():
             try:
                 self._write_batch(batch)
@@ -340,6 +345,7 @@ class PartialTable:
                 self.partial,
                 format_count(self.rows, "run"),
             )
+            # New records must follow an intact one, or they could not be read.
             os.truncate(self.partial, end)
 
     def _count(self, batch: Any) -> None:
@@ -429,6 +435,7 @@ class ResultTable:
         """
         require("pandas", extra="frame", purpose="a data frame")
         table = self.to_arrow()
+        # The first column is the number of the run.
         return table.to_pandas().set_index(table.column_names[0])
 
     def to_xarray(self) -> Any:
@@ -509,6 +516,8 @@ def compute_ranges(path: str | Path, names: Sequence[str]) -> dict[str, ColumnRa
                 counts[name] = before + len(column)
                 lower = min((old, new), key=lambda item: item.least)
                 upper = max((old, new), key=lambda item: item.most)
+                # Batches have different numbers of finite values, so that means are weighted by
+                # them.
                 mean = (old.mean * before + new.mean * len(column)) / counts[name]
                 result[name] = ColumnRange(
                     lower.least, lower.run_of_least, upper.most, upper.run_of_most, mean

@@ -163,6 +163,7 @@ def sweep(
     # With a partial file, finished results of other settings were confirmed before the interruption.
     if path.is_file() and not force and not (resume and get_partial_path(path).exists()):
         protect_results(path, wanted)
+        # The sweep is complete already.
         if resume:
             return Outcome(path, samples.count, samples.count)
     with make_pool(plan, workers=workers, cluster=cluster) as workforce:
@@ -225,6 +226,7 @@ class _Dispatcher:
                 is_last = not self.under_way and self.next >= self.samples.count
                 if is_last or time.monotonic() - self.last_saved > SAVE_SECONDS:
                     self._save()
+        # Also Ctrl-C: results so far are worth keeping.
         except BaseException:
             self._save()
             raise
@@ -246,6 +248,7 @@ class _Dispatcher:
         """Update the outcome, and adapt the size of tasks to the duration of runs; the last tasks
         are smaller.
         """
+        # The clock may not advance during very short tasks.
         each = max(block.seconds, 1e-6) / max(len(block.status), 1)
         left = self.samples.count - self.next
         fair = -(-left // (TASKS_PER_WORKER * self.pool.workers)) if left else 1
@@ -259,6 +262,7 @@ class _Dispatcher:
             for status, reason in zip(block.status, block.reasons, strict=True)
             if status == "failed" and reason
         )
+        # Reasons that contain numbers differ from run to run and must not fill the memory.
         if len(self.outcome.reasons) > 1000:
             self.outcome.reasons = Counter(dict(self.outcome.reasons.most_common(100)))
         self._report_progress()

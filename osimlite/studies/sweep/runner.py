@@ -122,6 +122,7 @@ class _Observers:
             list({item.name: item for made in self.measures for item in made.watches}.values())
             + stops
         )
+        # Only the compiled engine stops runs at events.
         if self.watches and plan.engine != "compiled":
             raise SettingError("what stops a run needs --engine compiled")
         # The engine detects no events unless it may record at least one.
@@ -157,6 +158,7 @@ class Runner:
             np.full(count, np.nan),
             {get_measure_name(spec): np.full(count, np.nan) for spec in self.plan.measures},
         )
+        # Models of one structure run in one call; their engines differ in numbers only.
         groups: dict[bytes, list[_Sample]] = {}
         for index, row in enumerate(values.tolist()):
             try:
@@ -216,6 +218,7 @@ class Runner:
     def _get_observers(self, structure: bytes, engine: Any) -> _Observers:
         result = self._looks.get(structure)
         if result is None:
+            # Parameters of a function may give every sample a structure of its own.
             if len(self._looks) >= CACHED_VARIANTS:
                 self._looks = {}
             result = self._looks[structure] = _Observers(self.plan, engine)
@@ -335,6 +338,7 @@ class Runner:
                     **plan.integration_choices(),
                     report_interval=plan.interval or plan.to,
                     controller=variant.controller,
+                    # Locked and prescribed coordinates have their values from the model.
                     initial={infos[k].path: row[k] for k in may} | auxiliary,
                     initial_speeds={infos[k].path: row[count + k] for k in may},
                 )

@@ -76,10 +76,12 @@ class Samples:
         numbers = _draw_uniform(self.seed, first, last, len(varied))
         if self.sampler == "random":
             return numbers
+        # Latin hypercube: each column visits its N layers in a random order of its own.
         layers = [
             _permute_indices(first, last, self.count, self.seed, column)
             for column in range(len(varied))
         ]
+        # A uniform offset within the layer.
         return (np.stack(layers, axis=1) + numbers) / self.count
 
     def _compute_grid(self, first: int, last: int, varied: Sequence[int]) -> Floats:
@@ -111,6 +113,7 @@ def choose_samples(
     """
     varied = [item for item in variables if not item.is_fixed]
     with_values = [item.name for item in varied if item.count]
+    # Both would fix the number of runs, in different ways.
     if sampler is None and count is not None and with_values:
         raise SettingError(
             f"--samples says how many runs are drawn, the COUNT in the range of {join_words(with_values)} how many values "
@@ -178,6 +181,7 @@ class Sobol:
             head = start if first == 0 else head
         first = max(first, 1) if len(head) else first
         if first > self._next:
+            # Skipping points is much cheaper than drawing them.
             self._points.fast_forward(first - self._next)
         result: Floats = np.concatenate((head, self._points.random(last - first)))
         self._next = last
@@ -202,8 +206,10 @@ def _permute_indices(first: int, last: int, count: int, seed: int, column: int) 
     A Feistel network permutes the numbers of 2k bits. Results that are not below `count` pass
     through it again until they are (cycle walking).
     """
+    # Both halves of a Feistel network have the same number of bits.
     half = max(1, -(-(count - 1).bit_length() // 2))
     mask = np.uint64((1 << half) - 1)
+    # Six rounds mix the bits well enough for a shuffle.
     keys = np.random.default_rng((seed, column)).integers(0, 2**64, 6, dtype=np.uint64)
     result: Counts = np.arange(first, last, dtype=np.uint64)
     beyond = np.ones(len(result), dtype=bool)

@@ -296,6 +296,7 @@ def _resolve_target(
     parameter of the controller, control, property, slope.
     """
     front, _, last = name.rpartition("/")
+    # The complete name first: a coordinate may have a name that ends like a suffix.
     for key, is_speed in ((name, False), (front, last == "speed")):
         if (key == name or last in ("value", "speed")) and (
             meant := match_components(key, mechanism.coordinates)
@@ -315,6 +316,7 @@ def _resolve_target(
         return made, made.unit
     if word in ("", SCALE) and (result := find_properties(model, route)):
         unit = result[0].unit
+        # The unit of such a property depends on the motion type of its coordinate.
         if unit.startswith("rad | m") and (
             infos := match_components(result[0].component, mechanism.coordinates)
         ):
@@ -361,6 +363,7 @@ def _list_coordinates(
         )
     if not locked:
         return Start(tuple(info.path for info in infos), is_speed), unit
+    # A locked coordinate is a property, a free one an initial value; one variable cannot be both.
     if len(locked) < len(infos):
         raise SettingError(
             f"of '{name}', '{locked[0].name}' is locked and others are not; vary these one by one"
@@ -401,6 +404,7 @@ def _make_variable(name: str, target: Target, unit: str, given: Range) -> Variab
         raise SettingError(f"'{name}' takes LOW:HIGH, LOW:HIGH:COUNT or one value, not '{given}'")
     low, high = (_parse_number(name, part, unit) for part in (parts[0], parts[-1]))
     _refuse_mixed_units(name, parts, unit)
+    # A single value is a fixed variable.
     if len(parts) == 1:
         count = 1
     if low > high:
@@ -457,6 +461,7 @@ def _parse_number(name: str, part: object, unit: str) -> float:
         raise SettingError(f"'{part}' is no number for '{name}'; give one such as 0.5 or 30deg")
     if given.unit is None:
         return given.number
+    # Some properties of OpenSim, such as limits of CoordinateLimitForce, are in degrees.
     if given.is_angle and unit.startswith("deg"):
         return given.number if given.unit == "deg" else math.degrees(given.number)
     if given.is_angle and unit.startswith("rad"):

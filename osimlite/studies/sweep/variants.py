@@ -135,6 +135,7 @@ class Variants:
         if result is None:
             try:
                 result = self._make_variant(values)
+            # Errors are cached, too: an invalid model would be built again for each sample.
             except OsimliteError as error:
                 result = error
             if len(self._kept) >= CACHED_VARIANTS:
@@ -300,6 +301,7 @@ class Variants:
         self._controls.apply(values)
         for place in self._slopes:
             angle, g = float(values[place]), self._gravity
+            # Tilting gravity about z is equivalent to a slope of the floor.
             self.model.gravity = (g * math.sin(angle), -g * math.cos(angle), self.model.gravity[2])
 
     # ------------------------------------------------------------------------------------------------ helpers
@@ -329,6 +331,7 @@ class Variants:
             self._open = model.add(
                 make_controller(model, {item.path: 0.0 for item in model.components(Actuator)})
             )
+        # A function with other parameters may return any model.
         can_renew = self._plan.engine == "compiled" and not self._parameters
         self._owners = (
             owners
@@ -349,6 +352,8 @@ class Variants:
         engine: Any = simulation.engine
         infos = engine.mechanism.coordinates
         kind = (*(info.path for info in infos), *engine.order, *engine.contacts)
+        # Coordinates, their order in the state and contacts, besides the structure of the compiled
+        # engine.
         structure = repr(kind).encode() + getattr(engine, "structure", np.zeros(0)).tobytes()
         numbers = getattr(engine, "numbers", np.zeros(0))
         return self._add_controls(
@@ -366,6 +371,7 @@ class Variants:
         """Make the model of a sample, by an update if possible."""
         self.apply_sample(values)
         given = self.given
+        # Gains change the controller only; the engine stays.
         if self._changes == self._gains:
             return self._add_controls(replace(given))
         if self._owners is None:
@@ -375,6 +381,7 @@ class Variants:
                 self.model, Path(self._plan.folder or "."), self._plan.wrapping
             )
         made = self._renewal.update(self._owners)
+        # The numbers change the structure, which needs a new engine.
         if made is None:
             return self._make_complete_variant()
         # The start values of auxiliary states may depend on the numbers.
