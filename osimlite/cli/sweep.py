@@ -121,10 +121,10 @@ def sweep(
         )
     _describe_sweep(plan, outcome).show()
     if plot:
-        from osimlite.studies.sweep.measures import measure_name
+        from osimlite.studies.sweep.measures import get_measure_name
         from osimlite.view.sweep_plots import plot_runs
 
-        names = [measure_name(spec) for spec in plan.measures]
+        names = [get_measure_name(spec) for spec in plan.measures]
         variables = [variable.name for variable in plan.variables]
         with progress_bar("drawing", None):
             written = plot_runs(

@@ -137,6 +137,7 @@ def dynamic_walker(
         ),
     ]
     model.add(*spheres)
+    # One force per sphere, as in the exercise, so that each is reported separately.
     for sphere in spheres:
         model.add(_make_contact(sphere, ground_plane))
     for hip in hips:

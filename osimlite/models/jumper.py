@@ -228,6 +228,7 @@ def _add_leg(model: Model, torso: Body, side: str, z: float, floor: ContactHalfS
         (torso, "hip_front", (0.0, 0.0, z), 0.035, "+x"),
         (femur, "knee", (0.0, -THIGH_LENGTH_M, 0.0), 0.042, "+x"),
     ):
+        # Cylinders keep the muscles outside of hip and knee when these are bent.
         body.wrap_object_set.objects.append(
             WrapCylinder(
                 name=f"{name}_{side}", translation=at, radius=radius, length=0.2, quadrant=quadrant

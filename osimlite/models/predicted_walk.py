@@ -67,6 +67,8 @@ def human_walks() -> Model:
     for coordinate in model.components(Coordinate):
         if (limits := RANGES_DEG.get(coordinate.name[:-2])) is not None:
             coordinate.range = (radians(limits[0]), radians(limits[1]))
+    # Direct collocation needs smooth forces: no equilibrium of tendons, no wrapping, no contact
+    # with kinks.
     model = modify(model, muscles="degroote", tendon="rigid", paths="polynomial", contact="smooth")
     for contact in model.components(SmoothSphereHalfSpaceForce):
         # The stiffness of a shoe and a heel pad. The jumper's stiffer contact bounces within a
@@ -132,6 +134,7 @@ def make_walking_study(model: Model, file: str, guess: str) -> MocoStudy:
     phase = MocoPhase(
         model=ModelProcessor(name="model", filepath=file),
         time_initial_bounds=MocoInitialBounds(name="time_initial_bounds", bounds=(0.0,)),
+        # Durations of a step of people who walk at this speed.
         time_final_bounds=MocoFinalBounds(name="time_final_bounds", bounds=(0.35, 0.7)),
         state_infos=[
             MocoVariableInfo(name=f"{PELVIS}pelvis_tilt/value", bounds=(-0.1, 0.05)),

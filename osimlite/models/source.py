@@ -47,6 +47,7 @@ def make_model(source: str, parameters: Mapping[str, str] | None = None) -> Mode
     function = _find_function(source)
     arguments = _parse_arguments(function, parameters or {}, source)
     file = inspect.getsourcefile(function)
+    # Errors in the file of the user are reported with its line.
     with (
         locate_errors(str(file)),
         nullcontext() if source in BUILT_IN else allow_local_imports(str(file)),
@@ -175,6 +176,7 @@ def _select_function(module: ModuleType, place: str) -> Callable[..., Any]:
         return lambda: ready
     functions = _list_functions(module)
     annotated = {name: f for name, f in functions.items() if _returns_model(f)}
+    # A file may contain helper functions; an annotation tells which one makes the model.
     candidates = annotated or functions
     if len(candidates) == 1:
         return next(iter(candidates.values()))

@@ -51,6 +51,7 @@ def collect_collisions(
             frame = tree.path_of(tree.target(geometry, "socket_frame", geometry.socket_frame))
         except ModelError:
             frame = None
+        # A frame that is missing or not fixed to a body has no place in a link.
         if frame is None or frame not in mechanism.frames:
             fidelity.add(
                 "contact-geometry",
@@ -96,6 +97,7 @@ def _make_shape(
                 f"a collision box of {size} m whose face is its surface",
             )
             return Box(HALF_SPACE_BOX_M), here
+        # URDF has no ellipsoids, so that a scaled ball becomes a mesh file.
         case ContactEllipsoid() if min(geometry.radii) > 0.0:
             file = mesh_files.name_of_stretched("ellipsoid", make_ball(), geometry.radii)
             report("an ellipsoid, and its material", "a collision shape in a mesh file", file)

@@ -129,6 +129,7 @@ def to_urdf(
             raise OsimliteError(
                 f"a limit of {what} is a positive number, not {limit:g}; leave it out for no limit"
             )
+    # Options are checked before the model is built, which may take seconds.
     mechanism = build_mechanism(model)
     fidelity = Fidelity(mechanism.name, "urdf")
     places = MeshFolders(None if folder is None else Path(folder), geometry)
@@ -140,6 +141,7 @@ def to_urdf(
     )
     touching = collect_collisions(model, mechanism, fidelity, mesh_files) if collision else {}
     robot = build_robot(mechanism, locked=locked, visuals=shapes.by_body, collisions=touching)
+    # Merging comes before limits and names, which belong to the remaining links.
     if merge:
         robot = merge_fixed(robot)
     if limits == "range":
@@ -147,6 +149,7 @@ def to_urdf(
     robot = add_strength_limits(
         legal_names(robot), model, fidelity, effort=effort, velocity=velocity
     )
+    # The account is last: it needs final names, limits and shapes.
     record_losses(model, robot, fidelity)
     name = legal(model.name or "model") if name is None else name
     coordinates = format_coordinates(robot, f"{name}.urdf")

@@ -96,6 +96,7 @@ class Group:
         result: dict[tuple[str, str], Error] = {}
         for record in self.records:
             for what, error in record.errors.items():
+                # Moment arms about different coordinates are one quantity for a summary.
                 name = what.partition(" about ")[0]
                 result[name, error.unit] = max(error, result.get((name, error.unit), error))
         return [(name, error) for (name, _), error in result.items()]
@@ -175,6 +176,7 @@ class Fidelity:
         Returns:
             Numbers of components that are translated exactly, approximately, and not at all.
         """
+        # A component with several records counts once, by the worst of them.
         dropped = {record.component for record in self.records if record.how == "dropped"}
         changed = {record.component for record in self.records} - dropped
         return len(self.translated.keys() - changed - dropped), len(changed), len(dropped)

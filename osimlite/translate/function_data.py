@@ -31,6 +31,7 @@ def describe_function(function: f.Function) -> dict[str, Any]:
         case f.WeightedSum(weights, start):
             return {"type": "weighted-sum", "weights": weights, "start": start}
         case f.Polynomial(coefficients):
+            # OpenSim has the highest power first, the format the constant.
             return {"type": "polynomial", "coefficients": coefficients[::-1]}
         case f.Sine(amplitude, omega, phase, offset):
             return {

@@ -36,6 +36,7 @@ def format_coordinates(robot: Robot, file: str) -> str:
         "coordinates": _list_coordinates(robot),
         "joints": _list_joints(robot),
         "couplers": _list_couplers(robot),
+        # Several bodies may share a link, and a body's frame may differ from that of its link.
         "bodies": [
             {"path": path, "link": link.name, "frame": frame.tolist()}
             for path, (link, frame) in robot.link_of.items()
@@ -66,6 +67,7 @@ def _list_coordinates(robot: Robot) -> list[dict[str, Any]]:
     drives: dict[int, list[str]] = {}
     for joint in robot.moving:
         for place in joint.coordinates:
+            # A coordinate may drive several joints, and a joint may depend on several coordinates.
             drives.setdefault(place, []).append(joint.name)
     return [
         {
@@ -97,6 +99,7 @@ def _list_joints(robot: Robot) -> list[dict[str, Any]]:
             "coordinates": [coordinates[place].path for place in joint.coordinates],
             "function": describe_function(joint.function),
         }
+        # Readers can use such a joint without evaluating a function.
         if joint.function == IDENTITY:
             said["identity"] = True
         if (mimic := following.get(joint.name)) is not None:

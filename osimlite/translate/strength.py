@@ -49,6 +49,7 @@ def add_strength_limits(
             )
         except ModelError:
             continue
+        # URDF's effort limit is symmetric.
         greatest = max(abs(actuator.min_control), abs(actuator.max_control))
         force = abs(actuator.optimal_force) * greatest if actuator.optimal_force else 0.0
         if place is not None:
@@ -57,6 +58,7 @@ def add_strength_limits(
     for place, actuators in result.items():
         total = sum(force for _, force in actuators)
         joint = robot.joint_of.get(place)
+        # An actuator without bounds of its control has no largest force.
         if joint is None or not math.isfinite(total):
             continue
         limits[joint.name] = total

@@ -106,6 +106,7 @@ class _Survey:
 
     def _record_gravity(self) -> None:
         units = f"{self.model.length_units} {self.model.force_units}".lower().split()
+        # OpenSim's unit names have no effect on computations; all files are read as SI.
         if units not in (["meters", "n"], ["m", "n"]):
             self.note(
                 "units",
@@ -248,6 +249,7 @@ class _Survey:
             self.note("clamped", path, "clamped range in user interfaces", "left out", text)
 
     def _record_start(self, coordinate: Coordinate, path: str, unit: str) -> None:
+        # URDF has no initial position.
         if coordinate.default_value != 0.0:
             self.note(
                 "default-pose",
@@ -288,6 +290,7 @@ class _Survey:
             leaders = {
                 self._mimics[name].leader if name in self._mimics else None for name in driven
             }
+            # Several joints of one coordinate may mimic different leaders; then none is named.
             leader = leaders.pop() if len(leaders) == 1 else None
             name = self.robot.mechanism.coordinates[coupler.dependent].name
             self.note(
@@ -314,6 +317,7 @@ class _Survey:
                 or path in self.fidelity.translated
             ):
                 continue
+            # Offset frames of joints are part of the joint origins.
             if isinstance(self.tree.parent_of(frame), Joint):
                 self.fidelity.translated[path] = "origins of the joint's parts"
                 continue

@@ -40,6 +40,7 @@ def human() -> Model:
         heel = forces[f"heel_{side}_force"]
         ball = forces[f"ball_{side}_force"]
         (own,), (other,) = heel.contact_parameters.objects, ball.contact_parameters.objects
+        # SCONE expects one contact force per foot: heel and ball share it.
         own.geometry = (*own.geometry[:1], *other.geometry)
         heel.name = f"foot_{side}"
         model.remove(ball)
@@ -70,6 +71,7 @@ def write_scenario(folder: Path) -> Path:
             Path(__file__).with_name(f"{SCENARIO}{ending}").read_bytes()
         )
     for path, content in files.items():
+        # All files are checked before any is written.
         if path.exists() and read_file(path) != content:
             raise SettingError(
                 f"'{path}' exists already and has changes: run '{folder / SCENARIO}.scone', or name another folder"

@@ -37,6 +37,7 @@ def add_bodies(draft: Draft) -> None:
     for link in robot.links:
         if not link.bodies:
             continue
+        # Bodies are not merged for MJCF: each link has at most one.
         (path,) = link.bodies
         if path == "/ground":
             element = draft.get_section("worldbody")
@@ -74,6 +75,7 @@ def _add_chain(draft: Draft, chain: list[RobotJoint], name: str) -> _Element:
     """Add the element of the body at the end of a chain of joints to the body that carries it."""
     parent, start = draft.frames[chain[0].parent]
     moving = [place for place, joint in enumerate(chain) if joint.kind != "fixed"]
+    # A longer chain is cut: a carrier body with negligible inertia has the first joints.
     if len(moving) > MAX_JOINTS_PER_BODY:
         cut = moving[MAX_JOINTS_PER_BODY]
         carrier = _add_chain(draft, chain[:cut], draft.make_name("body", f"{name}_carrier"))
@@ -100,6 +102,7 @@ def _add_chain(draft: Draft, chain: list[RobotJoint], name: str) -> _Element:
     for joint, axis, anchor in reversed(joints):
         turns = joint.kind == "revolute"
         place = clear_rounding(anchor)
+        # The anchor of a slide has no effect.
         anchored = place if turns and place.any() else None
         add_element(
             element,
@@ -128,6 +131,7 @@ def _add_inertia(draft: Draft, element: _Element, link: Link, path: str, *, move
             {"moment": Error.measure(_repair_moments(moments) - moments, "kg m^2")},
         )
     moments = _repair_moments(moments)
+    # Bodies that are welded to the world need no mass.
     if moves and (mass < MIN_MASS or moments.min() < MIN_MASS):
         if mass < MIN_MASS:
             draft.fidelity.add(
@@ -158,6 +162,7 @@ def _repair_moments(moments: Array) -> Array:
     raised = moments.copy()
     least, middle, greatest = np.argsort(moments)
     raised[least] = max(raised[least], raised[greatest] - raised[middle], 0.0)
+    # MuJoCo compares the sum without tolerance, so that rounding must not leave it too small.
     while raised[least] + raised[middle] < raised[greatest]:
         raised[least] = np.nextafter(raised[least], np.inf)
     return raised

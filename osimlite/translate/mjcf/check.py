@@ -194,6 +194,7 @@ class _MujocoModel:
             positions of the matched bodies (b, 3) (m).
         """
         model, data = self.model, self.data
+        # Joints that the model does not know stay in their reference pose.
         data.qpos[:] = model.qpos0
         rates = np.zeros((len(self.free), model.nv))
         for place, joint in self.joints.items():
@@ -256,6 +257,7 @@ class _MujocoModel:
         off = (curves.compute_tension(spread, 1.0) - wanted)[
             np.isfinite(wanted)
         ] / muscle.max_isometric_force
+        # MuJoCo's fibers lie along the tendon.
         along = muscle.optimal_fiber_length * np.cos(muscle.pennation_angle_at_optimal)
         return {
             "force": Error.measure(off, "Fmax") if len(off) else None,
@@ -268,6 +270,7 @@ def _compare_bodies(theirs: _MujocoModel, origins: Array, places: Sequence[Array
     """Return the error of body positions after the best rigid motion in each pose (Kabsch's
     algorithm).
     """
+    # Fewer than three points do not determine a rigid motion.
     if len(theirs.bodies) < 3:
         return None
     off = []
@@ -275,6 +278,7 @@ def _compare_bodies(theirs: _MujocoModel, origins: Array, places: Sequence[Array
         wanted = origins[list(theirs.bodies), pose]
         a, b = result - result.mean(0), wanted - wanted.mean(0)
         left, _, right = np.linalg.svd(a.T @ b)
+        # The sign avoids a reflection.
         flip = np.diag((1.0, 1.0, np.sign(np.linalg.det(left @ right))))
         off.append(np.linalg.norm(a @ left @ flip @ right - b, axis=1))
     return Error.measure(np.concatenate(off), "m")

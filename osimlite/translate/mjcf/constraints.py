@@ -51,6 +51,7 @@ def _add_distance(draft: Draft, item: b.DistanceConstraint) -> str:
         "tendon",
         name=name,
         tendon1=name,
+        # The equality sets the change of length from the reference length.
         polycoef=[item.distance - length, 0, 0, 0, 0],
     )
     return f"equality {name}"
@@ -67,6 +68,7 @@ def _add_point_on_line(draft: Draft, item: b.PointOnLineConstraint) -> str:
     add_element(speck, "joint", name=name, type="slide", axis=item.along)
     state = draft.mechanism.at(draft.default_state[0])
     arm = state.point(*item.follower) - state.point(*item.line)
+    # The slide starts at the projection of the follower on the line.
     draft.starts[name] = float(arm @ state.transform(item.line.body)[:3, :3] @ item.along)
     draft.fidelity.add(
         "constraint",

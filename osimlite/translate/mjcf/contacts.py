@@ -99,6 +99,7 @@ def _make_geom(
             return {"type": "sphere", "size": [geometry.radius]}, np.eye(4)
         case ContactEllipsoid() if min(geometry.radii) > 0.0:
             return {"type": "ellipsoid", "size": geometry.radii}, np.eye(4)
+        # MuJoCo allows planes on static bodies only.
         case ContactHalfSpace() if still:
             return {"type": "plane", "size": (0.0, 0.0, 1.0)}, _PLANE
         case ContactHalfSpace():
@@ -126,12 +127,14 @@ def _add_pairs(draft: Draft, force: ContactForce) -> Iterator[str]:
         ]
         bodies = [draft.find_placement(item, "socket_frame").body for item in (one, two)]
         flat = isinstance(one, ContactHalfSpace) and isinstance(two, ContactHalfSpace)
+        # Two half spaces have no defined contact, and a body does not touch itself.
         if flat or bodies[0] == bodies[1] or None in became:
             continue
         geoms = [str(what).removeprefix("geom ") for what in became]
         name = draft.make_name("pair", ".".join(geoms))
         # Simbody combines two coefficients by their harmonic mean.
         slide = 2.0 * first * second / (first + second) if first + second else 0.0
+        # OpenSim has no torsional or rolling friction.
         friction = (slide, slide, 0.0, 0.0, 0.0)
         add_element(
             draft.get_section("contact"),

@@ -119,6 +119,7 @@ def add_limit(draft: Draft, force: CoordinateLimitForce, path: str) -> str:
     Ku, qu, Kl, ql, D, t = read_limit_constants(force, info)
     if ql > qu:
         raise Untranslatable("its lower limit lies above its upper one")
+    # One tendon has one stiffness; two stiffnesses need a tendon for each side.
     if Ku == Kl:
         made = _add_tendon(draft, lead, path, (ql, qu), stiffness=Ku)
     else:
@@ -126,6 +127,7 @@ def add_limit(draft: Draft, force: CoordinateLimitForce, path: str) -> str:
         made += " " + _add_tendon(
             draft, lead, f"{path}_lower", (ql, UNREACHABLE_VALUE), stiffness=Kl
         ).removeprefix("tendon ")
+    # The difference to OpenSim's smooth limit is in the transition of width t.
     beyond = np.linspace(0.0, 3.0 * t, 200)
     off = [limit_force(qu + d, 0.0, Ku, qu, Kl, ql, D, t) + Ku * d for d in beyond]
     off += [limit_force(ql - d, 0.0, Ku, qu, Kl, ql, D, t) - Kl * d for d in beyond]
@@ -148,6 +150,7 @@ def _add_tendon(
     coordinate.
     """
     slope, start = lead.line
+    # The length of the tendon is the coordinate plus start / slope.
     ends = [end + start / slope for end in slack]
     name = draft.make_name("tendon", path)
     tendon = add_element(draft.get_section("tendon"), "fixed", name=name, springlength=ends, **law)

@@ -29,15 +29,18 @@ def add_coordinates(draft: Draft) -> None:
             note("coordinate", info.path, "a coordinate that moves nothing", "left out")
         if lead is not None:
             draft.fidelity.note_name(info.path, "joint", info.name, lead.joint)
+        # A scaled joint would need a scaled range, which users would misread.
         if lead is not None and lead.line == (1.0, 0.0):
             element = elements[lead.joint]
             if all(map(math.isfinite, info.range)) and info.range[0] < info.range[1]:
                 element.set("range", " ".join(map(repr, info.range)))
+                # A range of a coordinate does not stop a motion in OpenSim.
                 element.set("limited", "false")
         if info.clamped:
             note("clamped", info.path, "clamped range in user interfaces", "left out")
         if info.prescribed is not None and not info.locked and lead is not None:
             start = info.prescribed.evaluate(np.zeros(1))[0]
+            # The driver evaluates the function of time at every step.
             exact = Composed(Linear(*lead.line), info.prescribed) if draft.options.driver else None
             draft.add_follower(
                 lead.joint, Follower(None, (lead.line.slope * start + lead.line.start,), exact)

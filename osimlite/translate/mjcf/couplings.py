@@ -50,6 +50,7 @@ def add_couplings(draft: Draft) -> None:
     draft.leads |= {
         place: Lead(joint.name, line) for place, (joint, line) in leaders(robot).items()
     }
+    # The driver computes ellipsoid joints exactly, without the mechanism.
     if not draft.options.driver:
         add_ellipsoids(draft)
     drivers = coordinate_drivers(robot)
@@ -58,6 +59,7 @@ def add_couplings(draft: Draft) -> None:
     }
     for joint in robot.moving:
         driver = joint_driver(joint, drivers)
+        # The mechanism of an ellipsoid joint already moves this joint.
         if joint.name in draft.followers:
             continue
         if driver is None:
@@ -101,6 +103,7 @@ def _add_follower(draft: Draft, joint: RobotJoint, driver: Driver, whose: str) -
         assert led is not None
         follower = Follower(led.joint, compose_with_line(led.line, outer))
         done = "a quartic of a quartic, fitted"
+        # The error is measured between the points of the fit as well.
         x = np.linspace(low, high, 400)
         fit = Fit(
             (),
@@ -180,6 +183,7 @@ def add_helper(draft: Draft, place: int, drive: Array) -> Lead | None:
         return None
     lead = draft.leads.get(place) or _add_argument_joint(draft, place)
     own = lead.line.inverse()
+    # The identity needs no helper.
     if np.array_equal(drive, (0.0, 1.0, 0.0, 0.0, 0.0)):
         return Lead(lead.joint, own)
     follower = Follower(lead.joint, compose_with_line(own, drive))

@@ -283,6 +283,7 @@ class Draft:
         if name in taken:
             name = whole if whole not in taken else make_unique_name(whole, taken, first=2)
         taken.add(name)
+        # Only components have a name of their own to compare with.
         if path in self.tree.by_path:
             self.fidelity.note_name(path, kind, own, name)
         return name
@@ -340,6 +341,7 @@ class Draft:
             follower: its dependence.
         """
         self.followers[joint] = follower
+        # MuJoCo's equality has a quartic with five coefficients.
         coefficients = np.zeros(5)
         coefficients[: len(follower.polynomial)] = follower.polynomial
         name = self.make_name("equality", joint)

@@ -38,8 +38,10 @@ def add_driven(draft: Draft) -> None:
         if isinstance(component, ContactGeometry | WrapObject | Controller):
             draft.record_result(path, COMPUTED_NOTE)
     joint = draft.get_section("worldbody").find(".//joint")
+    # MuJoCo's actuators need a joint; a model without one has no motion.
     if joint is None:
         return
+    # With gear and gain 0, MuJoCo applies no force; controls are read by the driver.
     states = draft.make_name("actuator", STATES_ACTUATOR)
     idle = {"joint": joint.get("name"), "gainprm": 0, "gear": 0}
     for path in forces.controls.names:

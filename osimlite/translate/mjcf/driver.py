@@ -124,12 +124,14 @@ class Driver:
         else:
             self.model = self._mujoco.MjModel.from_xml_path(str(file))
         self.model.opt.timestep = timestep
+        # The driver reads the constraint Jacobian as a full matrix.
         self.model.opt.jacobian = self._mujoco.mjtJacobian.mjJAC_DENSE
         self.model.opt.integrator = getattr(
             self._mujoco.mjtIntegrator, f"mjINT_{integrator.upper()}"
         )
         self.data = self._mujoco.MjData(self.model)
         self._mechanism = mechanism = self.mjcf.robot.mechanism
+        # Only ball and free joints have speeds that are not the rates of coordinates.
         self._turns = not all(body.mobilizer.speeds_are_rates for body in mechanism.bodies)
         self._restore_inertias()
         forces = force_elements(model, mechanism, skip_unsupported=True, folder=folder)
@@ -143,6 +145,7 @@ class Driver:
         self._dofs = np.array([joint.dofadr[0] for joint in joints], dtype=int)
         self._slopes, self._starts = np.array([lead.line for lead in leads]).reshape(-1, 2).T
         led = set(self.mjcf.leads)
+        # Coordinates without a joint of their own follow a leading coordinate.
         self._following = {
             k: each for k, each in coordinate_drivers(self.mjcf.robot).items() if k not in led
         }
@@ -223,6 +226,7 @@ class Driver:
         before = mujoco.get_mjcb_control(), mujoco.get_mjcb_act_dyn()
 
         def push(model: Any, data: Any) -> None:
+            # Callbacks of other code continue to act.
             if before[0] is not None:
                 before[0](model, data)
             self._apply_forces(data)
@@ -260,10 +264,13 @@ class Driver:
         self._rates = row[2 * count :]
         forces = np.zeros(len(q))
         forces[list(state.order)] = row[count : 2 * count]
+        # Generalized forces of speeds are transformed to those of coordinate rates: Q = N^-T f.
         if self._turns:
             forces[:] = np.linalg.solve(self._mechanism.rate_matrix(q).T, forces)
         for place, (leader, slope) in slopes.items():
+            # The force of a follower acts on its leader by the chain rule.
             forces[leader] += slope * forces[place]
+        # Passive forces: MuJoCo adds them to all others without further processing.
         data.qfrc_passive[self._dofs] += forces[self._places] / self._slopes
         self._apply_equality_forces(data)
 
@@ -324,6 +331,7 @@ class Driver:
         """Return rates of auxiliary states, which `_apply_forces` has computed at the same
         evaluation.
         """
+        # MuJoCo expects the rate of a single state as the return value.
         if len(self._rates) == 1:
             return self._rates[0]
         if actuator == self._states:
@@ -397,6 +405,7 @@ class Driver:
     def _add_controls(self) -> None:
         """Add MuJoCo's controls to those of the model, and find where the forces have their values."""
         controls = self.system.forces.controls
+        # Two sets of controls with different values reveal where the values are stored.
         none, one = (
             controls.add_functions(dict.fromkeys(controls.names, Constant(value)))
             for value in (0.0, 1.0)

@@ -44,8 +44,10 @@ def _add_mechanism(draft: Draft, slides: list[RobotJoint], turns: tuple[RobotJoi
     base = draft.frames.get(slides[0].parent)
     end = draft.frames.get(turns[-1].child) if turns else None
     whole = {place for joint in turns for place in joint.coordinates} == set(slides[0].coordinates)
+    # Another arrangement of axes is left to the general treatment of functions.
     if len(radii) < len(slides) or base is None or end is None or not whole:
         return
+    # Any distance is exact; the largest radius makes ratios of about one half.
     ahead = max(radii.values())
     path = slides[0].source
     name = draft.make_name("ellipsoid", path)

@@ -195,8 +195,10 @@ def to_mjcf(
     fidelity.translated["/"] = f"mujoco {mechanism.name}"
     for make in (*MECHANISM_PASSES, *((add_driven,) if driver else FORCE_PASSES), *SCENERY_PASSES):
         make(draft)
+    # What no pass has accounted for is lost.
     account_for_rest(draft.tree, fidelity)
     for section in list(draft.root):
+        # Empty sections would only clutter the file.
         if not section.attrib and not len(section) and not isinstance(section, _Comment):
             draft.root.remove(section)
     name = legal(model.name or "model") if name is None else name

@@ -48,6 +48,7 @@ def fit_tendon(router: Router, tendon: Tendon) -> Tendon:
     fixed = [
         index for index, part in enumerate(tendon) if isinstance(part, TendonSite) and part.name
     ]
+    # From the end, so that indices of earlier pieces remain valid.
     for first, last in reversed(list(pairwise(fixed))):
         piece = tendon[first : last + 1]
         if any(map(_is_free, piece)):
@@ -66,6 +67,7 @@ def _fit_piece(piece: Tendon, wrong: Residuals) -> Tendon:
         start = best
         size = sum(7 if isinstance(part, WrapGeom) else 3 for part in start if _is_free(part))
         guess = search(
+            # Millimetres: tolerances of least_squares are for residuals near 1.
             lambda x, t=start: 1e3 * wrong(_move_free_parts(t, x)).ravel(),
             np.zeros(size),
             max_nfev=40,
@@ -88,6 +90,7 @@ def _choose_sides(piece: Tendon, wrong: Residuals) -> Tendon:
     """Return the piece with the best side for each surface."""
     turns = np.arange(SIDE_DIRECTIONS) * (2.0 * np.pi / SIDE_DIRECTIONS)
     directions = np.stack((np.cos(turns), np.sin(turns), 0.0 * turns), axis=1)
+    # The length of a tendon jumps with the side, which no gradient shows: all sides are tried.
     for index, part in enumerate(piece):
         if isinstance(part, WrapGeom) and _is_free(part):
             options = [
@@ -115,6 +118,7 @@ def _move_free_parts(piece: Tendon, x: Array) -> Tendon:
             x = x[3:]
         else:
             frame = part.frame @ make_offset(SHIFT_SCALE_M * x[:3], TURN_SCALE_RAD * x[3:6])
+            # A logarithm keeps the radius positive.
             radius = part.radius * float(np.exp(np.clip(LOG_RADIUS_SCALE * x[6], -5.0, 5.0)))
             parts.append(part.move_to(frame, radius))
             x = x[7:]

@@ -45,6 +45,7 @@ def add_forces(draft: Draft) -> None:
         try:
             if not force.appliesForce:
                 raise Untranslatable("its appliesForce is false")
+            # A muscle class that osimlite cannot compute has no tension to fit to.
             if isinstance(force, Muscle) and FORCE_TYPES.find(type(force)):
                 draft.fidelity.translated[path] = add_muscle(draft, force, path)
             elif what in MAKERS:

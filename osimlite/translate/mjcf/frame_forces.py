@@ -92,6 +92,7 @@ def add_torque_actuator(draft: Draft, force: TorqueActuator, path: str) -> str:
     second = draft.find_placement(force, "bodyB") if force.bodyB else GROUND_FRAME
     gear = np.append(np.zeros(3), _normalize_axis(force.axis) * force.optimal_force)
     one = draft.add_site(path, *first)
+    # The axis is fixed in body B; MuJoCo applies the torque in the axes of the reference site.
     if not force.torque_is_global:
         return _add_site_motor(draft, path, -gear, draft.add_site(path, *second), one)
     if second.body != GROUND:
@@ -217,6 +218,7 @@ def add_bushing(draft: Draft, force: BushingForce, path: str) -> str:
     name = draft.make_name("bushing", path)
     speck = draft.add_speck(name, draft.bodies[one], inner)
     state = draft.mechanism.at(draft.default_state[0])
+    # Deviations in the default pose, at which the joints start.
     apart = invert_transform(state.transform(one) @ inner) @ state.transform(second[0]) @ second[1]
     starts = (*angles_xyz(apart[:3, :3]), *apart[:3, 3])
     stiffness = (*force.rotational_stiffness, *force.translational_stiffness)

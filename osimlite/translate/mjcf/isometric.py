@@ -36,6 +36,7 @@ def compute_isometric_tension(force: Any, lengths: Array, activations: Sequence[
         Tensions (A, L) (N); NaN where a muscle has no equilibrium.
     """
     model = Model(name="bench", gravity=(0.0, 0.0, 0.0))
+    # A bench: the length of the path is the position of the block.
     block = model.add(Body(name="block", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)))
     model.add(SliderJoint(name="slide").between(model.ground, block))
     path = GeometryPath(name="path")
@@ -52,6 +53,7 @@ def compute_isometric_tension(force: Any, lengths: Array, activations: Sequence[
     result = np.full((len(activations), len(lengths)), np.nan)
     for row, activation in zip(result, activations, strict=True):
         start = [
+            # Fiber lengths are solved for; 0.1 m is a start.
             activation if variable.path.endswith("/activation") else 0.1
             for variable in system.state.variables
         ]

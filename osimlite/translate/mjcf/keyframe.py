@@ -30,7 +30,9 @@ def add_keyframe(draft: Draft) -> None:
     rates = dict(zip(values, (draft.robot.joint_jacobian(q) @ qdot).tolist(), strict=True))
     for place, (joint, line) in draft.leads.items():
         values[joint], rates[joint] = line.slope * q[place] + line.start, line.slope * qdot[place]
+    # Joints of helper bodies are not part of the robot.
     values |= draft.starts
+    # Followers last: their leaders have values by now.
     for joint, follower in draft.followers.items():
         value = values.get(follower.leader or "", 0.0)
         rate = rates.get(follower.leader or "", 0.0)

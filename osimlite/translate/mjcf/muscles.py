@@ -122,6 +122,7 @@ class Curves(NamedTuple):
         """
         (low, high), (first, last) = lengthrange, gain[:2]
         fiber = (high - low) / (last - first)
+        # A bias with another scale than the gain is not a shift of the passive curve.
         same_scale = math.isclose(bias[1] - bias[0], last - first, rel_tol=1e-9)
         shift = gain[0] - bias[0] if same_scale else math.nan
         return cls(low - first * fiber, fiber, gain[2], gain[4], gain[5], bias[5], bias[7], shift)
@@ -172,6 +173,7 @@ def add_muscle(draft: Draft, force: Muscle, path: str) -> str:
             computed.
     """
     tied = draft.find_tendon(path)
+    # MuJoCo has no pennation: lengths and forces are projected on the tendon at the optimal length.
     cos = math.cos(force.pennation_angle_at_optimal)
     own = Curves(
         force.tendon_slack_length, force.optimal_fiber_length * cos, force.max_isometric_force * cos
@@ -201,6 +203,7 @@ def add_muscle(draft: Draft, force: Muscle, path: str) -> str:
     name = draft.make_name("actuator", path)
     limits = (max(force.min_control, 0.0), min(force.max_control, 1.0))
     rise, fall = rates.rise, rates.fall
+    # Without time constants or an activation state, the control is the activation.
     lags = rise > 0.0 and fall > 0.0 and "activation" in list_states(force)
     gain, bias = curves.make_parameters(vmax, fvmax)
     add_element(
@@ -308,6 +311,7 @@ def _measure_velocity_curve(force: Delp1990Muscle_Deprecated) -> tuple[float, fl
         factors = [curve.evaluate((velocity,))[0] for velocity in velocities]
     except OsimliteError:
         return 0.0, DEFAULT_FVMAX
+    # Shortening velocities without force; the slowest of them is the maximum.
     idle = [
         velocity
         for velocity, factor in zip(velocities, factors, strict=True)

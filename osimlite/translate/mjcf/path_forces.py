@@ -85,6 +85,7 @@ def add_ligament(draft: Draft, force: Ligament | Blankevoort1991Ligament, path: 
         (other,) = compute_isometric_tension(force, tied.held_out, (0.0,))
     except OsimliteError as error:
         raise Untranslatable(f"its tension cannot be computed: {error.message}") from error
+    # Slack poses are left out: a spring that fits them too would be too soft.
     stiffness, rest = _fit_spring(tied.lengths[tension > 0.0], tension[tension > 0.0])
     element.attrib.update(
         {"stiffness": format_value(stiffness), "springlength": format_value((0.0, rest))}

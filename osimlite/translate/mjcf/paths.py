@@ -64,6 +64,7 @@ def add_paths(draft: Draft) -> None:
     exact = Paths(draft.model)
     fits = draft.options.fit != "none"
     poses, truth = draw_poses(exact, FIT_POSES if fits else SELECTION_POSES, 0)
+    # Other seeds give other poses: errors are measured in poses that no fit has seen.
     held, held_truth = draw_poses(exact, TEST_POSES, 1)
     others, other_truth = draw_poses(exact, VALIDATION_POSES, 2) if fits else (poses, truth)
     default = exact.lengths(draft.default_state[0])
@@ -71,6 +72,7 @@ def add_paths(draft: Draft) -> None:
     for path, given in owners.items():
         route = exact.routes[path]
         own = draft.tree.path_of(given) or ""
+        # Function-based paths have no points for sites.
         if not isinstance(route, ThroughPoints):
             kind = type(given).__name__
             draft.fidelity.add("path", own, f"a path that is a {kind}", LEFT_OUT)
@@ -215,6 +217,7 @@ class _Writer:
         return site
 
     def _write_geom(self, path: str, around: WrapGeom) -> str:
+        # Muscles share wrap objects; equal geoms are written once.
         key = (
             around.body,
             around.kind,
@@ -253,6 +256,7 @@ def _split_into_axes(slides: Array) -> Iterator[tuple[Array, Array]]:
     for a straight line.
     """
     axes, sizes, rows = np.linalg.svd(slides, full_matrices=False)
+    # The singular values tell whether all coefficients lie along one axis.
     if sizes[1] <= 1e-12 * sizes[0]:
         yield axes[:, 0], sizes[0] * rows[0]
         return

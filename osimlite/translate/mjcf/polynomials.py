@@ -81,6 +81,7 @@ def fit_quartic(function: f.Function, span: tuple[float, float], unit: str) -> F
         return Fit(tuple(exact.coef.tolist()))
     low, high = span
     middle, half = 0.5 * (high + low), 0.5 * (high - low)
+    # Chebyshev points are dense at the ends, where the error of a fit is largest.
     x = middle + half * np.cos(np.linspace(0.0, np.pi, _SAMPLE_COUNT))
     y = sample_function(function, x)
     basis = np.polynomial.chebyshev.chebvander((x - middle) / half, DEGREE)
@@ -98,6 +99,7 @@ def fit_quartic(function: f.Function, span: tuple[float, float], unit: str) -> F
         weights *= off
         weights /= weights.sum()
     fitted = Chebyshev(best, domain=[low, high]).convert(kind=Polynomial)
+    # The reported error is from other points than those of the fit.
     even = np.linspace(low, high, _SAMPLE_COUNT)
     return Fit(
         tuple(fitted.coef.tolist()),
@@ -142,6 +144,7 @@ def select_span(
     if not high - low <= _MAX_RANGE and points:
         low = max(low, min(points))
         high = min(high, max(points))
+    # An empty or absurd range says nothing about the motion.
     if not 0.0 < high - low <= _MAX_RANGE:
         low, high = start - 1.0, start + 1.0
     return min(low, start), max(high, start)

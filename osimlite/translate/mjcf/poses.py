@@ -155,6 +155,7 @@ def draw_values(mechanism: Mechanism, count: int, seed: int) -> Array:
         if not 0.0 <= high - low < np.inf:
             low = info.default_value - 1.0
             high = info.default_value + 1.0
+        # A generator per coordinate: locking another coordinate does not change these values.
         values[:, place] = np.random.default_rng((seed, place)).uniform(low, high, count)
     for item in coupled:
         values[:, item.dependent] = [
@@ -191,6 +192,7 @@ def draw_poses(paths: Paths, count: int, seed: int = 0) -> tuple[Poses, Mapping[
     moving = np.array(list_free_coordinates(mechanism), dtype=int)
     states = [mechanism.at(row) for row in values]
     couplings = [paths.compute_free_coupling(state) for state in states]
+    # A coordinate that constraints block has no rate (NaN).
     rates = np.nan_to_num(np.stack([coupling[:, moving] for coupling in couplings]))
     poses = Poses(
         values,

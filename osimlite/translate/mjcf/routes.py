@@ -75,6 +75,7 @@ class Router:
     def __init__(
         self, route: ThroughPoints, truth: PathSamples, poses: Poses, version: int
     ) -> None:
+        # Coordinates about which the path has no moment arm would only dilute the error.
         columns = np.flatnonzero(np.abs(truth.arms).max(0, initial=0.0) > 1e-9)
         self.route = route
         self.truth = truth
@@ -207,6 +208,7 @@ class Router:
             best[number] = result
         options = [(), *((each,) for each in best.values())]
         for (one, first), (two, second) in combinations(best.items(), 2):
+            # MuJoCo needs a site between two surfaces.
             for middle in self._place_sites_between(one, two):
                 sides = product(self._vary_side(one, first, 0), self._vary_side(two, second, 0))
                 options += [(sided, middle, other) for sided, other in sides]
@@ -252,6 +254,7 @@ class Router:
         """
         first, second = self.touches[one], self.touches[two]
         both, at_one, at_two = np.intersect1d(first.poses, second.poses, return_indices=True)
+        # The path never touches both surfaces in one pose.
         if not len(both):
             return
         bodies = [self.route.surfaces[number].tangent.body for number in (one, two)]
@@ -326,6 +329,7 @@ class Router:
             np.einsum("pji,pj->pi", self.poses.rotations[body][poses], way).mean(0)
             for way in (turning, unit(after) - unit(before))
         )
+        # A path that does not turn needs no cylinder.
         if not normal.any() or not into.any():
             return
         frame = make_transform(rotate_z_to(normal))

@@ -54,6 +54,7 @@ def add_camera(draft: Draft) -> None:
     fall = draft.mechanism.gravity if draft.mechanism.gravity.any() else np.array((0.0, -1.0, 0.0))
     fall = fall / np.abs(fall).max()
     up = -fall / np.linalg.norm(fall)
+    # Any horizontal axis that is not parallel to up.
     right = np.eye(3)[0] if abs(up[0]) < 0.9 else np.eye(3)[1]
     right = right - (right @ up) * up
     right /= np.linalg.norm(right)

@@ -31,6 +31,7 @@ def make_substitutes(surface: Surface, touched: Array) -> Iterator[WrapGeom]:
         case "wrap_cylinder":
             yield replace(own, kind="cylinder", radius=sizes[0], length=sizes[1])
         case "wrap_ellipsoid":
+            # Candidates are the semi-axes and the mean distance of the touched points.
             for radius in {*sizes, float(np.linalg.norm(touched, axis=1).mean())}:
                 yield replace(own, radius=radius)
             for axis in range(3):

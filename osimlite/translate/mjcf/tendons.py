@@ -127,6 +127,7 @@ def measure_tendons(tendons: Sequence[Tendon], poses: Poses, version: int) -> tu
     alike: dict[Any, list[tuple[int, WrapGeom | None]]] = {}
     for place, tendon in enumerate(tendons):
         for first, around, second in iterate_sections(tendon):
+            # Sections with equal sites and the same kind of surface are measured in one call.
             side = around and around.side and (around.side.body, around.side.slides is None)
             kind = around and (around.body, around.kind, side)
             alike.setdefault((first, second, kind), []).append((place, around))
@@ -196,6 +197,7 @@ def _measure_section(
         chosen = result.choice * len(frames) + owners[:, None], np.arange(len(poses.q))
     for spot, place, pull in ((first, one, unit(way)), (second, two, unit(back))):
         arms = arms + _compute_generalized_forces(spot.body, place, pull, poses)
+        # A sliding site does work by its own motion, too.
         if spot.slides is not None:
             arms = arms + _compute_sliding_forces(spot, pull, poses)
     return (lengths + norm(way))[chosen], arms[chosen]

@@ -60,6 +60,7 @@ def choose_step(draft: Draft) -> None:
             error.message,
         )
     if rate * DEFAULT_STEP_S > 2.0:
+        # Half of the stability limit, with one digit.
         step = float(f"{1.0 / rate:.0e}")
         next(draft.root.iter("option")).set("timestep", format_value(step))
         cannot = f"springs too stiff for steps of {DEFAULT_STEP_S:g} s, which would end in NaN"
@@ -70,6 +71,8 @@ def choose_step(draft: Draft) -> None:
         if isinstance(muscle, Muscle):
             with suppress(OsimliteError):
                 (tension,) = compute_isometric_tension(muscle, np.array((tied.default,)), (0.0,))[0]
+            # Passive tension above the strength: the default pose is beyond the range of the
+            # fibers.
             if tension > muscle.max_isometric_force:
                 cannot = "fibers that are longer in the default pose than they can bear"
                 done = "as it is: the model may run away, in smaller steps too"
@@ -90,8 +93,10 @@ def _compute_fastest_rate(draft: Draft) -> float:
         rows, _ = stack_equations(
             [item.velocity_equations(state) for item in mechanism.constraints]
         )
+        # Only motions that the constraints allow.
         _, free = solve_with_null_space(rows, np.zeros(len(rows)))
     mass = free.T @ mechanism.mass_matrix(q) @ free
+    # A motion without inertia has no finite rate.
     if not len(mass) or np.linalg.eigvalsh(mass)[0] < SAFE_MASS:
         return 0.0
     builder = ElementBuilder(draft.model, mechanism, draft.folder or Path())

@@ -93,6 +93,7 @@ def bend_tendon(
     arc = radius * (winding - reach_p - reach_q)
     at_p = _turn_on_circle(p, signs * reach_p, radius)
     at_q = _turn_on_circle(q, -signs * reach_q, radius)
+    # MuJoCo does not wrap if an end is inside the surface.
     outside = (norm(p) >= radius) & (norm(q) >= radius)
     touches = outside & (arc > 0.0)
     choice = np.zeros((len(owners), len(p[0])), dtype=int)
@@ -119,6 +120,7 @@ def bend_tendon(
             np.concatenate((at, z[..., None]), axis=-1)
             for at, z in zip((at_p, at_q), heights, strict=True)
         )
+        # On a cylinder the tendon is a helix, whose length is the hypotenuse of arc and height.
         arc = np.hypot(arc, heights[1] - heights[0])
     else:
         one, two = (np.einsum("spij,cspi->cspj", across, at) for at in (at_p, at_q))
@@ -148,6 +150,7 @@ def _choose_side(
     straight = (norm(nearest) > radius)[owners] & (_dot(side, nearest[owners]) >= 0.0)
     middle = unit(at_p + at_q)
     crossed: Mask = _lines_cross(p, at_p, q, at_q)
+    # A way whose tangents cross is impossible.
     good = np.where(crossed[:, owners], -np.inf, _dot(middle[:, owners], side))
     return np.where(straight | np.all(crossed, axis=0)[owners], 0, 1 + good.argmax(0))
 
@@ -187,6 +190,7 @@ def _lines_cross(p: Array, one: Array, q: Array, two: Array) -> Mask:
     """Return whether the segments from p to one and from q to two intersect (...)."""
     way, other, apart = one - p, two - q, q - p
     across = _cross(way, other)
+    # Parallel lines have no intersection; comparisons with NaN are false.
     across = np.where(np.abs(across) < TINY, np.nan, across)
     along = _cross(apart, other) / across
     back = _cross(apart, way) / across
