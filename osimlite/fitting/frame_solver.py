@@ -68,6 +68,7 @@ class FrameSolver:
         frames = {
             name: find_sensor_frames(model, mechanism, (name,))[name] for name in self.sensors
         }
+        # Orientation sensors do not measure positions.
         self._mechanism = mechanism if self.markers else lock_translations(mechanism)
         weighed = dict.fromkeys((*self.markers, *self.sensors), 1.0) | dict(weights or {})
         self.coordinates = mechanism.coordinate_names

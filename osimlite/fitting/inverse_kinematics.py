@@ -101,6 +101,7 @@ def inverse_kinematics(
             what = "marker" if not frames else "sensor" if markers is None else "marker or sensor"
             raise SettingError(f"'{model.name}' has no {what} '{name}'{suggest_name(name, known)}")
         check_weight(weight, f"'{name}'")
+        # A marker and a sensor of one name share the weight.
         for kind in (weighed, sensed):
             if name in kind:
                 kind[name] = float(weight)
@@ -112,6 +113,7 @@ def inverse_kinematics(
         )
         goals.append(CoordinateTarget(index, float(weight)))
         targets.append(float(value))
+    # Constant targets, in the form of a table over time.
     rows = np.tile(targets, (len(data.times), 1))
     return fit_motion(model, mechanism, data, weighed, goals, rows, constraints, turned, sensed)
 
@@ -170,6 +172,7 @@ def fit_motion(
         data.times,
         compute_first_pose(mechanism, float(data.times[0]), constraints),
     )
+    # A marker with one missing component counts as unseen.
     seen = np.asarray(np.isfinite(measured).all(axis=2))
     undetermined = find_undetermined(
         mechanism, poses.values, seen, points, turning, goals, constraints=constraints
@@ -202,6 +205,7 @@ def check_weight(weight: float, what: str) -> None:
     Raises:
         SettingError: the weight is negative, infinite or NaN.
     """
+    # NaN fails this comparison, too.
     if not 0.0 <= weight < np.inf:
         raise SettingError(
             f"the weight {weight:g} of {what} is invalid; set a number that is not negative"
@@ -215,7 +219,10 @@ def lock_translations(mechanism: Mechanism) -> Mechanism:
         for info in mechanism.coordinates
     )
     others = tuple(
-        item for item in mechanism.constraints if not isinstance(item, Lock | PrescribedCoordinate)
+        # Locks and prescribed motions are in the coordinates already.
+        item
+        for item in mechanism.constraints
+        if not isinstance(item, Lock | Prescribed)
     )
     return replace(mechanism, coordinates=infos, constraints=others)
 
@@ -240,5 +247,6 @@ def find_marker_stations(model: Model, mechanism: Mechanism) -> dict[str, Statio
     for marker in model.components(ModelMarker):
         placed = mechanism.stations.get(tree.path_of(marker) or "")
         if placed is not None:
+            # OpenSim finds the first marker of a name.
             result.setdefault(marker.name, placed)
     return result

@@ -78,6 +78,7 @@ def place_markers(
             "set one that begins "
             f"before it ends, within {data.times[0]:g} to {data.times[-1]:g} s"
         )
+    # The pose is fitted to the mean of the frames, in which a marker that was missed once is NaN.
     mean = MarkerData(
         data.names, np.array((first,)), data.positions[within].mean(axis=0)[None], data.file
     )
@@ -102,6 +103,7 @@ def place_markers(
         if marker.fixed or marker.name not in target or not np.isfinite(target[marker.name]).all():
             continue
         body, frame = mechanism.placement(_find_frame_path(model, marker))
+        # From ground to the frame of the marker in the fitted pose.
         there = np.linalg.inv(state.transform(body) @ frame) @ [*target[marker.name], 1.0]
         moved[marker.name] = float(np.linalg.norm(there[:3] - np.array(marker.location)))
         marker.location = tuple(there[:3].tolist())
@@ -126,6 +128,7 @@ def format_pose(model: Model, placed: MarkerPlacement) -> str:
     mechanism = placed.pose.mechanism
     motion = placed.pose
     elements = force_elements(model, mechanism, skip_unsupported=True).elements
+    # All states, also those of muscles, because OpenSim's file has them.
     layout = StateLayout(mechanism, range(len(mechanism.coordinates)), elements)
     values = motion.values[0].tolist()
     state = layout.pack(values, [0.0] * len(values))

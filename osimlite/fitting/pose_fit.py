@@ -92,6 +92,8 @@ class PoseFit:
         self._held: dict[int, Function | None] = {}
         free = set(find_free_coordinates(mechanism))
         for index, info in enumerate(infos):
+            # Their values change from frame to frame or from fit to fit; as inputs they need no new
+            # kernel.
             if index in free and (info.locked or info.prescribed is not None):
                 self._held[index] = None if info.locked else info.prescribed
                 infos[index] = replace(info, locked=False, prescribed=None)
@@ -121,6 +123,7 @@ class PoseFit:
 
     def set_pose(self, q: Array) -> None:
         """Start from the values (n,) of all coordinates."""
+        # The solver extrapolates from earlier frames; after a jump there are none.
         self._history[0] = 0.0
         self.system.set_pose(q)
 

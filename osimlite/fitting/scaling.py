@@ -68,15 +68,18 @@ def scale_model(
         OsimliteError: osimlite cannot compute the paths of the model.
     """
     mechanism = build_mechanism(model) if mechanism is None else mechanism
+    # Lengths before scaling: fibers and tendons scale with the ratio.
     before = compute_path_lengths(model, mechanism)
     scaler = _Scaler(model, factors, mechanism)
     for component in scaler.tree.components:
+        # Internal components belong to their owner, whose rule covers them.
         if not scaler.tree.is_internal(component):
             scaler.scale_component(component)
     for body in model.components(Body):
         body_factors = scaler.get_base_factors(body)
         if body_factors is not None:
             scale_inertia(body, body_factors, scales_mass=not preserve_mass_distribution)
+    # The requested mass rescales all bodies alike, as in OpenSim.
     if mass > 0.0:
         total = sum(body.mass for body in model.components(Body))
         if total > 0.0:
@@ -123,6 +126,7 @@ def get_scale_rules(cls: type[Any]) -> dict[str, str]:
         Rule by name of the property.
     """
     result: dict[str, str] = {}
+    # Rules of derived classes override those of their bases.
     for base in reversed(cls.__mro__):
         facts = vars(base).get("facts")
         if isinstance(facts, Facts):
@@ -240,6 +244,7 @@ class _Scaler:
             self.mechanism.coordinate_index(self.placements.path(coordinate))
         ]
         joint = self.tree.parent_of(coordinate)
+        # Angles do not scale.
         if info.motion_type != "translational" or not isinstance(joint, Joint):
             return None
         factors = self.get_base_factors(self.placements.follow_socket(joint, "socket_parent_frame"))
@@ -263,6 +268,7 @@ def _select_factors(component: Component, factors: Array, which: str) -> Array:
         return factors
     assert isinstance(component, WrapObject)
     axes = rotation_xyz(np.array(component.xyz_body_rotation, dtype=float))
+    # Factors along the rotated axes of the wrap object.
     lengths = np.linalg.norm(axes * factors[:, None], axis=0)
     if which == AXES:
         return np.asarray(lengths)

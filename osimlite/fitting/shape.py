@@ -39,12 +39,14 @@ class ScalableMarkers:
 
     def __init__(self, model: Model, names: Sequence[str], segments: Segments) -> None:
         self._bare = model.copy_deep()
+        # Forces do not move markers, and copying and scaling them takes most of the time.
         for held in (self._bare.force_set, self._bare.controller_set, self._bare.probe_set):
             held.objects.clear()
         self._names = list(names)
         self.segments = segments
         ones = np.ones(len(segments.parts))
         self._first = self._create_points(ones)
+        # Positions are linear in the factors, so that a step of 1 gives the exact derivative.
         self._larger = [self._create_points(ones + unit) for unit in np.eye(len(ones))]
 
     def scale_mechanism(self, sizes: Array) -> tuple[Mechanism, list[StationPlacement]]:
@@ -145,6 +147,7 @@ class _MarkerPoints:
         free = mechanism.without_constraints()
         self._system = System(free, Forces(()), apart=True)
         links = [self._system.placements[station.body][0] for station in stations]
+        # Several markers are on one link, whose motion is computed once.
         self._carrying, self._links = np.unique(links, return_inverse=True)
         frames = [self._system.placements[station.body][1] for station in stations]
         located = zip(frames, stations, strict=True)
@@ -203,8 +206,11 @@ class _MarkerPoints:
                 zip(self._mechanism.coordinates, q.tolist(), strict=True)
             )
             if info.clamped
+            # At the end of its range a clamped coordinate could move one way only; it counts as
+            # fixed.
             and not info.range[0] + RANGE_TOLERANCE < value < info.range[1] - RANGE_TOLERANCE
         ]
+        # Rows of the constraint matrix; free motions are its null space.
         rows = [np.eye(len(q))[[*self._still, *held]]]
         if self._holds:
             state = self._mechanism.at(q)

@@ -49,6 +49,7 @@ def run_analyze_tool(job: Job, outcome: Outcome) -> None:
     states = job.find_path("states_file")
     model = build_model(job)
     with build_simulation(job, model) as simulation:
+        # Either states or coordinates define the motion; states have precedence.
         if states is None:
             first, rows, record = _read_coordinate_motion(job, outcome, simulation, model)
         else:
@@ -113,6 +114,7 @@ def equilibrate_rows(
     elements = {element.path: element for element in simulation.forces.elements}
     for path, missing in unbalanced.items():
         element = elements[path]
+        # Muscles without states of their own have nothing to mark; their records become NaN below.
         if element.states:
             index = simulation.state.find_first_state(element)
             states[missing, index : index + len(element.states)] = np.nan
@@ -132,6 +134,7 @@ def equilibrate_rows(
 
 def _describe_spans(times: Array, selected: BoolArray) -> str:
     """Return the spans of consecutive selected times, in words."""
+    # Padding with False makes every span begin and end with a change.
     edges = np.flatnonzero(np.diff(np.concatenate([[False], selected, [False]]).astype(int)))
     spans = [(times[first], times[last - 1]) for first, last in edges.reshape(-1, 2)]
     words = [f"at {a:g} s" if a == b else f"from {a:g} s to {b:g} s" for a, b in spans]

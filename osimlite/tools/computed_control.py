@@ -82,6 +82,7 @@ class ActuatorControl:
             if given is None
             else [item for item in given.objects if isinstance(item, ControlLinear)]
         )
+        # Controls are named like the actuator, with or without the suffix of excitations.
         for name in (actuator.name + EXCITATION, actuator.name):
             bounds = next((item for item in controls if item.name == name), None)
             if bounds is not None:
@@ -97,6 +98,7 @@ class ActuatorControl:
             else actuator.max_control
         )
         is_muscle = isinstance(actuator, Muscle)
+        # The bounds of muscles are raised, so that no muscle is switched off.
         if is_muscle:
             low, high = max(low, MIN_MUSCLE_BOUND), max(high, MIN_MUSCLE_UPPER_BOUND)
         return cls(
@@ -132,6 +134,7 @@ class ActuatorControl:
                 (self.times[0], *(nextafter(t, inf) for t in self.times[:-1])), tuple(self.values)
             )
         t, v = np.array(self.times), np.array(self.values)
+        # After the last node the control keeps its value.
         slopes = np.append(np.diff(v) / np.diff(t), 0.0)
         return PiecewisePolynomial(
             np.append(t[0], t), np.column_stack([np.append(v[0], v), np.append(0.0, slopes)])
@@ -268,6 +271,7 @@ class ComputedControl:
                 result.failure = error.message
                 return result
             if stepper.ended is not None:
+                # A stop by the user is no failure of the motion.
                 if isinstance(stepper.ended, KeyboardInterrupt):
                     raise stepper.ended
                 result.failure = stepper.ended.message
@@ -317,6 +321,8 @@ class ComputedControl:
         # Forces that the actuators can reach by the end of the window.
         least = self._predict_forces(t, target, z, low)
         most = self._predict_forces(t, target, z, high)
+        # The pose at the end of the window is predicted, not computed: it depends on the forces
+        # sought.
         end = self._predict_state(target, z)
         # A control that hardly changes its force has no unique value: keep the lower bound.
         high = np.where(most - least < MIN_FORCE_RANGE, low, high)
@@ -326,6 +332,7 @@ class ComputedControl:
         forces, lacking = self.sharing.compute_forces(
             target, q_end, u_end, requested, errors[0], bounds
         )
+        # The failure ends the tool; the motion so far is still written.
         if lacking:
             result.failure = (
                 f"the actuators cannot produce the accelerations that the tasks need at {t:g} s; "
@@ -360,6 +367,7 @@ class ComputedControl:
     def _drive_functions(self, functions: Sequence[Function]) -> None:
         """Drive the model with a function of time for each actuator."""
         controls = self.simulation.forces.controls
+        # Controls of the tool are added to those of the model's own controllers.
         self.engine.set_controls(
             controls.add_functions(dict(zip(self._paths, functions, strict=True)))
         )
@@ -458,6 +466,7 @@ class ComputedControl:
             if error <= PREDICTION_TOLERANCE or h < 1e-9:
                 time = target if h == target - time else time + h
                 z = new
+            # Step control of a fourth-order method, with the usual limits of growth.
             factor = 0.9 * (PREDICTION_TOLERANCE / error) ** 0.25 if error else 5.0
             step = min(MAX_PREDICTION_STEP_S, h * min(5.0, max(0.1, factor)))
         return z

@@ -73,6 +73,7 @@ def compute_analyses(
         part = motion
         if item.step_interval > 1:
             selected = numbers % item.step_interval == 0
+            # OpenSim always analyses the first and the last row.
             selected[[0, -1]] = True
             part = motion.select_times(selected)
         write(item, part, AnalysisTables(job, outcome, item.name, part.times, describe_gaps(part)))

@@ -106,6 +106,7 @@ def find_steps(loads: Path, up: int) -> dict[str, Steps]:
     for force in document.objects:
         side = split_side(str(force.applied_to_body))[1]
         label = f"{(force.force_identifier or '').strip()}{'xyz'[up]}"
+        # Several forces, for example of two plates, may act on one foot.
         if side and label in table.columns:
             result[side] = result.get(side, 0.0) + table[label]
     return {
@@ -121,6 +122,7 @@ def _detect_steps(times: Array, stands: Any) -> Steps:
     kept: list[list[int]] = []
     for first, last in spans:
         is_brief = times[min(last, len(times) - 1)] - times[first] < MIN_PHASE_S
+        # A brief phase joins the one before, and so does the next of the same kind.
         if kept and (is_brief or stands[kept[-1][0]] == stands[first]):
             kept[-1][1] = last
         else:
@@ -155,6 +157,7 @@ def find_root_coordinates(mechanism: Mechanism) -> tuple[int, ...]:
     """
     roots = [body.mobilizer.coordinates for body in mechanism.bodies if body.parent == GROUND]
     moving = [coordinates for coordinates in roots if coordinates]
+    # A model that a hinge connects to ground does not move freely.
     return moving[0] if len(moving) == 1 and len(moving[0]) >= 3 else ()
 
 

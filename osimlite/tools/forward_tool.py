@@ -52,6 +52,7 @@ def run_forward_tool(job: Job, outcome: Outcome) -> None:
                 f"the final_time {setup.final_time:g} s does not come after the start at {start:g} "
                 "s"
             )
+        # Every step is recorded, so that their number bounds the memory.
         if setup.final_time - start > MAX_FIXED_STEPS * bounds[1]:
             raise job.create_error(
                 f"the final_time {setup.final_time:g} s is too far away for steps of {bounds[1]:g} "
@@ -89,6 +90,7 @@ def _compute_start(job: Job, outcome: Outcome, simulation: Simulation) -> tuple[
         given = StateRows.read(job, path, simulation)
         given.report_missing(outcome)
         row = given.find_row(start)
+        # OpenSim starts at the time of the row, not at the initial time of the setup.
         start = float(given.table.times[row])
         y = given.create_state(simulation, row)
         if start != setup.initial_time:
@@ -109,6 +111,8 @@ def _write_tables(job: Job, outcome: Outcome, motion: Motion) -> None:
     turned = [
         info.path for info in motion.mechanism.coordinates if info.motion_type == "rotational"
     ]
+    # The file in degrees has rotational coordinates and their speeds in degrees; translations
+    # remain.
     turning = [
         np.degrees(1.0) if path.rpartition("/")[0] in turned else 1.0 for path in simulation.paths
     ]

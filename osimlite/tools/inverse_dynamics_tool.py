@@ -54,6 +54,7 @@ def run_inverse_dynamics_tool(job: Job, outcome: Outcome) -> None:
     if cutoff >= 0.0:
         # OpenSim's filter extends the motion; OpenSim treats the extension as measured.
         recorded = recorded.lowpassed(cutoff, continued=True)
+    # After filtering, so that the filter sees the complete motion.
     recorded = recorded.between(*expect_time_range(setup.time_range))
     exclude_forces(model, map(str, setup.forces_to_exclude))
     loads = job.find_path("external_loads_file")
@@ -61,6 +62,7 @@ def run_inverse_dynamics_tool(job: Job, outcome: Outcome) -> None:
     table = recorded.inverse_dynamics(forces)
     outcome.add_table(job.get_results_path(setup.output_gen_force_file), table)
     if joints:
+        # The table has the order of the tree, joint loads need that of the mechanism.
         result = np.empty_like(table.rows)
         result[
             :, [index for body in recorded.mechanism.bodies for index in body.mobilizer.coordinates]
@@ -201,6 +203,7 @@ def _split_mobilizer(
     mobilizer = mechanism.bodies[body].mobilizer
     groups = [[motion] for motion in mobilizer.motions] if apart else [[*mobilizer.motions]]
     hinges: list[_Hinge] = []
+    # A reversed mobilizer runs from the child to the parent.
     for motions in groups[::-1] if mobilizer.reversed else groups:
         used = sorted({index for motion in motions for index in motion.coordinates})
         renumbered: Any = [
@@ -209,6 +212,7 @@ def _split_mobilizer(
         indices = [mobilizer.coordinates[index] for index in used]
         still = np.eye(4)
         count = tuple(range(len(used)))
+        # A mechanism with this hinge alone in ground has its Jacobian as that of its body.
         alone = replace(
             mobilizer, motions=renumbered, coordinates=count, parent_frame=still, child_frame=still
         )

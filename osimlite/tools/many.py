@@ -81,6 +81,7 @@ def find_setups(words: Iterable[str | Path]) -> list[Path]:
     """
     files: dict[Path, None] = {}
     for word in map(str, words):
+        # A file whose name contains a bracket is no pattern.
         if has_magic(word) and not os.path.exists(word):
             matches = find_files(word)
             setups = [
@@ -187,6 +188,7 @@ def assign_folders(setups: Sequence[Path], output: Path | None) -> dict[Path, Pa
     if output is None or len(setups) == 1:
         return dict.fromkeys(setups, output)
     paths = [os.path.abspath(setup) for setup in setups]
+    # Results mirror the folders of the setups, so that equal names do not collide.
     common = os.path.commonpath([os.path.dirname(path) for path in paths])
     return {
         setup: output / Path(os.path.relpath(path, common)).with_suffix("")
@@ -217,6 +219,7 @@ def find_substitutes(
             os.path.realpath(name) for name in find_named_files(str(maker), "output-file")
         }:
             new = folder / os.path.basename(path)
+            # The other setup may have failed to write this result.
             if new.is_file():
                 result[path] = str(new.absolute())
     return result
@@ -273,6 +276,7 @@ def compute_digest(setup: Path) -> str:
         try:
             made.update(read_file(path))
         except OsimliteError:
+            # A missing input differs from an empty one.
             made.update(b"\0")
     return made.hexdigest()
 
@@ -352,6 +356,7 @@ def read_record(line: bytes) -> RunRecord | None:
                 error = values["summary"].get("rms_marker_error", 0.0)
                 if isinstance(error, int | float) and all(isinstance(word, str) for word in words):
                     return RunRecord(**{**values, "told": pairs})
+    # A damaged line only means that its setup runs again.
     except (ValueError, TypeError, RecursionError):
         pass
     return None

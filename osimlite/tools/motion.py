@@ -120,6 +120,7 @@ class Motion:
         names = [*self.unbalanced]
         missing = np.column_stack([*self.unbalanced.values()])
         result = []
+        # Times with the same unbalanced muscles share one model.
         for pattern in np.unique(missing, axis=0):
             rows = (missing == pattern).all(axis=1)
             part = self.select_times(rows)
@@ -269,6 +270,7 @@ class Motion:
         selected = [k for k, path in enumerate(paths) if path in self.unbalanced]
         if not (requested and selected):
             return
+        # Path lengths do not depend on the state of the muscle.
         measured = Paths(self.model)
         for row in np.flatnonzero(~self.balanced):
             lengths = measured.lengths(self.values[row])
@@ -284,6 +286,7 @@ class Motion:
         """Derivatives of the speeds (t, n) under all forces; NaN without an equilibrium."""
         order = list(self.simulation.state.order)
         result = np.zeros_like(self.values)
+        # The derivative of the state follows the work vector: rates of coordinates, then of speeds.
         first = self.system.work_size + len(order)
         result[:, order] = self.evaluate_kernels(
             range(first, first + len(order)), STAGE.ACCELERATION
@@ -308,6 +311,7 @@ class Motion:
     @cached_property
     def links(self) -> LinkMotion:
         """Positions, velocities and accelerations of the bodies at every time."""
+        # Positions and velocities need neither constraints nor forces; accelerations are given.
         system = System(self.mechanism.without_constraints(), Forces(()))
         moments = np.column_stack([self.times, system.state.pack_rows(self.values, self.speeds)])
         return LinkMotion.compute(system, moments, self.accelerations[:, list(system.order)])

@@ -69,9 +69,11 @@ def compute_quantities(known: Mapping[str, Array], muscles: Sequence[Any]) -> Mu
     spring = known.get(SPRING, passive)
     optimal = np.array([muscle.optimal_fiber_length for muscle in muscles])
     fastest = np.array([muscle.max_contraction_velocity for muscle in muscles])
+    # Rounding may leave the cosine slightly beyond 1.
     angle = np.arccos(np.clip(cos, -1.0, 1.0))
     # The width of the muscle, across the tendon, is constant.
     turning = -speed / length * np.tan(angle)
+    # Derivative of (fiber length * cos angle) by time.
     along = speed * cos - length * np.sin(angle) * turning
     result = {
         "PennationAngle": angle,

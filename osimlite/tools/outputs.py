@@ -118,6 +118,8 @@ def _create_momentum_reader(about_origin: bool, part: slice) -> Reader:
         mass = motion.mechanism.bodies[index].mass_properties
         rotation, origin = motion.links.locate_frame(index, np.eye(4))
         center, velocity, _ = motion.links.compute_point_motion(index, mass.center)
+        # Inertia is constant in the frame of the body, so that the spin is transformed there and
+        # back.
         spin = rotation @ (
             mass.inertia
             @ (rotation.transpose(0, 2, 1) @ motion.links.get_angular_motion(index)[0][..., None])

@@ -51,6 +51,7 @@ class _Search:
             yield from self._walk_folders(folders)
             return
         for folder in folders:
+            # A plain name needs no listing of the folder.
             if not has_magic(part):
                 path = os.path.join(folder, part)
                 if os.path.lexists(path):

@@ -235,6 +235,7 @@ class JointWrenches:
 
     def _add_unbalanced_times(self, motion: Motion) -> Array:
         """Return the links at all times (t, l, n), with NaN wrenches at unbalanced times."""
+        # Without forces the wrenches are unknown, but the kinematics of the links is not.
         still = System(self.mechanism.without_constraints(), Forces(()), apart=True)
         moments = np.column_stack(
             [motion.times, still.state.pack_rows(motion.values, motion.speeds)]

@@ -37,10 +37,13 @@ def find_roots(
     open_ = np.ones(len(a), dtype=bool)
     while True:
         step = np.zeros(len(a))
+        # All functions are evaluated at once, because one evaluation of the model gives all of
+        # them.
         for i in np.flatnonzero(open_).tolist():
             if (fb[i] > 0.0 and fc[i] > 0.0) or (fb[i] < 0.0 and fc[i] < 0.0):
                 c[i], fc[i] = a[i], fa[i]
             before = b[i] - a[i]
+            # Brent's convention: b is the best estimate, c the other end of the bracket.
             if abs(fc[i]) < abs(fb[i]):
                 a[i], b[i] = b[i], c[i]
                 c[i] = a[i]
@@ -53,6 +56,7 @@ def find_roots(
                 continue
             if abs(before) >= near and abs(fa[i]) > abs(fb[i]):
                 new = _interpolate_step(a[i], b[i], c[i], fa[i], fb[i], fc[i], before, near, new)
+            # A step below the tolerance would make no progress.
             if abs(new) < near:
                 new = near if new > 0.0 else -near
             a[i], fa[i] = b[i], fb[i]

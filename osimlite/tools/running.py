@@ -114,6 +114,7 @@ def run(
         raise SettingError(f"a {tag} has no mesh to refine; leave out --refine")
     outcome = Outcome(progress=progress)
     replaced = substitute_inputs(top, file.parent, substitutes or {})
+    # Errors are cheaper to find before a tool that may run for hours.
     if check:
         away: dict[str, None] = {}
         report = merge_reports(_check_documents(str(file), away))
@@ -140,6 +141,7 @@ def run(
         run_tool(Job(top, file, folder, refine, simulates), outcome)
         outcome.write(file, writer)
     except OsimliteError as error:
+        # Importing the simulation here keeps setups that need none fast.
         from osimlite.simulation.elements.gather import SKIP_ADVICE
 
         error.message = error.message.replace(SKIP_ADVICE, NO_OPTION)
@@ -228,6 +230,7 @@ def _check_documents(setup: str, away: dict[str, None]) -> Iterator[Report]:
             path = naming.path
             if not os.path.isfile(path):
                 continue
+            # The file was found relative to the current folder, not to that of the document.
             if path == naming.name.strip() and not os.path.isabs(path):
                 away[path] = None
             real = os.path.realpath(path)

@@ -95,6 +95,7 @@ class DesiredMotion:
             )
         start = float(recorded.times[0])
         end = float(recorded.times[-1])
+        # OpenSim pads by reflection, so that the filter has no transient at the ends.
         times = extend_ends(recorded.times, PADDING_ROWS)
         values = extend_ends(recorded.values, PADDING_ROWS)
         if setup.lowpass_cutoff_frequency >= 0.0:
@@ -214,6 +215,7 @@ class TrackingTasks:
         result = []
         names = mechanism.coordinate_names
         for item in job.read_object(path, CMC_TaskSet).objects:
+            # Subclasses would be tracked by other rules.
             if type(item) is not CMC_Joint:
                 message = f"the task '{item.name}' is a {type(item).__name__}, which osimlite cannot track yet"
                 raise NotRunnable(message, file=str(path))
@@ -286,6 +288,7 @@ class TrackingTasks:
         for task, error in zip(self.tasks, np.abs(errors).tolist(), strict=True):
             if task.limit:
                 distance = (error - task.limit) / (LIMIT_WIDTH * task.limit)
+                # A logistic function of the distance to the limit; exp overflows beyond 709.
                 result = min(result, 1.0 - 1.0 / (1.0 + math.exp(-max(distance, -700.0))))
         return result
 
@@ -439,6 +442,7 @@ class ForceDistribution:
             if counts
         ]
         off = np.abs(lacking)
+        # Small deficits beside the largest one are noise.
         worst = [
             f"{lacking[k]:.4g} at {names[k]}" for k in np.argsort(-off) if off[k] > 0.1 * off.max()
         ]
@@ -452,6 +456,7 @@ def refuse_controllers(job: Job, model: Model) -> None:
         SettingError: a controller of the model is enabled.
     """
     for controller in model.controller_set.objects:
+        # Controllers of unknown classes may lack the property.
         if getattr(controller, "enabled", True):
             message = (
                 f"the controller '{controller.name}' would add to the controls that the tool computes; "
