@@ -42,6 +42,7 @@ class Measurements:
                 f"{' × '.join(map(str, self.values.shape))}"
             )
         steps = np.diff(self.times)
+        # NaN in the times gives NaN steps, which fail the comparison.
         if not (steps > 0.0).all() or not np.isfinite(self.times).all():
             frame = int(np.argmin(steps > 0.0)) + 2 if len(steps) else 1
             raise DocumentError(
@@ -67,6 +68,7 @@ class Measurements:
                 f"{type(arrays).__name__}"
             )
         values = [np.asarray(value, dtype=float) for value in arrays.values()]
+        # A single value counts as one frame.
         values = [value[None] if value.ndim == len(cls.shape) else value for value in values]
         counts = {value.shape for value in values}
         if len(counts) != 1 or next(iter(counts))[1:] != cls.shape:

@@ -48,6 +48,7 @@ class ScaleFactorFinder:
         self.mechanism = build_mechanism(model)
         self._stations = find_marker_stations(model, self.mechanism)
         self._state = self.mechanism.at(_compute_default_pose(self.mechanism))
+        # OpenSim's scale set has all physical frames, not only bodies.
         names = [frame.name for frame in model.components(PhysicalFrame)]
         self.found = ScaleFactors({name: [1.0, 1.0, 1.0] for name in names}, {}, [])
         self.frames = names
@@ -56,6 +57,7 @@ class ScaleFactorFinder:
         """Set scale factors that a setup prescribes."""
         for scale in scales:
             if scale.apply:
+                # A segment is a name in files, and may be an object in Python.
                 name = str(getattr(scale.segment, "name", scale.segment))
                 if self._is_known(name, "scale factors given by hand"):
                     self.found.factors[name] = [float(factor) for factor in scale.scales]
@@ -118,10 +120,12 @@ class ScaleFactorFinder:
             length = float(np.linalg.norm(one - two))
             positions = data.select_values(names)[frames]
             measured = float(np.mean(np.linalg.norm(positions[:, 0] - positions[:, 1], axis=1)))
+            # One unseen marker makes the mean undefined, as in OpenSim.
             if not np.isfinite(measured):
                 return 0.0, f"{join_words(names)} were not seen in every frame of the time range"
             if not length > 0.0:
                 return 0.0, f"{join_words(names)} have the same position in the model"
+            # OpenSim averages ratios, not distances.
             ratios.append(measured / length)
         return (float(np.mean(ratios)), "") if ratios else (0.0, "it has no pairs of markers")
 

@@ -153,8 +153,10 @@ def fit(
     stations = {
         name: station
         for name, station in find_marker_stations(model, mechanism).items()
+        # A marker on ground says nothing about the person.
         if station.body != GROUND
     }
+    # Neighbouring frames are nearly the same; a selection gives almost all information.
     selected = SelectedFrames(_read_trials(trials, static), list(stations), frames, weights or {})
     moving = {marker.name for marker in model.components(ModelMarker) if not marker.fixed}
     if held is not None:
@@ -177,10 +179,12 @@ def fit(
     )
     result = search.start_from_model(mechanism)
     before = result.places
+    # Excluding the worst positions changes the fit, which may reveal others.
     for _ in range(OUTLIER_ROUNDS):
         result = search.run(result, OUTLIER_STEP)
         if not selected.exclude_outliers(result.places):
             break
+    # Only the last search is worth full accuracy.
     result = search.run(result, FINAL_STEP)
     scaled = model.copy_deep()
     factors = segments.expand_factors(result.sizes)
@@ -196,6 +200,7 @@ def fit(
             _, frame = placements.resolve_frame(
                 placements.follow_socket(marker, "socket_parent_frame")
             )
+            # Offsets are along the axes of the body, locations along those of the marker's frame.
             local_offset = frame[:3, :3].T @ offsets[marker.name]
             marker.location = tuple((np.array(marker.location) + local_offset).tolist())
     return Person(
@@ -275,6 +280,7 @@ class _PersonFit:
         self._sizes = len(shape.segments.parts)
         self._moved = 3 * len(self._free)
         frames = len(selected.times)
+        # Errors of neighbouring frames are correlated: many frames must not outweigh the prior.
         self._unit = min(1.0, INDEPENDENT_FRAMES / frames) / SKIN_MOTION_M**2
         self._prior, self._wanted = shape.segments.compute_prior(
             FIRST_SIZE_DEVIATION, NEIGHBOUR_DEVIATION, AXIS_DEVIATION
@@ -300,6 +306,8 @@ class _PersonFit:
             matrix, slope = self._compute_normal_equations(here)
             while True:
                 # Levenberg-Marquardt: raise the damping until the cost falls.
+                # Damping by the diagonal makes the step independent of the units of sizes and
+                # offsets.
                 step = -np.linalg.solve(matrix + damping * np.diag(np.diag(matrix)), slope)
                 sizes = np.clip(here.sizes + step[: self._sizes], MIN_FACTOR, MAX_FACTOR)
                 offsets = here.offsets.copy()
@@ -334,6 +342,7 @@ class _PersonFit:
         errors = places - self._chosen.measured
         squares = self._unit * float(np.nansum(self._chosen.weights[:, None] * errors**2))
         likely = self._prior @ sizes - self._wanted
+        # Negative logarithm of a Cauchy density, up to a constant.
         far = float(np.log1p((offsets[self._free] ** 2).sum(axis=1) / MARKER_OFFSET_M**2).sum())
         return _Estimate(
             sizes, offsets, posed, values, places, 0.5 * (squares + float(likely @ likely) + far)
@@ -374,6 +383,7 @@ class _PersonFit:
             moved = (scaled * moves[is_seen]).reshape(len(rows), moves.shape[-1])
             # Orthonormal directions in which a change of the pose moves the markers.
             squares, axes = np.linalg.eigh(moved.T @ moved)
+            # Directions in which the markers do not move are rounding errors.
             certain = squares > 1e-12 * squares.max(initial=1e-300)
             directions = moved @ (axes[:, certain] / np.sqrt(squares[certain]))
             across = rows - directions @ (directions.T @ rows)

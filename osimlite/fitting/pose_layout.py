@@ -63,6 +63,7 @@ def separate_couplers(
     pending: list[Coupler] = []
     depend: set[int] = set()
     for item in constraints:
+        # A coordinate can be determined only once; further couplers remain constraints.
         if isinstance(item, Coupler) and item.dependent not in fixed | depend:
             pending.append(item)
             depend.add(item.dependent)
@@ -138,6 +139,7 @@ class FitLayout:
             records.append(len(ints))
             arguments = [places.freedom(index) for index in coupler.independent]
             ints += [places.freedom(coupler.dependent), len(numbers), len(arguments), *arguments]
+            # Arguments that are locked have no degree of freedom, but a value.
             numbers += [places.locked_value(index) for index in coupler.independent]
             numbers += function_table(coupler.function, f"the function of '{coupler.name}'")
         self._append_list(ints, fit.COUPLERS, fit.COUPLER_AT, records)
@@ -148,6 +150,7 @@ class FitLayout:
         ints += [known.get(k, fit.VARIABLE) for k in range(size)]
         ints[fit.FREE_AT] = len(ints)
         ints += [0] * size
+        # The sum of all scratch vectors that the kernel uses at one time.
         room = 2 * size + factor_size(equations, size) + 2 * equations + 3 * size * size + 4 * size
         lengths = {
             fit.MEASURED: 3 * len(markers) + 9 * len(sensors) + len(goals) + len(held),
@@ -242,6 +245,7 @@ def compute_ranges(
         index: info.range if info.clamped else (-np.inf, np.inf)
         for index, info in enumerate(mechanism.coordinates)
     }
+    # From the last dependent coordinate back, so that ranges pass along chains of couplers.
     for coupler in reversed(couplers):
         low, high = ends[coupler.dependent]
         if len(coupler.independent) == 1 and (low > -np.inf or high < np.inf):
@@ -270,6 +274,7 @@ def _find_allowed_interval(
         return low - 1e-12 <= value <= high + 1e-12
 
     start = min(max(start, ends[0]), ends[1])
+    # The default value violates the range: no interval can be found around it.
     if not is_inside(start):
         return ends
     result = []

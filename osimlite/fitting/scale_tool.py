@@ -126,6 +126,7 @@ def scale(
     by_hand = []
     for name, given in (factors or {}).items():
         expect_body(name)
+        # One number scales all axes alike.
         three = (given, given, given) if isinstance(given, int | float) else tuple(given)
         if not all(0.0 < number < math.inf for number in three):
             numbers = ", ".join(f"{number:g}" for number in three)
@@ -194,6 +195,7 @@ def compute_scaled_model(tool: ScaleTool, folder: Path) -> ScaledModel:
         result.unknown = describe_unknown(model, UNSCALED)
     if maker.marker_set_file not in NO_FILE:
         add_markers(model, folder / maker.marker_set_file)
+    # OpenSim names the scaled model after the setup, before markers are placed.
     model.name = tool.name
     if scaler.apply:
         result.measured = _scale_by_setup(tool, model, folder)
@@ -218,6 +220,7 @@ def _scale_by_setup(tool: ScaleTool, model: Model, folder: Path) -> ScaleFactors
     """Scale a model by the measurements and factors of a setup."""
     scaler = tool.model_scaler
     measuring = ScaleFactorFinder(model)
+    # Later words overwrite earlier ones, so that their order matters.
     for word in scaler.scaling_order:
         if word == MEASUREMENTS and any(item.apply for item in scaler.measurement_set.objects):
             if scaler.marker_file in NO_FILE:

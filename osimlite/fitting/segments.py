@@ -123,6 +123,7 @@ class Segments(NamedTuple):
             for k, segment in self.sides
         ]
         wanted = np.zeros(len(rows))
+        # The expected size of the first segment is 1; expected differences are 0.
         wanted[0] = 1.0 / first
         return np.array(rows), wanted
 

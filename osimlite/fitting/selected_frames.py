@@ -72,11 +72,14 @@ class SelectedFrames:
                 if name == STATIC_TRIAL and moving
                 else len(trial.times) / max(moving, 1)
             )
+            # All trials have the same columns; markers that a trial lacks are NaN.
             rows = np.full((len(trial.times), len(self.markers), 3), np.nan)
             for index, marker in enumerate(self.markers):
                 if marker in trial.names:
                     rows[:, index] = trial.positions[:, trial.names.index(marker)]
+            # Fewer markers than three do not determine the pose of any segment.
             seen = np.flatnonzero(np.isfinite(rows).all(axis=2).sum(axis=1) >= MIN_MARKERS)
+            # Each trial contributes at least one frame.
             taken = max(1, round(count * min(share, 1.0)))
             for frame in (
                 seen[np.unique(np.linspace(0, len(seen) - 1, taken).round().astype(int))]

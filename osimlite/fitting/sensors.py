@@ -112,12 +112,14 @@ def place_sensors(
         heading = _compute_heading(
             _find_forward_direction(model, mechanism, state.rotations), faced
         )
+        # The vertical is y in OpenSim.
         turn = rotation_about_space((0.0, heading, 0.0))
         measured = {name: turn @ rotation for name, rotation in measured.items()}
     frames = list(model.components(PhysicalFrame))
     placed = []
     for name, rotation in measured.items():
         owner, ending, _ = name.rpartition(SENSOR_SUFFIX)
+        # A sensor without the suffix is not worn on a body.
         worn = _find_single_frame(frames, owner, model) if ending else None
         if worn is None:
             continue
@@ -126,6 +128,7 @@ def place_sensors(
                 f"the first frame of {data.source} has no orientation of the sensor '{name}'"
             )
         body, matrix = mechanism.frames[model.tree().path_of(worn) or ""]
+        # Orientation of the sensor in the frame on which it is worn.
         inside = (state.transform(body) @ matrix)[:3, :3].T @ rotation
         placed.append((name, worn, tuple(angles_xyz(inside).tolist())))
     if not placed:
@@ -135,6 +138,7 @@ def place_sensors(
             f"'{model.name}' "
             f"and the suffix '{SENSOR_SUFFIX}'{example}"
         )
+    # All sensors are checked before the model is changed.
     for name, worn, angles in placed:
         there = _find_single_frame(
             [frame for frame in frames if isinstance(frame, PhysicalOffsetFrame)], name, model
@@ -188,6 +192,7 @@ def _find_forward_direction(model: Model, mechanism: Mechanism, rotations: Array
             ].body
             for socket in ("socket_parent_frame", "socket_child_frame")
         ]
+        # OpenSim takes the first joint whose parent is ground.
         if ends[0] == GROUND:
             return rotations[ends[1]][:, 0]
     raise SettingError(f"no joint of '{model.name}' has ground as parent; leave out base_imu_label")
@@ -202,5 +207,6 @@ def _compute_heading(forwards: Array, faced: Array) -> float:
         forwards: direction in which the model faces (3,).
         faced: direction of the sensor's axis (3,).
     """
+    # Rounding may leave the cosine slightly beyond 1.
     angle = math.acos(min(1.0, max(-1.0, float(forwards @ faced))))
     return -angle if float(np.cross(forwards, faced)[1]) > 0.0 else angle

@@ -101,6 +101,7 @@ def _move_mass_center(
     body = bodies[name]
     gravity = model.gravity
     weight = abs(gravity[1]) * body.mass
+    # Simbody's SignificantReal.
     if weight < 2.0**-45.5:
         outcome.add_message(
             "mass center", f"'{name}' has no weight, so its mass centre stays, as in OpenSim"
@@ -116,6 +117,7 @@ def _move_mass_center(
             z - dz,
         )
     total = sum(item.mass for item in bodies.values())
+    # The vertical residual is carried by a mass of this size.
     change = before[1] / gravity[1]
     outcome.summary |= {"mass_center_moved": [-dx, 0.0, -dz], "mass_change": change}
     outcome.add_message(

@@ -54,6 +54,7 @@ def _create_smooth_force(
 ) -> SmoothSphereHalfSpaceForce:
     """Return the smooth force between one sphere and one half space."""
     one, other = known[sphere], known[plane]
+    # Hertz contact: the deformation is proportional to stiffness^(-2/3) for a given force.
     softness = [
         item.stiffness ** (-2.0 / 3.0) if item.stiffness else float("inf") for item in (one, other)
     ]
@@ -62,6 +63,7 @@ def _create_smooth_force(
 
     def mean(name: str) -> float:
         a, b = getattr(one, name), getattr(other, name)
+        # Simbody's harmonic mean of two friction coefficients.
         return 2.0 * a * b / (a + b) if a + b else 0.0
 
     return SmoothSphereHalfSpaceForce(
@@ -69,6 +71,8 @@ def _create_smooth_force(
         appliesForce=force.appliesForce,
         socket_sphere=f"/contactgeometryset/{sphere}",
         socket_half_space=f"/contactgeometryset/{plane}",
+        # Springs in series: deformations add up; the factor 2 makes equal surfaces keep their
+        # number.
         stiffness=(2.0 / sum(softness)) ** 1.5,
         dissipation=one.dissipation * share + other.dissipation * (1.0 - share),
         static_friction=mean("static_friction"),

@@ -126,6 +126,7 @@ def _replace_with_path_actuators(model: Model, operator: Any, folder: Path) -> N
     """Replace all muscles by path actuators."""
     for muscle in find_muscles(model):
         other = PathActuator(name=muscle.name, optimal_force=muscle.max_isometric_force)
+        # Other properties of a muscle mean nothing for a path actuator.
         for name in ("appliesForce", "min_control", "max_control"):
             setattr(other, name, getattr(muscle, name))
         _replace_muscle(model, muscle, other)
@@ -150,6 +151,7 @@ def _replace_with_degroote(model: Model, operator: Any, folder: Path) -> None:
             }
         elif isinstance(muscle, Thelen2003Muscle):
             given |= {
+                # Thelen's muscle has no damping.
                 "fiber_damping": 0.0,
                 "passive_fiber_strain_at_one_norm_force": muscle.FmaxMuscleStrain,
                 "tendon_strain_at_one_norm_force": muscle.FmaxTendonStrain,
@@ -214,6 +216,7 @@ def _add_reserves(model: Model, operator: p.ModOpAddReserves, folder: Path) -> N
     }
     for coordinate in list(model.components(Coordinate)):
         path = tree.path_of(coordinate) or ""
+        # A reserve on a coordinate that cannot move by itself would do nothing.
         if path in fixed or (operator.skip_coordinates_with_actuators and path in driven):
             continue
         if operator.skip_residual_coordinates and _is_on_ground(model, path):
@@ -224,6 +227,7 @@ def _add_reserves(model: Model, operator: p.ModOpAddReserves, folder: Path) -> N
             else {"min_control": -operator.bound, "max_control": operator.bound}
         )
         reserve = CoordinateActuator(
+            # OpenSim's name, by which users select reserves in results.
             name="reserve" + path.replace("/", "_"),
             coordinate=coordinate.name,
             optimal_force=operator.optimal_force,
@@ -283,6 +287,7 @@ def _replace_joints_with_welds(
             name=joint.name, socket_parent_frame=one, socket_child_frame=other, frames=frames
         )
         model.joint_set.objects.remove(joint)
+        # OpenSim puts the weld at the end of the set.
         model.joint_set.objects.append(weld)
 
 
