@@ -60,6 +60,7 @@ def write_joint_reactions(analysis: JointReaction, motion: Motion, tables: Analy
         frame = _find_frame_path(motion, requested, bases, tables)
         force, moment, point = loads.get_reaction(joint, side)
         rotation, origin = loads.moved.locate_frame(*mechanism.placement(frame))
+        # From ground to the frame in which the results are expressed.
         back = rotation.transpose(0, 2, 1)
         rows += [(back @ item[..., None])[..., 0] for item in (force, moment, point - origin)]
         root = f"{joint.name}_on_{_get_last_name(bases[side])}_in_{_get_last_name(frame)}"
@@ -80,6 +81,7 @@ def _find_joints(analysis: JointReaction, model: Model, tables: AnalysisTables) 
     """
     every = model.joint_set.objects
     names = list(map(str, analysis.joint_names)) or ["ALL"]
+    # OpenSim looks at the first word only.
     if names[0].upper() == "ALL":
         return list(every)
     known = {joint.name: joint for joint in every}
@@ -169,12 +171,14 @@ def _override_forces(
             "as in OpenSim",
         )
         return motion, None
+    # The forces of the file replace what controllers would command.
     model.controller_set.objects.clear()
     # Probes are not needed here, and those of muscles would not find the muscles, which are
     # replaced below.
     model.probe_set.objects.clear()
     indices = {id(force): number for number, force in enumerate(model.force_set.objects)}
     for item in actuators:
+        # An ideal actuator with optimal force 1 has its control as its force.
         other = make_ideal_actuator(item, 1.0)
         if other is None or id(item) not in indices:
             raise tables.job.create_unsupported_error(
@@ -223,6 +227,7 @@ def write_actuation(analysis: Actuation, motion: Motion, tables: AnalysisTables)
         if isinstance(item, Actuator) and item.appliesForce
     ]
     for item in actuators:
+        # The table has one column per actuator.
         if item.control_count != 1:
             raise tables.job.create_unsupported_error(
                 f"'{analysis.name}' needs one force of '{item.name}', a {type(item).__name__}, "

@@ -65,11 +65,13 @@ def write_body_kinematics(analysis: BodyKinematics, motion: Motion, tables: Anal
     for body in bodies:
         index = indices[tree.path_of(body) or ""]
         linear = np.array(motion.links.compute_point_motion(index, np.array(body.mass_center)))
+        # The motion of the mass centre is the weighted mean of those of the bodies.
         whole += body.mass / total * linear
         rotation, _ = motion.links.locate_frame(index, np.eye(4))
         rows = np.stack(
             [linear, [angles_xyz(rotation), *motion.links.get_angular_motion(index)]], axis=2
         )
+        # Positions remain in ground, as in OpenSim.
         if local:
             rows[1:] = rows[1:] @ rotation
         if analysis.in_degrees:

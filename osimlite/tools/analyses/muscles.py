@@ -63,6 +63,7 @@ def _compute_tables(motion: Motion, muscles: list[Muscle]) -> dict[str, Array]:
     """Return the tables (t, m) of muscles of any classes."""
     result: dict[str, Array] = {}
     tree = motion.model.tree()
+    # Corrections differ between classes; all muscles of a class are computed at once.
     for cls in dict.fromkeys(map(type, muscles)):
         indices = [index for index, muscle in enumerate(muscles) if type(muscle) is cls]
         paths = [tree.path_of(muscles[index]) or "" for index in indices]

@@ -59,6 +59,7 @@ def write_outputs(analysis: OutputReporter, motion: Motion, tables: AnalysisTabl
             )
         outputs = list_outputs(type(component))
         reader = find_reader(motion, component, parts["output"])
+        # Outputs that the class does not list, such as those of states, are single numbers.
         kind = outputs[parts["output"]].type if parts["output"] in outputs else "double"
         if kind not in OUTPUT_FILES:
             left_out.append(requested)
@@ -68,6 +69,7 @@ def write_outputs(analysis: OutputReporter, motion: Motion, tables: AnalysisTabl
             raise tables.job.create_error(
                 f"'{path}' has no output '{parts['output']}' for '{analysis.name}'{near}"
             )
+        # Channels belong to list outputs, which have no reader.
         if reader is None or parts["channel"]:
             raise tables.job.create_unsupported_error(
                 f"'{analysis.name}' requests '{requested}' of a {type(component).__name__}, which "
@@ -120,6 +122,7 @@ def collect_force_records(motion: Motion, system: System) -> Array:
     """
     result = np.full((len(motion.times), len(system.columns)), np.nan)
     owners = [element.path for element in system.forces.elements for _ in element.columns]
+    # Columns of muscles that are off stay NaN.
     there = [k for k, path in enumerate(owners) if path not in motion.left_out]
     result[:, there] = motion.system.force_table(motion.times, motion.states)
     return result
@@ -144,6 +147,7 @@ def write_probes(analysis: ProbeReporter, motion: Motion, tables: AnalysisTables
     tree = motion.model.tree()
     computed = {probe.path for probe in engine.probes}
     for probe in motion.model.components(Probe):
+        # A table without a requested probe could be mistaken for a complete one.
         if probe.enabled and tree.path_of(probe) not in computed:
             raise tables.job.create_unsupported_error(
                 f"'{analysis.name}' requests '{probe.name}', a {type(probe).__name__} that "

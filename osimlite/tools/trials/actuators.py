@@ -217,8 +217,10 @@ def _find_crossed_coordinates(tool: TrialTool) -> set[str]:
     ]
     try:
         motion = tool.motion.values
+        # A moment arm may vanish in one pose, so that several are examined.
         poses = motion[np.unique(np.linspace(0, len(motion) - 1, POSE_COUNT).astype(int))]
     except MissingInput:
+        # Without a motion, the default pose has to do.
         poses = mechanism.values({})[None]
     arms = (
         np.abs(paths.compute_moment_arms(poses)[:, rows]).max(axis=(0, 1)) if rows else np.zeros(0)
@@ -249,6 +251,7 @@ def _find_joint_moments(
         MissingInput: the moments are missing and cannot be computed.
     """
     names = [info.name for info in tool.mechanism.coordinates]
+    # Results of the user's own tools come first: they have the user's filter.
     for tag in ("InverseDynamicsTool", "RRATool"):
         for other in (other for other in others if other.tag == tag):
             if tag == "RRATool":
@@ -291,6 +294,7 @@ def measure_activations(folder: TrialFolder, file: Path, muscles: Sequence[str])
     table = folder.read_table(file)
     most = 0
     for index, label in enumerate(table.columns):
+        # Labels of OpenSim 4, of OpenSim 3, and of static optimization.
         name = label.removesuffix("/activation").removesuffix(".activation").rpartition("/")[2]
         if name not in muscles or (
             label != name and not label.endswith(("/activation", ".activation"))

@@ -60,6 +60,7 @@ class TrialReport(Report):
         """Verdict of each kind in each file that is farthest beyond its limits."""
         result: dict[tuple[str, str, str, str], TrialVerdict] = {}
         for verdict in self.verdicts:
+            # Verdicts about several parts of one kind, such as markers, count as one.
             key = verdict.name, verdict.file, verdict.unit, verdict.of.partition(" of ")[0]
             if key not in result or _compute_badness(verdict) > _compute_badness(result[key]):
                 result[key] = verdict
@@ -123,6 +124,7 @@ def check_trial(
         try:
             for file, number in measure():
                 numbers.setdefault(file, []).append(number)
+        # One missing input must not hide all other results.
         except OsimliteError as error:
             unchecked[f"{what}: {error.message if isinstance(error, MissingInput) else error}"] = (
                 None
@@ -205,6 +207,7 @@ def _plan_measurements(folder: TrialFolder) -> Iterator[PlannedMeasurement]:
             yield from _plan_static_optimization(tool, folder.tools, claimed)
         if tool.tag not in ("ScaleTool", "InverseKinematicsTool"):
             yield from _plan_inputs(tool, looked)
+    # Files that the user names singly are not searched for results of other tools.
     if folder.is_whole:
         yield from _plan_results_without_setup(folder, claimed)
 
@@ -230,6 +233,7 @@ def _plan_inputs(tool: TrialTool, looked: set[tuple[object, ...]]) -> Iterator[P
         yield "motion and loads", partial(_raise_missing, error)
         return
     if motion is None:
+        # An AnalyzeTool may read states instead of coordinates.
         if tool.tag != "AnalyzeTool":
             yield (
                 "motion and loads",
@@ -242,6 +246,7 @@ def _plan_inputs(tool: TrialTool, looked: set[tuple[object, ...]]) -> Iterator[P
     if loads is None:
         yield "loads", partial(_raise_missing, MissingInput(f"{tool} names no external loads"))
     else:
+        # Several tools of a trial name the same files.
         if (loads,) not in looked:
             looked.add((loads,))
             yield "feet under loads", partial(measure_feet, tool)

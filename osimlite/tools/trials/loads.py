@@ -96,8 +96,10 @@ def compute_scale(tool: TrialTool) -> LoadScale:
         up = _find_up(tool)
     except OsimliteError:
         return LoadScale(force)
+    # A few poses suffice for a mean height.
     selected = np.unique(np.linspace(0, len(motion.times) - 1, TIME_COUNT).astype(int))
     height = np.mean([motion.mechanism.center_of_mass(motion.values[row]) @ up for row in selected])
+    # The lowest point of application is the height of the floor.
     floor = [float(np.median(load.point[in_span] @ up)) for load in loads if load.point is not None]
     return LoadScale(force, force * float(height - (min(floor) if floor else 0.0)))
 
@@ -117,11 +119,13 @@ def measure_feet(tool: TrialTool) -> Numbers:
     bodies = [str(load.item.applied_to_body).rpartition("/")[2] for load in loads]
     known = {body.name.rpartition("/")[2] for body in motion.mechanism.bodies}
     for load, body_name in zip(loads, bodies, strict=True):
+        # Candidates are the bodies of other loads and the same body on the other side.
         others = {body for body in bodies if body != body_name} | {_mirror_name(body_name)}
         others = {body for body in others if body in known}
         if load.point is None or body_name not in known or not others:
             continue
         away = _measure_distances(motion, table, load, [body_name, *sorted(others)])
+        # A load that is never large has no reliable point of application.
         if away is None:
             continue
         wrong = away[:, 1:].min(axis=1) < away[:, 0]
@@ -183,6 +187,7 @@ def _measure_distances(
         point = load.point[row]
         frame = str(load.item.point_expressed_in_body).rpartition("/")[2]
         if frame != "ground":
+            # Points may be expressed in a moving body, such as a treadmill.
             point = mechanism.station_position(frame, point, q)
         centres = [
             mechanism.station_position(name, bodies_by_name[name].mass_properties.center, q)
@@ -201,6 +206,7 @@ def measure_weight(tool: TrialTool) -> Numbers:
     mass = tool.mechanism.total_mass
     if not loads or not mass or not gravity:
         raise MissingInput(f"{tool} has no loads on a model with a mass")
+    # Forces in different frames cannot be added.
     if any(str(load.item.force_expressed_in_body).rpartition("/")[2] != "ground" for load in loads):
         raise MissingInput(f"the loads of {tool} are not expressed in ground")
     lift: Any = sum(load.force for load in loads) @ up
@@ -216,6 +222,7 @@ def measure_weight(tool: TrialTool) -> Numbers:
     first = float(times[in_span][0])
     last = float(times[in_span][-1])
     mean = float(np.trapezoid(lift[in_span], times[in_span])) / (last - first)
+    # Speeds of an unfiltered motion are mostly noise.
     smooth = motion.lowpassed(tool.cutoff) if tool.cutoff > 0.0 else motion
     speeds = [_compute_rising_speed(smooth, time, up) for time in (first, last)]
     # Newton's second law over the interval: mean lift = m (g + change of speed / duration).
