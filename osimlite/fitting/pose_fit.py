@@ -123,7 +123,7 @@ class PoseFit:
 
     def set_pose(self, q: Array) -> None:
         """Start from the values (n,) of all coordinates."""
-        # The solver extrapolates from earlier frames; after a jump there are none.
+        # The solver extrapolates from earlier frames, which a jump makes useless.
         self._history[0] = 0.0
         self.system.set_pose(q)
 

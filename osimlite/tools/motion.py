@@ -77,7 +77,7 @@ class Motion:
 
     @property
     def mechanism(self) -> Any:
-        """Mechanism of the model."""
+        """Mechanism of the model, as the simulation uses it."""
         return self.simulation.mechanism
 
     @property
@@ -196,12 +196,16 @@ class Motion:
 
     @property
     def speeds(self) -> Array:
-        """Generalized speeds (t, n)."""
+        """Generalized speeds (t, n) in the order of the mechanism, rad/s and m/s."""
         return self._histories[1]
 
     @cached_property
     def histories(self) -> dict[str, Array]:
-        """Columns (t,) of all states by their paths, in OpenSim's order."""
+        """Histories of all states, in OpenSim's order.
+
+        Returns:
+            Column (t,) by the path of the state.
+        """
         columns = self.simulation.state.extract_auxiliary(self.states)
         for index, info in enumerate(self.mechanism.coordinates):
             columns[f"{info.path}/value"], columns[f"{info.path}/speed"] = (

@@ -108,7 +108,7 @@ def _correct_thelen(tables: MuscleTables, muscles: Sequence[Any]) -> MuscleTable
 
 
 def _correct_millard(tables: MuscleTables, muscles: Sequence[Any]) -> MuscleTables:
-    """Correct Millard2012EquilibriumMuscle."""
+    """Correct Millard2012EquilibriumMuscle: a rigid tendon has no power."""
     return _correct_tendon_power(tables, [muscle.ignore_tendon_compliance for muscle in muscles])
 
 

@@ -83,7 +83,11 @@ class TrialOutcomes(NamedTuple):
 
     @property
     def steps(self) -> dict[str, Steps]:
-        """Steps of the feet, from the measured loads of any setup."""
+        """Steps of the feet, from the measured loads of any setup.
+
+        Returns:
+            Steps by side ("r" or "l"); empty without measured loads.
+        """
         result = (
             try_find_steps(outcome.evidence)
             for outcome in self.outcomes

@@ -253,7 +253,7 @@ class TrackingTasks:
 
     @property
     def weights(self) -> Array:
-        """Weights of all tasks."""
+        """Weights of all tasks (k,)."""
         return np.array([task.weight for task in self.tasks])
 
     def compute_errors(self, desired: Array, q: Array, u: Array) -> tuple[Array, Array]:

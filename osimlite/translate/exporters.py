@@ -234,7 +234,11 @@ EXPORTERS: list[Exporter] = [
 
 
 def list_exporters(command: str) -> dict[str, Exporter]:
-    """Return the exporters of a command by name, the default one first."""
+    """List the exporters of a command, the default one first.
+
+    Returns:
+        Exporter by name.
+    """
     selected = [exporter for exporter in EXPORTERS if exporter.command == command]
     selected.sort(key=lambda exporter: not exporter.is_default)
     return {exporter.name: exporter for exporter in selected}

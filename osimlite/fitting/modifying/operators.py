@@ -116,7 +116,7 @@ OPERATIONS.update(dict.fromkeys(SETTINGS, _set_muscle_property))
 
 @register_operation(p.ModOpRemoveMuscles)
 def _remove_muscles(model: Model, operator: Any, folder: Path) -> None:
-    """Remove all muscles."""
+    """Remove all muscles from the set of forces and from its groups."""
     for muscle in find_muscles(model):
         _remove_muscle(model, muscle)
 

@@ -67,10 +67,10 @@ class TermOrGate(NamedTuple):
         second: offset of a term, or largest value of a gate (w,).
     """
 
-    ints: tuple[int, ...]  # as the kernels have them
-    delay: Array  # s, as the next of each candidate (w,)
-    first: Array  # gain, or least value
-    second: Array  # offset, or largest value
+    ints: tuple[int, ...]
+    delay: Array
+    first: Array
+    second: Array
 
 
 PowerTerms = Iterable[tuple[int, Array, Array]]
@@ -102,7 +102,7 @@ def _read_control_points(node: Node, parameters: Parameters, before: str) -> tup
     ]
     if np.any(np.array(spans) <= 0.0):
         raise node.error("'control_point_dt' must be positive")
-    # Scenarios give intervals between points, of which each may be a parameter.
+    # Scenarios give intervals between points; each may be a parameter.
     return np.cumsum([np.zeros_like(values[0]), *spans], axis=0), np.array(values)
 
 

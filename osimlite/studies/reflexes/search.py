@@ -164,7 +164,7 @@ def search_parameters(
                 )
             if es.stop():
                 break
-    # The best parameters are already in the file; the caller goes on with them.
+    # The best parameters are in the file already; the caller continues with them.
     except KeyboardInterrupt:
         pass
     return dict(zip((each.name for each in own), best.tolist(), strict=True))

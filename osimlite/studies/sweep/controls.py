@@ -86,7 +86,7 @@ class Control:
 
     @property
     def unit(self) -> str:
-        """Unit of the number."""
+        """Unit of the number: "s" for a time, else ""."""
         return "s" if self.kind == SWITCH else ""
 
     @property

@@ -157,7 +157,7 @@ class Run:
 
     @cached_property
     def mechanism(self) -> Any:
-        """Mechanism of the model."""
+        """Mechanism of the model of this run."""
         return self.engine.mechanism
 
 

@@ -95,7 +95,11 @@ class Property:
 
     @property
     def parts(self) -> tuple[PropertyPath, ...]:
-        """Properties that no other variable may change."""
+        """Numbers that no other variable may change.
+
+        Returns:
+            Path of each property.
+        """
         return self.places
 
 

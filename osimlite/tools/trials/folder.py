@@ -243,17 +243,17 @@ class TrialTool:
 
     @property
     def model_file(self) -> Path:
-        """File of the model."""
+        """Path of the model file that the setup names."""
         return self.require_input("model_file")
 
     @property
     def model(self) -> Model:
-        """Model of the setup."""
+        """Model that the setup names, from the cache."""
         return self.folder.read_model(self.model_file)
 
     @property
     def mechanism(self) -> Mechanism:
-        """Mechanism of the model."""
+        """Mechanism of this model, from the cache."""
         return self.folder.build_mechanism(self.model_file)
 
     @property
@@ -270,7 +270,11 @@ class TrialTool:
 
     @cached_property
     def span(self) -> tuple[float, float]:
-        """First and last time of the results, s."""
+        """First and last time of the results.
+
+        Returns:
+            Two times (s), which are infinite if the setup has none.
+        """
         given = getattr(self.setup, "time_range", None)
         if given is not None and len(given) > 1:
             return float(given[0]), float(given[1])

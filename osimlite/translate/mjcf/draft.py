@@ -129,7 +129,7 @@ NON_FINITE_WORDS = frozenset(("NaN", "Inf", "-Inf"))
 
 
 def add_element(parent: _Element, tag: str, **attributes: Value) -> _Element:
-    """Add an element; attributes that are None are left out, and `class_` means `class`.
+    """Add an element; `class_` means `class`, and None leaves an attribute out.
 
     Args:
         parent: element to which it is added.

@@ -380,7 +380,7 @@ def _is_tendon(tendon: Tendon) -> bool:
 
 
 def _find_last_site(tendon: Tendon) -> int:
-    """Return the index of the last site; 0 if there is none."""
+    """Return the index of the last site, or 0 without any site."""
     return max(
         (index for index, part in enumerate(tendon) if isinstance(part, TendonSite)), default=0
     )
