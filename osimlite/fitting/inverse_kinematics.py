@@ -222,7 +222,7 @@ def lock_translations(mechanism: Mechanism) -> Mechanism:
         # Locks and prescribed motions are in the coordinates already.
         item
         for item in mechanism.constraints
-        if not isinstance(item, Lock | Prescribed)
+        if not isinstance(item, Lock | PrescribedCoordinate)
     )
     return replace(mechanism, coordinates=infos, constraints=others)
 

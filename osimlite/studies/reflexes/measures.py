@@ -415,7 +415,11 @@ class Penalty(Measure):
             times: times at which the walks ended (w,) (s).
             duration: longest duration (s).
         """
-        places = {"sum": SAMPLE_WORK.TOTAL, "highest": SAMPLE_WORK.HIGHEST, "lowest": SAMPLE_WORK.LOWEST}
+        places = {
+            "sum": SAMPLE_WORK.TOTAL,
+            "highest": SAMPLE_WORK.HIGHEST,
+            "lowest": SAMPLE_WORK.LOWEST,
+        }
         total = np.zeros(self.count)
         for mode, first in self._statistics:
             total += (
