@@ -29,8 +29,7 @@ def dynamic_walker(
     shank_length: float = 0.435,
     slope: float = 10.0,
 ) -> Model:
-    """Build the walker of the exercise "Building a Dynamic Walker": passive, with knees, on a
-    slope.
+    """Build the walker of the exercise "Building a Dynamic Walker", passive with knees on a slope.
 
     Args:
         pelvis_width: distance from the middle of the pelvis to each hip (m), which the exercise

@@ -279,9 +279,7 @@ def _add_muscle(
 
 
 def _add_body(model: Model, name: str, mass: float, center: Vec3, inertia: float) -> Body:
-    """Add a body; only its inertia about the z axis matters, because it moves in the sagittal
-    plane.
-    """
+    """Add a body; it moves in the sagittal plane, so that only its inertia about z matters."""
     body = Body(
         name=name, mass=mass, mass_center=center, inertia=(inertia, inertia, inertia, 0.0, 0.0, 0.0)
     )

@@ -85,8 +85,9 @@ def human_walks() -> Model:
 
 
 def make_walking_study(model: Model, file: str, guess: str) -> MocoStudy:
-    """Return a study of half a stride at a given speed, with minimal effort and roughness per
-    distance.
+    """Return a study of half a stride at a given speed with minimal effort and roughness.
+
+    Both goals are divided by the distance.
 
     Args:
         model: model of :func:`human_walks`.
@@ -160,8 +161,9 @@ def make_walking_study(model: Model, file: str, guess: str) -> MocoStudy:
 
 
 def make_guess(model: Model) -> MocoTrajectory:
-    """Return a rough step as initial guess: one leg moves back straight, the other swings forward
-    with a bent knee.
+    """Return a rough step as initial guess.
+
+    One leg moves back straight, the other swings forward with a bent knee.
 
     All muscles have the same small activation.
     """

@@ -168,8 +168,9 @@ def _list_functions(module: ModuleType) -> dict[str, Callable[..., Any]]:
 
 
 def _select_function(module: ModuleType, place: str) -> Callable[..., Any]:
-    """Return the function of a file that makes its model: the one annotated to return a Model, or
-    the only one.
+    """Return the function of a file that makes its model.
+
+    It is the one annotated to return a Model, or the only one.
     """
     ready = getattr(module, "model", None)
     if isinstance(ready, Model):

@@ -1,5 +1,4 @@
-"""Walkers with stable gait cycles, and the walker of the exercise with the initial state of its
-longest walk.
+"""Walkers with stable gait cycles, and the walker of the exercise with its longest walk.
 
 Each is the model of the exercise (:func:`osimlite.models.dynamic_walker.dynamic_walker`) with few
 changed numbers, and starts from its default values and speeds in the middle of a step.
@@ -56,8 +55,7 @@ exercise.
 
 
 def furthest_walker() -> Model:
-    """Build the walker of the exercise with the initial state from which it makes four steps before
-    it falls.
+    """Build the walker of the exercise with the initial state from which it makes four steps.
 
     It stands on its right foot, which is at rest, with the left leg drawn up and swinging forward.
     No cycle was found for this walker: the inertia of its shanks is so large that a leg swings too

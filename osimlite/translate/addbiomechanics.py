@@ -331,7 +331,7 @@ class SubjectFolder:
             written = forces.rows[:, 9 * body + 3 : 9 * body + 6]
             selected = point.any(axis=1) & (np.abs(forces.rows[:, 9 * body + 1]) > LOADED_FORCE_N)
             distances += np.linalg.norm(point - written, axis=1)[selected].tolist()
-        errors: Mapping[str, Error] = {"point": Error.of(distances, "m")} if distances else {}
+        errors: Mapping[str, Error] = {"point": Error.measure(distances, "m")} if distances else {}
         self.fidelity.add(
             "center-of-pressure",
             f"{place}/ground_forces",

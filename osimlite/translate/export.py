@@ -1,6 +1,4 @@
-"""Translation of a complete model to URDF: robot, text, mesh files, and the account of what was
-lost.
-"""
+"""Translation of a complete model to URDF: robot, text, mesh files, and account."""
 
 from __future__ import annotations
 
@@ -57,8 +55,9 @@ class Urdf:
     files: dict[str, bytes] = field(default_factory=dict)
 
     def write(self, folder: str | Path) -> list[Path]:
-        """Write `<name>.urdf`, its meshes, `<name>.coordinates.json` and `fidelity.json` into a
-        folder.
+        """Write the URDF, its meshes, and files about coordinates and losses into a folder.
+
+        The files are `<name>.urdf`, `<name>.coordinates.json` and `fidelity.json`.
 
         Args:
             folder: output folder; created if necessary.

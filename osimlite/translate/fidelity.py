@@ -62,7 +62,7 @@ class Record:
 
     @property
     def how(self) -> Literal["approximate", "dropped"]:
-        """ "dropped" if nothing of the component is in the target, else "approximate"."""
+        """Consequence: "dropped" if nothing is in the target, else "approximate"."""
         return "dropped" if self.done.startswith(LEFT_OUT) else "approximate"
 
 
@@ -182,8 +182,9 @@ class Fidelity:
         return len(self.translated.keys() - changed - dropped), len(changed), len(dropped)
 
     def list_missing(self, paths: Iterable[str]) -> list[str]:
-        """Return the paths that the account does not cover: neither translated, nor recorded, nor
-        below a record.
+        """Return the paths that the account does not cover.
+
+        They are neither translated nor recorded, nor below a record.
         """
         recorded = {record.component for record in self.records}
         missing = []

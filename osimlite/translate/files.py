@@ -9,8 +9,9 @@ from osimlite.base.files import make_folder, write_atomically
 
 
 def write_files(folder: Path, files: Mapping[str, str | bytes]) -> list[Path]:
-    """Write files into a folder, in reverse order, so that the first appears when all that it needs
-    exist.
+    """Write files into a folder, the first one last.
+
+    The first file then appears when all files that it needs exist.
 
     Args:
         folder: output folder; created if necessary.

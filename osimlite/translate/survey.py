@@ -1,6 +1,4 @@
-"""Account of a translation to URDF: a pass over all components, with a record for each loss and
-change.
-"""
+"""Account of a translation to URDF, with a record for each loss and change."""
 
 from __future__ import annotations
 
@@ -53,8 +51,9 @@ def record_losses(model: Model, robot: Robot, fidelity: Fidelity) -> None:
 
 
 def account_for_rest(tree: Tree, fidelity: Fidelity) -> None:
-    """Record every component that is not accounted for as left out; parts of such components need
-    no record.
+    """Record every component that is not accounted for as left out.
+
+    Parts of such components need no record.
 
     Args:
         tree: components of the model.

@@ -1,6 +1,4 @@
-"""Reflex walk: the jumper's body standing, and a scenario of SCONE whose parameters were optimized
-with osimlite.
-"""
+"""Reflex walk: the jumper's body standing, and a scenario of SCONE with optimized parameters."""
 
 from __future__ import annotations
 

@@ -239,8 +239,7 @@ class CycleSearch:
         return self.compute_fractions(numbers)
 
     def make_model(self, fractions: Floats, start: Mapping[str, tuple[float, float]]) -> Model:
-        """Return the model with some numbers, and an initial state as its default values and
-        speeds.
+        """Return the model with some numbers and with an initial state as its defaults.
 
         Args:
             fractions: fractions of the numbers (k,).
@@ -269,8 +268,9 @@ class CycleSearch:
     def find_candidates(
         self, count: int, seed: int, progress: Progress | None = None
     ) -> list[Candidate]:
-        """Simulate random walkers, and return those that make two steps without a scuff between,
-        the best first.
+        """Simulate random walkers, and return those that make two steps, the best first.
+
+        A walker with a scuff between the two steps is no candidate.
 
         Args:
             count: number of random walkers.
@@ -340,8 +340,9 @@ class CycleSearch:
         return [pair for pair in pairs if pair is not None]
 
     def _find_similar_strikes(self, walk: Walk, fractions: Floats) -> Candidate | None:
-        """Find the most similar touch-downs of a walk, one step apart, or one stride if the legs
-        differ.
+        """Find the most similar touch-downs of a walk, one step or one stride apart.
+
+        They are a stride apart if the legs differ.
         """
         if len(walk.steps) < 2:
             return None
@@ -371,8 +372,9 @@ class CycleSearch:
 
     @staticmethod
     def _compute_distance(step_map: StepMap, one: Floats, two: Floats) -> float:
-        """Return the distance of two states without neutral directions; speeds have the weight
-        `SPEED_WEIGHT_S`.
+        """Return the distance of two states without their neutral directions.
+
+        Speeds have the weight `SPEED_WEIGHT_S`.
         """
         difference = step_map.basis @ step_map.reduce(two - one)
         n = len(step_map.engine.order)
@@ -454,8 +456,9 @@ class CycleSearch:
         return sum(len(walk.steps) >= BASIN_STEPS for walk in walks) / BASIN_STARTS
 
     def make_step_map(self, fractions: Floats, state: Floats, accuracy: float) -> StepMap:
-        """Return the step map of the model with given numbers; reduced states of all models are
-        comparable.
+        """Return the step map of the model with given numbers.
+
+        Reduced states of all models are comparable.
 
         Args:
             fractions: fractions of the numbers (k,).
@@ -540,8 +543,9 @@ class _ClosingProblem:
         return fractions, step_map, step_map.expand(reduced)
 
     def compute_residual(self, unknowns: Floats) -> Floats:
-        """Return the change of the reduced state by the step map, `FALL_RESIDUAL` where there is no
-        step.
+        """Return the change of the reduced state by the step map.
+
+        Where the walker makes no step, all entries are `FALL_RESIDUAL`.
         """
         try:
             _, step_map, state = self.unpack(unknowns)
@@ -551,8 +555,9 @@ class _ClosingProblem:
         return moved if np.isfinite(moved).all() else np.full(self._size, FALL_RESIDUAL)
 
     def check_progress(self, intermediate_result: Any) -> None:
-        """Stop the solver where Newton's method can take over, or where the residual no longer
-        decreases.
+        """Stop the solver near a cycle, or where the residual no longer decreases.
+
+        Near a cycle Newton's method takes over.
         """
         self._sizes.append(float(np.linalg.norm(intermediate_result.fun)))
         here = self._sizes[-1]

@@ -1,6 +1,4 @@
-"""Search for a stable gait of a model: find cycles, make the best one stable, round it, and write
-the walker.
-"""
+"""Search for a stable gait: find cycles, stabilize the best one, round it, write the walker."""
 
 from __future__ import annotations
 

@@ -1,5 +1,6 @@
-"""Measures of sweeps for walkers (steps, scuffs, time of the fall), and a start with the feet on
-the ground.
+"""Measures of sweeps for walkers, and a start with the feet on the ground.
+
+The measures are steps, scuffs, the time of the fall, and progress.
 
 The names of the public functions are the names that users write in a sweep. A fall ends the run.
 """
@@ -55,8 +56,9 @@ def scuffs(engine: Any, feet: Sequence[str] | None = None) -> RunMeasure:
 
 @registry.register_measure(is_maximized=True)
 def time_to_fall(engine: Any, feet: Sequence[str] | None = None) -> RunMeasure:
-    """Return the measure of the time of the fall (s); the end of the run for walkers that do not
-    fall.
+    """Return the measure of the time of the fall (s).
+
+    For walkers that do not fall it is the end of the run.
 
     Args:
         engine: engine of the model.
@@ -67,8 +69,10 @@ def time_to_fall(engine: Any, feet: Sequence[str] | None = None) -> RunMeasure:
 
 @registry.register_measure(is_maximized=True)
 def progress(engine: Any, feet: Sequence[str] | None = None) -> RunMeasure:
-    """Return a measure that a search can climb: steps before the first scuff, plus how near the
-    next one was.
+    """Return the measure of progress, which a search can climb.
+
+    It is the number of steps before the first scuff, plus a fraction for how near the next step
+    was.
 
     The fraction after the decimal point is the mean of two numbers below 1. The first is m / (m +
     d), where m is the shortest length of a step and d is what the foot lacked to it when it scuffed
@@ -118,9 +122,7 @@ def planted(engine: Any, feet: Sequence[str] | None) -> registry.Place:
 
 
 def _compute_progress(walk: Walk, places: Sequence[float]) -> float:
-    """Return the progress of a walk; `places` are the positions of the feet along the slope at its
-    end (m).
-    """
+    """Return the progress of a walk with feet at some positions along the slope at its end (m)."""
     if walk.scuffs:
         until = walk.scuffs[0].time
         lead = walk.scuffs[0].length

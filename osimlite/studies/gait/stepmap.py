@@ -42,8 +42,9 @@ NEUTRAL_SAMPLES = 9
 
 
 def refuse_constraints(mechanism: Mechanism) -> None:
-    """Refuse a model with constraints, which restrict the directions of the state that a step map
-    varies.
+    """Refuse a model with constraints.
+
+    They restrict the directions of the state that a step map varies.
 
     Raises:
         UnsupportedError: the model has constraints, or prescribed coordinates.
@@ -125,8 +126,9 @@ class StepMap:
     def rebuild_for_model(
         self, engine: BatchEngine, near: ArrayLike, accuracy: float | None = None
     ) -> StepMap:
-        """Return the step map of a model with other numbers, with reduced states as comparable as
-        possible.
+        """Return the step map of a model with other numbers.
+
+        Its reduced states are as comparable as possible with those of this map.
 
         The new basis is the old one, projected onto the complement of the new neutral directions
         and made orthonormal by a polar decomposition, which changes it least.
@@ -191,8 +193,7 @@ class StepMap:
         return images.states[0]
 
     def move_to_strike(self, state: Floats, foot: int) -> Floats:
-        """Move a state (y,) that is a rounding error away from a touch-down onto it, by one Newton
-        step in time.
+        """Move a state (y,) near a touch-down onto it, by one Newton step in time.
 
         Args:
             state: state at the event of a touch-down (y,).
@@ -268,7 +269,8 @@ class StepMap:
         return np.asarray(states, dtype=float) @ self.basis
 
     def expand(self, reduced: ArrayLike) -> Floats:
-        """Return states (..., y) from reduced ones; along neutral directions they are where `start`
-        is.
+        """Return states (..., y) from reduced ones.
+
+        Along neutral directions they are where `start` is.
         """
         return np.asarray(reduced) @ self.basis.T + self.start @ self.neutral @ self.neutral.T

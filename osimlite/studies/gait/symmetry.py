@@ -23,8 +23,9 @@ begins there.
 
 
 def find_leg_exchange(engine: BatchEngine, footing: FootContacts, states: ArrayLike) -> Ints | None:
-    """Find the permutation of the state that exchanges the legs, and check it by the equations of
-    motion.
+    """Find the permutation of the state that exchanges the legs.
+
+    The equations of motion decide whether it is a symmetry.
 
     The coordinates of one leg, from where the legs part to the foot, are exchanged with those of
     the other, and auxiliary states with those that have the same effect there.
@@ -130,8 +131,9 @@ def _compute_effects(engine: BatchEngine, state: Floats) -> Floats:
 
 
 def find_neutral_directions(engine: BatchEngine, states: ArrayLike) -> Floats:
-    """Find the directions of the state that do not change the motion except for the motion along
-    them.
+    """Find the directions of the state that do not change the motion.
+
+    The motion along these directions themselves may change.
 
     A walker may be anywhere along an even slope, and a body that hangs in its mass centre may turn
     at any rate. The derivative of the state does not change in these directions, or changes along

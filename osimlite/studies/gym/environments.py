@@ -87,9 +87,7 @@ class _ObservedCopies:
         self.copies.set_states(which, start)
 
     def observe(self, controls: Array) -> Observation:
-        """Return the states of all copies by name, as rewards need them; `controls` are those of
-        the step (w, c).
-        """
+        """Return the states of all copies by name, with the controls of the step (w, c)."""
         states = self.copies.states.copy()
         return Observation(
             dict(zip(self.state_names, states.T, strict=True)), controls, self.task.step
@@ -251,8 +249,9 @@ class MuscleEnv(gymnasium.Env[Any, Any]):
 
 
 class MuscleVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
-    """Environment with many copies of a model, each like a `MuscleEnv`, stepped in one call on all
-    cores.
+    """Environment with many copies of a model that are stepped in one call on all cores.
+
+    Each copy behaves like a `MuscleEnv`.
 
     A copy whose episode is over starts a new one in the next step, which ignores its action.
 
@@ -351,9 +350,7 @@ class MuscleVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
         return self._all.flatten_observations(), rewards, over, late, {}
 
     def _reset_state(self, k: int) -> Array:
-        """Return a new initial state of a copy, after drawing it from the random generator of this
-        copy.
-        """
+        """Draw a new initial state of a copy from the random generator of this copy."""
         self._all.reset_copy(k, self._random[k])
         return self._all.copies.states[k].copy()
 

@@ -56,8 +56,9 @@ MAX_NOISE_SEED = 10**15
 
 
 class TermOrGate(NamedTuple):
-    """Term of a controller, or a gate: a range of a coordinate beyond which terms rest while it
-    moves away.
+    """Term of a controller, or a gate.
+
+    A gate is a range of a coordinate beyond which terms rest while the coordinate moves away.
 
     Attributes:
         ints: integers for the kernels: `TERM`, or for a gate the sensors of the coordinate and its
@@ -232,8 +233,9 @@ class Reflexes:
             )
 
     def _read_functions(self, node: Node, parameters: Parameters) -> None:
-        """Read a function of time for some actuators; a symmetric one has the same parameters on
-        both sides.
+        """Read a function of time for some actuators.
+
+        A symmetric function has the same parameters on both sides.
         """
         symmetric = node.flag("symmetric", True)
         include = node.text("include", "*")
@@ -344,8 +346,9 @@ class Reflexes:
             raise node.error("a ReflexController needs reflexes")
 
     def _find_index(self, node: Node, name: str, names: list[str], leg: int) -> int:
-        """Return the index of a name with or without the side of a leg; `_o` means the opposite
-        leg.
+        """Return the index of a name with or without the side of a leg.
+
+        The ending `_o` means the opposite leg.
 
         Args:
             node: node for errors.
@@ -368,8 +371,7 @@ class Reflexes:
     def _resolve_target_and_source(
         self, node: Node, prefix: str, leg: int, symmetric: bool, kind: ReflexType
     ) -> tuple[int, int, str]:
-        """Find the target and the source of a reflex, and the beginning of the names of its
-        parameters.
+        """Find target and source of a reflex, and the prefix of its parameters.
 
         Args:
             node: node of the reflex.
@@ -502,8 +504,9 @@ class Reflexes:
         return len(self._gates) - 1
 
     def pack(self) -> tuple[Ints, Array]:
-        """Return the controller as the kernels take it (see
-        :mod:`osimlite.mechanics.kernels.reflexes`).
+        """Return the controller as the kernels take it.
+
+        See :mod:`osimlite.mechanics.kernels.reflexes`.
 
         Returns:
             Integers, and the numbers of each candidate (w, r).

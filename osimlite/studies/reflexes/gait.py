@@ -20,8 +20,9 @@ MIN_CONTACT_S = 0.05
 
 
 class Strides(NamedTuple):
-    """Averages over complete strides, each from one touch-down of a foot to its next, without the
-    first strides.
+    """Averages over complete strides, each from one touch-down of a foot to its next.
+
+    The first strides are left out.
 
     Attributes:
         number: number of strides of both legs.
@@ -168,9 +169,7 @@ def measure_strides(times: Array, way: Array, loads: Array) -> Strides | None:
 
 
 def _remove_brief_contacts(on: Any, times: Array) -> None:
-    """Replace contacts shorter than `MIN_CONTACT_S` by swing, and then such swings by contact, in
-    place.
-    """
+    """Remove contacts, and then swings, that are shorter than `MIN_CONTACT_S`, in place."""
     for contact in (True, False):
         edges = np.flatnonzero(on[1:] != on[:-1]) + 1
         for first, last in pairwise(edges):

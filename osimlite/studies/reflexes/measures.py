@@ -200,8 +200,9 @@ class Measure(ABC):
         return found
 
     def average_over_time(self, first: int) -> Array:
-        """Return the time average of a criterion (w,); the last value of one that was active for no
-        time.
+        """Return the time average of a criterion (w,).
+
+        A criterion that was active for no time has its last value.
         """
         total, span, last = (
             self.read_recorded(first, place)
@@ -211,8 +212,9 @@ class Measure(ABC):
 
 
 class GaitMeasure(Measure):
-    """Deviation of the speed of steps from a range; 0 is a perfect gait, 1 a walker that falls at
-    once.
+    """Deviation of the speed of steps from a range.
+
+    It is 0 if all steps are within the range, 1 without steps, and at most 2.
 
     A walker whose mass centre sinks below a part of its initial height has fallen.
     """
@@ -327,8 +329,9 @@ class EffortMeasure(Measure):
     """Effort of the muscles: metabolic power, total force, or a sum of powers of activations."""
 
     def read(self, node: Node) -> None:
-        """Read the type of effort; the mass of a muscle is F_max / specific tension * density *
-        optimal length.
+        """Read the type of effort, and compute the masses of the muscles.
+
+        The mass is F_max / specific tension * density * optimal fiber length.
         """
         kind, walkers = node.text("measure_type"), self.walkers
         if kind not in EFFORTS:

@@ -65,8 +65,7 @@ class Parameters:
         self.values_used: dict[str, float] = {}
 
     def get_number(self, node: Node, key: str, default: float, name: str = "") -> Array:
-        """Return a number of each candidate (w,): the literal number in the scenario, or the value
-        of the parameter.
+        """Return a number of each candidate (w,), literal or the value of a parameter.
 
         Args:
             node: node that the number is a part of.
@@ -85,8 +84,9 @@ class Parameters:
         return found
 
     def parse_number(self, part: Node, name: str) -> Array:
-        """Return a number of each candidate (w,) from its own node; values of parameters are
-        clipped to their bounds.
+        """Return a number of each candidate (w,) from its own node.
+
+        Values of parameters are clipped to their bounds.
 
         Args:
             part: node of the number.

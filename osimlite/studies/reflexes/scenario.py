@@ -1,6 +1,4 @@
-"""Scenarios of SCONE: a model, its controller, the measures that score a walk, and the parameters
-to optimize.
-"""
+"""Scenarios of SCONE: model, controller, measures of a walk, and parameters to optimize."""
 
 from __future__ import annotations
 
@@ -275,8 +273,9 @@ class Scenario:
         return candidates.walk()
 
     def get_walkers(self, count: int) -> Walkers:
-        """Return the copies of the model for a number of candidates; they are cached, because
-        making them takes longer than a walk.
+        """Return the copies of the model for a number of candidates.
+
+        They are cached, because making them takes longer than a walk.
         """
         if count not in self._walkers:
             node = self.settings
@@ -334,8 +333,9 @@ class Candidates:
                 _settle_on_ground(walkers, k, height, load)
 
     def _set_initial_states(self) -> None:
-        """Set the initial states: default of the model, then the file, then offsets that may be
-        parameters.
+        """Set the initial states: the model's default, then a file, then offsets.
+
+        Offsets may be parameters.
         """
         walkers = self.walkers
         node = self.scenario.settings
@@ -360,8 +360,9 @@ class Candidates:
                     states[:, index] += self.parameters.parse_number(offset, f"{name}.offset")
 
     def _read_state_file(self, path: Path) -> None:
-        """Set initial states from a storage file (.sto), or from a SCONE file with `values` and
-        `velocities`.
+        """Set initial states from a storage file (.sto) or a SCONE file.
+
+        A SCONE file has the blocks `values` and `velocities`.
         """
         walkers = self.walkers
         if path.suffix.lower() == ".sto":

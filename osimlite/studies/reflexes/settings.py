@@ -1,5 +1,4 @@
-"""Reader of scenarios as trees of keys and values: SCONE files (.scone, .zml), YAML and Python
-data.
+"""Reader of scenarios as trees of keys and values: SCONE files, YAML and Python data.
 
 SCONE files may include other files and define constants (`$name = 3`). In YAML and in Python data,
 a key that occurs several times in SCONE has a list of mappings; the key `include` of YAML names
@@ -177,8 +176,9 @@ class Node:
         return np.array([x, y, z])
 
     def select_all(self, *names: str) -> Iterator[tuple[str, Node]]:
-        """Return an iterator over the parts with any of some keys, in the order of the file, as
-        (key, node).
+        """Return an iterator over the parts with any of some keys, as (key, node).
+
+        They have the order of the file.
         """
         self.read_keys.update(names)
         return ((name, node) for name, node in self.parts if name in names)

@@ -56,8 +56,7 @@ That derivative belongs to the previous excitations.
 
 
 class SensedModel:
-    """Actuators, coordinates and legs of a model, with the plan from which kernels fill its sensor
-    rows.
+    """Actuators, coordinates and legs of a model, with the plan of its sensor rows.
 
     Args:
         model: model with sensors.
@@ -222,8 +221,9 @@ class SensedModel:
 
 
 def _read_control_bounds(actuator: Any) -> tuple[float, float]:
-    """Return smallest and largest control of an actuator; one with several controls has no bounds
-    in OpenSim's tools.
+    """Return smallest and largest control of an actuator.
+
+    An actuator with several controls has no bounds in OpenSim's tools.
     """
     if isinstance(actuator, Muscle):
         return getattr(actuator, "minimum_activation", actuator.min_control), 1.0
@@ -346,9 +346,7 @@ class Walkers(SensedModel):
         return record[: int(self.progress[0, STEPS]) - before] if order > 0 else record
 
     def get_leg_loads(self) -> Array:
-        """Return the ground reaction forces on the legs over the weight, from the last sensor rows
-        (w, l).
-        """
+        """Return the latest ground reaction forces on the legs over the weight (w, l)."""
         return self.rows[:, self.sensor_plan[SENSES.LOADS] : self.sensor_plan[SENSES.PLACES]]
 
     def equilibrate_muscles(self, activations: Array) -> None:

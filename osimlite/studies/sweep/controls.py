@@ -117,8 +117,9 @@ def parse_control(name: str, actuators: Sequence[str], word: str) -> Control:
 
 
 def expand_nodes(name: str) -> list[str]:
-    """Return the names of the nodes that one name stands for: `a@0:0.4:3` is `a@0`, `a@0.2` and
-    `a@0.4`.
+    """Return the names of the nodes that one name stands for.
+
+    For example, `a@0:0.4:3` is `a@0`, `a@0.2` and `a@0.4`.
 
     Raises:
         SettingError: the times are malformed.
@@ -183,8 +184,9 @@ def check_nodes(controls: Mapping[int, Control], interpolation: str, to: float) 
 
 
 def make_controller(model: Model, controls: Mapping[str, Any]) -> PrescribedController:
-    """Return a controller with given controls; outside of the times of a table its first and last
-    values hold.
+    """Return a controller with given controls.
+
+    Outside of the times of a table its first and last values hold.
 
     Args:
         model: model with the actuators.
@@ -222,8 +224,9 @@ def make_controller(model: Model, controls: Mapping[str, Any]) -> PrescribedCont
 def _make_empty_controller(
     model: Model, kind: str, actuators: Sequence[str]
 ) -> PrescribedController:
-    """Return a controller without functions, with an unused name: a model of an earlier search has
-    others.
+    """Return a controller without functions, with an unused name.
+
+    A model of an earlier search has controllers of the same kind.
     """
     taken = {item.name for item in model.components(Controller)}
     name = next(name for number in count(1) if (name := f"{kind}_{number}") not in taken)
@@ -325,8 +328,9 @@ class VariedControls:
 def _group_by_actuator(
     controls: Mapping[int, Control], kind: str
 ) -> dict[str, list[tuple[float, int]]]:
-    """Return the controls of a kind by actuator, as sorted pairs of time or number, and index of
-    the variable.
+    """Return the controls of a kind by actuator.
+
+    Each is a pair of time or number, and index of the variable; pairs are sorted.
     """
     result: dict[str, list[tuple[float, int]]] = {}
     for place, part in controls.items():

@@ -96,9 +96,7 @@ class RunMeasure:
 
 
 class State(Mapping[str, float]):
-    """State by name: `state["RHip_rz"]`, `state["RHip_rz/speed"]`, and any variable by its path in
-    `states.sto`.
-    """
+    """State by name: `state["RHip_rz"]`, `state["RHip_rz/speed"]`, or by a path in `states.sto`."""
 
     def __init__(self, engine: Any, y: Floats) -> None:
         self._engine, self._y = engine, y

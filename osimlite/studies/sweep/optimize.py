@@ -1,5 +1,6 @@
-"""Optimization of an objective over the variables of a plan; evaluations run like the samples of a
-sweep.
+"""Optimization of an objective over the variables of a plan.
+
+Evaluations run like the samples of a sweep.
 """
 
 from __future__ import annotations
@@ -432,8 +433,9 @@ class _Evaluations:
         return values
 
     def _compute_cost(self, status: str, value: float) -> float:
-        """Return the cost of a run; a failure costs more than anything before, so that methods
-        avoid it.
+        """Return the cost of a run.
+
+        A failure costs more than anything before, so that methods avoid it.
         """
         if status == FAILED or not isfinite(value):
             return self.worst + max(1.0, abs(self.worst))
@@ -442,8 +444,10 @@ class _Evaluations:
         return cost
 
     def _run(self, values: Floats, first: int) -> list[tuple[list[float], str, float]]:
-        """Run samples (k, v) on the pool, and save them; return values, status and objective of
-        each.
+        """Run samples (k, v) on the pool, and save them.
+
+        Returns:
+            Values, status and objective of each run.
         """
         # Two tasks per worker balance runs of different duration.
         size = max(1, -(-len(values) // (2 * self.pool.workers)))

@@ -1,6 +1,4 @@
-"""Plan of a sweep or a search: model, variables, measures and settings, which can be sent to other
-processes.
-"""
+"""Plan of a sweep or a search, which can be sent to other processes."""
 
 from __future__ import annotations
 
@@ -125,9 +123,7 @@ class Plan(IntegrationOptions):
 
     @property
     def interval(self) -> float | None:
-        """Interval (s) at which states are saved: the requested one, or the default if there are
-        expressions.
-        """
+        """Interval (s) at which states are saved, as requested or as expressions need it."""
         return self.report_interval or (
             REPORT_INTERVAL if any(map(is_expression, self.measures)) else None
         )
@@ -149,8 +145,9 @@ class Plan(IntegrationOptions):
 
     @staticmethod
     def unpack(data: bytes) -> Plan:
-        """Return a packed plan. Unpickling runs code, so that the bytes must come from a trusted
-        program.
+        """Return a packed plan.
+
+        Unpickling runs code, so that the bytes must come from a trusted program.
         """
         return pickle.loads(zlib.decompress(data))
 

@@ -1,6 +1,4 @@
-"""Workers that run the samples of a sweep: threads, processes or a Dask cluster, with the same
-results.
-"""
+"""Workers that run samples: threads, processes or a Dask cluster, with the same results."""
 
 from __future__ import annotations
 

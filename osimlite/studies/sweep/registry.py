@@ -72,8 +72,9 @@ def find_measure(name: str) -> RegisteredMeasure | None:
 
 
 def make_gradients(plan: Plan) -> Any:
-    """Return the derivatives of the first measure of a plan, with a method `evaluate(values,
-    free)`.
+    """Return the derivatives of the first measure of a plan.
+
+    The result has a method `evaluate(values, free)`.
     """
     return import_module(GRADIENTS_MODULE).Gradients(plan)
 

@@ -1,5 +1,4 @@
-"""Tables of results: a Parquet file when complete, and until then a partial file to which rows are
-added.
+"""Tables of results: a Parquet file when complete, and a growing partial file until then.
 
 The partial file consists of records: Arrow's schema with the settings, then batches of rows in the
 order of the runs. Each record starts with its length and a checksum. If the file is damaged, the
@@ -261,8 +260,9 @@ class PartialTable:
         self.stream.flush()
 
     def finish(self) -> Path:
-        """Convert the rows to the Parquet file, which replaces an older one in one step; without
-        rows nothing is written.
+        """Convert the rows to the Parquet file, which replaces an older one in one step.
+
+        Without rows nothing is written.
         """
         if self.rows == 0:
             return self.path
@@ -394,9 +394,7 @@ def _compute_checksum(body: bytes) -> bytes:
 
 
 def _read_batches(path: Path, take: Callable[[Any], object]) -> int:
-    """Call a function with each batch up to the first damaged one; return the offset after the
-    last.
-    """
+    """Call a function with each intact batch, and return the offset after the last one."""
     pa = _load_arrow()
     records = _read_records(path)
     head, end = next(records)
@@ -408,8 +406,9 @@ def _read_batches(path: Path, take: Callable[[Any], object]) -> int:
 
 
 class ResultTable:
-    """Access to a Parquet file of results with one row per run; each method reads the complete
-    file.
+    """Access to a Parquet file of results with one row per run.
+
+    Each method reads the complete file.
     """
 
     def _get_results_path(self) -> Path:

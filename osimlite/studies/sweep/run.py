@@ -245,8 +245,9 @@ class _Dispatcher:
             self.under_way += 1
 
     def _record_block(self, block: Block) -> None:
-        """Update the outcome, and adapt the size of tasks to the duration of runs; the last tasks
-        are smaller.
+        """Update the outcome, and adapt the size of tasks to the duration of runs.
+
+        The last tasks are smaller, so that all workers end at about the same time.
         """
         # The clock may not advance during very short tasks.
         each = max(block.seconds, 1e-6) / max(len(block.status), 1)

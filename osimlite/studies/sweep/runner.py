@@ -225,8 +225,9 @@ class Runner:
         return result
 
     def _apply_measure(self, made: RunMeasure, batch: Batch, rows: Any, block: Block) -> None:
-        """Compute a measure of some runs; an exception of a user's function becomes the reason of a
-        failed run.
+        """Compute a measure of some runs.
+
+        An exception of a user's function becomes the reason of a failed run.
         """
         try:
             block.measures[made.name][rows] = made.compute(batch)
@@ -301,8 +302,9 @@ class Runner:
         events: Sequence[tuple[float, str, bool]],
         state: Floats,
     ) -> str:
-        """Return the watch that ended a run: the last event if it was recorded, else the level
-        nearest to the state.
+        """Return the name of the watch that ended a run.
+
+        It is the last event if this was recorded, else the level nearest to the state.
         """
         last = events[-1][1] if events else ""
         if any(watch.stops and watch.name == last for watch in look.watches):

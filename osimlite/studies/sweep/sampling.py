@@ -200,8 +200,9 @@ def _draw_uniform(seed: int, first: int, last: int, width: int) -> Floats:
 
 
 def _permute_indices(first: int, last: int, count: int, seed: int, column: int) -> Floats:
-    """Return entries first ... last - 1 of a random permutation of 0 ... count - 1, without
-    computing the others.
+    """Return entries first ... last - 1 of a random permutation of 0 ... count - 1.
+
+    The other entries are not computed.
 
     A Feistel network permutes the numbers of 2k bits. Results that are not below `count` pass
     through it again until they are (cycle walking).

@@ -1,5 +1,4 @@
-"""Search methods: functions that ask for the costs of points of the unit cube and approach the
-smallest.
+"""Search methods: functions that approach the smallest cost on the unit cube.
 
 All are deterministic: with the same seed and the same costs they ask for the same points, so that
 an interrupted search continues where it was.
@@ -89,8 +88,9 @@ def run_cma(ask: CostFunction, search: Search, *, keeps_best: bool = False) -> s
 
 
 def run_sobol_cma(ask: CostFunction, search: Search) -> str:
-    """Evaluate two populations of Sobol points and the start, then run CMA-ES from the best; return
-    why it ended.
+    """Run CMA-ES from the best of two populations of Sobol points and the start.
+
+    The function returns why it ended.
 
     With a small budget and a cost of many valleys, as that of a walker, this gets farther than
     CMA-ES from the start alone, and never ends worse than it began. With thousands of evaluations
@@ -149,8 +149,9 @@ def run_differential_evolution(ask: CostFunction, search: Search) -> str:
 
 
 def run_nelder_mead(ask: CostFunction, search: Search) -> str:
-    """Minimize with the simplex method of Nelder and Mead (scipy), one point at a time; return why
-    it ended.
+    """Minimize with the simplex method of Nelder and Mead (scipy); return why it ended.
+
+    It evaluates one point at a time.
 
     Args:
         ask: cost function.

@@ -1,5 +1,4 @@
-"""Variables of a sweep: their names, their ranges, and which numbers of the model or the initial
-state they are.
+"""Variables of a sweep: names, ranges, and what they change in the model or its initial state.
 
 ======================================  ==========================================================
 ``RHip_rz``, ``?Hip_rz``                initial value of a coordinate, by name or path, or of several

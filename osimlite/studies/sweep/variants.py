@@ -175,8 +175,9 @@ class Variants:
         return self.prepare_states(engine, [variant], row[None])[0]
 
     def prepare_states(self, engine: Any, variants: Sequence[Variant], states: Floats) -> Floats:
-        """Return states (k, y) in which auxiliary states have their start values for the given
-        values and speeds.
+        """Return states (k, y) with the start values of their auxiliary states.
+
+        These follow from values and speeds.
 
         Args:
             engine: engine of any model of this structure.
@@ -272,8 +273,9 @@ class Variants:
         return self._plan.controller.with_values({name: float(value) for name, value in parts})
 
     def build_model(self, values: Sequence[float]) -> Model:
-        """Return the model of a sample for writing: with its initial state, without the open
-        control inputs.
+        """Return the model of a sample for writing.
+
+        It has the initial state of the sample, and no open control inputs.
         """
         self.apply_sample(values)
         self.set_default_state(values)

@@ -156,8 +156,9 @@ def _add_inertia(draft: Draft, element: _Element, link: Link, path: str, *, move
 
 
 def _repair_moments(moments: Array) -> Array:
-    """Raise the smallest principal moment until none exceeds the sum of the others, also in
-    floating point.
+    """Raise the smallest principal moment until none exceeds the sum of the others.
+
+    This holds in floating point as well.
     """
     raised = moments.copy()
     least, middle, greatest = np.argsort(moments)

@@ -170,9 +170,7 @@ class _MujocoModel:
         ]
 
     def find_tendon(self, name: str) -> int | None:
-        """Return the index of the tendon of an actuator with a name, or of the tendon with this
-        name, or None.
-        """
+        """Return the index of the tendon of an actuator, or of the tendon, with a name; or None."""
         kinds = self.mujoco.mjtObj
         actuator = self.mujoco.mj_name2id(self.model, kinds.mjOBJ_ACTUATOR, name)
         if (
@@ -267,8 +265,9 @@ class _MujocoModel:
 
 
 def _compare_bodies(theirs: _MujocoModel, origins: Array, places: Sequence[Array]) -> Error | None:
-    """Return the error of body positions after the best rigid motion in each pose (Kabsch's
-    algorithm).
+    """Return the error of body positions after the best rigid motion in each pose.
+
+    The rotation is computed by Kabsch's algorithm.
     """
     # Fewer than three points do not determine a rigid motion.
     if len(theirs.bodies) < 3:

@@ -15,8 +15,9 @@ from osimlite.translate.mjcf.frame_forces import add_straight_tendon
 
 
 def add_constraints(draft: Draft) -> None:
-    """Add every constraint between bodies; those of coordinates only are equalities of joints, see
-    `couplings`.
+    """Add every constraint between bodies.
+
+    Constraints between coordinates are equalities of joints, see `couplings`.
     """
     for constraint in draft.mechanism.constraints:
         if constraint.bodies:
@@ -58,8 +59,9 @@ def _add_distance(draft: Draft, item: b.DistanceConstraint) -> str:
 
 
 def _add_point_on_line(draft: Draft, item: b.PointOnLineConstraint) -> str:
-    """Add a light body that slides along the line, and connect it to the follower; MuJoCo has no
-    such constraint.
+    """Add a light body that slides along the line, and connect it to the follower.
+
+    MuJoCo has no constraint of a point to a line.
     """
     name = draft.make_name("joint", item.name)
     frame = np.eye(4)

@@ -1,6 +1,4 @@
-"""Contact surfaces as geoms, and pairs of geoms for the contact forces of the model, with MuJoCo's
-own law.
-"""
+"""Contact surfaces as geoms, and contact forces as pairs of geoms with MuJoCo's own law."""
 
 from __future__ import annotations
 
@@ -91,8 +89,9 @@ def _add_surface(draft: Draft, geometry: ContactGeometry, path: str) -> None:
 def _make_geom(
     draft: Draft, geometry: ContactGeometry, path: str, *, still: bool
 ) -> tuple[dict[str, Value], Array] | None:
-    """Return the attributes of a geom and its frame (4, 4) in that of the geometry; None for a mesh
-    without a file.
+    """Return the attributes of a geom and its frame (4, 4) in that of the geometry.
+
+    A mesh without a file gives None.
     """
     match geometry:
         case ContactSphere() if geometry.radius > 0.0:

@@ -1,5 +1,6 @@
-"""Forces on one coordinate: actuators on its joint, and springs as tendons whose length is the
-coordinate.
+"""Forces on one coordinate: actuators on its joint, and springs as tendons.
+
+The length of such a tendon is the coordinate.
 
 Such a tendon is exact, has the name of the force, and allows several springs on one joint.
 """
@@ -146,8 +147,9 @@ def add_limit(draft: Draft, force: CoordinateLimitForce, path: str) -> str:
 def _add_tendon(
     draft: Draft, lead: Lead, path: str, slack: tuple[float, float], **law: Value
 ) -> str:
-    """Add a tendon whose length is the coordinate plus a constant, slack between two values of the
-    coordinate.
+    """Add a tendon whose length is the coordinate plus a constant.
+
+    It is slack between two values of the coordinate.
     """
     slope, start = lead.line
     # The length of the tendon is the coordinate plus start / slope.

@@ -43,9 +43,7 @@ follow the joint.
 
 
 def add_couplings(draft: Draft) -> None:
-    """Add an equality for every joint whose value follows from a function of a coordinate or from a
-    coupler.
-    """
+    """Add an equality for every joint that follows a function or a coupler."""
     robot = draft.robot
     draft.leads |= {
         place: Lead(joint.name, line) for place, (joint, line) in leaders(robot).items()
@@ -126,8 +124,9 @@ def _add_follower(draft: Draft, joint: RobotJoint, driver: Driver, whose: str) -
 
 
 def _add_argument_joint(draft: Draft, place: int) -> Lead:
-    """Add a joint for a coordinate that is only the argument of functions: it turns a small body
-    about its centre.
+    """Add a joint for a coordinate that is only the argument of functions.
+
+    It turns a small body about its centre.
     """
     info = draft.mechanism.coordinates[place]
     name = joint_names(draft.mechanism)[place]
@@ -153,8 +152,9 @@ def _add_argument_joint(draft: Draft, place: int) -> Lead:
 
 
 def _compute_inertia(draft: Draft, place: int) -> float:
-    """Return the inertia that a coordinate moves in the default pose, by itself and by couplers
-    (kg·m²).
+    """Return the inertia that a coordinate moves in the default pose (kg·m²).
+
+    Coordinates that couplers move along are included.
     """
     q = draft.default_state[0]
     rates = np.zeros(len(q))
@@ -226,8 +226,9 @@ def compose_with_line(line: Line, polynomial: Array) -> tuple[float, ...]:
 
 
 def _hold_joint(draft: Draft, joint: RobotJoint) -> None:
-    """Hold a joint that is a function of several coordinates at its default value; the driver moves
-    it exactly.
+    """Hold a joint that is a function of several coordinates at its default value.
+
+    The driver moves it exactly.
     """
     value = joint.value(draft.default_state[0])
     leads = [

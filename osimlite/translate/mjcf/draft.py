@@ -219,8 +219,7 @@ class Draft:
 
     @cached_property
     def default_state(self) -> tuple[Array, Array]:
-        """Values (n,) and speeds (n,) of the coordinates in the default pose, assembled to fulfil
-        the constraints.
+        """Values (n,) and speeds (n,) in the default pose, which fulfil the constraints.
 
         If no pose near the model's own fulfils them, it is the model's own.
 
@@ -239,9 +238,7 @@ class Draft:
             return self.mechanism.values({}), self.mechanism.speeds({})
 
     def iterate_components(self, kind: type[C]) -> Iterator[tuple[C, str]]:
-        """Yield the components of a class that no pass has accounted for, with their absolute
-        paths.
-        """
+        """Yield the components of a class that are not accounted for, with their paths."""
         spoken_of = self.fidelity.translated.keys() | {
             record.component for record in self.fidelity.records
         }
@@ -253,8 +250,9 @@ class Draft:
                 yield component, path
 
     def record_result(self, path: str, became: str) -> None:
-        """Record what a component and all components below it became, except those accounted for
-        already.
+        """Record what a component and all components below it became.
+
+        Components that are accounted for keep their entry.
 
         Args:
             path: absolute path of the component.
@@ -382,8 +380,9 @@ class Draft:
         return speck
 
     def locate_at_zero(self, station: StationPlacement) -> Array:
-        """Return the position of a station in ground (3,) with all joints at zero, MuJoCo's
-        reference pose.
+        """Return the position of a station in ground (3,) with all joints at zero.
+
+        This is MuJoCo's reference pose.
         """
         body, location = station
         link, _ = self.robot.link_of[

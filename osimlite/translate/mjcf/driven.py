@@ -1,6 +1,4 @@
-"""Elements for the driver: a control for each control of the model, and memory for the states of
-its forces.
-"""
+"""Elements for the driver: controls of the model, and memory for the states of its forces."""
 
 from __future__ import annotations
 

@@ -243,8 +243,9 @@ class Driver:
             raise failure
 
     def _apply_forces(self, data: Any) -> None:
-        """Add the generalized forces of the model to MuJoCo's passive forces (callback of
-        controls).
+        """Add the generalized forces of the model to MuJoCo's passive forces.
+
+        MuJoCo calls this function as its callback of controls.
         """
         if self._failure is not None or not self.model.nv:
             return
@@ -328,8 +329,9 @@ class Driver:
         return forces
 
     def _compute_activation_rates(self, _: Any, data: Any, actuator: int) -> float:
-        """Return rates of auxiliary states, which `_apply_forces` has computed at the same
-        evaluation.
+        """Return the rates of the auxiliary states.
+
+        `_apply_forces` has computed them at the same evaluation.
         """
         # MuJoCo expects the rate of a single state as the return value.
         if len(self._rates) == 1:
@@ -362,8 +364,9 @@ class Driver:
 
     # ----------------------------------------------------------------------------------------------- equalities
     def _update_equalities(self) -> None:
-        """Move followers to their exact values, and write value, slope and curvature into the
-        equalities.
+        """Move followers to their exact values, and update the equalities.
+
+        These get the value, the slope and the curvature of the exact functions.
         """
         for followed in self._followed:
             if followed.fitted:

@@ -1,5 +1,4 @@
-"""Ellipsoid joints: a mechanism that keeps a body on an ellipsoid without functions of several
-coordinates.
+"""Ellipsoid joints: a mechanism with linear couplings that keeps a body on an ellipsoid.
 
 The origin of the body is p = diag(r) n with the radii r (m) and the body's own z axis n. A point
 ahead of it by h (m) along n is s = diag(r + h) n. A small body on three slides that is connected to
@@ -32,8 +31,9 @@ def add_ellipsoids(draft: Draft) -> None:
 
 
 def _add_mechanism(draft: Draft, slides: list[RobotJoint], turns: tuple[RobotJoint, ...]) -> None:
-    """Add the body on slides, its connection and the couplings of one joint, if it has the expected
-    structure.
+    """Add the body on slides, its connection and the couplings of one joint.
+
+    A joint of another structure is left alone.
     """
     radii = {}
     for joint in slides:

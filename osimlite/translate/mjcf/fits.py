@@ -33,8 +33,9 @@ Residuals = Callable[[Tendon], Array]
 
 
 def fit_tendon(router: Router, tendon: Tendon) -> Tendon:
-    """Return the tendon whose free wrap geoms and sites have the smallest error near their present
-    pose.
+    """Return the tendon with the smallest error near its present geometry.
+
+    Its free wrap geoms and sites are moved.
 
     Points of the path stay where they are, and so do the small spheres that replace conditional
     points.
@@ -58,8 +59,9 @@ def fit_tendon(router: Router, tendon: Tendon) -> Tendon:
 
 
 def _fit_piece(piece: Tendon, wrong: Residuals) -> Tendon:
-    """Fit a piece of a tendon: all numbers together by least squares, then the side of each
-    surface, repeatedly.
+    """Fit a piece of a tendon.
+
+    All numbers are fitted together by least squares, then the side of each surface, repeatedly.
     """
     search = require("scipy.optimize", extra="sim", purpose="fits of tendons").least_squares
     best, least = piece, _compute_error(wrong(piece))

@@ -157,8 +157,9 @@ def _add_site_motor(
 
 
 def _add_point_site(draft: Draft, owner: Component, path: str, socket: str, point: Vec3) -> str:
-    """Add a site at a point of a body; OpenSim uses the body even where the socket names a frame on
-    it.
+    """Add a site at a point of a body.
+
+    OpenSim uses the body even where the socket names a frame on it.
     """
     return draft.add_site(path, draft.find_placement(owner, socket).body, np.array(point))
 
@@ -197,8 +198,7 @@ def add_body_actuator(draft: Draft, force: BodyActuator, path: str) -> str:
 
 
 def add_bushing(draft: Draft, force: BushingForce, path: str) -> str:
-    """Add a small body on six joints with springs and dampers in the first frame, welded to the
-    second.
+    """Add a small body on six springs in the first frame, welded to the second.
 
     The joints are the six deviations of OpenSim's law, so that it is exact except for the
     compliance of the weld.

@@ -10,8 +10,9 @@ from osimlite.translate.mjcf.draft import Draft, add_element
 
 
 def add_keyframe(draft: Draft) -> None:
-    """Add the default pose and speeds, which fulfil the constraints; followers are where their
-    leaders put them.
+    """Add the default pose and speeds, which fulfil the constraints.
+
+    Followers are where their leaders put them.
     """
     q, u = draft.default_state
     try:

@@ -68,8 +68,9 @@ def fit_composition(
 
 @cache
 def fit_quartics(data: bytes) -> tuple[Array, Array]:
-    """Fit the quartics to samples of functions; cached, because both sides of a body have the same
-    functions.
+    """Fit the quartics to samples of functions.
+
+    Results are cached, because both sides of a body have the same functions.
 
     Args:
         data: bytes of the samples (SAMPLE_COUNT, k).

@@ -332,8 +332,9 @@ def _read_parameter(force: Muscle, name: str, default: float) -> float:
 
 
 def _fit_curves(own: Curves, lengths: Array, tensions: Array, *, free: bool) -> Curves:
-    """Return the curves nearest to tensions (A, L) at lengths (L,); if `free`, with tendon, fibers
-    and strength.
+    """Return the curves nearest to tensions (A, L) at lengths (L,).
+
+    If `free`, tendon, fibers and strength are fitted, too.
     """
     known = _select_tensions(tensions, own)
     if not known.any():

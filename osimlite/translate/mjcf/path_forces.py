@@ -103,8 +103,9 @@ def add_ligament(draft: Draft, force: Ligament | Blankevoort1991Ligament, path: 
 
 
 def _fit_spring(lengths: Array, tension: Array) -> tuple[float, float]:
-    """Return stiffness (N/m) and rest length (m) of the spring nearest to tensions (N); zeros if it
-    is never taut.
+    """Return stiffness (N/m) and rest length (m) of the spring nearest to tensions (N).
+
+    Both are zero if it is never taut.
     """
     if len(np.unique(lengths)) < 2:
         return 0.0, 0.0

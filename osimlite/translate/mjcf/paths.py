@@ -252,8 +252,9 @@ class _Writer:
 
 
 def _split_into_axes(slides: Array) -> Iterator[tuple[Array, Array]]:
-    """Yield axes (3,) and polynomials (5,) along them whose sum is a motion (3, 5); only one axis
-    for a straight line.
+    """Yield axes (3,) and polynomials (5,) along them whose sum is a motion (3, 5).
+
+    A motion on a straight line has one axis only.
     """
     axes, sizes, rows = np.linalg.svd(slides, full_matrices=False)
     # The singular values tell whether all coefficients lie along one axis.

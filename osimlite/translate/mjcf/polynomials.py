@@ -65,8 +65,9 @@ def find_polynomial(function: f.Function) -> Polynomial | None:
 
 
 def fit_quartic(function: f.Function, span: tuple[float, float], unit: str) -> Fit:
-    """Return the polynomial of degree 4 that a function is, or the one with the smallest maximum
-    error.
+    """Return the polynomial of degree 4 that is, or is nearest to, a function.
+
+    The nearest one has the smallest maximum error.
 
     The fit uses Lawson's algorithm: least squares with weights that are multiplied by the error,
     repeatedly, which converges to the minimax approximation.

@@ -1,6 +1,4 @@
-"""Random poses of a model, and samples of its paths in them, for the selection, fits and tests of
-tendons.
-"""
+"""Random poses of a model, and samples of its paths in them, to which tendons are compared."""
 
 from __future__ import annotations
 
@@ -25,8 +23,9 @@ EXACT_TOLERANCE_M = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Poses:
-    """P poses of a mechanism of b bodies and n coordinates, m of which are free; ground is the last
-    body.
+    """P poses of a mechanism of b bodies and n coordinates; m coordinates are free.
+
+    Ground is the last body.
 
     Attributes:
         q: values of the coordinates (P, n).
@@ -165,9 +164,7 @@ def draw_values(mechanism: Mechanism, count: int, seed: int) -> Array:
 
 
 def list_free_coordinates(mechanism: Mechanism) -> list[int]:
-    """Return the indices of the coordinates that are neither locked, prescribed nor coupled to
-    others.
-    """
+    """Return the indices of coordinates that are not locked, prescribed or coupled."""
     coupled = {item.dependent for item in mechanism.constraints if isinstance(item, Coupler)}
     return [
         index

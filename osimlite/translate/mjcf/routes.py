@@ -142,8 +142,9 @@ class Router:
         return sound[int(np.argmax(errors <= errors.min() * (1.0 + 1e-9) + 1e-24))]
 
     def make_piece_residuals(self, tendon: Tendon, piece: Tendon) -> Callable[[Tendon], Array]:
-        """Return the residuals of a tendon as a function of a replacement for a piece from site to
-        site.
+        """Return the residuals as a function of a replacement for a piece of a tendon.
+
+        A piece runs from site to site.
 
         Args:
             tendon: complete tendon.
@@ -186,8 +187,9 @@ class Router:
 
     # ----------------------------------------------------------------------------------------------- options
     def _choose_obstacles(self, numbers: Sequence[int], choose: Choose) -> Tendon:
-        """Return what a tendon wraps around between two points: nothing, a surface, or two with a
-        site between.
+        """Return what a tendon wraps around between two points.
+
+        It is nothing, a surface, or two surfaces with a site between.
         """
         best: dict[int, WrapGeom] = {}
         options: list[Tendon]
@@ -221,8 +223,9 @@ class Router:
         return (np.concatenate((touch.first, touch.second)) - frame[:3, 3]) @ frame[:3, :3]
 
     def _vary_side(self, number: int, around: WrapGeom, directions: int) -> Iterator[WrapGeom]:
-        """Yield a geom as it is, with the side of its quadrant, with the touched side, and with
-        directions all around.
+        """Yield a geom with various side sites.
+
+        They are: as it is, the side of its quadrant, the touched side, and directions all around.
         """
         yield around
         surface = self.route.surfaces[number]
@@ -249,8 +252,9 @@ class Router:
         return result
 
     def _place_sites_between(self, one: int, two: int) -> Iterator[TendonSite]:
-        """Yield sites between two surfaces: in the body of either, halfway between their tangent
-        points.
+        """Yield sites between two surfaces, halfway between their tangent points.
+
+        They are in the body of either surface.
         """
         first, second = self.touches[one], self.touches[two]
         both, at_one, at_two = np.intersect1d(first.poses, second.poses, return_indices=True)
@@ -266,8 +270,9 @@ class Router:
             )
 
     def _make_switches(self, number: int) -> Iterator[Tendon]:
-        """Yield small spheres through which the path runs only while a coordinate is in the range
-        of a point.
+        """Yield small spheres in place of a conditional point.
+
+        The path runs through a sphere only while the coordinate is in the range of the point.
 
         The path runs through the sphere while its side site is inside. The side site leaves the
         centre with the square of the distance of the coordinate from the middle of its range,

@@ -40,8 +40,9 @@ def add_shapes(draft: Draft) -> None:
 
 
 def add_camera(draft: Draft) -> None:
-    """Add a camera that shows the default pose upright: up is z in MuJoCo, and y in models of
-    OpenSim.
+    """Add a camera that shows the default pose upright.
+
+    Up is z in MuJoCo, and y in models of OpenSim.
     """
     state = draft.mechanism.at(draft.default_state[0])
     spots = np.array(
@@ -80,8 +81,9 @@ def add_markers(draft: Draft) -> None:
 
 
 def format_shape(draft: Draft, visual: Visual) -> dict[str, Value]:
-    """Return the attributes of a geom with a shape; a mesh is an asset, one for each file and
-    scale.
+    """Return the attributes of a geom with a shape.
+
+    A mesh is an asset, one for each file and scale.
 
     Args:
         draft: MJCF under construction.

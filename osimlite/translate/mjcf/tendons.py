@@ -63,8 +63,9 @@ class WrapGeom:
     name: str = ""
 
     def replace_side(self, direction: Array | None) -> WrapGeom:
-        """Return a copy with the side site in a direction (3,) in the frame of the surface, two
-        radii from its centre.
+        """Return a copy with the side site in a direction (3,) in the frame of the surface.
+
+        The site is two radii from the centre.
 
         Without a direction, or with a zero one, the copy has no side site.
         """
@@ -238,9 +239,7 @@ def _compute_generalized_forces(body: int, places: Array, force: Array, poses: P
 
 
 def _compute_sliding_forces(spot: TendonSite, force: Array, poses: Poses) -> Array:
-    """Return the generalized forces (k, P, m) of forces (k, P, 3) on a site from its motion in its
-    body.
-    """
+    """Return generalized forces (k, P, m) of forces (k, P, 3) from a site's motion in its body."""
     assert spot.slides is not None and spot.drive is not None
     value = poses.q[:, spot.coordinate]
     helper = polyval(value, spot.drive)

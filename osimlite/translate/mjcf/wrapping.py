@@ -198,8 +198,9 @@ def _lines_cross(p: Array, one: Array, q: Array, two: Array) -> Mask:
 
 
 def _make_plane_axes(first: Array, second: Array) -> Array:
-    """Return two unit vectors (S, P, 2, 3) in the plane of both ends and the centre, the first
-    toward the first end.
+    """Return two unit vectors (S, P, 2, 3) in the plane of both ends and the centre.
+
+    The first one points to the first end.
     """
     along = first / np.maximum(norm(first), TINY)[..., None]
     normal = np.cross(first, second)
@@ -212,8 +213,9 @@ def _make_plane_axes(first: Array, second: Array) -> Array:
 
 
 def _project_to_plane(across: Array | None, points: Array) -> Array:
-    """Return coordinates (..., 2) of points (..., 3) in the plane of two vectors (..., 2, 3), or
-    the one normal to z.
+    """Return coordinates (..., 2) of points (..., 3) in a plane.
+
+    It is the plane of two vectors (..., 2, 3), or the one normal to z.
     """
     return points[..., :2] if across is None else np.einsum("...ij,...j->...i", across, points)
 
