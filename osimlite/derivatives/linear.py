@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from osimlite.base.records import dataclass
-from osimlite.base.text import suggest_name, suggest_path
+from osimlite.base.text import format_count, suggest_name, suggest_path
 from osimlite.derivatives.functions import CasadiModel
 from osimlite.derivatives.tangents import TangentModel, tangents
 from osimlite.errors import SettingError, SimulationError
@@ -51,6 +51,14 @@ class Linearization:
     y: Array
     C: Array
     D: Array
+
+    def __repr__(self) -> str:
+        parts = [
+            format_count(len(self.states), "state"),
+            format_count(len(self.controls), "control"),
+            format_count(len(self.outputs), "output"),
+        ]
+        return f"Linearization at {self.time:g} s: {', '.join(parts)}"
 
 
 def linearize(

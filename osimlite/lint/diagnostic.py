@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from osimlite.base.lazy import make_notebook_repr
 from osimlite.base.records import dataclass, field
-from osimlite.base.text import escape_unprintable
+from osimlite.base.text import escape_unprintable, format_count
 
 
 class Severity(StrEnum):
@@ -128,6 +128,17 @@ class MissingPackageNote(NamedTuple):
     message: str
 
 
+MAX_LISTED = 5
+"""Findings that the text of a report lists."""
+MAX_LINE_LENGTH = 160
+"""Letters of a finding in the text of a report."""
+
+
+def _shorten(line: str) -> str:
+    """Return a line without what is beyond the most letters."""
+    return line if len(line) <= MAX_LINE_LENGTH else f"{line[: MAX_LINE_LENGTH - 3]}..."
+
+
 @dataclass(slots=True)
 class Report:
     """All findings of one or several files, sorted by file and position.
@@ -150,6 +161,16 @@ class Report:
     passed: list[str] = field(default_factory=list)
 
     _repr_html_ = make_notebook_repr("findings")
+
+    def __repr__(self) -> str:
+        parts = ("error", self.errors), ("warning", self.warnings), ("remark", self.infos)
+        counts = ", ".join(format_count(len(part), kind) for kind, part in parts)
+        lines = [f"Report: {counts} in {format_count(self.checked, 'file')}"]
+        ranked = sorted(self.findings, key=lambda finding: finding.severity.rank)
+        lines += [_shorten(str(finding)) for finding in ranked[:MAX_LISTED]]
+        if (more := len(ranked) - MAX_LISTED) > 0:
+            lines.append(f"... and {format_count(more, 'finding')} more")
+        return "\n".join(lines)
 
     @property
     def errors(self) -> list[Finding]:

@@ -5,7 +5,7 @@ because `path` is where a component stands in the tree; the word ``path`` is und
 component is made or a path is assigned.
 """
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from osimlite.schema.base import ModelComponent, make_default, make_empty_list
 from osimlite.schema.facts import Facts
@@ -30,6 +30,10 @@ from osimlite.schema.references import (
     WrapObjectName,
 )
 from osimlite.schema.sets import Set
+
+if TYPE_CHECKING:
+    from osimlite.schema.frames import PhysicalFrame
+    from osimlite.schema.wrapping import WrapObject
 
 
 class AbstractPathPoint(Point, abstract=True):
@@ -131,6 +135,45 @@ class GeometryPath(AbstractGeometryPath):
     """The points that the path runs through, from one attachment to the other."""
     path_wrap_set: Unnamed[PathWrapSet] = make_default(PathWrapSet)
     """The surfaces that the path may wrap around."""
+
+    def add_point(
+        self,
+        frame: "PhysicalFrame | str",
+        location: tuple[float, float, float] = (0.0, 0.0, 0.0),
+        *,
+        name: str = "",
+    ) -> PathPoint:
+        """Add a fixed point at the end of the path, as OpenSim's ``appendNewPathPoint`` does.
+
+        Args:
+            frame: body or other frame in which the point is fixed, or its path.
+            location: position in the frame, m.
+            name: name of the point; by default ``<path>-P<number>``, as in OpenSim's models.
+
+        Returns:
+            The point.
+        """
+        points = self.path_point_set.objects
+        name = name or f"{self.name}-P{len(points) + 1}"
+        point = PathPoint(name=name, socket_parent_frame=frame, location=location)
+        points.append(point)
+        return point
+
+    def add_wrap(self, surface: "WrapObject | str", *, method: str = "hybrid") -> PathWrap:
+        """Let the path wrap around a surface, as OpenSim's ``addPathWrap`` does.
+
+        Args:
+            surface: wrap object of a frame of the model, or its name.
+            method: how the wrap over an ellipsoid is found.
+
+        Returns:
+            The entry for the surface.
+        """
+        name = surface if isinstance(surface, str) else surface.name
+        wraps = self.path_wrap_set.objects
+        wrap = PathWrap(name=f"{self.name}-wrap{len(wraps) + 1}", wrap_object=name, method=method)
+        wraps.append(wrap)
+        return wrap
 
 
 class FunctionBasedPath(AbstractGeometryPath):

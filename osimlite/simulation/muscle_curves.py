@@ -12,7 +12,7 @@ import numpy as np
 from osimlite.base.lazy import make_notebook_repr
 from osimlite.base.records import dataclass, replace
 from osimlite.base.require import require
-from osimlite.base.text import join_words, suggest_name
+from osimlite.base.text import format_count, join_words, suggest_name
 from osimlite.errors import SettingError, SimulationError
 from osimlite.io.tables.tabular import Tabular
 from osimlite.mechanics.kernels.layout import OUTCOME, STAGE
@@ -60,6 +60,19 @@ class MuscleCurves(Tabular):
     columns: Mapping[str, Array]
 
     _repr_html_ = make_notebook_repr("muscle_curves")
+
+    @property
+    def heading(self) -> str:
+        """What the curves are, in one line."""
+        over = f" over {join_words(self.coordinates)}" if self.values else ""
+        count = int(np.prod([len(values) for values in self.values.values()], dtype=int))
+        muscles = format_count(len(self.muscles), "muscle")
+        return f"MuscleCurves: {muscles} in {format_count(count, 'pose')}{over}"
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        """Units of the columns that have one."""
+        return {name: unit for name in self.columns if (unit := QUANTITIES.get(name, "m"))}
 
     @property
     def coordinates(self) -> tuple[str, ...]:

@@ -50,6 +50,10 @@ def paths(model: Model, wrapping: str = OPENSIM, mechanism: Mechanism | None = N
     return Paths(model, wrapping, mechanism=mechanism)
 
 
+MAX_LISTED = 6
+"""Names that the text of paths lists."""
+
+
 @methods_of_any_numbers
 class Paths:
     """The paths of a model, see :func:`paths`.
@@ -72,6 +76,12 @@ class Paths:
     """
 
     _repr_html_ = make_notebook_repr("paths")
+
+    def __repr__(self) -> str:
+        some = ", ".join(name.rpartition("/")[2] for name in self.names[:MAX_LISTED])
+        more = len(self.names) - MAX_LISTED
+        rest = f" and {more} more" if more > 0 else ""
+        return f"Paths of '{self.mechanism.name}': {some or 'none'}{rest}"
 
     def __init__(
         self,

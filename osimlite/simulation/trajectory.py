@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike
 from osimlite.base.files import make_folder, write_atomically
 from osimlite.base.lazy import make_notebook_repr, make_plot
 from osimlite.base.require import require
-from osimlite.base.text import format_json
-from osimlite.io.tables.storage import StoTable, format_sto
+from osimlite.base.text import format_count, format_json
+from osimlite.io.tables.storage import StoTable, describe_times, format_sto
 from osimlite.io.tables.tabular import Tabular
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.spatial import Array
@@ -78,10 +78,47 @@ class Trajectory(Tabular):
         """Copy of the simulated model if it is known; notebooks show it."""
         return self._model.model if isinstance(self._model, Snapshot) else self._model
 
-    def __repr__(self) -> str:
+    @property
+    def heading(self) -> str:
+        """What the trajectory is, in one line."""
         return (
-            f"Trajectory of '{self.mechanism.name}': {len(self.times)} moments from {self.times[0]:g} to "
-            f"{self.times[-1]:g} s, {len(self.coordinates)} coordinates"
+            f"Trajectory of '{self.mechanism.name}': {describe_times(self.times)}, "
+            f"{format_count(len(self.coordinates), 'coordinate')}"
+        )
+
+    @property
+    def _listed(self) -> Mapping[str, Array]:
+        """Coordinates: forces would have to be computed first."""
+        return dict(zip(self.coordinates, self.values.T, strict=True))
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        """Units of the `columns` of coordinates and their speeds; a coupled coordinate has none."""
+        result = {}
+        for info in self.mechanism.coordinates:
+            if info.unit:
+                result |= {info.name: info.unit, f"{info.name}/speed": f"{info.unit}/s"}
+        return result
+
+    def to_frame(self, *, paths: bool = False) -> Any:
+        """Return the `columns` as a pandas DataFrame over ``time`` (s).
+
+        ``frame.attrs["units"]`` has the units of coordinates and speeds.
+
+        Args:
+            paths: whether coordinates and speeds are called by their paths in state files,
+                ``.../value`` and ``.../speed``, instead of ``<coordinate>`` and
+                ``<coordinate>/speed``.
+
+        Raises:
+            MissingDependency: pandas is not installed.
+        """
+        names = {}
+        for info in self.mechanism.coordinates if paths else ():
+            names |= {info.name: f"{info.path}/value", f"{info.name}/speed": f"{info.path}/speed"}
+        return self._make_frame(
+            {names.get(name, name): column for name, column in self.columns.items()},
+            {names.get(name, name): unit for name, unit in self.units.items()},
         )
 
     def __getstate__(self) -> dict[str, Any]:
@@ -297,6 +334,19 @@ class Movement(Tabular):
     def table(self) -> tuple[Mapping[str, Array], Mapping[str, Array]]:
         """The coordinates over ``time``, rad and m."""
         return {"time": self.times}, dict(zip(self.coordinates, self.values.T, strict=True))
+
+    @property
+    def heading(self) -> str:
+        """What the motion is, in one line."""
+        return (
+            f"{type(self).__name__} of '{self.mechanism.name}': {describe_times(self.times)}, "
+            f"{format_count(len(self.coordinates), 'coordinate')}"
+        )
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        """Units of the coordinates; a coupled coordinate has none."""
+        return {info.name: info.unit for info in self.mechanism.coordinates if info.unit}
 
     @property
     def in_degrees(self) -> Array:

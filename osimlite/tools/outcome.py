@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from contextlib import ExitStack
+from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ import numpy as np
 
 from osimlite.base.quantity import warn_caller
 from osimlite.base.records import dataclass, field, replace
-from osimlite.base.text import join_words
+from osimlite.base.text import format_count, join_words
 from osimlite.base.writing import ResultWriter
 from osimlite.errors import DocumentError, SettingError, SimulationError
 from osimlite.io.tables.old_storage import PRECISION, format_old_table
@@ -22,6 +23,8 @@ from osimlite.tools.named_files import find_inputs
 
 MAX_PRECISION = 1074
 """Digits after the decimal point of the smallest number of double precision."""
+MAX_LISTED = 6
+"""Messages, and files, that the text of an outcome lists."""
 DYNAMICS_TITLE = "Inverse Dynamics Generalized Forces"
 """Title of the table that inverse dynamics writes."""
 
@@ -52,6 +55,26 @@ class Outcome:
     # Whether the tool succeeded; its results are written in either case.
     done: bool = True
     _texts: dict[Path, Iterable[str]] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        words = "done" if self.done else "not done"
+        counts = (
+            f"{format_count(len(self.tables), 'table')}, {format_count(len(self.files), 'file')}"
+        )
+        lines = [f"Outcome: {words}, {counts}"]
+        lines += [f"{name}: {said}" for name, said in self.told[:MAX_LISTED]]
+        lines += [str(path) for path in self.files[:MAX_LISTED]]
+        if (more := len(self.files) - MAX_LISTED) > 0:
+            lines.append(f"... and {format_count(more, 'file')} more")
+        return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        rows = "".join(
+            f"<tr><td>{escape(name)}</td><td>{escape(said)}</td></tr>"
+            for name, said in [*self.told, *(("file", str(path)) for path in self.files)]
+        )
+        words = "done" if self.done else "not done"
+        return f"<div>Outcome: {words}</div><table>{rows}</table>"
 
     def add_table(
         self, path: Path, table: StoTable, description: str = "", precision: int = PRECISION

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Literal
 
 from osimlite.base.records import dataclass, field
+from osimlite.base.text import format_count
 from osimlite.errors import OsimliteError
 from osimlite.io.meshes.folders import MeshFolders
 from osimlite.mechanics.multibody import build_mechanism
@@ -53,6 +54,10 @@ class Urdf:
     robot: Robot
     coordinates: str
     files: dict[str, bytes] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        size = f"{len(self.text) / 1000.0:.0f} kB"
+        return f"Urdf of '{self.name}': {size}, {format_count(len(self.files), 'further file')}"
 
     def write(self, folder: str | Path) -> list[Path]:
         """Write the URDF, its meshes, and files about coordinates and losses into a folder.

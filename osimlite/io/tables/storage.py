@@ -47,6 +47,12 @@ class StoTable(Tabular):
 
     plot = make_plot("plot_table")
 
+    @property
+    def heading(self) -> str:
+        """What the table is, in one line."""
+        words = f"{type(self).__name__} '{self.name}': {describe_times(self.times)}"
+        return f"{words}, {format_count(len(self.columns), 'column')}"
+
     def __getitem__(self, column: str) -> Array:
         """Return the first column (n,) with a label; raise KeyError if there is none."""
         if column not in self.columns:
@@ -65,6 +71,13 @@ class StoTable(Tabular):
             columns[f"{label}.{again[label]}" if again[label] else label] = column
             again[label] += 1
         return {"time": self.times}, columns
+
+
+def describe_times(times: Array) -> str:
+    """Return number and range of times, in words."""
+    if not len(times):
+        return "no times"
+    return f"{format_count(len(times), 'time')} from {times[0]:g} to {times[-1]:g} s"
 
 
 def format_sto(

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from osimlite.base.records import dataclass, field, replace
-from osimlite.base.text import suggest_name
+from osimlite.base.text import format_count, suggest_name
 from osimlite.errors import ModelError
 from osimlite.mechanics.multibody import dynamics
 from osimlite.mechanics.multibody.assembly import assemble_pose, project_speeds
@@ -107,6 +107,14 @@ class Mechanism:
         object.__setattr__(self, "constraints", (*holds, *self.constraints))
 
     # ------------------------------------------------------------------------------------ names and states
+    def __repr__(self) -> str:
+        parts = [
+            format_count(len(self.bodies), "body"),
+            format_count(len(self.coordinates), "coordinate"),
+            format_count(len(self.constraints), "constraint"),
+        ]
+        return f"Mechanism of '{self.name}': {', '.join(parts)}, {self.total_mass:.4g} kg"
+
     @cached_property
     def coordinate_names(self) -> tuple[str, ...]:
         """Names in the order of all arrays; coordinates that share a name have their paths.

@@ -10,6 +10,7 @@ from numpy.polynomial.polynomial import polyval
 
 from osimlite import __version__
 from osimlite.base.records import dataclass, field
+from osimlite.base.text import format_count
 from osimlite.errors import SettingError
 from osimlite.io.document.printer import to_text
 from osimlite.io.meshes.folders import MeshFolders
@@ -86,6 +87,10 @@ class Mjcf:
     leads: Mapping[int, Lead] = field(default_factory=dict)
     followers: Mapping[str, Follower] = field(default_factory=dict)
     start_note: str = ""
+
+    def __repr__(self) -> str:
+        size = f"{len(self.text) / 1000.0:.0f} kB"
+        return f"Mjcf of '{self.name}': {size}, {format_count(len(self.files), 'further file')}"
 
     def joint_values(self, q: Values) -> dict[str, float]:
         """Compute the values of all joints, exactly also where equalities are fitted.
