@@ -128,7 +128,12 @@ def main(arguments: list[str] | None = None) -> None:
 
     protect_processes()
     with escape_output():
-        _run(sys.argv[1:] if arguments is None else arguments)
+        try:
+            _run(sys.argv[1:] if arguments is None else arguments)
+        finally:
+            # Only a terminal has loaded it.
+            if (progress := sys.modules.get("osimlite.cli._progress")) is not None:
+                progress.finish_command()
 
 
 def _run(words: list[str]) -> None:
@@ -169,9 +174,11 @@ def _run(words: list[str]) -> None:
             _print_version(verbose=len({*words}) > 1)
             return
         if sys.stderr.isatty():
-            from osimlite.cli._progress import show_engine_warnings
+            from osimlite.cli._progress import show_engine_warnings, watch_command
 
             show_engine_warnings()
+            if names != COMMANDS and not {"--help", "-h"} & {*words}:
+                watch_command(words[0])
         with warnings.catch_warnings():
             default = warnings.showwarning
             warnings.showwarning = lambda message, category, *place: (

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any, TextIO, cast
 
@@ -17,6 +17,16 @@ from osimlite.base.text import escape_control_sequences, escape_unprintable
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
+
+
+_before_output: Callable[[], None] | None = None
+"""Function that makes room for output."""
+
+
+def before_output(function: Callable[[], None] | None) -> None:
+    """Let a function run before anything is printed; None for nothing."""
+    global _before_output
+    _before_output = function
 
 
 class EscapingStream:
@@ -30,6 +40,8 @@ class EscapingStream:
 
     def write(self, text: str) -> int:
         """Write text, and return the number of its characters."""
+        if _before_output is not None:
+            _before_output()
         self.stream.write(escape_control_sequences(text, starts_line=self._starts_line))
         last = text[text.rfind("\n") + 1 :]
         self._starts_line = not last.strip() and (self._starts_line or "\n" in text)
@@ -108,6 +120,8 @@ def print_diff(before: str, after: str, old: str, new: str) -> None:
 
 def print_for_programs(text: str) -> None:
     """Write text for other programs to standard output, unescaped and in UTF-8."""
+    if _before_output is not None:
+        _before_output()
     sys.stdout.flush()
     # Tests replace standard output by streams without bytes.
     # What takes the place of standard output in tests may be without bytes.

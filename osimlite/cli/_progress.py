@@ -1,71 +1,259 @@
-"""Progress bars for slow work on a terminal."""
+"""The line that tells people at a terminal what long work does, how far it is, and how long it takes."""
 
 from __future__ import annotations
 
+import contextlib
+import os
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
-from typing import TYPE_CHECKING
+from typing import Any
 
+from osimlite.base.progress import listen_to_progress
 from osimlite.base.text import escape_unprintable
-from osimlite.cli._console import complain, create_console, get_raw_stream
+from osimlite.cli._console import before_output, complain, count_columns, get_raw_stream
 
-if TYPE_CHECKING:
-    from rich.progress import Progress
+SILENT_S = 0.5
+"""Time without any output after which the line appears, s."""
+REDRAW_S = 0.1
+"""Time between two states of the line, s."""
+ESTIMATE_S = 1.0
+"""Work that took less than this says nothing about the time left, s."""
+LONG_S = 30.0
+"""Work of this duration says in logs and pipes, once, how far it is, and when it ends, s."""
+
+INTERACTIVE = ("demo", "lsp", "view")
+"""Commands that wait for people or editors."""
+
+ACTIVITIES = {
+    "check-trial": "checking",
+    "find-gait": "searching",
+    "fit": "fitting",
+    "format": "formatting",
+    "gait": "analysing the gait",
+    "ik": "fitting the motion",
+    "info": "reading",
+    "inverse-dynamics": "computing moments",
+    "kinematics": "computing positions",
+    "muscles": "computing muscles",
+    "optimize": "preparing the search",
+    "run": "running",
+    "scale": "scaling",
+    "scone": "walking",
+    "simulate": "preparing the simulation",
+    "static-optimization": "computing muscle forces",
+    "sweep": "preparing the runs",
+    "translate": "translating",
+    "validate": "checking",
+}
+"""What commands do until they say more, in words."""
+
+
+class _Task:
+    """Work of known or unknown length.
+
+    Attributes:
+        title: what is done.
+        total: how much there is to do; None if that is unknown.
+        unit: unit of the amounts, with a blank before it.
+        done: how much is done.
+        details: more about the state, in words.
+    """
+
+    def __init__(self, title: str, total: float | None, unit: str = "") -> None:
+        self.title, self.total, self.unit = title, total, unit
+        self.started = time.monotonic()
+        self.done = 0.0
+        self.details = ""
+        self.is_told = False
+
+    def receive(self, title: str, done: float, total: float, unit: str) -> None:
+        """Take over what the library reports."""
+        if title != self.title:
+            self.title, self.started, self.details = title, time.monotonic(), ""
+        self.done, self.total, self.unit = float(done), total, unit
+
+    def describe(self, now: float) -> str:
+        """Return the task, how far it is, and the time left."""
+        elapsed = now - self.started
+        parts = []
+        if self.total and self.done:
+            part = min(1.0, self.done / self.total)
+            amount = f"{_format(self.done)} of {_format(self.total)}{self.unit}"
+            parts += [f"{100.0 * part:.0f} % ({amount})"]
+            if self.details:
+                parts.append(self.details)
+            if elapsed > ESTIMATE_S and 0.0 < part < 1.0:
+                parts.append(f"{_format_duration(elapsed * (1.0 - part) / part)} left")
+        else:
+            parts += [words for words in (self.details,) if words]
+            if elapsed > ESTIMATE_S:
+                parts.append(_format_duration(elapsed))
+        return escape_unprintable(f"{self.title}: {', '.join(parts)}" if parts else self.title)
+
+
+def _format(amount: float) -> str:
+    """Return an amount with at most four digits, integers with all."""
+    return f"{amount:.0f}" if float(amount).is_integer() else f"{amount:.4g}"
+
+
+def _format_duration(seconds: float) -> str:
+    """Return a duration in words."""
+    if seconds < 100.0:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60.0:.0f} min" if seconds < 6000.0 else f"{seconds / 3600.0:.1f} h"
+
+
+class _Line:
+    """The line on standard error; it is erased before anything else is printed."""
+
+    def __init__(self) -> None:
+        self.tasks: list[_Task] = []
+        self._shown = 0
+        self._last_output = time.monotonic()
+        self._last_drawn = 0.0
+        self._lock = threading.RLock()
+        self._thread: threading.Thread | None = None
+
+    def is_terminal(self) -> bool:
+        """Return whether standard error is a terminal that can erase a line."""
+        return bool(sys.stderr and sys.stderr.isatty()) and os.environ.get("TERM") != "dumb"
+
+    def start(self) -> None:
+        """Redraw the line in the background, while the program computes."""
+        if self._thread is None and self.is_terminal():
+            before_output(self.erase)
+            if hasattr(os, "register_at_fork"):
+                # A child has the line of its parent, but not the thread.
+                os.register_at_fork(after_in_child=self.abandon)
+            self._thread = threading.Thread(target=self._redraw, daemon=True)
+            self._thread.start()
+
+    def abandon(self) -> None:
+        """Never draw again, in a process that another has started."""
+        self.tasks, self._shown = [], 0
+        self._lock = threading.RLock()
+        before_output(None)
+
+    def _redraw(self) -> None:
+        while True:
+            time.sleep(REDRAW_S)
+            self.draw()
+
+    def draw(self) -> None:
+        """Show the current task if nothing was printed for a while."""
+        # Nobody waits for the line: what is printed at the same time comes first.
+        if not self._lock.acquire(blocking=False):
+            return
+        try:
+            now = time.monotonic()
+            is_due = now - self._last_output >= SILENT_S and now - self._last_drawn >= REDRAW_S
+            if self.tasks and is_due and self.is_terminal():
+                self._last_drawn = now
+                words = self.tasks[-1].describe(now)[: max(1, count_columns() - 1)]
+                self._write(f"\r{words:{self._shown}}")
+                self._shown = len(words)
+        finally:
+            self._lock.release()
+
+    def erase(self) -> None:
+        """Remove the line, since something else is printed."""
+        with self._lock:
+            self._last_output = time.monotonic()
+            if self._shown:
+                self._write(f"\r{'':{self._shown}}\r")
+                self._shown = 0
+
+    def _write(self, text: str) -> None:
+        with contextlib.suppress(OSError, ValueError):
+            stream = get_raw_stream(sys.stderr)
+            stream.write(text)
+            stream.flush()
+
+
+_line = _Line()
+_stack = ExitStack()
+"""Listeners of the command."""
+
+
+def watch_command(name: str) -> None:
+    """Show what a command does while it prints nothing, at a terminal only."""
+    if name not in INTERACTIVE:
+        task = _Task(ACTIVITIES.get(name, "working"), None)
+        _line.tasks.append(task)
+        _stack.enter_context(listen_to_progress(task.receive))
+        _line.start()
+
+
+def finish_command() -> None:
+    """Remove the line at the end of the program."""
+    _stack.close()
+    _line.tasks.clear()
+    _line.erase()
 
 
 @contextmanager
-def progress_bar(title: str, total: float | None) -> Iterator[Callable[..., None]]:
-    """Show a progress bar on standard error, in a terminal only, after the first second of work.
+def progress_bar(title: str, total: float | None, unit: str = "") -> Iterator[Callable[..., None]]:
+    """Show what is done, how far it is and the time left in a line on standard error.
 
-    What is yielded takes how much is done, of how much if that has become known, and what tells
-    more of it, which takes how much is done in a second. The library that draws the bar is loaded
-    when it first shows. It has no thread of its
-    own: processes may be started beside it.
+    At a terminal the line appears after half a second. In a log or a pipe, work that takes long
+    prints how far it is once, and when it is finished.
+
+    Args:
+        title: what is done.
+        total: how much there is to do; None if that is unknown.
+        unit: unit of the amounts, with a blank before it.
+
+    Yields:
+        A function that takes how much is done, of how much if that has become known, and details in
+        words, or a function that returns them for an amount done in a second.
     """
-    is_terminal = sys.stderr.isatty()
-    due = time.monotonic() + 1.0
-    bar: Progress | None = None
+    task = _Task(title, total, unit)
+    _line.tasks.append(task)
 
-    def advance(
-        done: float, of: float | None = None, more: Callable[[float], str] | None = None
-    ) -> None:
-        nonlocal bar, due
-        if not is_terminal or (now := time.monotonic()) < due:
-            return
-        due = now + 0.1
-        if bar is None:
-            bar = _start_bar(title)
-        bar.update(bar.task_ids[0], completed=done, total=total if of is None else of)
+    def advance(done: float, of: float | None = None, more: Any = None) -> None:
+        task.done = float(done)
+        if of is not None:
+            task.total = of
+        now = time.monotonic()
         if more is not None:
-            bar.update(bar.task_ids[0], more=more(bar.tasks[0].speed or 0.0))
-        bar.refresh()
+            elapsed = max(now - task.started, 1e-9)
+            task.details = more(task.done / elapsed) if callable(more) else str(more)
+        if _line.is_terminal():
+            _line.draw()
+        elif not task.is_told and now - task.started > LONG_S:
+            task.is_told = True
+            complain(task.describe(now))
 
     try:
         yield advance
     finally:
-        if bar is not None:
-            bar.stop()
+        if task in _line.tasks:
+            _line.tasks.remove(task)
+        _line.erase()
+    if task.is_told:
+        complain(f"{title}: finished in {_format_duration(time.monotonic() - task.started)}")
 
 
 @contextmanager
 def motion_bar(title: str, to: float) -> Iterator[Callable[[float, float], None]]:
-    """A progress bar for a motion up to a time (s).
+    """Show the progress of a motion up to a time (s).
 
-    What is yielded takes the time reached and the length of the steps, s.
+    Yields:
+        A function that takes the time reached and the length of the steps, s.
     """
-    with progress_bar(title, to) as advance:
-        yield lambda t, step: advance(
-            t, None, lambda rate: f"{t:.6g} s, steps of {step:.2g} s, {rate:.2g} s in a second"
-        )
+    with progress_bar(title, to, " s") as advance:
+        yield lambda t, step: advance(t, None, f"steps of {step:.2g} s")
 
 
 @contextmanager
 def progress_bars() -> Iterator[Callable[[str, float, float], None]]:
-    """Progress bars for work in stages, one after the other.
+    """Show the progress of work in stages, one after the other.
 
-    What is yielded takes what is being done, how much of it is, and of how much.
+    Yields:
+        A function that takes what is being done, how much of it is done, and of how much.
     """
     current: str | None = None
     advance: Callable[..., None] = _ignore_progress
@@ -82,36 +270,22 @@ def progress_bars() -> Iterator[Callable[[str, float, float], None]]:
 
 
 def show_engine_warnings() -> None:
-    """Print the warnings of the engine: kernels run as Python, or compiled code cannot be cached."""
+    """Show people what the engine warns of, and that it compiles."""
     import logging
 
-    class WarningPrinter(logging.Handler):
+    class Shown(logging.Handler):
         def emit(self, record: logging.LogRecord) -> None:
-            complain(record.getMessage())
+            if record.levelno >= logging.WARNING:
+                complain(record.getMessage())
+            elif _line.tasks:
+                words = record.getMessage()
+                is_over = not words.startswith("compiling")
+                _line.tasks[-1].details = "" if is_over else f"{words} (once per machine)"
 
-    logging.getLogger("osimlite.simulation.engines").addHandler(WarningPrinter())
+    log = logging.getLogger("osimlite.simulation.engines")
+    log.addHandler(Shown())
+    log.setLevel(logging.INFO)
 
 
 def _ignore_progress(*_: float) -> None:
-    """Ignore progress that is reported before the first bar exists."""
-
-
-def _start_bar(title: str) -> Progress:
-    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
-
-    columns = (
-        TextColumn("{task.description}", markup=False),
-        BarColumn(),
-        TextColumn("{task.percentage:3.0f} %"),
-        TimeRemainingColumn(),
-        TextColumn("{task.fields[more]}", markup=False),
-    )
-    bar = Progress(
-        *columns,
-        console=create_console(file=get_raw_stream(sys.stderr)),
-        transient=True,
-        auto_refresh=False,
-    )
-    bar.add_task(escape_unprintable(title), total=None, more="")
-    bar.start()
-    return bar
+    """Report nothing before the first stage."""

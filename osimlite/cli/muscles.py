@@ -97,7 +97,7 @@ def muscles(
     )
     result: dict[str, MuscleCurves] = {}
     for path in (file, *((compare,) if compare is not None else ())):
-        with progress_bar(f"muscles of {path.name}", None) as advance:
+        with progress_bar("computing muscles", None) as advance:
             curves = muscle_curves(
                 model if path is file else read(path),
                 values,

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from osimlite.base.progress import report_progress
 from osimlite.base.records import dataclass, field
 from osimlite.errors import SimulationError
 from osimlite.mechanics.kernels.layout import STAGE
@@ -256,6 +257,7 @@ class ComputedControl:
         t = start
         stepper = None
         while t < end:
+            report_progress("tracking the motion", t - start, end - start, " s")
             target = t + self.window
             self.compute_controls(t, target, y, result)
             if result.failure:

@@ -5,12 +5,12 @@ from __future__ import annotations
 import io
 import logging
 import sys
-from types import SimpleNamespace
 
 import pytest
 
-from osimlite.cli import _progress
-from osimlite.cli._progress import progress_bar
+from osimlite.base.progress import report_progress
+from osimlite.cli import _console, _progress
+from osimlite.cli._progress import motion_bar, progress_bar
 
 
 class Terminal(io.StringIO):
@@ -18,30 +18,124 @@ class Terminal(io.StringIO):
         return True
 
 
-@pytest.mark.parametrize(
-    ("stream", "second", "shows"),
-    [(Terminal, 1.5, True), (Terminal, 0.5, False), (io.StringIO, 1.5, False)],
-)
-def test_bar(monkeypatch, stream, second, shows):
-    clock = iter((0.0, second, second + 0.05, second + 0.2))
-    monkeypatch.setattr(_progress, "time", SimpleNamespace(monotonic=lambda: next(clock)))
+class Clock:
+    """Seconds that a test sets."""
+
+    def __init__(self) -> None:
+        self.now = 0.0
+
+    def monotonic(self) -> float:
+        return self.now
+
+    def sleep(self, _: float) -> None:
+        raise AssertionError("a test does not wait")
+
+
+@pytest.fixture
+def clock(monkeypatch):
+    clock = Clock()
+    monkeypatch.setattr(_progress, "time", clock)
     monkeypatch.setenv("TERM", "xterm")
-    monkeypatch.setattr(sys, "stderr", stream())
+    monkeypatch.setenv("COLUMNS", "80")
+    line = _progress._Line()
+    monkeypatch.setattr(_progress, "_line", line)
+    monkeypatch.setattr(_progress, "_stack", _progress.ExitStack())
+    monkeypatch.setattr(line, "start", lambda: _console.before_output(line.erase))
+    yield clock
+    _console.before_output(None)
+
+
+def shown(stream: io.StringIO) -> str:
+    """The last state of the line."""
+    return stream.getvalue().split("\r")[-1].rstrip()
+
+
+@pytest.mark.parametrize(("second", "shows"), [(0.6, True), (0.4, False)])
+def test_the_line_appears_after_half_a_second(monkeypatch, clock, second, shows):
+    monkeypatch.setattr(sys, "stderr", Terminal())
     with progress_bar("walking", 4.0) as progress:
+        clock.now = second
         progress(1.0)
-        if shows:
-            progress(3.0)
-    text = sys.stderr.getvalue()
-    assert ("walking" in text and "25 %" in text) is shows
-    # Two calls within a tenth of a second draw once.
-    assert "75 %" not in text
-    assert shows or not text
+        assert shown(sys.stderr) == ("walking: 25 % (1 of 4)" if shows else "")
+        clock.now = second + 0.05
+        progress(3.0)
+        assert "75 %" not in sys.stderr.getvalue()
+    # Nothing is left of it.
+    assert shown(sys.stderr) == ""
 
 
-def test_people_see_what_the_engine_warns_of(monkeypatch):
+def test_the_time_left_is_told(monkeypatch, clock):
+    monkeypatch.setattr(sys, "stderr", Terminal())
+    with motion_bar("simulating", 2.0) as progress:
+        clock.now = 3.0
+        progress(0.5, 0.001)
+        assert shown(sys.stderr) == "simulating: 25 % (0.5 of 2 s), steps of 0.001 s, 9 s left"
+        clock.now = 6.0
+        progress(0.01, 0.001)
+        assert shown(sys.stderr).endswith("20 min left")
+
+
+def test_a_narrow_terminal_has_one_line(monkeypatch, clock):
+    monkeypatch.setattr(sys, "stderr", Terminal())
+    monkeypatch.setenv("COLUMNS", "20")
+    with progress_bar("a long title of some work", 4.0) as progress:
+        clock.now = 1.0
+        progress(1.0)
+        assert shown(sys.stderr) == "a long title of som"
+
+
+def test_output_removes_the_line_first(monkeypatch, clock):
+    monkeypatch.setattr(sys, "stderr", Terminal())
+    _progress.watch_command("static-optimization")
+    clock.now = 2.0
+    _progress._line.draw()
+    assert shown(sys.stderr) == "computing muscle forces: 2 s"
+    out = _console.EscapingStream(io.StringIO())
+    out.write("done\n")
+    assert shown(sys.stderr) == ""
+    # It comes back only after another half a second.
+    clock.now = 2.3
+    _progress._line.draw()
+    assert shown(sys.stderr) == ""
+    report_progress("tracking", 1.0, 2.0, " s")
+    clock.now = 3.0
+    _progress._line.draw()
+    assert shown(sys.stderr) == "tracking: 50 % (1 of 2 s)"
+    _progress.finish_command()
+    assert shown(sys.stderr) == ""
+
+
+def test_commands_that_wait_for_people_have_no_line(monkeypatch, clock):
+    monkeypatch.setattr(sys, "stderr", Terminal())
+    _progress.watch_command("view")
+    assert not _progress._line.tasks
+
+
+def test_a_log_has_two_lines_of_long_work_and_none_of_short(monkeypatch, clock):
+    monkeypatch.setattr(sys, "stderr", io.StringIO())
+    with progress_bar("walking", 4.0) as progress:
+        for clock.now in (1.0, 29.0):
+            progress(1.0)
+        assert sys.stderr.getvalue() == ""
+        for clock.now in (31.0, 50.0, 60.0):
+            progress(2.0)
+    assert sys.stderr.getvalue().splitlines() == [
+        "osimlite: walking: 50 % (2 of 4), 31 s left",
+        "osimlite: walking: finished in 60 s",
+    ]
+
+
+def test_people_see_what_the_engine_warns_of(monkeypatch, clock):
     monkeypatch.setattr(sys, "stderr", Terminal())
     log = logging.getLogger("osimlite.simulation.engines")
     monkeypatch.setattr(log, "handlers", [])
+    monkeypatch.setattr(log, "level", logging.NOTSET)
     _progress.show_engine_warnings()
-    logging.getLogger("osimlite.simulation.engines.linking").warning("kernels run as Python")
+    log = logging.getLogger("osimlite.simulation.engines.linking")
+    log.warning("kernels run as Python")
     assert sys.stderr.getvalue() == "osimlite: kernels run as Python\n"
+    _progress.watch_command("run")
+    log.info("compiling 3 kernels")
+    clock.now = 0.7
+    _progress._line.draw()
+    assert shown(sys.stderr) == "running: compiling 3 kernels (once per machine)"

@@ -87,12 +87,14 @@ def compile_laws(names: Sequence[str]) -> dict[str, int]:
         CompilationError: there is no compiler, it failed, or a law cannot be translated.
     """
     find_compiler()
-    _log.info("compiling %d kernels", len(names))
+    _log.info("compiling %d kernel%s", len(names), "s"[: len(names) > 1])
     with ThreadPoolExecutor(max(1, min(count_cores(), len(names)))) as pool:
         addresses = pool.map(
             lambda name: compile_function(get_symbol(name), *find_law(name)), names
         )
-        return dict(zip(names, addresses, strict=True))
+        result = dict(zip(names, addresses, strict=True))
+    _log.info("compiled %d kernel%s", len(names), "s"[: len(names) > 1])
+    return result
 
 
 def compile_function(symbol: str, function: Function, directions: int) -> int:
