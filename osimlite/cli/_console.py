@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any, TextIO, cast
 
@@ -65,13 +65,65 @@ def escape_output() -> Iterator[None]:
 
 
 def say(text: object = "", *, err: bool = False) -> None:
-    """Print one line; line breaks and control characters in it are escaped.
+    """Print one line; a terminal shows it in several, broken between words.
+
+    Whatever names the text holds, it stays one line in a file or a pipe.
+    """
+    stream = sys.stderr if err else sys.stdout
+    line = escape_unprintable(str(text))
+    print(_break_line(line) if stream.isatty() else line, file=stream, flush=True)
+
+
+def _break_line(line: str) -> str:
+    """Return a line with breaks between words where a terminal would break it inside a word."""
+    width = count_columns()
+    # Letters of other scripts may be twice as wide; the terminal breaks their lines itself.
+    if len(line) <= width or not line.isascii():
+        return line
+    from textwrap import wrap
+
+    return "\n".join(wrap(line, width, break_on_hyphens=False, break_long_words=False))
+
+
+MIN_TEXT_WIDTH = 30
+"""Letters of the narrowest column of text beside others."""
+
+
+def show_rows(
+    headings: Sequence[str], rows: Sequence[Sequence[str]], right: Sequence[int] = ()
+) -> None:
+    """Print a table whose last column is text that is broken between words.
+
+    Where the other columns leave too little room, the text stands below each row. No word and no
+    path is ever broken.
 
     Args:
-        text: the line.
-        err: print to standard error.
+        headings: headings of the columns.
+        rows: cells of each row, as many as headings.
+        right: indices of the columns that are aligned to the right.
     """
-    print(escape_unprintable(str(text)), file=sys.stderr if err else sys.stdout, flush=True)
+    from textwrap import wrap
+
+    clean = [[escape_unprintable(cell) for cell in row] for row in rows]
+    heads = [*headings]
+    last = len(heads) - 1
+    widths = [max(len(row[index]) for row in [heads, *clean]) for index in range(last)]
+    indent = sum(widths) + 2 * last
+    is_beside = count_columns() - indent >= MIN_TEXT_WIDTH
+    start = indent if is_beside else 4
+    bold, end = ("\033[1m", "\033[0m") if wants_colour() else ("", "")
+    for number, row in enumerate([heads, *clean]):
+        cells = [
+            f"{cell:>{width}}" if index in right else f"{cell:{width}}"
+            for index, (cell, width) in enumerate(zip(row[:last], widths, strict=True))
+        ]
+        left = "  ".join(cells if is_beside else filter(None, row[:last]))
+        room = max(count_columns() - start, 10)
+        lines = wrap(row[last], room, break_on_hyphens=False, break_long_words=False)
+        if is_beside:
+            left = f"{left}  {lines.pop(0) if lines else ''}"
+        text = "\n".join([left.rstrip(), *(f"{'':{start}}{line}" for line in lines)])
+        show((f"{bold}{text}{end}" if number == 0 else text) + "\n")
 
 
 def complain(text: object, advice: str = "") -> None:

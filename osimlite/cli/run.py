@@ -280,7 +280,7 @@ def _show_trials(trials: list[RunRecord]) -> None:
     from collections import Counter
 
     from osimlite.base.text import format_count
-    from osimlite.cli._console import add_row, create_console, create_table, show
+    from osimlite.cli._console import show, show_rows
     from osimlite.tools.many import STATUSES
 
     shown = trials
@@ -293,9 +293,7 @@ def _show_trials(trials: list[RunRecord]) -> None:
             ),
         )
         shown = worst[-MOST_ROWS:][::-1]
-    table = create_table()
-    for column in ("setup", "", "s", ""):
-        table.add_column(column, overflow="fold", justify="right" if column == "s" else "left")
+    rows = []
     for trial in shown:
         words = trial.message or "; ".join(f"{name} {said}" for name, said in trial.told[:2])
         if trial.warnings:
@@ -306,14 +304,9 @@ def _show_trials(trials: list[RunRecord]) -> None:
             )
             words = f"{words}; {trial.warnings[0]}{more}"
         seconds = "" if trial.was_done else f"{trial.seconds:.2f}"
-        add_row(
-            table,
-            trial.setup,
-            trial.status + (", before" if trial.was_done else ""),
-            seconds,
-            words,
-        )
-    create_console().print(table)
+        status = trial.status + (", before" if trial.was_done else "")
+        rows.append((trial.setup, status, seconds, words))
+    show_rows(("setup", "", "s", ""), rows, right=(2,))
     counts = Counter(trial.status for trial in trials)
     told = ", ".join(f"{counts[status]} {status}" for status in STATUSES if counts[status])
     if warned := sum(1 for trial in trials if trial.warnings):

@@ -156,3 +156,28 @@ def test_what_others_print_is_guarded_too(capsys: pytest.CaptureFixture[str]) ->
         "\\x3a:error::x\nBody::error::\\x1b[2J\x1b[1mbold\x1b[0m\n::as it was\n",
         "\\x07\n",
     )
+
+
+def test_tables_and_sentences_are_never_broken_inside_a_word(monkeypatch, capsys):
+    import sys
+
+    from osimlite.cli._console import say, show_rows
+
+    monkeypatch.setenv("COLUMNS", "60")
+    path = "results/subject01/a_very_long_name_of_a_setup_of_inverse_dynamics.xml"
+    rows = [(path, "done", "0.10", "largest moment 12 N·m at 0.3 s"), ("b.xml", "failed", "", path)]
+    show_rows(("setup", "", "s", ""), rows, right=(2,))
+    out = capsys.readouterr().out
+    assert out.count(path) == 2
+    assert all(len(line) <= 60 or path in line for line in out.splitlines())
+    show_rows(("setup", ""), [("a.xml", "one two three four five six seven eight nine ten eleven")])
+    assert capsys.readouterr().out == (
+        "setup\na.xml  one two three four five six seven eight nine ten\n       eleven\n"
+    )
+    # In a pipe a message is one line; a terminal shows it in several.
+    message = f"75 times from 0 to 1 s; wrote {path} and other files"
+    say(message)
+    assert capsys.readouterr().out == f"{message}\n"
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
+    say(message)
+    assert path in capsys.readouterr().out.splitlines()
