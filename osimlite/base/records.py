@@ -135,7 +135,8 @@ def _build_record(cls: type, frozen: bool, eq: bool, kw_only: bool, slots: bool)
         methods |= {"__setattr__": _refuse_change, "__delattr__": _refuse_change}
         if slots:
             methods |= {"__getstate__": _get_state, "__setstate__": _set_state}
-    if cls.__repr__ not in (object.__repr__, _format_record):
+    inherited: Any = cls.__repr__
+    if inherited is not object.__repr__ and inherited is not _format_record:
         # A class keeps the text that its base class gives it.
         del methods["__repr__"]
     for name, method in methods.items():

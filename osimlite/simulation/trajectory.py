@@ -94,7 +94,7 @@ class Trajectory(Tabular):
     @property
     def units(self) -> Mapping[str, str]:
         """Units of the `columns` of coordinates and their speeds; a coupled coordinate has none."""
-        result = {}
+        result: dict[str, str] = {}
         for info in self.mechanism.coordinates:
             if info.unit:
                 result |= {info.name: info.unit, f"{info.name}/speed": f"{info.unit}/s"}
@@ -113,7 +113,7 @@ class Trajectory(Tabular):
         Raises:
             MissingDependency: pandas is not installed.
         """
-        names = {}
+        names: dict[str, str] = {}
         for info in self.mechanism.coordinates if paths else ():
             names |= {info.name: f"{info.path}/value", f"{info.name}/speed": f"{info.path}/speed"}
         return self._make_frame(
