@@ -20,6 +20,7 @@ FOREARM_LENGTH_M = 0.25
 
 def arm() -> Model:
     """Build a forearm with a weight, a muscle that flexes the elbow and one that extends it."""
+    # OpenSim's default gravity.
     model = Model(name="Arm", gravity=(0.0, -9.80665, 0.0))
     fore = Body(
         name="forearm",
@@ -42,6 +43,7 @@ def arm() -> Model:
         ("extensor", 900.0, 0.12, 0.15, (("ground", -0.03, 0.98), ("forearm", -0.02, 0.02))),
     ):
         path = GeometryPath(name="path")
+        # All points lie in the plane of motion.
         for number, (body, x, y) in enumerate(points):
             frame = "/ground" if body == "ground" else f"/bodyset/{body}"
             path.path_point_set.objects.append(
@@ -53,6 +55,8 @@ def arm() -> Model:
                 max_isometric_force=force,
                 optimal_fiber_length=fiber,
                 tendon_slack_length=slack,
+                # A rigid tendon has no state of its own, which makes the arm a small and fast
+                # example.
                 ignore_tendon_compliance=True,
                 fiber_damping=0.01,
                 default_activation=0.05,

@@ -79,6 +79,7 @@ def dynamic_walker(
             ],
         )
     )
+    # The order of bodies and joints is that of the exercise, so that its files can be compared.
     hips, knees = [], []
     for (side, z, angle), thigh in zip(SIDES, thighs, strict=True):
         hip = Coordinate(
@@ -153,6 +154,7 @@ def _make_sphere(name: str, body: Body, location: tuple[float, float, float]) ->
 def _make_contact(sphere: ContactSphere, plane: ContactGeometry) -> HuntCrossleyForce:
     material = HuntCrossleyForce.ContactParameters(
         geometry=(sphere, plane),
+        # Numbers of the exercise.
         stiffness=1e6,
         dissipation=2.0,
         static_friction=0.8,
@@ -170,6 +172,7 @@ def _make_limit(coordinate: Coordinate, *, upper: float, lower: float) -> Coordi
     return CoordinateLimitForce(
         name=coordinate.name.replace("_rz", "LimitTorque"),
         coordinate=coordinate,
+        # Numbers of the exercise; its limits are soft.
         upper_stiffness=0.5,
         upper_limit=upper,
         lower_stiffness=0.5,

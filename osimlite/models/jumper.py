@@ -135,6 +135,7 @@ def jumper(driven: bool = True) -> Model:
         )
     )
     floor = model.add(
+        # A half space faces its negative x axis; the rotation makes it face up.
         ContactHalfSpace(name="floor", socket_frame=model.ground, orientation=(0.0, 0.0, -pi / 2))
     )
     for side, z in SIDES:
@@ -216,7 +217,9 @@ def _add_leg(model: Model, torso: Body, side: str, z: float, floor: ContactHalfS
                 transition=10.0,
             )
         )
+    # Two spheres per foot carry it at heel and ball, so that the ankle can roll it.
     for name, x, radius in (("heel", -0.05, 0.03), ("ball", 0.15, 0.025)):
+        # The lowest points of the spheres are at the sole.
         place = (x, radius - ANKLE_HEIGHT_M, 0.0)
         _add_contact(
             model,
@@ -273,6 +276,7 @@ def _add_muscle(
             tendon_slack_length=muscle.tendon,
             pennation_angle_at_optimal=radians(muscle.pennation),
             default_activation=muscle.activation,
+            # With these defaults the muscles start near equilibrium in the squat.
             default_fiber_length=muscle.length,
         )
     )
@@ -297,6 +301,7 @@ def _add_contact(model: Model, sphere: ContactSphere, floor: ContactHalfSpace) -
         dissipation=1.0,
         static_friction=0.9,
         dynamic_friction=0.9,
+        # Friction of a shoe on the floor, independent of the sliding speed.
         viscous_friction=0.0,
     )
     model.add(sphere)

@@ -111,6 +111,7 @@ def make_walking_study(model: Model, file: str, guess: str) -> MocoStudy:
     mean = sum(sizes.values()) / len(sizes)
     weights = [MocoWeight(name=name, weight=round(size / mean, 3)) for name, size in sizes.items()]
     goals = [
+        # Half a stride: the end mirrors the start, except for the distance walked.
         MocoPeriodicityGoal(
             name="mirrored",
             state_pairs=[pair for pair in pairs["state"] if pair.initial_variable != forward],
@@ -138,6 +139,7 @@ def make_walking_study(model: Model, file: str, guess: str) -> MocoStudy:
         # Durations of a step of people who walk at this speed.
         time_final_bounds=MocoFinalBounds(name="time_final_bounds", bounds=(0.35, 0.7)),
         state_infos=[
+            # People hold the trunk nearly upright.
             MocoVariableInfo(name=f"{PELVIS}pelvis_tilt/value", bounds=(-0.1, 0.05)),
             MocoVariableInfo(name=forward, bounds=(0.0, 2.0), initial_bounds=(0.0,)),
             MocoVariableInfo(name=f"{PELVIS}pelvis_ty/value", bounds=(0.75, 1.1)),
@@ -227,6 +229,7 @@ def _list_variables(model: Model) -> tuple[list[str], list[str]]:
 
 def _mirror_path(name: str) -> str:
     """Return the path of the same variable on the other side."""
+    # Names end in _r or _l.
     swap = str.maketrans("rl", "lr")
     return "/".join(
         part[:-1] + part[-1].translate(swap) if part[-2:] in ("_r", "_l") else part

@@ -117,6 +117,7 @@ def describe_model(name: str) -> str:
 def _find_function(source: str) -> Callable[..., Any]:
     target = BUILT_IN.get(source, source)
     place, _, name = target.rpartition(":")
+    # Without a colon the target is a file, whose function is found by itself.
     if not place:
         place, name = target, ""
     if source in BUILT_IN:
@@ -220,6 +221,7 @@ def _parse_arguments(
 
 def _parse_value(name: str, text: str, parameter: inspect.Parameter) -> Any:
     default = parameter.default
+    # The type of the default decides how a text is read.
     kind: type | None = None if default in (inspect.Parameter.empty, None) else type(default)
     try:
         if kind is bool:

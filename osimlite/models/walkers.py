@@ -82,6 +82,7 @@ def steady_walker(shank_inertia: float = 0.0921, foot_ahead: float = 0.0744) -> 
     model.name = "SteadyWalker"
     for body in model.components(Body):
         if body.name.endswith("Shank"):
+            # Only the moment about z matters for a motion in the sagittal plane.
             body.inertia = (1.0, 1.0, shank_inertia, 0.0, 0.0, 0.0)
     for sphere in model.components(ContactSphere):
         if sphere.name.endswith("FootContact"):
@@ -148,6 +149,7 @@ def _set_start_and_track(
         if coordinate.name in start:
             coordinate.default_value, coordinate.default_speed_value = start[coordinate.name]
         if coordinate.name == "Pelvis_tx":
+            # The range does not limit the motion; it tells how far the walker may go.
             coordinate.range = (-1.0, way)
         elif coordinate.name.endswith("Knee_rz"):
             # The stops of the knees are elastic, so that the knees exceed 0 a little.

@@ -52,6 +52,7 @@ class _ObservedCopies:
             *(f"{info.name}/speed" for info in order),
             *("/".join(path.split("/")[-2:]) for path in simulation.state.paths),
         ]
+        # A misspelt name would silently leave the coordinate visible.
         for name in task.hidden:
             if name not in self.state_names:
                 near = suggest_name(name, self.state_names)

@@ -98,6 +98,7 @@ def _perturb_state(scale: float) -> Callable[[Array, tuple[str, ...], np.random.
         # Muscle states are left alone: they depend on the pose.
         moving = np.array([name.endswith(("/value", "/speed")) for name in names])
         result = y.copy()
+        # Small perturbations keep learners from memorizing one motion.
         result[moving] += scale * rng.uniform(-1.0, 1.0, int(moving.sum()))
         return result
 

@@ -327,6 +327,7 @@ class Reflexes:
             # Several states in one mask are one reflex that is active in each of them; masks that a
             # comma separates are reflexes with parameters of their own.
             for leg in range(len(SIDES)):
+                # A side may be a word or a letter.
                 if side and side.lower() not in (SIDES[leg].strip("_"), ("left", "right")[leg]):
                     continue
                 for _, controller in node.select_all("ReflexController"):
@@ -422,6 +423,7 @@ class Reflexes:
         delay = parameters.get_number(node, "delay", 0.0, before + "delay")
         if np.any(delay < 0.0):
             raise node.error(f"a delay of {delay.min():g} s knows what is to come")
+        # Written so that NaN is refused, too.
         if not np.all(delay <= MAX_DELAY_S):
             raise node.error(
                 f"a delay of {delay.max():g} s is more than {MAX_DELAY_S:g} s, the longest that is remembered"

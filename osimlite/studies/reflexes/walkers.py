@@ -169,6 +169,7 @@ class SensedModel:
         parents = {
             body.name: names[body.parent] for body in self.mechanism.bodies if body.parent != GROUND
         }
+        # Leg lengths are measured in the default pose.
         at_rest = self.mechanism.at(
             np.array([info.default_value for info in self.mechanism.coordinates])
         )

@@ -386,6 +386,7 @@ class _Evaluations:
                 "the search takes another way than before, so that it cannot go on; another version of its library "
                 "may be installed, so start it anew in another folder"
             )
+        # Points beyond the history are simulated.
         rest = values[len(known) :]
         if len(rest):
             known = known + self._run(rest, self.count + len(known))

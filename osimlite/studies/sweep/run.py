@@ -279,6 +279,7 @@ class _Dispatcher:
         values: list[Floats] = []
         blocks: list[Block] = []
         first = self.saved
+        # Only rows without a gap before them are written.
         while self.saved in self.done:
             own, block = self.done.pop(self.saved)
             values.append(own)

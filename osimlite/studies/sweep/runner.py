@@ -109,6 +109,7 @@ class _Observers:
                     f"the measure '{spec}' looks at '{name}', which the controller has a part in; of runs with a "
                     "controller a sweep keeps states alone"
                 )
+        # Levels of the plan act on all runs, besides the watches of measures.
         stops = [
             Watch(
                 stop.words,
@@ -259,6 +260,7 @@ class Runner:
             report_times=self._report_times.tolist(),
             watches=look.watches,
             most_events=look.most_events,
+            # States at events take memory; they are recorded only if a measure needs them.
             event_states=any(made.event_states for made in look.measures),
             most_tries=MAX_INTEGRATOR_STEPS,
             threads=1,

@@ -105,6 +105,7 @@ def check_mjcf(model: Model, file: str | Path, *, poses: int = 50, seed: int = 7
     if not paths.names:
         raise ModelError(f"'{model.name}' has no muscles or other paths to compare")
     theirs = _MujocoModel(mujoco, compiled, paths)
+    # MuJoCo knows names, not paths.
     owners = {name.rpartition("/")[2]: name for name in paths.names}
     tendons = {name: place for name in owners if (place := theirs.find_tendon(name)) is not None}
     if not tendons:
@@ -216,6 +217,8 @@ class _MujocoModel:
                         polyval(value, polyder(polynomial)) * rates[:, model.jnt_dofadr[leader]]
                     )
         arms = np.empty((model.ntendon, len(self.free)))
+        # MuJoCo computes the rates of tendons from speeds, so that each coordinate gets a unit
+        # speed.
         for column, rate in enumerate(rates):
             data.qvel[:] = rate
             self.mujoco.mj_fwdPosition(model, data)

@@ -162,6 +162,7 @@ def _compute_inertia(draft: Draft, place: int) -> float:
     for other, driver in coordinate_drivers(draft.robot).items():
         if driver.coordinate == place:
             rates[other] = driver.function.evaluate(q[[place]])[1][0]
+    # Kinetic energy at unit rate: twice of it is the inertia.
     speeds = draft.mechanism.speeds_from_rates(q, rates)
     return float(speeds @ draft.mechanism.mass_matrix(q) @ speeds)
 
@@ -187,6 +188,7 @@ def add_helper(draft: Draft, place: int, drive: Array) -> Lead | None:
     if np.array_equal(drive, (0.0, 1.0, 0.0, 0.0, 0.0)):
         return Lead(lead.joint, own)
     follower = Follower(lead.joint, compose_with_line(own, drive))
+    # Paths with equal polynomials share a helper.
     name = next(
         (
             name

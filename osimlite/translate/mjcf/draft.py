@@ -228,6 +228,7 @@ class Draft:
         """
         try:
             return self.mechanism.default_state()
+        # A model that cannot be assembled is still worth translating.
         except SimulationError:
             self.fidelity.add(
                 "default-pose",
@@ -279,6 +280,7 @@ class Draft:
         whole = xml_name(dotted_name(path))
         name = xml_name(own or whole)
         if name in taken:
+            # The path is unique in the model, but another pass may have used it.
             name = whole if whole not in taken else make_unique_name(whole, taken, first=2)
         taken.add(name)
         # Only components have a name of their own to compare with.

@@ -202,6 +202,7 @@ class Driver:
             self.data.joint(name).qpos[0] = value
         for joint, rate in zip(robot.moving, robot.joint_jacobian(q) @ rates, strict=True):
             self.data.joint(joint.name).qvel[0] = rate
+        # Joints of coordinates are linear functions of them.
         self.data.qvel[self._dofs] = rates[self._places] * self._slopes
         self.forward()
 
@@ -247,6 +248,7 @@ class Driver:
 
         MuJoCo calls this function as its callback of controls.
         """
+        # After a failure MuJoCo finishes its step without forces.
         if self._failure is not None or not self.model.nv:
             return
         try:
@@ -313,6 +315,7 @@ class Driver:
             np.linalg.lstsq(matrix, known)[0] if len(others) else np.linalg.solve(matrix, known)
         )
         accelerations = moves @ result[: len(self._free)] + wanted
+        # Forces that produce exactly these accelerations.
         data.qfrc_passive += self._multiply_mass(data, accelerations) - applied
         # `_update_equalities` writes for the start of a step; within the step fitted equalities have no
         # errors to correct.

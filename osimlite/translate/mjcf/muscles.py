@@ -189,6 +189,7 @@ def add_muscle(draft: Draft, force: Muscle, path: str) -> str:
     fits = draft.options.fit == "force"
     try:
         spread = [
+            # Quantiles weight lengths by how often they occur.
             np.quantile(lengths, np.linspace(0.0, 1.0, LENGTH_COUNT))
             for lengths in (tied.lengths, tied.held_out)
         ]
@@ -199,6 +200,7 @@ def add_muscle(draft: Draft, force: Muscle, path: str) -> str:
         )
     except OsimliteError as error:
         raise Untranslatable(f"its tension cannot be computed: {error.message}") from error
+    # Fitted to one set of poses, judged in the other.
     curves = _fit_curves(own, spread[0], tensions, free=fits)
     name = draft.make_name("actuator", path)
     limits = (max(force.min_control, 0.0), min(force.max_control, 1.0))
@@ -288,6 +290,7 @@ def _read_rates(force: Muscle) -> Rates:
     if not time > 0.0:
         return Rates(0.0, DEFAULT_FVMAX, 0.0, 0.0)
     if isinstance(force, Schutte1993Muscle_Deprecated):
+        # The velocity at which a fully active muscle of this law has no force.
         vmax = -schutte_velocity(1.0, 1.0, 0.0, force.damping) if force.damping > 0.0 else 0.0
         fvmax = DEFAULT_FVMAX
     else:

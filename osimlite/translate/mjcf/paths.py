@@ -94,6 +94,7 @@ def add_paths(draft: Draft) -> None:
             )
             draft.fidelity.translated[surface] = "what tendons go around, if they touch it"
         errors = _measure_errors(draft, tendon, held, held_truth[path])
+        # Exact tendons need no record.
         if any(error.max > EXACT_TOLERANCE_M for error in errors.values()):
             how = "the nearest tendon that its own points and surfaces make"
             done = f"{how}, fitted" if fits else how

@@ -165,6 +165,8 @@ class Router:
         for pose, nodes in enumerate(self.truth.nodes):
             last = 0
             for (node, place), (_, after) in pairwise(nodes):
+                # Nodes below the number of points are path points, others are tangent points of
+                # surfaces.
                 last = node if node < len(self.route.points) else last
                 if node == one:
                     result.append((pose, place, after, last))
@@ -208,6 +210,7 @@ class Router:
             (result,) = choose(options)
             assert isinstance(result, WrapGeom)
             best[number] = result
+        # Nothing is an option too: the surface may hardly be touched.
         options = [(), *((each,) for each in best.values())]
         for (one, first), (two, second) in combinations(best.items(), 2):
             # MuJoCo needs a site between two surfaces.
@@ -236,6 +239,7 @@ class Router:
         if sign:
             yield around.replace_side(turned @ (sign * np.eye(3)[axis]))
         middles = (0.5 * (touch.first + touch.second) - around.frame[:3, 3]) @ around.frame[:3, :3]
+        # The mean direction in which the path touches the surface.
         yield around.replace_side(unit(middles).mean(0))
         for turn in np.arange(directions) * (2.0 * np.pi / max(directions, 1)):
             yield around.replace_side(np.array((np.cos(turn), np.sin(turn), 0.0)))
@@ -284,6 +288,7 @@ class Router:
         low, high = node.range
         middle, half = 0.5 * (low + high), 0.5 * (high - low)
         parabola = SPECK_RADIUS_M / half**2 * np.array((middle**2, -2.0 * middle, 1.0, 0.0, 0.0))
+        # Toward a neighbouring point the sphere lies on the path and does not deflect it.
         for other in (number - 1, number + 1):
             if not 0 <= other < len(self.route.points):
                 continue
@@ -329,6 +334,7 @@ class Router:
         if not ways or any(point.body != body for point in points):
             return
         poses, before, after = (np.array(column) for column in zip(*ways, strict=True))
+        # The axis about which the path turns at the points.
         turning = np.cross(unit(before), unit(after))
         normal, into = (
             np.einsum("pji,pj->pi", self.poses.rotations[body][poses], way).mean(0)
@@ -353,6 +359,7 @@ class Router:
                 around = WrapGeom(
                     body, placed, "cylinder", radius, length=4.0 * radius, name=points[0].name
                 )
+                # Side sites around the outside of the bend, 1 rad to either side.
                 for turn in np.linspace(-1.0, 1.0, 5):
                     yield (
                         around.replace_side(

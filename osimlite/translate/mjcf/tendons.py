@@ -139,6 +139,7 @@ def measure_tendons(tendons: Sequence[Tendon], poses: Poses, version: int) -> tu
         arounds = () if kind is None else [around for around in numbers if around is not None]
         length, arm = _measure_section(first, arounds, second, poses, version)
         for place, around in uses:
+            # A tendon is as long as its sections together.
             lengths[place] += length[numbers[around]]
             arms[place] += arm[numbers[around]]
     return lengths, arms
@@ -169,6 +170,7 @@ def _measure_section(
         body, kind = arounds[0].body, arounds[0].kind
         numbers: dict[Any, int] = {}
         keys = [(around.radius, around.frame.tobytes()) for around in arounds]
+        # Surfaces of equal geometry share one computation.
         owners = np.array([numbers.setdefault(key, len(numbers)) for key in keys])
         of_each = np.unique(owners, return_index=True)[1]
         frames = np.stack([arounds[place].frame for place in of_each])

@@ -89,12 +89,14 @@ def bend_tendon(
     )
     # If one end is behind the other, MuJoCo 3 with a side site winds completely around the circle.
     least = reach_p + reach_q if version < 4 and sides is not None else -ROUNDING
+    # The angle from p to q in each direction, which is at least `least`.
     winding = np.abs(signs) * (np.mod(signs * between - least, 2.0 * np.pi) + least)
     arc = radius * (winding - reach_p - reach_q)
     at_p = _turn_on_circle(p, signs * reach_p, radius)
     at_q = _turn_on_circle(q, -signs * reach_q, radius)
     # MuJoCo does not wrap if an end is inside the surface.
     outside = (norm(p) >= radius) & (norm(q) >= radius)
+    # Otherwise the straight line passes the surface.
     touches = outside & (arc > 0.0)
     choice = np.zeros((len(owners), len(p[0])), dtype=int)
     if sides is not None:
@@ -114,6 +116,7 @@ def bend_tendon(
             choice = np.where(inside, 3, choice)
     if across is None:
         lines = np.stack((norm(at_p - p), arc, norm(at_q - q)))
+        # Height changes in proportion to the length in the plane, as on an unrolled cylinder.
         share = (second - first)[..., 2] / np.maximum(lines.sum(0), TINY)
         heights = first[..., 2] + share * lines[0], first[..., 2] + share * (lines[0] + lines[1])
         one, two = (
