@@ -80,6 +80,7 @@ def read_trc(path: str | Path) -> MarkerData:
     data, file = read_file(path), str(path)
     header = MarkerHeader(data)
     names = tuple(label.text for label in header.labels)
+    # Spreadsheet programs write a byte order mark before the first word.
     if not names or not header.lines[0].lstrip("\ufeff").startswith("PathFileType"):
         raise DocumentError(
             "this is not a marker file: it must begin with 'PathFileType' and name markers",
@@ -92,6 +93,7 @@ def read_trc(path: str | Path) -> MarkerData:
             file=file,
             line=3,
         )
+    # Frame number, time, and three coordinates of each marker.
     width = 2 + 3 * len(names)
     rows = []
     for number, line in enumerate(
@@ -100,6 +102,7 @@ def read_trc(path: str | Path) -> MarkerData:
         if not line.strip():
             continue
         cells = line.rstrip("\r\n").split("\t")
+        # Some programs separate cells by spaces, which is unambiguous if no cell is empty.
         if len(cells) < width and len(line.split()) == width:
             cells = line.split()
         if any(cell.strip() for cell in cells[width:]):
@@ -111,6 +114,7 @@ def read_trc(path: str | Path) -> MarkerData:
         rows.append(
             [_parse_number(cell, file, number, index) for index, cell in enumerate(cells[:width])]
         )
+        # Editors remove tabs at the end of a line, and with them the cells of unseen markers.
         rows[-1] += [np.nan] * (width - len(rows[-1]))
     table = np.array(rows, dtype=float).reshape(-1, width)
     return MarkerData(

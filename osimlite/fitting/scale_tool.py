@@ -263,6 +263,7 @@ def add_markers(model: Model, path: Path) -> None:
             f"the file holds a {type(result).__name__}, not a MarkerSet", file=str(path)
         )
     for marker in result.objects:
+        # A copy of the list, because markers are removed from it.
         for same in [item for item in model.marker_set.objects if item.name == marker.name]:
             model.marker_set.objects.remove(same)
         model.marker_set.objects.append(marker.copy_deep())

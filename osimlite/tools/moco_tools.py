@@ -81,6 +81,8 @@ def report_solution(job: Job, problem: Problem, solution: MocoSolution, outcome:
     for goal, value in solution.terms.items():
         outcome.add_message(goal, f"{value:.8g}")
     outcome.add_message("objective", f"{solution.objective:.8g}")
+    # Of a solution, the largest violation shows its accuracy; of a failure, several help to find
+    # the cause.
     for violation in solution.violations[: 1 if solution.success else 5]:
         outcome.add_message(
             "largest violation" if solution.success else "not fulfilled", str(violation)

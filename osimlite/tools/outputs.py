@@ -165,6 +165,7 @@ def _compute_com_acceleration(mechanism: Any, q: Array, u: Array, udot: Array) -
             body.mass_properties.mass
             * (acceleration[3:] + np.cross(acceleration[:3], arm) + np.cross(w, np.cross(w, arm)))
         )
+    # Without mass the sum is zero, and so is the result.
     return np.asarray(np.sum(rows, axis=0) / (mechanism.total_mass or 1.0))
 
 
@@ -220,6 +221,7 @@ def _create_path_reader(name: str) -> Reader:
 
 def _read_power(motion: Motion, actuator: ScalarActuator, path: str) -> Array:
     """Return the power of an actuator, W; a tension does work against the lengthening speed."""
+    # A positive actuation of a path is a tension, which shortens it.
     sense = -1.0 if isinstance(actuator, PathActuator) else 1.0
     known = motion.read_records([path], "actuation", "speed")
     return sense * known["actuation"] * known["speed"]
@@ -258,6 +260,7 @@ def _read_joint_power(motion: Motion, joint: Joint, path: str) -> Array:
             f"osimlite cannot compute the power of '{tree.path_of(joint)}', which has prescribed "
             "coordinates"
         )
+    # In OpenSim the power of a joint is that of the constraints that prescribe its coordinates.
     return np.zeros((len(motion.times), 1))
 
 
@@ -285,6 +288,7 @@ def _read_muscle_output(
             * np.sin(quantities["PennationAngle"])
             * quantities["PennationAngularVelocity"]
         )
+        # The fiber's length along the tendon is l cos(α); this is its derivative.
         quantities["along"] = (
             quantities["FiberVelocity"] * np.cos(quantities["PennationAngle"]) - turning
         )

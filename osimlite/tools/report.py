@@ -146,6 +146,7 @@ def collect_trials(outcomes: Mapping[str | Path, Outcome]) -> list[TrialOutcomes
     for setup, outcome in outcomes.items():
         by_folder.setdefault(Path(setup).resolve().parent, []).append(outcome)
     titles = [outcome.title for outcome in outcomes.values()]
+    # The name of a single study says more than that of its folder.
     alone = titles[0] if len(titles) == 1 else ""
     return [TrialOutcomes(alone or folder.name, group) for folder, group in by_folder.items()]
 
@@ -179,6 +180,7 @@ def _render_verdicts(outcomes: Mapping[str | Path, Outcome]) -> Iterator[str]:
     setups = [setup for setup in outcomes if type(get_object(str(setup))).__name__ in SETUPS]
     try:
         result = check_trial(*setups, written=written) if setups else None
+    # A trial of which nothing can be checked has no verdicts, but has a report.
     except OsimliteError:
         return
     if result is None or not result.verdicts:
@@ -267,6 +269,7 @@ def collect_angles(trials: Sequence[TrialOutcomes]) -> dict[str, list[_Curve]]:
         assert evidence is not None
         for index, name in enumerate(evidence.coordinates):
             column = evidence.values[:, index]
+            # Locked and unused coordinates would only take up space.
             if not evidence.turning[index] or np.ptp(column) < MIN_ANGLE_CHANGE_RAD:
                 continue
             stem, side = split_side(name)
@@ -299,6 +302,8 @@ def collect_moments(trials: Sequence[TrialOutcomes]) -> dict[str, list[_Curve]]:
             for table in _select_dynamics_tables(outcome):
                 for label in table.columns:
                     name, _, kind = label.rpartition("_")
+                    # Generalized forces at the root are residuals, which have a section of their
+                    # own.
                     if name in root or kind not in ("moment", "force"):
                         continue
                     stem, side = split_side(name)
@@ -350,11 +355,14 @@ def collect_contacts(trials: Sequence[TrialOutcomes]) -> dict[str, list[_Curve]]
             continue
         sums: dict[str, Array] = {}
         for force in contact_forces(_create_recording(evidence, build_mechanism(evidence.model))):
+            # Both sides of a contact have a force; they are opposite, so that their sum would
+            # vanish.
             if force.frame not in STATIC_FRAMES:
                 side = split_side(force.element)[1]
                 sums[side] = sums.get(side, 0.0) + force.vectors
         for axis, name in enumerate("xyz"):
             for side, vectors in sums.items():
+                # Planar models have no forces along z.
                 if np.ptp(vectors[:, axis]) > 0.0:
                     line = _Curve(
                         evidence.times, vectors[:, axis], side, STYLES[number % 3], trial.name, {}
@@ -510,6 +518,7 @@ def _draw_errors(
     """
     seen = np.isfinite(errors)
     filled = np.where(seen, errors, 0.0)
+    # A frame without any measured marker divides by 1, not by 0.
     rms = np.sqrt((filled**2).sum(axis=1) / np.maximum(seen.sum(axis=1), 1))
     figure = figure_of("", (11.0, 3.4))
     over, beside = figure.subplots(1, 2, width_ratios=(2, 1))
@@ -532,6 +541,7 @@ def _draw_errors(
 
 def _add_legend(figure: Any, lines: Sequence[_Curve]) -> None:
     """Add a legend of sides and trials to a figure."""
+    # matplotlib is optional, so that this module can be imported without it.
     from matplotlib.lines import Line2D
 
     sides = [
@@ -564,6 +574,7 @@ def _style_axes(panel: Any, label: str) -> None:
 def _render_image(figure: Any) -> str:
     """Return the HTML of a figure as an embedded image."""
     out = io.BytesIO()
+    # Vector graphics remain sharp when the page is enlarged or printed.
     figure.savefig(out, format="svg")
     return (
         f'<img alt="" src="data:image/svg+xml;base64,{base64.b64encode(out.getvalue()).decode()}">'

@@ -40,9 +40,12 @@ from osimlite.tools.tracking import (
 )
 
 RRA_WINDOW_S = 1e-3
-"""Length of the windows of RRATool, s."""
+"""Length of the windows of RRATool, s.
+
+It is fixed in OpenSim as well, where only CMCTool has a property for it.
+"""
 MAX_SHIFT_M = 0.1
-"""Largest shift of a mass centre along an axis, m."""
+"""Largest shift of a mass centre along an axis, m; the limit of OpenSim."""
 
 
 def run_rra_tool(job: Job, outcome: Outcome) -> None:
@@ -57,12 +60,15 @@ def run_rra_tool(job: Job, outcome: Outcome) -> None:
     whole = job.read_model()
     with build_simulation(job, model) as simulation:
         desired = DesiredMotion.read(job, outcome, simulation, model)
+    # The desired motion has coordinates only, so that it remains valid when a mass centre moves.
     if setup.adjust_com_to_reduce_residuals:
         _move_mass_center(job, outcome, model, whole, desired)
         outcome.add_text(_get_model_output(job, setup.output_model_file.strip()), to_text(whole))
     motion = _track_motion(job, outcome, model, desired, RRA_WINDOW_S, exact=False)
     if motion is None:
         return
+    # These averages are over the followed motion; those of the mass centre are over the desired
+    # one.
     forces = outcome.tables[f"{setup.name}_Actuation_force.sto"]
     averages = _average_residual_columns(forces.times, forces.columns, forces.rows)
     outcome.summary["average_residuals"] = dict(zip(RESIDUALS, averages, strict=True))
@@ -107,9 +113,12 @@ def _move_mass_center(
             "mass center", f"'{name}' has no weight, so its mass centre stays, as in OpenSim"
         )
         return
+    # The weight W acts along -y, so that a mass centre that moves by (x, 0, z) adds the moments z W
+    # about x and -x W about z; these are to replace the residual moments.
     before = _compute_average_residuals(job, model, desired)
     dx, dz = np.clip([before[5] / weight, -before[3] / weight], -MAX_SHIFT_M, MAX_SHIFT_M).tolist()
     x, y, z = body.mass_center
+    # `whole`, which is written, lacks the actuators that the setup adds to `model`.
     for each in (model, whole):
         next(item for item in each.components(Body) if item.name == name).mass_center = (
             x - dx,
@@ -142,7 +151,9 @@ def _compute_average_residuals(job: Job, model: Model, desired: DesiredMotion) -
     sharing = build_static_optimization(job, model, mechanism, muscles="isometric")
     given = setup.initial_time_for_com_adjustment, setup.final_time_for_com_adjustment
     desired_range = max(setup.initial_time, desired.start), min(setup.final_time, desired.end)
+    # -1, the default of both times, means that none is given.
     first, last = desired_range if given == (-1.0, -1.0) else given
+    # As in OpenSim, a time means the last row that is not later.
     rows = [
         max(0, int(np.searchsorted(desired.times, time, side="right")) - 1)
         for time in (first, last)
@@ -200,6 +211,7 @@ def _track_motion(
     setup: RRATool | CMCTool = job.setup
     refuse_controllers(job, model)
     analyses = find_analyses(job)
+    # OpenSim adds both analyses to every RRATool and CMCTool: their tables are the results.
     have = {type(item) for item, _ in analyses}
     for cls in (Actuation, Kinematics):
         if cls not in have:
@@ -210,6 +222,8 @@ def _track_motion(
     analyses = find_analyses(job)
     start = max(setup.initial_time, desired.start)
     end = min(setup.final_time, desired.end)
+    # Controls follow from the desired pose at the end of their window, so that the last window must
+    # end within the motion.
     if not start < end - window:
         raise job.create_error(
             f"the motion from {start:g} s to {end:g} s is shorter than a window of {window:g} s; "
@@ -222,6 +236,7 @@ def _track_motion(
         tracker = ComputedControl(job, simulation, desired, tasks, sharing, controls, window)
         y = _compute_first_state(job, simulation, desired, start)
         followed = TrackedMotion()
+        # The desired motion says nothing about the states of muscles, which therefore settle first.
         if tracker.has_states:
             start, y = tracker.settle_muscles(start, y, followed)
         if not followed.failure:
@@ -235,6 +250,7 @@ def _track_motion(
             outcome.add_message("ended early", followed.failure)
         if len(followed.times) < 2:
             return None
+        # Analyses evaluate the controls at all times, and not only in the last window.
         tracker.drive_all_windows()
         moments = list(zip(followed.times, followed.states, strict=True))
         motion = Motion(
@@ -336,6 +352,8 @@ def _average_residual_columns(times: Array, columns: tuple[str, ...], rows: Arra
     """Return time averages of the residual columns, 0 for those that are missing."""
     if len(times) < 2:
         return [0.0] * len(RESIDUALS)
+    # The integrator's steps differ in length, so that a mean of the rows would not be an average
+    # over time.
     areas = np.trapezoid(rows, times, axis=0) / (times[-1] - times[0])
     return [float(areas[columns.index(name)]) if name in columns else 0.0 for name in RESIDUALS]
 

@@ -43,6 +43,7 @@ def write_muscle_analysis(analysis: MuscleAnalysis, motion: Motion, tables: Anal
     )
     muscles = [every[index] for index in selected]
     for muscle in muscles:
+        # Corrections reproduce OpenSim's numbers; they are known for certain classes only.
         why = "which osimlite cannot analyse yet" if type(muscle) not in CORRECTIONS else ""
         why = why or ("" if muscle.appliesForce else "which applies no force")
         if why:
@@ -51,6 +52,7 @@ def write_muscle_analysis(analysis: MuscleAnalysis, motion: Motion, tables: Anal
             )
     names = [muscle.name for muscle in muscles]
     result = _compute_tables(motion, muscles)
+    # As in OpenSim, which evaluates these quantities only if the model has mass.
     if not motion.mechanism.total_mass > np.finfo(float).eps:
         result |= {suffix: np.full_like(result[suffix], np.nan) for suffix in DYNAMIC_QUANTITIES}
     for suffix, rows in result.items():

@@ -70,6 +70,8 @@ def find_actuators(tool: TrialTool | None) -> ActuatorRoles:
                 residuals[force.name] = "N m" if infos[name].motion_type == "rotational" else "N"
             elif name in infos:
                 reserves[force.name] = name
+        # OpenSim's setups also apply residuals by a PointActuator at the pelvis for each force, and
+        # a TorqueActuator for each moment.
         elif isinstance(force, PointActuator) and str(force.body).rpartition("/")[2] in bodies:
             residuals[force.name] = "N"
         elif isinstance(force, TorqueActuator) and str(force.bodyA).rpartition("/")[2] in bodies | {
@@ -108,6 +110,7 @@ def measure_residuals(
         if column in table.columns:
             values = np.abs(table[column])
             row = int(np.argmax(values))
+            # Forces are compared with the measured load, moments with it times a height.
             rule, size = (
                 ("residual-force", scale.force)
                 if unit == "N"
@@ -180,6 +183,7 @@ def measure_reserves(
         reserve = np.abs(table[columns[name]])
         moment = moments.get(name)
         row = int(np.argmax(reserve))
+        # A ratio to a small moment would be large, although the reserve hardly matters.
         if moment is None or reserve[row] < MIN_RESERVE_NM:
             continue
         judged += 1
@@ -227,6 +231,7 @@ def _find_crossed_coordinates(tool: TrialTool) -> set[str]:
     )
     return {
         info.name
+        # Without muscles there are no arms, and no coordinate is crossed.
         for info, arm in zip(mechanism.coordinates, arms, strict=bool(rows))
         if arm > MIN_MOMENT_ARM_M
     }
@@ -256,6 +261,7 @@ def _find_joint_moments(
         for other in (other for other in others if other.tag == tag):
             if tag == "RRATool":
                 name = f"{other.setup.name}_Actuation_force.sto"
+                # RRA has no muscles, so that its reserves carry the whole joint moments.
                 columns = find_actuators(other).reserves
             else:
                 name, columns = (

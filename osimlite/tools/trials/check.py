@@ -185,6 +185,7 @@ def _plan_measurements(folder: TrialFolder) -> Iterator[PlannedMeasurement]:
     """Yield all measurements of a trial."""
     looked: set[tuple[object, ...]] = set()
     claimed: set[Path] = set()
+    # RRA and CMC reduce the residuals of inverse dynamics, which then are not the final ones.
     followed = any(
         tool.tag in ("RRATool", "CMCTool") and _find_result(tool, "_Actuation_force.sto")
         for tool in folder.tools

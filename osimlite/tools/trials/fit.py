@@ -82,6 +82,7 @@ def measure_marker_errors(tool: TrialTool) -> Numbers:
         raise MissingInput(f"the motion of {tool} is missing ('{name}'); run it")
     try:
         motion = _read_fitted_motion(tool, file)
+    # Without the model or the markers, the errors that the tool itself wrote have to do.
     except OsimliteError as error:
         errors = tool.find_result(f"{setup.name}_ik_marker_errors.sto")
         if errors is None:
@@ -180,6 +181,7 @@ def _read_fitted_motion(tool: TrialTool, file: Path) -> FittedMotion:
     is_before = recorded.times - data.times[before] < data.times[after] - recorded.times
     rows = np.where(is_before, before, after)
     step = float(np.median(np.diff(data.times))) if len(data.times) > 1 else 1.0
+    # Times in files are rounded, so that those of one frame may differ slightly.
     near = np.flatnonzero(np.abs(data.times[rows] - recorded.times) < 0.1 * step)
     if not len(near):
         raise MissingInput(f"'{file}' and the markers of {tool} have no times in common")
@@ -228,6 +230,7 @@ def _find_swapped_markers(
 
     def cost(frame: int, pair: tuple[int, int] = (0, 0)) -> float:
         order = np.arange(len(motion.markers))
+        # The default pair exchanges a marker with itself, which keeps the order.
         order[list(pair)] = order[list(reversed(pair))]
         measured = motion.measured[frame : frame + 1, order].reshape(1, -1)
         return float(
@@ -236,6 +239,8 @@ def _find_swapped_markers(
 
     frames = np.unique(np.linspace(0, len(motion.times) - 1, SWAP_FRAMES).astype(int))
     costs_in_order = {frame: cost(frame) for frame in (worst, *frames.tolist())}
+    # All pairs are tried in the worst frame only: m markers have m (m - 1) / 2 pairs, and each
+    # needs a fit.
     costs = {pair: cost(worst, pair) for pair in combinations(range(len(motion.markers)), 2)}
     one, other = min(costs, key=lambda pair: costs[pair])
     if costs[one, other] < MAX_COST_RATIO * costs_in_order[worst]:
@@ -264,6 +269,7 @@ def measure_ranges(tool: TrialTool, file: Path) -> Numbers:
         low, high = info.range
         excess = np.maximum(low - motion.values[:, index], motion.values[:, index] - high)
         row = int(np.argmax(excess))
+        # Up to 0.05 degrees or cm may come from the rounding of files.
         size = _to_display_unit(info, float(excess[row]))
         if index in root or info.name in motion.missing or info.locked or size < 0.05:
             continue
@@ -304,6 +310,8 @@ def measure_tracking_errors(folder: TrialFolder, file: Path, tool: TrialTool | N
     infos = {} if tool is None else {info.name: info for info in tool.mechanism.coordinates}
     for name in table.columns:
         info = infos.get(name)
+        # Without a setup only the name tells the unit: translations in OpenSim's models end in _tx,
+        # _ty and _tz.
         turning = (
             info.motion_type == "rotational"
             if info is not None
@@ -365,6 +373,7 @@ def measure_filter(tool: TrialTool) -> Numbers:
 
 def _is_from_markers(file: Path) -> bool:
     """Return whether inverse kinematics made a motion, and not a tool that integrates."""
+    # A motion of RRA or CMC is integrated and therefore smooth; it says nothing about the markers.
     return not file.name.endswith(("_Kinematics_q.sto", "_states.sto", "_q.mot"))
 
 

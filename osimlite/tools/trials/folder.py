@@ -45,7 +45,10 @@ MOTIONS = ("coordinates_file", "desired_kinematics_file")
 LOADS = "external_loads_file"
 """Property of setups that names the measured loads."""
 CUTOFFS = ("lowpass_cutoff_frequency_for_coordinates", "lowpass_cutoff_frequency")
-"""Properties of setups with the cutoff frequency of the motion's filter."""
+"""Properties of setups with the cutoff frequency of the motion's filter.
+
+The first is of InverseDynamicsTool and AnalyzeTool, the second of RRATool and CMCTool.
+"""
 
 
 class MissingInput(OsimliteError):
@@ -78,6 +81,7 @@ class TrialFolder:
                 raise make_missing_error(path, may_be_folder=True)
             for file in sorted((path if path.is_dir() else path.parent).rglob("*")):
                 if file.suffix.lower() in SUFFIXES and file.is_file():
+                    # The given folders may overlap.
                     known = self._named.setdefault(file.name, [])
                     if file not in known:
                         known.append(file)
@@ -94,6 +98,8 @@ class TrialFolder:
                         file=str(path),
                     )
                 setups.setdefault(os.path.realpath(path), path)
+        # The real path is the key, so that links and overlapping folders do not count a setup
+        # twice.
         for file in setups.values():
             top = get_object(str(file))
             if top is not None and type(top).__name__ in SETUPS:
@@ -114,6 +120,7 @@ class TrialFolder:
 
     def find_file(self, path: Path) -> Path | None:
         """Return a path if the file exists, or else the nearest file of its name, or None."""
+        # Results of this run are newer than files of the same name beside the setup.
         if path.name in self._written:
             return self._written[path.name]
         if path.is_file():
@@ -122,6 +129,8 @@ class TrialFolder:
         def count_steps(file: Path) -> int:
             return os.path.relpath(file.parent, path.parent).count(os.sep)
 
+        # Trials are often moved after their setups were written, so that paths in setups lead
+        # elsewhere.
         return min(self._named.get(path.name, ()), key=count_steps, default=None)
 
     def find_files(self, *endings: str) -> Iterator[Path]:
@@ -154,6 +163,7 @@ class TrialFolder:
 
         def read() -> RecordedMotion:
             table = self.read_table(file)
+            # A repeated time has no slope: splines and filters need increasing times.
             is_later = np.diff(np.maximum.accumulate(table.times), prepend=-np.inf) > 0.0
             kept = replace(table, times=table.times[is_later], rows=table.rows[is_later])
             return RecordedMotion.from_table(self.build_mechanism(model), kept)
@@ -275,6 +285,7 @@ class TrialTool:
         Returns:
             Two times (s), which are infinite if the setup has none.
         """
+        # Inverse kinematics and dynamics have a range, the other tools two single times.
         given = getattr(self.setup, "time_range", None)
         if given is not None and len(given) > 1:
             return float(given[0]), float(given[1])
