@@ -41,6 +41,7 @@ def describe_fit(
             if rms < advice[0] and largest < advice[1]
             else f"; OpenSim advises less than {most} cm{of}"
         )
+        # Errors of metres are typical of millimetres that are read as metres.
         advised += "; check the units of the data" if rms > IMPLAUSIBLE_ERROR_M else ""
         yield (
             f"{format_count(result['frames'], 'frame')}, "

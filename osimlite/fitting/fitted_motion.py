@@ -98,6 +98,7 @@ class FittedMotion(Movement):
         for kind, names, errors in kinds:
             seen = np.isfinite(errors)
             if seen.any():
+                # Errors are not negative, so that -1 is never the largest.
                 filled = np.where(seen, errors, -1.0)
                 frame, one = np.unravel_index(int(filled.argmax()), filled.shape)
                 noun, time = (
@@ -112,6 +113,7 @@ class FittedMotion(Movement):
                     time: float(self.times[int(frame)]),
                 }
             missing = (1.0 - seen.mean(axis=0)).tolist()
+            # Only markers that are unseen in some frame are named.
             partly |= {
                 name: round(part, 4) for name, part in zip(names, missing, strict=True) if part
             }

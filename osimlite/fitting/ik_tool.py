@@ -71,6 +71,7 @@ def collect_targets(
         task.name: float(task.weight) for task in applied if isinstance(task, IKMarkerTask)
     } or None
     names = data.find_shared_names([*find_marker_stations(model, mechanism)], requested)
+    # Markers of weight 0 are not fitted, but their errors are reported.
     weights = {name: 1.0 if requested is None else requested[name] for name in names}
     goals, targets = [], []
     for task in applied:

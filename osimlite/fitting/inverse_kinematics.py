@@ -87,10 +87,12 @@ def inverse_kinematics(
     if markers is not None:
         data = MarkerData.from_source(markers, times).select_times(start, end)
     elif turned is not None:
+        # Without markers the fit has the times of the orientations.
         data = MarkerData.create_empty(turned.times)
     mechanism = build_mechanism(model)
     stations = find_marker_stations(model, mechanism)
     frames = {} if turned is None else find_sensor_frames(model, mechanism, turned.names)
+    # By default every marker that the model and the data share counts equally.
     weighed = {
         name: 1.0 for name in (data.find_shared_names([*stations]) if markers is not None else ())
     }

@@ -62,6 +62,7 @@ class OrientationData(Measurements):
         Raises:
             SettingError: there is no frame between these times.
         """
+        # Unlike markers, orientations are not taken from the nearest frames outside the range.
         inside = np.flatnonzero(
             (self.times >= first - TIME_TOLERANCE_S) & (self.times <= last + TIME_TOLERANCE_S)
         )
@@ -128,6 +129,7 @@ def read_orientations(path: str | Path) -> OrientationData:
             f"DataType={QUATERNION}",
             file=str(path),
         )
+    # The reader of tables splits a quaternion into four columns, with the suffixes _1 to _4.
     names = tuple(label.removesuffix("_1") for label in table.columns[::4])
     return OrientationData(
         names, table.times, rotation_of(table.rows.reshape(-1, len(names), 4)), str(path)

@@ -48,6 +48,8 @@ def create_person_files(
     for copy, marker in zip(unscaled, model.marker_set.objects, strict=True):
         base, _ = placements.resolve_frame(placements.follow_socket(marker, "socket_parent_frame"))
         factors = person.factors.get(base.rsplit("/", 1)[1], [1.0, 1.0, 1.0])
+        # ScaleTool multiplies the markers of the generic model by the factors, so that they are
+        # divided here.
         copy.location = tuple((np.array(marker.location) / factors).tolist())
     frames = [frame.name for frame in model.components(PhysicalFrame)]
     result = ScaleFactors(
@@ -61,10 +63,12 @@ def create_person_files(
             model_file=_make_relative_path(generic, folder), marker_set_file=UNSCALED
         ),
         model_scaler=ModelScaler(
+            # The factors are known; measurements of markers would replace them.
             scaling_order=("manualScale",),
             scale_set=create_scale_set(frames, result),
             output_model_file=file,
         ),
+        # The fit has found the offsets of the markers already.
         marker_placer=MarkerPlacer(apply=False),
     )
     documents = {
@@ -81,5 +85,6 @@ def _make_relative_path(file: Path, folder: Path) -> str:
     """Return a path relative to a folder, or the absolute path on another drive."""
     try:
         return Path(os.path.relpath(file.absolute(), folder.absolute())).as_posix()
+    # On Windows no relative path leads to another drive.
     except ValueError:
         return str(file.absolute())

@@ -126,6 +126,7 @@ class FitLayout:
             fit.SENSOR_AT,
             list(self._list_sensor_links(places, sensors, numbers)),
         )
+        # The kernel reads the numbers in this order: markers, sensors, goals, ranges, couplers.
         numbers += [goal.weight for goal in goals]
         self._append_list(
             ints, fit.GOALS, fit.GOAL_AT, [places.freedom(goal.coordinate) for goal in goals]
@@ -214,6 +215,8 @@ class FitLayout:
             record = model[model[MODEL.LINK_AT] + LINK.SIZE * link :]
             for operation in range(record[LINK.FIRST_OPERATION], record[LINK.END_OPERATION]):
                 j = model[model[MODEL.OPERATION_AT] + OPERATION.SIZE * operation :]
+                # An axis of its own has no part (-1). A ball has the rotations 0 to 2, and before
+                # them, if its surface is an ellipsoid, the translations 3 to 5.
                 parts = [-1]
                 if j[OPERATION.MOTION] in (MOTION.BALL, MOTION.BALL_BACK):
                     balls.append(int(j[OPERATION.ARGUMENTS]))
@@ -271,6 +274,7 @@ def _find_allowed_interval(
 
     def is_inside(argument: float) -> bool:
         value = coupler.function.evaluate(np.array((argument,)))[0]
+        # Rounding must not put the end of the range outside it.
         return low - 1e-12 <= value <= high + 1e-12
 
     start = min(max(start, ends[0]), ends[1])

@@ -224,6 +224,7 @@ class _Scaler:
 
     def _find_holder(self, component: Component) -> PhysicalFrame:
         """Return the frame that contains a component."""
+        # A frame holds itself.
         holder: Component | None = component
         while holder is not None and not isinstance(holder, PhysicalFrame):
             holder = self.tree.parent_of(holder)
@@ -272,6 +273,7 @@ def _select_factors(component: Component, factors: Array, which: str) -> Array:
     lengths = np.linalg.norm(axes * factors[:, None], axis=0)
     if which == AXES:
         return np.asarray(lengths)
+    # Wrap cylinders lie along their z axes.
     return np.array((lengths[2] if which == ALONG else 0.5 * (lengths[0] + lengths[1]),))
 
 

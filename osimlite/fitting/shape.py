@@ -177,6 +177,7 @@ class _MarkerPoints:
         Returns:
             Positions (t, m, 3), m, and rotations (t, m, 3, 3) of their bodies.
         """
+        # The mechanism of the points has no constraints, so that couplers are applied here.
         followed = values.copy()
         for coupler in self._couplers:
             others = list(coupler.independent)

@@ -56,6 +56,7 @@ def find_undetermined(
         for k, info in enumerate(mechanism.coordinates)
         if info.locked or info.prescribed is not None
     ]
+    # A target determines its coordinate, however small its weight.
     held += [goal.coordinate for goal in goals if goal.weight > 0.0]
     open_everywhere = np.ones(count, dtype=bool)
     frames = np.linspace(0, len(values) - 1, min(len(values), MAX_FRAMES)).astype(int)
@@ -66,10 +67,13 @@ def find_undetermined(
         for marker, is_seen in zip(markers, seen[frame].tolist(), strict=True):
             body, point = marker.station
             if is_seen and marker.weight > 0.0 and body != GROUND:
+                # The first three rows are the angular velocity of the body, which a point does not
+                # show.
                 rows.append(state.point_jacobian(body, point)[3:])
         for sensor in sensors:
             body, _ = sensor.frame
             if sensor.weight > 0.0 and body != GROUND:
+                # A sensor shows only the angular velocity, which comes first.
                 rows.append(state.jacobians[body][:3])
         if constraints:
             rows += [item.acceleration_equations(state)[0] for item in mechanism.constraints]

@@ -171,6 +171,7 @@ def run_imu_inverse_kinematics_tool(job: Job, outcome: Outcome) -> None:
     frames = {frame.name for frame in model.components(PhysicalFrame)} & {*data.names}
     weights = {
         item.name: item.weight
+        # Of several weights of one sensor the first counts.
         for item in reversed(setup.orientation_weights.objects)
         if item.name in frames
     }

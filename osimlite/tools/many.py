@@ -185,6 +185,7 @@ def assign_folders(setups: Sequence[Path], output: Path | None) -> dict[Path, Pa
     Returns:
         Folder by setup; None if the setup names the folder itself.
     """
+    # A single setup writes into the folder itself.
     if output is None or len(setups) == 1:
         return dict.fromkeys(setups, output)
     paths = [os.path.abspath(setup) for setup in setups]
@@ -271,6 +272,7 @@ def _to_json_values(summary: dict[str, Any]) -> dict[str, Any]:
 def compute_digest(setup: Path) -> str:
     """Return a digest of the contents of a setup and of all files that it names."""
     made = blake2b(digest_size=16)
+    # Names are part of the digest, because a setup may name another file of the same content.
     for path in dict.fromkeys((str(setup), *find_named_files(str(setup), "file"))):
         made.update(path.encode("utf-8", "surrogateescape"))
         try:
@@ -300,8 +302,10 @@ class _Journal:
     def find_finished(self, setup: Path) -> RunRecord | None:
         """Return the record of a finished run; None if its inputs or results have changed."""
         trial = self.noted.get(str(setup))
+        # A tool that ran and reported a failure (NO) would report it again.
         if trial is None or trial.status not in (DONE, NO) or trial.digest != compute_digest(setup):
             return None
+        # Results that were deleted are to be written again.
         if not all(map(os.path.isfile, trial.files)):
             return None
         trial.was_done = True
@@ -440,6 +444,7 @@ class _Schedule:
                         under_way.remove(setup)
                         self.record_run(trial)
             except WorkerLostError:
+                # One of these setups ended the process; which one is not known.
                 alone = under_way
             while alone:
                 setup = alone.pop(0)

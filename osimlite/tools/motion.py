@@ -344,6 +344,7 @@ class Motion:
             SettingError: a requested name is unknown.
         """
         words = [str(name) for name in requested]
+        # In OpenSim "all" counts wherever it stands in the list.
         if "all" in words:
             return list(range(len(names)))
         for name in words:
@@ -384,6 +385,7 @@ class AnalysisTables:
             description: text that the header contains as well.
             of: part of the file's name before the suffix, besides the name of the analysis.
         """
+        # Tables without missing numbers need no note about them.
         if self.note and np.isnan(rows).any():
             description = f"\n{self.note}{description}"
         table = StoTable(title, self.times, tuple(columns), rows, in_degrees)

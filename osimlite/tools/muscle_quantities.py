@@ -92,6 +92,7 @@ def compute_quantities(known: Mapping[str, Array], muscles: Sequence[Any]) -> Mu
         "PassiveFiberForceAlongTendon": passive * cos,
         "FiberActivePower": -(active + (passive - spring)) * speed,
         "FiberPassivePower": -spring * speed,
+        # A tension does work against lengthening, hence the minus signs of all powers.
         "TendonPower": -tension * (known["rate"] - along),
         "MuscleActuatorPower": -tension * known["rate"],
     }

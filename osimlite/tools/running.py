@@ -110,6 +110,7 @@ def run(
             f"osimlite cannot run a {tag}; it runs {join_words(list_runnable())}",
             file=str(file),
         )
+    # An option without effect would suggest results that it does not give.
     if refine is not None and not tag.startswith("Moco"):
         raise SettingError(f"a {tag} has no mesh to refine; leave out --refine")
     outcome = Outcome(progress=progress)
@@ -144,6 +145,7 @@ def run(
         # Importing the simulation here keeps setups that need none fast.
         from osimlite.simulation.elements.gather import SKIP_ADVICE
 
+        # The advice names an option of other commands, which this function lacks.
         error.message = error.message.replace(SKIP_ADVICE, NO_OPTION)
         error.file = error.file or str(file)
         subject = load_subject(str(file), Config()) if isinstance(error, MissingFileError) else None

@@ -73,6 +73,7 @@ def write_body_kinematics(analysis: BodyKinematics, motion: Motion, tables: Anal
         )
         # Positions remain in ground, as in OpenSim.
         if local:
+            # Row vectors times R are the components along the axes of the body.
             rows[1:] = rows[1:] @ rotation
         if analysis.in_degrees:
             rows[:, :, 1] = np.degrees(rows[:, :, 1])
@@ -147,6 +148,8 @@ def write_point_kinematics(
     path = motion.find_frame_path(beside, *FRAME_SEARCH)
     if path is not None:
         rotation, origin = motion.links.locate_frame(*mechanism.placement(path))
+        # Only the position is relative to the other body; the velocities are those in ground, along
+        # its axes.
         result[0] -= origin
         result = (result[..., None, :] @ rotation)[..., 0, :]
     elif beside not in ("", "none"):
