@@ -93,6 +93,11 @@ class _Edge:
     coordinates: tuple[int, ...]  # indices of its coordinates in the mechanism
 
     def build_mobilizer(self, *, reversed: bool) -> Mobilizer:
+        """Return the mobilizer of the joint.
+
+        Args:
+            reversed: whether the child carries the parent in the tree.
+        """
         return Mobilizer(
             joint=self.path,
             joint_type=self.kind,
@@ -115,6 +120,12 @@ class _Builder:
         self.constraints: list[Constraint] = []
 
     def build(self) -> Mechanism:
+        """Return the mechanism of the model.
+
+        Raises:
+            ModelError: the model has a mistake.
+            UnsupportedError: a class of the model cannot be computed.
+        """
         # Refuse unknown classes before anything else, with their own messages.
         for component in self.tree.components:
             self._refuse(component)
@@ -169,6 +180,11 @@ class _Builder:
             raise unknown_constraint(path, component.class_name)
 
     def _make_edge(self, joint: Joint) -> _Edge:
+        """Return the edge of a joint, and add the coordinates of the joint to the mechanism.
+
+        Raises:
+            ModelError: the joint connects a body to itself, or its coordinates have a mistake.
+        """
         path = self.placements.path(joint)
         parent, parent_frame = self.placements.resolve_frame(
             self.placements.follow_socket(joint, "socket_parent_frame")
@@ -214,6 +230,12 @@ class _Builder:
         )
 
     def _convert_prescribed_function(self, coordinate: Coordinate, path: str) -> Function | None:
+        """Return the function of time of a prescribed coordinate, None if it moves freely.
+
+        Args:
+            coordinate: coordinate.
+            path: its path, for messages.
+        """
         # OpenSim leaves a prescribed coordinate without a function free. It cannot start where one
         # is locked too.
         if not coordinate.prescribed or coordinate.prescribed_function is None or coordinate.locked:
@@ -334,6 +356,11 @@ class _Builder:
         self.constraints.append(weld)
 
     def _build_constraints(self, index: dict[str, int]) -> None:
+        """Add the constraints that are enforced.
+
+        Args:
+            index: index of each body and of ground, by path.
+        """
         places = {info.path: place for place, info in enumerate(self.coordinates)}
         reader = ConstraintReader(self.placements, index, places, self.opensim_derivatives)
         for component in self.tree.components:

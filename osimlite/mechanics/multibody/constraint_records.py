@@ -133,6 +133,13 @@ def room_for(equations: int, size: int, entries: int) -> dict[str, int]:
 
 
 def _coordinate(place: int, places: Places, balls: Balls) -> list[int]:
+    """Return the record of a coordinate, with its part of a ball joint if it has one.
+
+    Args:
+        place: index of the coordinate in the mechanism.
+        places: degrees of freedom and links of the mechanism.
+        balls: offset of the arguments of each ball joint, by its degrees of freedom.
+    """
     freedom = places.freedom(place)
     for freedoms, arguments in balls.items():
         if freedom in freedoms:
@@ -141,6 +148,13 @@ def _coordinate(place: int, places: Places, balls: Balls) -> list[int]:
 
 
 def _coupler(constraint: Coupler, places: Places, balls: Balls) -> ConstraintRecord:
+    """Return the record of a coordinate that is a function of others.
+
+    Args:
+        constraint: coupler.
+        places: degrees of freedom and links of the mechanism.
+        balls: offset of the arguments of each ball joint, by its degrees of freedom.
+    """
     others = constraint.independent
     table = function_table(constraint.function, f"the function of '{constraint.name}'")
     dependent = _coordinate(constraint.dependent, places, balls)
@@ -157,6 +171,12 @@ def _coupler(constraint: Coupler, places: Places, balls: Balls) -> ConstraintRec
 def _record_between_bodies(
     equations: Sequence[_Equation], positions: int | None = None
 ) -> ConstraintRecord:
+    """Return the record of a constraint between bodies.
+
+    Args:
+        equations: equations; those of positions come first.
+        positions: number of equations of positions; None if all are.
+    """
     ints: list[int] = []
     numbers: list[float] = []
     for item in equations:
@@ -169,11 +189,25 @@ def _record_between_bodies(
 
 
 def _axis(places: Places, body: int, axis: ArrayLike) -> _Vector:
+    """Return an axis that is fixed in a body, in the link of the body.
+
+    Args:
+        places: degrees of freedom and links of the mechanism.
+        body: index of the body.
+        axis: direction in the frame of the body (3,).
+    """
     direction = places.direction(body, np.asarray(axis, dtype=float).tolist())
     return _Vector([AXIS, places.placement(body).link, GROUND], [*direction, 0.0, 0.0, 0.0])
 
 
 def _arm(places: Places, first: StationPlacement, second: StationPlacement) -> _Vector:
+    """Return the vector from a point of one body to a point of another.
+
+    Args:
+        places: degrees of freedom and links of the mechanism.
+        first: point at its start.
+        second: point at its end.
+    """
     (one, start), (two, end) = (
         places.station(body, point.tolist()) for body, point in (first, second)
     )
@@ -196,6 +230,12 @@ def _meeting(places: Places, first: StationPlacement, second: StationPlacement) 
 
 
 def _weld(constraint: b.WeldConstraint, places: Places) -> list[_Equation]:
+    """Return the six equations of a weld: three of orientation, then three of position.
+
+    Args:
+        constraint: weld.
+        places: degrees of freedom and links of the mechanism.
+    """
     (one, inner), (two, outer) = constraint.first, constraint.second
     # Two frames have the same orientation if each axis of one is perpendicular to the next axis of
     # the other.
@@ -211,6 +251,15 @@ def _weld(constraint: b.WeldConstraint, places: Places) -> list[_Equation]:
 
 
 def _rolling(constraint: b.RollingConstraint, places: Places) -> list[_Equation]:
+    """Return the four equations of a body that rolls on a plane.
+
+    The height of its origin over the plane is constant, its z axis is perpendicular to the x axis of
+    the plane's body, and the point of contact does not slip along x and z.
+
+    Args:
+        constraint: rolling constraint.
+        places: degrees of freedom and links of the mechanism.
+    """
     surface, roller = constraint.surface, constraint.roller
     arm = _arm(
         places, StationPlacement(surface, np.zeros(3)), StationPlacement(roller, np.zeros(3))
@@ -227,4 +276,5 @@ def _rolling(constraint: b.RollingConstraint, places: Places) -> list[_Equation]
 
 
 def _origin(placement: FramePlacement) -> StationPlacement:
+    """Return the origin of a frame as a point of its body."""
     return StationPlacement(placement.body, placement.transform[:3, 3])

@@ -361,6 +361,14 @@ class _Reader:
         return self._append(law, *arguments)
 
     def _add_up(self, one: int, two: int, first: float | None, second: float | None) -> int:
+        """Return the register of a sum, simplified as Lepton does.
+
+        Args:
+            one: register of the first term.
+            two: register of the second term.
+            first: value of the first term if it is a constant, else None.
+            second: value of the second term if it is a constant, else None.
+        """
         if first == 0.0:
             return two
         if second == 0.0:
@@ -376,6 +384,7 @@ class _Reader:
         return self._append("+", one, two)
 
     def _subtract(self, one: int, two: int, first: float | None, second: float | None) -> int:
+        """Return the register of the difference of two registers, with arguments as in `_add_up`."""
         if self._is_same(one, two):
             return self._derive(0.0)
         if first == 0.0:
@@ -387,6 +396,7 @@ class _Reader:
         return self._append("-", one, two)
 
     def _multiply(self, one: int, two: int, first: float | None, second: float | None) -> int:
+        """Return the register of the product of two registers, with arguments as in `_add_up`."""
         if first == 0.0 or second == 0.0:
             return self._derive(0.0)
         if first == 1.0:
@@ -420,6 +430,7 @@ class _Reader:
         return self._append("*", one, two)
 
     def _divide(self, one: int, two: int, first: float | None, second: float | None) -> int:
+        """Return the register of the quotient of two registers, with arguments as in `_add_up`."""
         if self._is_same(one, two):
             return self._derive(1.0)
         if first == 0.0:
@@ -445,6 +456,14 @@ class _Reader:
         return self._append("divide", one, two)
 
     def _raise(self, one: int, two: int, base: float | None, exponent: float | None) -> int:
+        """Return the register of a power, simplified as Lepton does.
+
+        Args:
+            one: register of the base.
+            two: register of the exponent.
+            base: value of the base if it is a constant, else None.
+            exponent: value of the exponent if it is a constant, else None.
+        """
         if base == 0.0 or base == 1.0:
             return self._derive(base)
         if exponent == 0.0:
@@ -457,6 +476,7 @@ class _Reader:
         return self._append("power", one, two)
 
     def _negate(self, one: int) -> int:
+        """Return the register of the negative of a register, simplified as Lepton does."""
         if (inner := self._argument("negative", one)) is not None:
             return inner
         if (number := self._constant(one)) is not None:
@@ -516,6 +536,11 @@ class _Reader:
         return self._operands.pop()
 
     def _number_of(self, token: re.Match[str]) -> int:
+        """Return the register of a number or variable.
+
+        Args:
+            token: match of the number or name in the text.
+        """
         word = token.group()
         if token["number"]:
             return self.add("number", value=float(word))

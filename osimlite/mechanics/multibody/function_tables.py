@@ -26,6 +26,13 @@ def function_table(function: f.Function, where: str) -> list[float]:
 
 
 def _has_table(table: list[float], function: f.Function, where: str) -> list[float]:
+    """Return a table, or raise UnsupportedError if it is empty.
+
+    Args:
+        table: table of the function.
+        function: function.
+        where: its description for messages.
+    """
     if not table:
         name = type(function).__name__
         raise UnsupportedError(
@@ -53,6 +60,12 @@ def table_of_one(function: f.Function, where: str) -> list[float]:
 
 
 def _table_of_one(function: f.Function, where: str) -> list[float]:
+    """Return the table of a function of one number, see `table_of_one`, without a check of its numbers.
+
+    Args:
+        function: function.
+        where: its description for messages.
+    """
     if isinstance(function, f.ScaledFunction):
         kind, factor, *rest = _table_of_one(function.function, where)
         return [kind, function.scale * factor, *rest]

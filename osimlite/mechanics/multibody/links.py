@@ -312,7 +312,12 @@ def _square_of_skew(v: Array) -> Array:
 
 
 def _move_inertia(link: Link) -> list[float]:
-    # Inertia about the mass centre, by the parallel axis theorem.
+    """Return mass (kg), mass centre (m) and inertia (kg m²) of a link, as `layout.INERTIA` lists them.
+
+    The link has the inertia about its origin; that of the record is about the mass centre, by the
+    parallel axis theorem, as xx, yy, zz, xy, xz, yz.
+    """
+    # The mass centre of a link without mass does not matter.
     center = link.first / link.mass if link.mass != 0.0 else link.first
     i = link.second + link.mass * _square_of_skew(center)
     return [link.mass, *center.tolist(), i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2]]

@@ -612,6 +612,12 @@ class Mechanism:
         return self.inertial[0] @ vectors / (self.total_mass or 1.0)
 
     def _station(self, frame: str, station: ArrayLike) -> tuple[int, Array]:
+        """Return the body of a frame, and a point of the frame in the body (3,), m.
+
+        Args:
+            frame: name of a frame or body.
+            station: point in the frame (3,), m.
+        """
         body, placed = self.placement(frame)
         point: Array = placed[:3, :3] @ _make_vector(station, "station") + placed[:3, 3]
         return body, point
@@ -619,6 +625,13 @@ class Mechanism:
     def _sum_applied_forces(
         self, state: Kinematics, forces: Values, wrenches: Mapping[str, Wrench]
     ) -> Array:
+        """Return the generalized forces (n,) of forces and wrenches.
+
+        Args:
+            state: state.
+            forces: generalized forces, zero where omitted.
+            wrenches: wrenches at the origins of bodies or frames, by name.
+        """
         total = self._array(forces, "force")
         for name, (force, torque) in wrenches.items():
             body, placed = self.placement(name)
@@ -628,6 +641,16 @@ class Mechanism:
         return total
 
     def _array(self, values: Values, what: str, defaults: Sequence[float] = ()) -> Array:
+        """Return values of coordinates as an array (n,).
+
+        Args:
+            values: array, or numbers by coordinate name.
+            what: description of one number, for messages.
+            defaults: values of omitted names; zeros if empty.
+
+        Raises:
+            ModelError: a name is unknown, or the number of values is wrong.
+        """
         count = len(self.coordinates)
         # The usual case, in which simulations call, is not converted.
         if type(values) is np.ndarray and values.shape == (count,) and values.dtype == float:

@@ -57,10 +57,26 @@ class ConstraintReader:
         )
 
     def _find_frame(self, owner: Component, socket: str) -> FramePlacement:
+        """Return the body and place of the frame that a socket refers to.
+
+        Args:
+            owner: component with the socket.
+            socket: name of the socket.
+        """
         base, matrix = self.placements.resolve_frame(self.placements.follow_socket(owner, socket))
         return FramePlacement(self.bodies[base], matrix)
 
     def _find_coordinate(self, owner: Component, field: str, value: str | Component) -> int:
+        """Return the index in the mechanism of a coordinate that a constraint refers to.
+
+        Args:
+            owner: constraint.
+            field: name of the property, for messages.
+            value: its value: a name or path, or the coordinate.
+
+        Raises:
+            ModelError: no joint moves by the coordinate.
+        """
         path = self.placements.path(self.placements.tree.target(owner, field, value))
         if path not in self.coordinates:
             # If a coordinate occurs several times in a joint, only the first one moves the joint.

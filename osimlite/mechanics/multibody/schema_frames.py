@@ -78,6 +78,15 @@ class Placements:
         return []
 
     def _place_frame(self, frame: PhysicalFrame, path: str) -> tuple[str, Array]:
+        """Return the body that a frame is fixed to, and the frame in it.
+
+        Args:
+            frame: frame.
+            path: its path, for messages.
+
+        Returns:
+            Path of the body, and transform of the frame in the body (4, 4).
+        """
         if isinstance(frame, Body | Ground):
             return path, np.eye(4)
         if isinstance(frame, PhysicalOffsetFrame):
@@ -145,6 +154,17 @@ class Placements:
         return stations
 
     def _fit_frame_to_stations(self, frame: StationDefinedFrame, path: str) -> tuple[str, Array]:
+        """Return the body of a frame that four stations define, and the frame in it.
+
+        One axis is along the line from a to b, another one perpendicular to the plane of a, b and c.
+
+        Args:
+            frame: frame.
+            path: its path, for messages.
+
+        Returns:
+            Path of the body, and transform of the frame in the body (4, 4).
+        """
         bases, points = zip(*map(self.resolve_station, self._list_stations(frame)), strict=True)
         if len(set(bases)) > 1:
             raise ModelError(

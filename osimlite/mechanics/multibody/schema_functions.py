@@ -84,6 +84,12 @@ def _converts(function: Object, wanted: int, given: int) -> None:
 
 
 def _convert_linear(function: schema.LinearFunction, arguments: int) -> f.Function:
+    """Return a linear function of one or several arguments.
+
+    Args:
+        function: function of the file.
+        arguments: number of arguments.
+    """
     count = len(function.coefficients)
     if count <= arguments:
         raise _Impossible(f"it has {count} coefficients; give {arguments + 1}, the constant last")
@@ -121,6 +127,7 @@ def _read_points(
 
 
 def _piecewise_linear(function: schema.PiecewiseLinearFunction) -> f.Function:
+    """Return straight lines through points; one point is a constant."""
     x, y = _read_points(function, 1)
     if len(x) == 1:
         return f.Constant(y[0])
@@ -131,11 +138,13 @@ def _piecewise_linear(function: schema.PiecewiseLinearFunction) -> f.Function:
 
 
 def _piecewise_constant(function: schema.PiecewiseConstantFunction) -> f.Function:
+    """Return steps through points; one point is a constant."""
     x, y = _read_points(function, 1)
     return f.PiecewiseConstant(x, y) if len(x) > 1 else f.Constant(y[0])
 
 
 def _convert_gcv_spline(function: schema.GCVSpline) -> f.Function:
+    """Return a smoothing spline."""
     half_order = function.half_order
     if half_order < 1:
         raise _Impossible(f"its half_order is {half_order}; give 1 or more, 2 for a cubic spline")
@@ -147,6 +156,7 @@ def _convert_gcv_spline(function: schema.GCVSpline) -> f.Function:
 
 
 def _convert_step(function: schema.StepFunction) -> f.Function:
+    """Return a smooth step."""
     start, end = function.transition_start_time, function.transition_end_time
     if start > end:
         # OpenSim follows the same curve from its other end.

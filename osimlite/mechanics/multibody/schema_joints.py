@@ -98,6 +98,19 @@ def unknown_joint(path: str, kind: str) -> UnsupportedError:
 def _build_custom_motions(
     joint: schema.CustomJoint, path: str, opensim_derivatives: bool
 ) -> tuple[tuple[JointMotion, ...], Sequence[Coordinate]]:
+    """Return the motions of a CustomJoint, and its coordinates in the order of the motions.
+
+    Args:
+        joint: joint.
+        path: its path, for messages.
+        opensim_derivatives: whether accelerations have Simbody's error, see `make_custom_motions`.
+
+    Returns:
+        Motions, and coordinates.
+
+    Raises:
+        ModelError: an axis has no direction or an unknown coordinate, or a coordinate is unused.
+    """
     known = {coordinate.name: coordinate for coordinate in joint.coordinates}
     order: dict[str, int] = {}
     axes: list[TransformAxis] = []
@@ -132,6 +145,12 @@ def _build_custom_motions(
 
 
 def _read_radii(radii: Sequence[float], path: str) -> Sequence[float]:
+    """Return the half axes of an ellipsoid after a check (3,), m.
+
+    Args:
+        radii: half axes of the file.
+        path: path of the joint, for messages.
+    """
     # Negative radii are accepted: models use them to mirror an ellipsoid.
     if not np.isfinite(radii).all():
         words = " ".join(f"{radius:g}" for radius in radii)

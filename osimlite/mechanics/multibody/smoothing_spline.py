@@ -328,6 +328,7 @@ def _smooth_values(points: Array, values: Array, half_order: int, error_variance
     loads = vectors.T @ values
 
     def criterion(logarithm: float) -> float:
+        """Return what the smoothing minimizes, at the logarithm of the smoothing."""
         left = 1.0 - 1.0 / (1.0 + math.exp(logarithm) * roughness)
         trace, error = float(left.sum()) / n, float(np.sum((left * loads) ** 2)) / n
         # Generalized cross validation (Woltring 1986), else the mean squared error for a known

@@ -77,6 +77,7 @@ def spanning_tree(
     used: set[int] = set()
 
     def add(place: int) -> str:
+        """Add a joint to the tree, and return the body that it carries."""
         link = links[place]
         backward = link.parent not in levels
         inner, outer = (link.child, link.parent) if backward else (link.parent, link.child)
