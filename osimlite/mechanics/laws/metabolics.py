@@ -49,8 +49,7 @@ def umberger2010(
     lengths a second), largest velocity vmax, and factor fl of the active force by length, the terms
     per kg of muscle are
 
-    - heat of activation and maintenance: S A^0.6 (128 (1 - s) + 25), of which 60 % are multiplied by
-      fl for l > 1;
+    - heat of activation and maintenance: S A^0.6 (128 (1 - s) + 25), times 0.4 + 0.6 fl for l > 1;
     - heat of shortening, v <= 0: S A^2 (min(-ks v, 100) s - kf v (1 - s)), where kf = 153 / vmax
       and ks = 250 / vmax;
     - heat of lengthening, v > 0: 0.3 S A ks v, or 4 S A ks v if negative work is included;

@@ -253,8 +253,8 @@ def _weld(constraint: b.WeldConstraint, places: Places) -> list[_Equation]:
 def _rolling(constraint: b.RollingConstraint, places: Places) -> list[_Equation]:
     """Return the four equations of a body that rolls on a plane.
 
-    The height of its origin over the plane is constant, its z axis is perpendicular to the x axis of
-    the plane's body, and the point of contact does not slip along x and z.
+    They are the height, the direction of the z axis, and the two slips along x and z, see
+    `body_constraints.RollingConstraint`.
 
     Args:
         constraint: rolling constraint.

@@ -384,7 +384,7 @@ class _Reader:
         return self._append("+", one, two)
 
     def _subtract(self, one: int, two: int, first: float | None, second: float | None) -> int:
-        """Return the register of the difference of two registers, with arguments as in `_add_up`."""
+        """Return the register of a difference, with arguments as in `_add_up`."""
         if self._is_same(one, two):
             return self._derive(0.0)
         if first == 0.0:
@@ -396,7 +396,7 @@ class _Reader:
         return self._append("-", one, two)
 
     def _multiply(self, one: int, two: int, first: float | None, second: float | None) -> int:
-        """Return the register of the product of two registers, with arguments as in `_add_up`."""
+        """Return the register of a product, with arguments as in `_add_up`."""
         if first == 0.0 or second == 0.0:
             return self._derive(0.0)
         if first == 1.0:
@@ -430,7 +430,7 @@ class _Reader:
         return self._append("*", one, two)
 
     def _divide(self, one: int, two: int, first: float | None, second: float | None) -> int:
-        """Return the register of the quotient of two registers, with arguments as in `_add_up`."""
+        """Return the register of a quotient, with arguments as in `_add_up`."""
         if self._is_same(one, two):
             return self._derive(1.0)
         if first == 0.0:

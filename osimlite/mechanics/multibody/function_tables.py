@@ -60,7 +60,7 @@ def table_of_one(function: f.Function, where: str) -> list[float]:
 
 
 def _table_of_one(function: f.Function, where: str) -> list[float]:
-    """Return the table of a function of one number, see `table_of_one`, without a check of its numbers.
+    """Return the table of a function of one number, whose numbers are not checked.
 
     Args:
         function: function.

@@ -312,7 +312,7 @@ def _square_of_skew(v: Array) -> Array:
 
 
 def _move_inertia(link: Link) -> list[float]:
-    """Return mass (kg), mass centre (m) and inertia (kg m²) of a link, as `layout.INERTIA` lists them.
+    """Return mass (kg), mass centre (m) and inertia (kg m²) of a link, in the order of `INERTIA`.
 
     The link has the inertia about its origin; that of the record is about the mass centre, by the
     parallel axis theorem, as xx, yy, zz, xy, xz, yz.

@@ -156,7 +156,7 @@ class Placements:
     def _fit_frame_to_stations(self, frame: StationDefinedFrame, path: str) -> tuple[str, Array]:
         """Return the body of a frame that four stations define, and the frame in it.
 
-        One axis is along the line from a to b, another one perpendicular to the plane of a, b and c.
+        One axis is along the line from a to b, another one perpendicular to the plane abc.
 
         Args:
             frame: frame.

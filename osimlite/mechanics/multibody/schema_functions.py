@@ -144,7 +144,7 @@ def _piecewise_constant(function: schema.PiecewiseConstantFunction) -> f.Functio
 
 
 def _convert_gcv_spline(function: schema.GCVSpline) -> f.Function:
-    """Return a smoothing spline."""
+    """Return the smoothing spline of a GCVSpline, after checks."""
     half_order = function.half_order
     if half_order < 1:
         raise _Impossible(f"its half_order is {half_order}; give 1 or more, 2 for a cubic spline")
@@ -156,7 +156,7 @@ def _convert_gcv_spline(function: schema.GCVSpline) -> f.Function:
 
 
 def _convert_step(function: schema.StepFunction) -> f.Function:
-    """Return a smooth step."""
+    """Return a smooth step, with ascending arguments."""
     start, end = function.transition_start_time, function.transition_end_time
     if start > end:
         # OpenSim follows the same curve from its other end.
