@@ -24,8 +24,10 @@ WRITTEN = "the file that is written"
 
 
 def _list_format_options() -> Iterator[OptionSpec]:
-    for each in (*list_exporters("translate").values(), *_list_model_importers()):
-        yield from each.choices
+    for exporter in list_exporters("translate").values():
+        yield from exporter.choices
+    for importer in _list_model_importers():
+        yield from importer.choices
 
 
 def _list_model_importers() -> list[Importer]:

@@ -15,6 +15,7 @@ from osimlite.schema.model import Model
 from osimlite.simulation.robot.names import legal
 from osimlite.translate.fidelity import Fidelity
 from osimlite.translate.files import write_files
+from osimlite.translate.mjcf_import.actuators import add_actuators
 from osimlite.translate.mjcf_import.bodies import add_bodies, add_markers
 from osimlite.translate.mjcf_import.contacts import add_contacts
 from osimlite.translate.mjcf_import.coordinate_map import CoordinateMap
@@ -33,6 +34,7 @@ from osimlite.translate.mjcf_import.joints import add_joint_forces
 from osimlite.translate.mjcf_import.keyframes import add_keyframes
 from osimlite.translate.mjcf_import.shapes import add_shapes, record_unseen
 from osimlite.translate.mjcf_import.source import load_mjcf
+from osimlite.translate.mjcf_import.tendons import add_tendon_paths
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,6 +97,8 @@ PASSES: tuple[Callable[[Draft], None], ...] = (
     add_bodies,
     add_joint_forces,
     add_equalities,
+    add_tendon_paths,
+    add_actuators,
     add_markers,
     add_contacts,
     add_shapes,

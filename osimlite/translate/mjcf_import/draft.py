@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from osimlite.mechanics.multibody.spatial import Array, rotation_of, rotation_xy
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.frames import PhysicalFrame, PhysicalOffsetFrame
 from osimlite.schema.model import Model
+from osimlite.schema.paths import AbstractGeometryPath
 from osimlite.simulation.robot.names import UniqueNames
 from osimlite.translate.fidelity import LEFT_OUT, Error, Fidelity
 from osimlite.translate.mjcf_import.source import Source
@@ -39,6 +40,13 @@ class Options:
     seed: int = 0
 
 
+class TendonPath(NamedTuple):
+    """The path of a tendon."""
+
+    path: AbstractGeometryPath
+    shift: float = 0.0  # number that was added to the tendon's length, m
+
+
 @dataclass(eq=False)
 class Draft:
     """State of a conversion.
@@ -58,6 +66,8 @@ class Draft:
         meshes: file of each mesh that is written.
         wrapping_geoms: geoms that a tendon wraps around.
         path_sites: sites that a tendon runs through.
+        paths: path of each tendon, by the index of the tendon.
+        version: version of MuJoCo whose rules the tendons follow.
         names: unique names by kind of component.
     """
 
@@ -74,12 +84,18 @@ class Draft:
     meshes: dict[int, str] = field(default_factory=dict)
     wrapping_geoms: set[int] = field(default_factory=set)
     path_sites: set[int] = field(default_factory=set)
+    paths: dict[int, TendonPath] = field(default_factory=dict)
+    version: int = 4
     names: dict[str, UniqueNames] = field(default_factory=dict)
 
     @property
     def mj(self) -> Any:
         """MuJoCo's compiled model."""
         return self.source.model
+
+    def coordinate_path(self, joint: int) -> str:
+        """Return the path of the coordinate of a hinge or slide."""
+        return self.model.tree().path_of(self.made[self.coordinates[joint][0]]) or ""
 
     def unique(self, kind: str, name: str) -> str:
         """Return a legal name that no other component of this kind has."""

@@ -56,13 +56,13 @@ def _draw(draft: Draft, geom: int, frame: PhysicalFrame, shape: Geometry, name: 
     material = int(model.geom_matid[geom])
     if material >= 0 and np.allclose(rgba, (0.5, 0.5, 0.5, 1.0)):
         rgba = model.mat_rgba[material]
-    color = tuple(float(min(max(value, 0.0), 1.0)) for value in rgba)
+    red, green, blue, opacity = (float(min(max(value, 0.0), 1.0)) for value in rgba)
     # Viewers of MuJoCo show the groups 0 to 2 only, unless they are told otherwise.
     shape.appearance = Appearance(
         name="appearance",
         visible=bool(model.geom_group[geom] < 3),
-        opacity=color[3],
-        color=color[:3],
+        opacity=opacity,
+        color=(red, green, blue),
     )
     shape.name = draft.unique("shape", name)
     frame.attach(shape)

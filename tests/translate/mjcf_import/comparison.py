@@ -167,5 +167,68 @@ class LiveModel:
 
     def mobilities(self) -> list[str]:
         """Return the coordinate names in the order of OpenSim's mobilities."""
-        ordered = self.model.getCoordinatesInMultibodyTreeOrder()
-        return [ordered[k].getName() for k in range(len(self.coordinates))]
+        result = {}
+        for coordinate in self.coordinates.values():
+            coordinate.setSpeedValue(self.state, 0.0)
+        for name, coordinate in self.coordinates.items():
+            coordinate.setSpeedValue(self.state, 1.0)
+            speeds = self.state.getU()
+            result[next(k for k in range(speeds.size()) if speeds.get(k))] = name
+            coordinate.setSpeedValue(self.state, 0.0)
+        return [result[k] for k in sorted(result)]
+
+
+def actuator_torques(path: Path, qpos: Array, qvel: Array, control: float, name: str) -> Array:
+    """Return MuJoCo's generalized forces (nv,) of one actuator.
+
+    Args:
+        path: the file.
+        qpos: positions.
+        qvel: velocities.
+        control: of the actuator; its activation is the same.
+        name: the actuator.
+    """
+    model = mujoco.MjModel.from_xml_path(str(path))
+    for actuator in range(model.nu):
+        if model.actuator(actuator).name != name:
+            # Without gain and bias it gives no force.
+            model.actuator_gainprm[actuator] = model.actuator_biasprm[actuator] = 0.0
+            model.actuator_gaintype[actuator] = mujoco.mjtGain.mjGAIN_FIXED
+            model.actuator_biastype[actuator] = mujoco.mjtBias.mjBIAS_NONE
+    data = mujoco.MjData(model)
+    data.qpos[:], data.qvel[:], data.ctrl[:], data.act[:] = qpos, qvel, control, control
+    mujoco.mj_forward(model, data)
+    return data.qfrc_actuator.copy()
+
+
+class LiveForces:
+    """Generalized forces of single forces in OpenSim, in a model of hinges and slides without constraints."""
+
+    def __init__(self, live: LiveModel, made: Osim) -> None:
+        self.live, self.made = live, made
+        order = live.mobilities()
+        self.names = made.coordinates.names()
+        self.order = [order.index(name) for name in self.names]
+
+    def accelerations(self, qpos: Array, qvel: Array, control: float, names: list[str]) -> Array:
+        """Return the accelerations (n,) where only forces of these names act."""
+        live = self.live
+        live.place(self.made.coordinates.values(qpos))
+        for name, speed in zip(self.names, qvel, strict=True):
+            live.coordinates[name].setSpeedValue(live.state, speed)
+        for force in live.model.getForceSet():
+            force.setAppliesForce(live.state, force.getName() in names)
+        live.model.realizeVelocity(live.state)
+        controls = live.opensim.Vector(live.model.getNumControls(), control)
+        live.model.setControls(live.state, controls)
+        live.model.realizeAcceleration(live.state)
+        return np.array(
+            [live.coordinates[name].getAccelerationValue(live.state) for name in self.names]
+        )
+
+    def torques(self, qpos: Array, qvel: Array, control: float, names: list[str]) -> Array:
+        """Return the generalized forces (n,) of forces with these names."""
+        with_them = self.accelerations(qpos, qvel, control, names)
+        without = self.accelerations(qpos, qvel, control, [])
+        masses = self.live.mass_matrix()[np.ix_(self.order, self.order)]
+        return masses @ (with_them - without)

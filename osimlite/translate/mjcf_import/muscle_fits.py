@@ -1,0 +1,279 @@
+"""MuJoCo's muscle curves, as formulas and as fitted curves of Millard's muscle.
+
+The curves are piecewise parabolas (MuJoCo's manual, Modeling, "Muscles"; `mju_muscleGainLength`).
+With the normalized length L and velocity V, a = (lmin + 1)/2, b = (1 + lmax)/2 and y = fvmax - 1:
+
+- active: ((L - lmin)/(a - lmin))^2/2 up to a, 1 - ((1 - L)/(1 - a))^2/2 up to 1, and the same on
+  the other side,
+- velocity: (V + 1)^2 up to 0, fvmax - (y - V)^2/y up to y, fvmax beyond,
+- passive: fpmax ((L - 1)/(b - 1))^2/2 up to b, a line beyond.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from osimlite.base.require import require
+from osimlite.mechanics.laws.bezier import curve_value
+from osimlite.mechanics.laws.muscle_curves import (
+    active_force_length,
+    fiber_force_length,
+    force_velocity,
+)
+from osimlite.mechanics.multibody.spatial import Array
+from osimlite.schema.muscle_curves import (
+    ActiveForceLengthCurve,
+    FiberForceLengthCurve,
+    ForceVelocityCurve,
+)
+
+POINTS = 41
+"""Number of points in which a curve is fitted."""
+FITTED_LENGTHS = (0.4, 1.65)
+"""Normalized lengths between which the active curve is fitted: fibers are hardly ever outside."""
+SEARCHES = 2
+"""Number of starts, the best of all, from which a fit is searched."""
+DIGITS = 6
+"""Digits of the parameters that the cache of fitted curves distinguishes."""
+LEAST_FVMAX = 1.001
+"""Least force of lengthening fibers that a ForceVelocityCurve can have: it must be above 1."""
+LEAST_LENGTH = 0.01
+"""Least active fiber length of an ActiveForceLengthCurve."""
+
+
+class Shape(NamedTuple):
+    """Dimensionless parameters of a muscle of MuJoCo."""
+
+    lmin: float
+    lmax: float
+    fvmax: float
+    passive_start: float = 1.0  # normalized length at which the passive force begins
+    passive_width: float = 0.3  # distance from there to where it becomes a line
+    fpmax: float = 1.3  # twice the passive force there
+
+    def active(self, x: Array) -> Array:
+        """Return the active force at normalized lengths."""
+        low, high = 0.5 * (self.lmin + 1.0), 0.5 * (1.0 + self.lmax)
+        short = x <= 1.0
+        with np.errstate(divide="ignore", invalid="ignore"):
+            inner = np.where(short, (1.0 - x) / (1.0 - low), (x - 1.0) / (high - 1.0))
+            outer = np.where(
+                short, (x - self.lmin) / (low - self.lmin), (self.lmax - x) / (self.lmax - high)
+            )
+        force = np.where((x < low) | (x > high), 0.5 * outer**2, 1.0 - 0.5 * inner**2)
+        return np.where((x < self.lmin) | (x > self.lmax), 0.0, force)
+
+    def velocity(self, v: Array) -> Array:
+        """Return the factor of the active force at normalized velocities."""
+        y = self.fvmax - 1.0
+        lengthening = self.fvmax - (y - v) ** 2 / y if y > 0.0 else np.ones_like(v)
+        return np.where(
+            v <= -1.0,
+            0.0,
+            np.where(v <= 0.0, (v + 1.0) ** 2, np.where(v <= y, lengthening, self.fvmax)),
+        )
+
+    def passive(self, x: Array) -> Array:
+        """Return the passive force at normalized lengths."""
+        s = np.maximum((x - self.passive_start) / self.passive_width, 0.0)
+        return np.asarray(self.fpmax * np.where(s <= 1.0, 0.5 * s**2, s - 0.5))
+
+    def formulas(self) -> tuple[str, str, str]:
+        """Return the formulas of active force, passive force and velocity factor, in ``x``."""
+        low, high = 0.5 * (self.lmin + 1.0), 0.5 * (1.0 + self.lmax)
+        y = self.fvmax - 1.0
+
+        def between(first: float, last: float) -> str:
+            return f"step(x-{_n(first)})*(1-step(x-{_n(last)}))"
+
+        active = "+".join(
+            (
+                f"{between(self.lmin, low)}*0.5*((x-{_n(self.lmin)})/{_n(low - self.lmin)})^2",
+                f"{between(low, 1.0)}*(1-0.5*((1-x)/{_n(1.0 - low)})^2)",
+                f"{between(1.0, high)}*(1-0.5*((x-1)/{_n(high - 1.0)})^2)",
+                f"{between(high, self.lmax)}*0.5*(({_n(self.lmax)}-x)/{_n(self.lmax - high)})^2",
+            )
+        )
+        start, end = self.passive_start, self.passive_start + self.passive_width
+        s = f"((x-{_n(start)})/{_n(self.passive_width)})"
+        passive = (
+            f"{between(start, end)}*{_n(0.5 * self.fpmax)}*{s}^2"
+            f"+step(x-{_n(end)})*{_n(self.fpmax)}*({s}-0.5)"
+        )
+        velocity = f"{between(-1.0, 0.0)}*(x+1)^2"
+        if y > 0.0:
+            velocity += f"+{between(0.0, y)}*({_n(self.fvmax)}-({_n(y)}-x)^2/{_n(y)})"
+        velocity += f"+step(x-{_n(y)})*{_n(self.fvmax)}"
+        return active, passive, velocity
+
+
+def _n(value: float) -> str:
+    return f"({value!r})" if value < 0.0 else repr(value)
+
+
+class FittedCurves(NamedTuple):
+    """Curves of a Millard muscle: properties, and functions that evaluate them."""
+
+    active: dict[str, float]
+    velocity: dict[str, float]
+    passive: dict[str, float]
+
+    def evaluate(self, lengths: Array, velocities: Array) -> tuple[Array, Array, Array]:
+        """Return active force, passive force and velocity factor."""
+        return (
+            _evaluate(active_force_length(*self.active.values()), lengths),
+            _evaluate(fiber_force_length(*self.passive.values()), lengths),
+            _evaluate(force_velocity(*self.velocity.values()), velocities),
+        )
+
+    def components(
+        self,
+    ) -> tuple[ActiveForceLengthCurve, ForceVelocityCurve, FiberForceLengthCurve]:
+        """Return the curves as components of a muscle."""
+        return (
+            ActiveForceLengthCurve(name="ActiveForceLengthCurve", **self.active),
+            ForceVelocityCurve(name="ForceVelocityCurve", **self.velocity),
+            FiberForceLengthCurve(name="FiberForceLengthCurve", **self.passive),
+        )
+
+
+def fit_curves(shape: Shape) -> FittedCurves:
+    """Return the curves of a Millard muscle that are nearest to MuJoCo's."""
+    rounded = Shape(*(round(float(value), DIGITS) for value in shape))
+    return FittedCurves(
+        _fit_active(rounded.lmin, rounded.lmax),
+        _fit_velocity(rounded.fvmax),
+        _fit_passive(rounded.passive_start, rounded.passive_width, rounded.fpmax),
+    )
+
+
+def _evaluate(curve: Sequence[float], x: Array) -> Array:
+    return np.array([curve_value(curve, float(value))[0] for value in x])
+
+
+@lru_cache(maxsize=1024)
+def _fit_active(lmin: float, lmax: float) -> dict[str, float]:
+    x = np.linspace(max(lmin - 0.1, FITTED_LENGTHS[0]), min(lmax + 0.1, FITTED_LENGTHS[1]), POINTS)
+    target = Shape(lmin, lmax, 1.4).active(x)
+
+    def properties(p: Array) -> dict[str, float]:
+        shortest, inside, longest, slope = map(float, p)
+        transition = shortest + inside * (1.0 - shortest)
+        return {
+            "min_norm_active_fiber_length": shortest,
+            "transition_norm_fiber_length": transition,
+            "max_norm_active_fiber_length": longest,
+            "shallow_ascending_slope": slope / (1.0 - transition),
+            "minimum_value": 0.0,
+        }
+
+    least = max(lmin, LEAST_LENGTH)
+    longest = max(lmax, 1.06)
+    return _search(
+        properties,
+        lambda p: _evaluate(active_force_length(*p.values()), x) - target,
+        *(
+            (min(least + 0.1 * (1.0 - least), 0.85), inside, longest, slope)
+            for inside in (0.3, 0.45, 0.6, 0.75, 0.9)
+            for slope in (0.1, 0.3, 0.5, 0.7)
+        ),
+        (LEAST_LENGTH, 0.05, 1.06, 0.02),
+        (0.95, 0.95, max(1.5 * longest, 2.0), 0.95),
+    )
+
+
+@lru_cache(maxsize=1024)
+def _fit_velocity(fvmax: float) -> dict[str, float]:
+    most = max(fvmax, LEAST_FVMAX)
+    x = np.linspace(-1.05, 1.05, POINTS)
+    target = Shape(0.5, 1.6, most).velocity(x)
+
+    def properties(p: Array) -> dict[str, float]:
+        near, isometric, eccentric, one, other = map(float, p)
+        return {
+            "concentric_slope_at_vmax": 0.0,
+            "concentric_slope_near_vmax": near,
+            "isometric_slope": isometric,
+            "eccentric_slope_at_vmax": 0.0,
+            "eccentric_slope_near_vmax": eccentric * (most - 1.0),
+            "max_eccentric_velocity_force_multiplier": most,
+            "concentric_curviness": one,
+            "eccentric_curviness": other,
+        }
+
+    return _search(
+        properties,
+        lambda p: _evaluate(force_velocity(*p.values()), x) - target,
+        (0.25, 2.0, 0.1, 0.6, 0.9),
+        (0.02, 1.02, 1e-3, 0.0, 0.0),
+        (0.95, 12.0, 0.9, 1.0, 1.0),
+    )
+
+
+@lru_cache(maxsize=1024)
+def _fit_passive(start: float, width: float, fpmax: float) -> dict[str, float]:
+    if fpmax < 1e-6:
+        # A curve that begins beyond all lengths that occur.
+        return {"strain_at_zero_force": 9.0, "strain_at_one_norm_force": 10.0}
+    # The length at which the force is 1.
+    one = start + width * (np.sqrt(2.0 / fpmax) if fpmax >= 2.0 else 1.0 / fpmax + 0.5)
+    x = np.linspace(start - 0.1, max(one, 1.0) + 0.3 * (one - start), POINTS)
+    target = Shape(0.5, 1.6, 1.4, start, width, fpmax).passive(x)
+    zero = start - 1.0
+
+    def properties(p: Array) -> dict[str, float]:
+        first, last, low, stiffness, curviness = map(float, p)
+        lower = zero + first * (one - start)
+        upper = one - 1.0 + last * (one - start)
+        mean = 1.0 / (upper - lower)
+        return {
+            "strain_at_zero_force": lower,
+            "strain_at_one_norm_force": upper,
+            "stiffness_at_low_force": low * mean,
+            "stiffness_at_one_norm_force": stiffness * mean,
+            "curviness": curviness,
+        }
+
+    return _search(
+        properties,
+        lambda p: _evaluate(fiber_force_length(*p.values()), x) - target,
+        (0.0, 0.0, 0.2, 2.0, 0.75),
+        (-0.3, -0.2, 0.01, 1.05, 0.0),
+        (0.3, 0.2, 0.95, 6.0, 1.0),
+    )
+
+
+def _search(
+    properties: Callable[[Array], dict[str, float]],
+    residual: Callable[[dict[str, float]], Array],
+    *numbers: tuple[float, ...],
+) -> dict[str, float]:
+    """Return the properties with the least sum of squares.
+
+    Args:
+        properties: properties of a curve by the numbers that are sought.
+        residual: errors of a curve with these properties; ValueError if there is no such curve.
+        *numbers: numbers to start from, once or several times, then the bounds of the numbers.
+    """
+    *starts, low, high = numbers
+    optimize: Any = require("scipy.optimize", extra="sim", purpose="the fit of muscle curves")
+
+    def errors(p: Array) -> Array:
+        try:
+            return residual(properties(p))
+        except ValueError:
+            return np.full(POINTS, 10.0)
+
+    begins = [np.clip(start, np.array(low) + 1e-3, np.array(high) - 1e-3) for start in starts]
+    begins.sort(key=lambda p: float(np.sum(np.square(errors(p)))))
+    solutions = [
+        optimize.least_squares(
+            errors, start, bounds=(low, high), x_scale=np.ptp((low, high), axis=0)
+        )
+        for start in begins[:SEARCHES]
+    ]
+    return properties(min(solutions, key=lambda item: float(item.cost)).x)

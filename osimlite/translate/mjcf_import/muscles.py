@@ -1,0 +1,279 @@
+"""Muscles of MuJoCo as Millard muscles with fitted curves, or exactly as RigidTendonMuscles."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from osimlite.mechanics.multibody.spatial import Array
+from osimlite.schema.functions import ExpressionBasedFunction
+from osimlite.schema.muscles import Millard2012EquilibriumMuscle, Muscle, RigidTendonMuscle
+from osimlite.translate.fidelity import Error
+from osimlite.translate.mjcf_import.draft import Draft, TendonPath
+from osimlite.translate.mjcf_import.muscle_fits import FittedCurves, Shape, fit_curves
+
+LEAST_SLACK_M = 1e-4
+"""Least tendon slack length; OpenSim requires one above 0."""
+MOST_PASSIVE = 10.0
+"""Passive force at which a RigidTendonMuscle cuts its curve off, as a part of the isometric force."""
+SPEEDS = (-0.5, -0.25, 0.0, 0.25, 0.5)
+"""Normalized velocities at which forces are compared."""
+
+
+class MuscleData(NamedTuple):
+    """A muscle of MuJoCo as the numbers of a rigid-tendon muscle."""
+
+    force: float  # maximum isometric force, N
+    fiber: float  # optimal fiber length, m
+    slack: float  # tendon slack length, m
+    vmax: float  # maximum contraction velocity, optimal fiber lengths per second
+    shape: Shape
+
+    def with_slack(self, slack: float) -> MuscleData:
+        """Return the same muscle with another slack length.
+
+        Parabolas of the fiber length stay parabolas if the length is measured from another origin,
+        so that the curves are as exact as before.
+        """
+        fiber = self.fiber + self.slack - slack
+        ratio, shift = self.fiber / fiber, (self.slack - slack) / fiber
+        shape = self.shape
+        return MuscleData(
+            self.force,
+            fiber,
+            slack,
+            self.vmax * ratio,
+            shape._replace(
+                lmin=shape.lmin * ratio + shift,
+                lmax=shape.lmax * ratio + shift,
+                passive_start=shape.passive_start * ratio + shift,
+                passive_width=shape.passive_width * ratio,
+            ),
+        )
+
+    def tension(self, lengths: Array, speed: float, activation: float) -> Array:
+        """Return MuJoCo's tension (N) at tendon lengths (m) and a normalized velocity."""
+        x = (lengths - self.slack) / self.fiber
+        factor = float(self.shape.velocity(np.array([speed]))[0])
+        return self.force * (activation * self.shape.active(x) * factor + self.shape.passive(x))
+
+
+def read_muscle(draft: Draft, actuator: int, gear: float, shift: float) -> MuscleData:
+    """Return the numbers of a muscle, with lengths of the path.
+
+    Args:
+        draft: the conversion.
+        actuator: index of the actuator.
+        gear: factor from the length of the path to MuJoCo's actuator length; positive.
+        shift: number that was added to the path, m.
+    """
+    model = draft.mj
+    gain, bias = model.actuator_gainprm[actuator], model.actuator_biasprm[actuator]
+    low, high = map(float, model.actuator_lengthrange[actuator])
+
+    def lengths(numbers: Array) -> tuple[float, float]:
+        fiber = (high - low) / (float(numbers[1]) - float(numbers[0]))
+        return fiber, low - float(numbers[0]) * fiber
+
+    def strength(numbers: Array) -> float:
+        force = float(numbers[2])
+        return force if force >= 0.0 else float(numbers[3] / model.actuator_acc0[actuator])
+
+    fiber, slack = lengths(gain)
+    passive_fiber, passive_slack = lengths(bias)
+    force = strength(gain)
+    middle = 0.5 * (1.0 + float(bias[5]))
+    start = (passive_slack + passive_fiber - slack) / fiber
+    shape = Shape(
+        float(gain[4]),
+        float(gain[5]),
+        float(gain[8]),
+        start,
+        (middle - 1.0) * passive_fiber / fiber,
+        float(bias[7]) * strength(bias) / force if force else 0.0,
+    )
+    return MuscleData(force * gear, fiber / gear, slack / gear + shift, float(gain[6]), shape)
+
+
+def make_muscle(
+    draft: Draft, actuator: int, path: TendonPath, gear: float, lengths: Array
+) -> Muscle | None:
+    """Make a muscle, and record how near it is.
+
+    Args:
+        draft: the conversion.
+        actuator: index of the actuator.
+        path: its path.
+        gear: factor from the length of the path to MuJoCo's actuator length.
+        lengths: lengths of the path that occur (P,), m.
+
+    Returns:
+        The muscle, not yet in the model; None if it cannot be made, which is recorded.
+    """
+    model = draft.mj
+    if gear <= 0.0:
+        draft.drop(
+            "actuator", actuator, "a muscle with a gear that is not positive", f"gear {gear:g}"
+        )
+        return None
+    data = read_muscle(draft, actuator, gear, path.shift)
+    if not (
+        np.all(np.isfinite((*data[:4], *data.shape)))
+        and data.force > 0.0
+        and data.fiber > 0.0
+        and data.vmax > 0.0
+        and data.shape.passive_width > 0.0
+        and data.shape.lmin < 1.0 < data.shape.lmax
+        and data.fiber + data.slack > LEAST_SLACK_M
+    ):
+        draft.drop(
+            "actuator",
+            actuator,
+            "a muscle whose lengths, force or curves are not positive",
+            f"force {data.force:g} N, fiber length {data.fiber:g} m, tendon {data.slack:g} m",
+        )
+        return None
+    detail = ""
+    if data.slack < LEAST_SLACK_M:
+        detail = f"; its tendon slack length of {data.slack:.4g} m is now part of the fiber"
+        data = data.with_slack(LEAST_SLACK_M)
+    name = draft.unique("force", draft.source.name_of("actuator", actuator))
+    lags = int(model.actuator_dyntype[actuator]) == int(draft.source.mujoco.mjtDyn.mjDYN_MUSCLE)
+    limits = (0.0, 1.0)
+    if model.actuator_ctrllimited[actuator]:
+        low, high = map(float, model.actuator_ctrlrange[actuator])
+        limits = max(low, 0.0), min(high, 1.0)
+    if draft.options.muscle == "exact":
+        return _make_exact(draft, actuator, name, path, data, lags, limits, detail)
+    curves = fit_curves(data.shape)
+    active, velocity, passive = curves.components()
+    muscle = Millard2012EquilibriumMuscle(
+        name=name,
+        geometry_path=path.path,
+        max_isometric_force=data.force,
+        optimal_fiber_length=data.fiber,
+        tendon_slack_length=data.slack,
+        pennation_angle_at_optimal=0.0,
+        max_contraction_velocity=data.vmax,
+        ignore_tendon_compliance=True,
+        ignore_activation_dynamics=not lags,
+        min_control=limits[0],
+        max_control=limits[1],
+        fiber_damping=0.0,
+        default_fiber_length=data.fiber,
+        minimum_activation=0.0,
+        active_force_length_curve=active,
+        force_velocity_curve=velocity,
+        fiber_force_length_curve=passive,
+    )
+    if lags:
+        muscle.activation_time_constant = float(model.actuator_dynprm[actuator, 0])
+        muscle.deactivation_time_constant = float(model.actuator_dynprm[actuator, 1])
+    draft.record(
+        "actuator",
+        actuator,
+        "muscle curves of parabolas",
+        "a Millard2012EquilibriumMuscle with a rigid tendon and fitted curves",
+        f"optimal fiber length {data.fiber:.4g} m{detail}",
+        {
+            "force": Error.measure(_compare(data, curves, lengths), "F0"),
+            **_curve_errors(data.shape, curves),
+        },
+    )
+    _record_dynamics(draft, actuator, lags)
+    return muscle
+
+
+def _curve_errors(shape: Shape, curves: FittedCurves) -> dict[str, Error]:
+    x, v = np.linspace(0.5, 1.5, 101), np.linspace(-1.0, 1.0, 101)
+    active, passive, velocity = curves.evaluate(x, v)
+    return {
+        "active force-length": Error.measure(active - shape.active(x), "F0"),
+        "passive force-length": Error.measure(passive - shape.passive(x), "F0"),
+        "force-velocity": Error.measure(velocity - shape.velocity(v), "F0"),
+    }
+
+
+def _compare(data: MuscleData, curves: FittedCurves, lengths: Array) -> Array:
+    """Return the errors of the tension at full activation, over the isometric force."""
+    speeds = np.array(SPEEDS)
+    active, passive, velocity = curves.evaluate((lengths - data.slack) / data.fiber, speeds)
+    ours = active * velocity[:, None] + passive
+    theirs = [data.tension(lengths, speed, 1.0) / data.force for speed in SPEEDS]
+    return (ours - np.array(theirs)).ravel()
+
+
+def _make_exact(
+    draft: Draft,
+    actuator: int,
+    name: str,
+    path: TendonPath,
+    data: MuscleData,
+    lags: bool,
+    limits: tuple[float, float],
+    detail: str,
+) -> RigidTendonMuscle:
+    """Make a muscle with MuJoCo's curves as formulas."""
+    curves = [
+        ExpressionBasedFunction(name=word, expression=formula, variables=("x",))
+        for word, formula in zip(
+            ("active_force_length_curve", "passive_force_length_curve", "force_velocity_curve"),
+            data.shape.formulas(),
+            strict=True,
+        )
+    ]
+    muscle = RigidTendonMuscle(
+        name=name,
+        geometry_path=path.path,
+        max_isometric_force=data.force,
+        optimal_fiber_length=data.fiber,
+        tendon_slack_length=data.slack,
+        pennation_angle_at_optimal=0.0,
+        max_contraction_velocity=data.vmax,
+        min_control=limits[0],
+        max_control=limits[1],
+        active_force_length_curve=curves[0],
+        passive_force_length_curve=curves[1],
+        force_velocity_curve=curves[2],
+    )
+    if lags:
+        first, second = map(float, model_times(draft, actuator))
+        draft.record(
+            "actuator",
+            actuator,
+            "activation dynamics beside MuJoCo's own curves",
+            "a RigidTendonMuscle with MuJoCo's curves as formulas: its control is the activation",
+            f"time constants {first:g} and {second:g} s{detail}",
+        )
+    else:
+        draft.translated("actuator", actuator, f"muscle {name}")
+    if data.shape.fpmax > MOST_PASSIVE:
+        draft.record(
+            "actuator",
+            actuator,
+            f"a passive force of more than {MOST_PASSIVE:g} times the isometric force",
+            "it ends there",
+        )
+    return muscle
+
+
+def model_times(draft: Draft, actuator: int) -> Array:
+    """Return the time constants (2,) of the activation of a muscle, s."""
+    return np.array(draft.mj.actuator_dynprm[actuator, :2])
+
+
+def _record_dynamics(draft: Draft, actuator: int, lags: bool) -> None:
+    model = draft.mj
+    if lags and model.actuator_dynprm[actuator, 2]:
+        draft.record(
+            "actuator",
+            actuator,
+            "a smooth change between the time constants of activation",
+            "a change at once",
+            f"width {float(model.actuator_dynprm[actuator, 2]):g}",
+        )
+    if not lags and int(model.actuator_dyntype[actuator]):
+        draft.record(
+            "actuator", actuator, "activation dynamics other than a muscle's", "none at all"
+        )

@@ -1,0 +1,68 @@
+"""Lengths and moment arms of candidate paths of a converted model, in sampled poses."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from osimlite.io.document.printer import to_text
+from osimlite.io.document.reader import read_text
+from osimlite.mechanics.multibody.spatial import Array
+from osimlite.schema.frames import PhysicalFrame
+from osimlite.schema.muscles import PathActuator
+from osimlite.schema.paths import AbstractGeometryPath
+from osimlite.simulation.paths import Paths
+from osimlite.translate.mjcf_import.coordinate_map import CoordinateMap
+from osimlite.translate.mjcf_import.draft import Draft
+
+
+class Bench:
+    """A copy of the mechanism under construction that carries candidate paths.
+
+    Args:
+        draft: the conversion; its bodies and joints are complete.
+    """
+
+    def __init__(self, draft: Draft) -> None:
+        self._draft = draft
+        self.coordinates = CoordinateMap.of(draft.mj, draft.coordinates, draft.rotors)
+        self.model = read_text(to_text(draft.model))
+        self.frames: list[PhysicalFrame] = []
+        for frame in draft.frames:
+            path = draft.model.tree().path_of(frame)
+            found = self.model.find(path or "/ground")
+            assert isinstance(found, PhysicalFrame)
+            self.frames.append(found)
+        self._count = 0
+
+    def add(self, path: AbstractGeometryPath) -> int:
+        """Add a candidate, and return its number."""
+        self.model.add(PathActuator(name=f"candidate_{self._count}", geometry_path=path))
+        self._count += 1
+        return self._count - 1
+
+    def measure(self, qpos: Array, *, arms: bool = False) -> tuple[Array, Array, list[str]]:
+        """Measure all candidates.
+
+        Args:
+            qpos: MuJoCo's positions (P, nq).
+            arms: whether to compute moment arms.
+
+        Returns:
+            Lengths (k, P), moment arms (k, P, n) or an empty array, and the names of the n
+            coordinates.
+        """
+        paths = Paths(self.model)
+        names = list(paths.mechanism.coordinate_names)
+        values = np.array([self._row(names, pose) for pose in qpos])
+        wanted = [paths.names.index(f"/forceset/candidate_{k}") for k in range(self._count)]
+        lengths = paths.system.measure_poses(values).T[wanted]
+        if not arms:
+            return lengths, np.empty(0), names
+        moment_arms = np.nan_to_num(paths.compute_moment_arms(values)).swapaxes(0, 1)[wanted]
+        return lengths, moment_arms, names
+
+    def _row(self, names: Sequence[str], qpos: Array) -> list[float]:
+        values = self.coordinates.values(qpos)
+        return [values[name] for name in names]

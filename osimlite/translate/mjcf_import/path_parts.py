@@ -1,0 +1,157 @@
+"""Points and wrap surfaces of OpenSim paths for the parts of a tendon."""
+
+from __future__ import annotations
+
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from osimlite.mechanics.multibody.spatial import Array
+from osimlite.schema.frames import PhysicalFrame
+from osimlite.schema.paths import (
+    AbstractPathPoint,
+    GeometryPath,
+    PathPoint,
+    PathPointSet,
+    PathWrap,
+    PathWrapSet,
+)
+from osimlite.schema.wrapping import WrapCylinder, WrapObject, WrapSphere
+from osimlite.translate.mjcf_import.draft import Draft, angles_of, quaternion_matrix, vector
+from osimlite.translate.mjcf_import.tendon_lengths import Segment
+
+Quadrant = Literal["all", "+x"]
+
+CYLINDER_MARGIN_M = 0.2
+"""Length that a wrap cylinder has more than the sampled paths need; MuJoCo's has no ends."""
+
+
+class WrapKey(NamedTuple):
+    """A wrap surface: a geom, and the side of it on which paths stay."""
+
+    geom: int
+    side: int  # site that the local x axis points to; -1 if paths may go around either side
+
+
+class Surfaces:
+    """Wrap surfaces of a model, each made when it is first used.
+
+    Args:
+        draft: the conversion.
+        frames: frames that own the surfaces, by body.
+        reach: largest distance (m) along the axis of each cylinder at which a tendon ends.
+    """
+
+    def __init__(self, draft: Draft, frames: list[PhysicalFrame], reach: dict[int, float]) -> None:
+        self._draft, self._frames, self._reach = draft, frames, reach
+        self._made: dict[WrapKey, str] = {}
+        self._names: set[str] = set()
+
+    def name(self, key: WrapKey) -> str:
+        """Return the name of a surface."""
+        if key not in self._made:
+            self._made[key] = self._make(key)
+        return self._made[key]
+
+    def _make(self, key: WrapKey) -> str:
+        draft, model = self._draft, self._draft.mj
+        name = draft.source.name_of("geom", key.geom)
+        if key.side >= 0:
+            name = f"{name}_{draft.source.name_of('site', key.side)}"
+        name = draft.unique("wrap", name)
+        radius = float(model.geom_size[key.geom, 0])
+        surface: WrapObject
+        if int(model.geom_type[key.geom]) == 5:
+            drawn = 2.0 * float(model.geom_size[key.geom, 1])
+            needed = 2.0 * self._reach.get(key.geom, 0.0) + CYLINDER_MARGIN_M
+            surface = WrapCylinder(name=name, radius=radius, length=max(drawn, needed))
+        else:
+            surface = WrapSphere(name=name, radius=radius)
+        rotation = quaternion_matrix(model.geom_quat[key.geom])
+        surface.quadrant = "all"
+        if key.side >= 0:
+            rotation = rotation @ turn_to_side(draft, key)
+            surface.quadrant = "+x"
+        surface.xyz_body_rotation = angles_of(rotation)
+        surface.translation = vector(model.geom_pos[key.geom])
+        body = int(model.geom_bodyid[key.geom])
+        self._frames[body].wrap_object_set.objects.append(surface)
+        return name
+
+
+def turn_to_side(draft: Draft, key: WrapKey) -> Array:
+    """Return the rotation (3, 3) in the frame of a geom whose x axis points to the side site.
+
+    The z axis stays that of a cylinder. The site may be on another body; then its place in the
+    default pose counts.
+    """
+    source, model = draft.source, draft.mj
+    data = source.mujoco.MjData(model)
+    source.mujoco.mj_kinematics(model, data)
+    turned = data.geom_xmat[key.geom].reshape(3, 3)
+    side = turned.T @ (data.site_xpos[key.side] - data.geom_xpos[key.geom])
+    if int(model.geom_type[key.geom]) == 5:
+        side = np.array((side[0], side[1], 0.0))
+        up = np.array((0.0, 0.0, 1.0))
+    else:
+        up = np.eye(3)[int(np.argmin(np.abs(side)))]
+    length = np.linalg.norm(side)
+    if length < 1e-12:
+        return np.eye(3)
+    x = side / length
+    y = np.cross(up, x)
+    y /= np.linalg.norm(y)
+    return np.column_stack((x, y, np.cross(x, y)))
+
+
+def make_geometry_path(
+    draft: Draft,
+    frames: list[PhysicalFrame],
+    surfaces: Surfaces,
+    segments: tuple[Segment, ...],
+    quadrants: tuple[Quadrant | None, ...],
+) -> GeometryPath:
+    """Make a path through the sites of a tendon.
+
+    Args:
+        draft: the conversion.
+        frames: frames of the bodies.
+        surfaces: surfaces that paths wrap around.
+        segments: the segments of a tendon with one branch.
+        quadrants: how each segment wraps: ``"all"`` on either side, ``"+x"`` on that of the side
+            site, None not at all.
+    """
+    model = draft.mj
+    sites = [segments[0].first, *(item.second for item in segments)]
+    used: set[str] = set()
+    points: list[AbstractPathPoint] = []
+    for number, site in enumerate(sites):
+        name = draft.source.name_of("site", site)
+        name = "".join(letter if letter.isalnum() or letter in "_.-" else "_" for letter in name)
+        if name in used:
+            name = f"{name}_{number + 1}"
+        used.add(name)
+        points.append(
+            PathPoint(
+                name=name,
+                socket_parent_frame=frames[int(model.site_bodyid[site])],
+                location=vector(model.site_pos[site]),
+            )
+        )
+    wraps = []
+    for number, (item, quadrant) in enumerate(zip(segments, quadrants, strict=True), 1):
+        if quadrant is None or item.geom < 0:
+            continue
+        key = WrapKey(item.geom, item.side if quadrant == "+x" else -1)
+        wraps.append(
+            PathWrap(
+                name=f"pathwrap_{number}",
+                wrap_object=surfaces.name(key),
+                range=(number, number + 1),
+            )
+        )
+    return GeometryPath(
+        name="path",
+        path_point_set=PathPointSet(objects=points),
+        path_wrap_set=PathWrapSet(objects=wraps),
+    )

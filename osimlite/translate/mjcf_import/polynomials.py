@@ -1,0 +1,103 @@
+"""Polynomials of several coordinates, fitted to lengths of tendons."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from osimlite.mechanics.multibody.spatial import Array
+from osimlite.schema.functions import MultivariatePolynomialFunction
+
+MOST_TERMS = 330
+"""Largest number of terms: order 4 of seven coordinates, order 6 of four."""
+MOST_ORDER = 8
+SAMPLES_PER_TERM = 4
+CLOSE_M = 1e-6
+"""Error in poses that were not fitted (rms, m) at which the order is high enough."""
+GAIN = 0.8
+"""Factor by which a higher order must reduce the error to be preferred."""
+
+
+def list_exponents(count: int, order: int) -> NDArray[np.int64]:
+    """Return the exponents (k, n) of all terms, in the order of OpenSim's coefficients.
+
+    The last exponent changes first: 1, y, y^2, x, x y, x^2 for two arguments and order 2.
+    """
+
+    def rows(left: int, most: int) -> Iterator[tuple[int, ...]]:
+        if not left:
+            yield ()
+            return
+        for power in range(most + 1):
+            for rest in rows(left - 1, most - power):
+                yield (power, *rest)
+
+    return np.array(list(rows(count, order)), dtype=np.int64).reshape(-1, count)
+
+
+def evaluate_terms(values: Array, exponents: NDArray[np.int64]) -> Array:
+    """Return the terms (P, k) at values (P, n)."""
+    order = int(exponents.max(initial=0))
+    powers = values[:, None, :] ** np.arange(order + 1)[None, :, None]
+    result = np.ones((len(values), len(exponents)))
+    for column in range(values.shape[1]):
+        result *= powers[:, exponents[:, column], column]
+    return result
+
+
+def possible_orders(count: int) -> list[int]:
+    """Return the orders whose number of terms is not too large, for `count` coordinates."""
+    return [
+        order
+        for order in range(1, MOST_ORDER + 1)
+        if order == 1 or math.comb(count + order, order) <= MOST_TERMS
+    ]
+
+
+def samples_for(count: int) -> int:
+    """Return the number of poses that the highest possible order needs."""
+    return SAMPLES_PER_TERM * math.comb(count + possible_orders(count)[-1], count)
+
+
+def fit_polynomial(
+    values: Array, lengths: Array, checks: Array, expected: Array
+) -> tuple[MultivariatePolynomialFunction, Array]:
+    """Return the polynomial of the lowest order that is near the best in other poses.
+
+    Args:
+        values: values of the coordinates (P, n) in the poses of the fit.
+        lengths: lengths (P,) in these poses, m.
+        checks: values (Q, n) in other poses.
+        expected: lengths (Q,) in these.
+
+    Returns:
+        The function, and its errors (Q,) in the other poses, m.
+    """
+    count = values.shape[1]
+    best: tuple[float, int, Array, Array] | None = None
+    for order in possible_orders(count):
+        exponents = list_exponents(count, order)
+        if SAMPLES_PER_TERM * len(exponents) > len(values) and best is not None:
+            break
+        terms = evaluate_terms(values, exponents)
+        scale = np.abs(terms).max(0)
+        scale[scale == 0.0] = 1.0
+        solution = np.linalg.lstsq(terms / scale, lengths, rcond=1e-13)[0] / scale
+        errors = evaluate_terms(checks, exponents) @ solution - expected
+        size = float(np.sqrt(np.mean(errors**2)))
+        if best is None or size < GAIN * best[0]:
+            best = size, order, solution, errors
+        if best[0] < CLOSE_M:
+            break
+    assert best is not None
+    _, order, solution, errors = best
+    function = MultivariatePolynomialFunction(
+        name="length_function",
+        coefficients=tuple(float(value) for value in solution),
+        dimension=count,
+        order=order,
+    )
+    return function, errors

@@ -1,0 +1,342 @@
+"""Tendons as OpenSim paths: which path is nearest, and how far it is off.
+
+A tendon with one branch becomes a GeometryPath. For each segment that bends around a geom, the
+quadrant of the wrap surface is the one whose lengths are nearest to MuJoCo's in sampled poses.
+Tendons that bend inside of a geom, or have pulleys, become a FunctionBasedPath with a fitted
+polynomial of the coordinates, and so do tendons that no wrap follows well.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from osimlite.errors import SettingError
+from osimlite.mechanics.multibody.spatial import Array
+from osimlite.schema.functions import LinearFunction
+from osimlite.schema.paths import FunctionBasedPath
+from osimlite.translate.fidelity import Error
+from osimlite.translate.mjcf.wrapping import norm
+from osimlite.translate.mjcf_import.draft import Draft, TendonPath
+from osimlite.translate.mjcf_import.joints import BALL, FREE
+from osimlite.translate.mjcf_import.path_comparison import Bench
+from osimlite.translate.mjcf_import.path_parts import Quadrant, Surfaces, make_geometry_path
+from osimlite.translate.mjcf_import.polynomials import fit_polynomial, samples_for
+from osimlite.translate.mjcf_import.poses import Poses, place, sample_qpos, satisfy_equalities
+from osimlite.translate.mjcf_import.tendon_lengths import (
+    Segment,
+    Tendon,
+    read_tendon,
+    segment_lengths,
+    tendon_lengths,
+)
+
+EXACT_M = 1e-9
+"""Error of a length up to which a path is exact."""
+SAME_MEANING_M = 1e-6
+"""Difference of lengths up to which a tendon means the same in MuJoCo 3 and 4."""
+GOOD_WRAP_M = 3e-4
+"""Error (rms) of a wrapped path above which a polynomial is tried."""
+CHECK_POSES = 100
+"""Number of poses in which errors are measured; none is one that decided anything."""
+ARM_POSES = 20
+"""Number of poses in which moment arms are compared."""
+STEP = 1e-6
+"""Step of the joint position (rad, m) for derivatives of tendon lengths."""
+
+
+def find_version(draft: Draft, tendons: list[Tendon], poses: Poses) -> int:
+    """Return the version of MuJoCo whose rules the tendons follow.
+
+    Raises:
+        SettingError: the versions differ, and the option does not say which one is meant.
+    """
+    if draft.options.written_for is not None:
+        return draft.options.written_for
+    lengths = [tendon_lengths(draft.source, tendons, poses, version) for version in (3, 4)]
+    apart = np.abs(lengths[0] - lengths[1]).max(1, initial=0.0)
+    if not len(apart) or apart.max() <= SAME_MEANING_M:
+        return draft.source.major
+    worst = int(np.argmax(apart))
+    raise SettingError(
+        f"MuJoCo 3 and 4 understand side sites of this file differently: {np.sum(apart > SAME_MEANING_M)} "
+        f"tendons have other lengths, '{draft.source.name_of('tendon', tendons[worst].number)}' by up to "
+        f"{apart[worst]:.3g} m; say which version the file was written for by --written-for 3 "
+        "(also for older ones) or --written-for 4"
+    )
+
+
+def add_tendon_paths(draft: Draft) -> None:
+    """Make the path of each tendon, and measure it."""
+    source, model = draft.source, draft.mj
+    tendons = [read_tendon(source, index) for index in range(model.ntendon)]
+    for tendon in tendons:
+        for item in tendon.segments:
+            draft.path_sites |= {item.first, item.second, *({item.side} - {-1})}
+            if item.geom >= 0:
+                draft.wrapping_geoms.add(item.geom)
+    spatial = [tendon for tendon in tendons if not tendon.is_fixed]
+    for tendon in tendons:
+        if tendon.is_fixed:
+            draft.paths[tendon.number] = _make_linear_path(draft, tendon)
+    if not spatial:
+        return
+    poses = place(source, sample_qpos(source, draft.options.poses, draft.options.seed))
+    version = find_version(draft, spatial, poses)
+    draft.version = version
+    _Selection(draft, spatial, poses, version).run()
+
+
+class _Selection:
+    """Selection of the path of each spatial tendon."""
+
+    def __init__(self, draft: Draft, tendons: list[Tendon], poses: Poses, version: int) -> None:
+        self.draft, self.source = draft, draft.source
+        self.tendons, self.poses, self.version = tendons, poses, version
+        self.reach = _find_reach(draft, tendons, poses)
+        self.checks = place(self.source, sample_qpos(self.source, CHECK_POSES, 1))
+        self.truth = tendon_lengths(self.source, tendons, self.checks, version)
+
+    def run(self) -> None:
+        """Set the paths of the draft, and record their errors."""
+        draft = self.draft
+        quadrants, bad = self._select_quadrants()
+        routes = {
+            row: tuple(quadrants.get(_key(item)) for item in tendon.segments)
+            for row, tendon in enumerate(self.tendons)
+            if not tendon.has_pulley and not any(_key(item) in bad for item in tendon.segments)
+        }
+        bench = Bench(draft)
+        surfaces = Surfaces(draft, bench.frames, self.reach)
+        numbers = {
+            row: bench.add(
+                make_geometry_path(draft, bench.frames, surfaces, self.tendons[row].segments, route)
+            )
+            for row, route in routes.items()
+        }
+        lengths, _, _ = bench.measure(self.checks.qpos) if numbers else (np.empty(0), None, None)
+        errors = {row: lengths[number] - self.truth[row] for row, number in numbers.items()}
+        polynomials: dict[int, tuple[FunctionBasedPath, Array]] = {}
+        for row in range(len(self.tendons)):
+            rms = _rms(errors[row]) if row in errors else np.inf
+            if rms > GOOD_WRAP_M:
+                path, off = self._fit(row)
+                if _rms(off) < 0.5 * rms:
+                    polynomials[row] = path, off
+        self._record(polynomials, routes)
+        draft.names.pop("wrap", None)
+        surfaces = Surfaces(draft, draft.frames, self.reach)
+        for row, tendon in enumerate(self.tendons):
+            if row in polynomials:
+                draft.paths[tendon.number] = TendonPath(polynomials[row][0])
+            else:
+                draft.paths[tendon.number] = TendonPath(
+                    make_geometry_path(draft, draft.frames, surfaces, tendon.segments, routes[row])
+                )
+
+    def _select_quadrants(self) -> tuple[dict[Segment, Quadrant | None], set[Segment]]:
+        """Return how each wrapped segment wraps, and those that only a polynomial follows."""
+        segments = sorted(
+            {_key(item) for tendon in self.tendons for item in tendon.segments if item.geom >= 0}
+        )
+        truth, touching = segment_lengths(self.source, segments, self.poses, self.version)
+        bad = {item for item, row in zip(segments, touching, strict=True) if np.isnan(row).any()}
+        bench = Bench(self.draft)
+        surfaces = Surfaces(self.draft, bench.frames, self.reach)
+        candidates: list[tuple[int, Quadrant | None, int]] = []
+        for number, item in enumerate(segments):
+            if item in bad:
+                continue
+            options: tuple[Quadrant | None, ...] = ("all",)
+            if item.side >= 0:
+                options = (None,) if self._is_inside(item) else ("all", "+x")
+            for option in options:
+                path = make_geometry_path(self.draft, bench.frames, surfaces, (item,), (option,))
+                candidates.append((number, option, bench.add(path)))
+        result: dict[Segment, Quadrant | None] = {}
+        if candidates:
+            lengths, _, _ = bench.measure(self.poses.qpos)
+            best: dict[int, float] = {}
+            for number, option, row in candidates:
+                off = _rms(lengths[row] - truth[number])
+                # A tie leaves both sides open.
+                if number not in best or off < 0.99 * best[number] - 1e-12:
+                    best[number], result[segments[number]] = off, option
+        return result, bad
+
+    def _is_inside(self, item: Segment) -> bool:
+        """Whether the side site is inside of the geom, so that the tendon passes through it."""
+        model = self.draft.mj
+        apart = self.poses.sites[:, item.side] - self.poses.geoms[:, item.geom]
+        return bool(norm(apart).max() < float(model.geom_size[item.geom, 0]))
+
+    def _fit(self, row: int) -> tuple[FunctionBasedPath, Array]:
+        """Fit a polynomial to the length of a tendon; return its path and errors in the check poses."""
+        draft, source = self.draft, self.source
+        tendon = self.tendons[row]
+        joints = self._find_joints(tendon)
+        poses = place(source, sample_qpos(source, max(samples_for(len(joints)), 400), 2))
+        lengths = tendon_lengths(source, [tendon], poses, self.version)[0]
+        addresses = [int(draft.mj.jnt_qposadr[joint]) for joint in joints]
+        function, off = fit_polynomial(
+            poses.qpos[:, addresses],
+            lengths,
+            self.checks.qpos[:, addresses],
+            self.truth[row],
+        )
+        return (
+            FunctionBasedPath(
+                name="path",
+                coordinate_paths=tuple(draft.coordinate_path(joint) for joint in joints),
+                length_function=function,
+            ),
+            off,
+        )
+
+    def _find_joints(self, tendon: Tendon) -> list[int]:
+        """Return the independent hinges and slides that the length of a tendon depends on."""
+        arms, joints = self._true_arms([tendon], self.poses.qpos[:ARM_POSES])
+        return [
+            joint for column, joint in enumerate(joints) if np.abs(arms[0, :, column]).max() > 1e-8
+        ]
+
+    def _true_arms(self, tendons: list[Tendon], qpos: Array) -> tuple[Array, list[int]]:
+        """Return moment arms (T, P, n) about independent hinges and slides, and these joints.
+
+        They include what the joints do that equalities move along, as OpenSim's moment arms do.
+        """
+        model, source = self.draft.mj, self.source
+        joints = [
+            joint
+            for joint in range(model.njnt)
+            if int(model.jnt_type[joint]) not in (FREE, BALL)
+            and joint not in _dependent(self.draft)
+        ]
+        arms = np.empty((len(tendons), len(qpos), len(joints)))
+        for column, joint in enumerate(joints):
+            ends = []
+            for sign in (-1.0, 1.0):
+                moved = qpos.copy()
+                moved[:, int(model.jnt_qposadr[joint])] += sign * STEP
+                satisfy_equalities(source, moved)
+                ends.append(tendon_lengths(source, tendons, place(source, moved), self.version))
+            arms[:, :, column] = (ends[0] - ends[1]) / (2.0 * STEP)
+        return arms, joints
+
+    def _record(
+        self,
+        polynomials: dict[int, tuple[FunctionBasedPath, Array]],
+        routes: dict[int, tuple[Quadrant | None, ...]],
+    ) -> None:
+        """Measure the paths that were selected, and record what is not exact."""
+        draft, model = self.draft, self.draft.mj
+        bench = Bench(draft)
+        surfaces = Surfaces(draft, bench.frames, self.reach)
+        for row, tendon in enumerate(self.tendons):
+            if row in polynomials:
+                bench.add(polynomials[row][0].copy_deep())
+            else:
+                bench.add(
+                    make_geometry_path(draft, bench.frames, surfaces, tendon.segments, routes[row])
+                )
+        lengths, _, _ = bench.measure(self.checks.qpos)
+        qpos = self.checks.qpos[:ARM_POSES]
+        truth, joints = self._true_arms(self.tendons, qpos)
+        _, arms, names = bench.measure(qpos, arms=True)
+        columns = [names.index(draft.coordinates[joint][0]) for joint in joints]
+        turning = [int(model.jnt_type[joint]) == 3 for joint in joints]
+        for row, tendon in enumerate(self.tendons):
+            off = lengths[row] - self.truth[row]
+            errors = {"length": Error.measure(off, "m")}
+            apart = arms[row][:, columns] - truth[row]
+            if len(joints):
+                worst = int(np.argmax(np.abs(apart).max(0)))
+                errors["moment arm"] = Error.measure(apart[:, worst], "m" if turning[worst] else "1")
+            if row in polynomials:
+                path = polynomials[row][0]
+                function = path.length_function
+                reason = (
+                    "pulleys"
+                    if tendon.has_pulley
+                    else "a tendon that bends inside of a geom"
+                    if row not in routes
+                    else "a tendon that no wrap surface follows"
+                )
+                draft.record(
+                    "tendon",
+                    tendon.number,
+                    reason,
+                    "a FunctionBasedPath: a polynomial of the coordinates, fitted in sampled poses",
+                    f"order {function.order} of {function.dimension} coordinates",  # type: ignore[union-attr]
+                    errors,
+                )
+            elif errors["length"].max > EXACT_M:
+                words = sorted({str(word) for word in routes[row] if word})
+                draft.record(
+                    "tendon",
+                    tendon.number,
+                    f"the way around a geom by the rules of MuJoCo {self.version}",
+                    "a GeometryPath with wrap surfaces of the quadrant that is nearest",
+                    "quadrants " + " ".join(words),
+                    errors,
+                )
+            else:
+                draft.translated("tendon", tendon.number, "path")
+
+
+def _key(item: Segment) -> Segment:
+    return item._replace(divisor=1.0)
+
+
+def _rms(off: Array) -> float:
+    return float(np.sqrt(np.mean(np.square(off))))
+
+
+def _dependent(draft: Draft) -> set[int]:
+    model, kinds = draft.mj, draft.source.mujoco.mjtEq
+    return {
+        int(model.eq_obj1id[number])
+        for number in range(model.neq)
+        if int(model.eq_type[number]) == int(kinds.mjEQ_JOINT) and model.eq_active0[number]
+    }
+
+
+def _find_reach(draft: Draft, tendons: list[Tendon], poses: Poses) -> dict[int, float]:
+    """Return the largest height (m) over the middle of each cylinder at which a segment ends."""
+    result: dict[int, float] = {}
+    for tendon in tendons:
+        for item in tendon.segments:
+            if item.geom < 0:
+                continue
+            axis = poses.turns[:, item.geom, :, 2]
+            for site in (item.first, item.second):
+                apart = poses.sites[:, site] - poses.geoms[:, item.geom]
+                height = float(np.abs(np.einsum("pi,pi->p", apart, axis)).max())
+                result[item.geom] = max(result.get(item.geom, 0.0), height)
+    return result
+
+
+def _make_linear_path(draft: Draft, tendon: Tendon) -> TendonPath:
+    """Make the path of a fixed tendon, which is a linear function of joint positions."""
+    names, coefficients, least = [], [], 0.0
+    for joint, coefficient in tendon.joints:
+        names.append(draft.coordinate_path(joint))
+        coefficients.append(coefficient)
+        low, high = draft.made[draft.coordinates[joint][0]].range
+        least += min(coefficient * low, coefficient * high)
+    shift = max(0.0, 0.01 - least)
+    if shift:
+        draft.record(
+            "tendon",
+            tendon.number,
+            "a length that is negative in some poses",
+            "a FunctionBasedPath with a linear function and a constant, which keeps it positive",
+            f"constant {shift:g}",
+        )
+    else:
+        draft.translated("tendon", tendon.number, "path")
+    path = FunctionBasedPath(
+        name="path",
+        coordinate_paths=tuple(names),
+        length_function=LinearFunction(name="length_function", coefficients=(*coefficients, shift)),
+    )
+    return TendonPath(path, shift)

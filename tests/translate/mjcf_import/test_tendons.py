@@ -1,0 +1,127 @@
+"""Tendons, muscles and other actuators of MJCF files in OpenSim."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import osimlite
+from osimlite.errors import SettingError
+
+mujoco = pytest.importorskip("mujoco", reason="needs mujoco (extra 'mujoco')")
+
+from osimlite.translate.mjcf_import.poses import place, sample_qpos  # noqa: E402
+from osimlite.translate.mjcf_import.source import load_mjcf  # noqa: E402
+from osimlite.translate.mjcf_import.tendon_lengths import (  # noqa: E402
+    read_tendon,
+    tendon_lengths,
+)
+from tests.translate.mjcf_import import comparison, models  # noqa: E402
+
+VERSION = int(mujoco.__version__.split(".")[0])
+
+
+@pytest.fixture(scope="module")
+def arm(tmp_path_factory):
+    return models.write_mjcf(tmp_path_factory.mktemp("arm"), models.ARM)
+
+
+@pytest.fixture(scope="module")
+def made(arm):
+    return osimlite.from_mjcf(arm, written_for=VERSION)
+
+
+@pytest.fixture(scope="module")
+def records(made):
+    return {record.component: record for record in made.fidelity}
+
+
+def test_lengths_by_our_rules_are_mujocos(arm):
+    source = load_mjcf(arm)
+    qpos = sample_qpos(source, 50, 4)
+    tendons = [read_tendon(source, index) for index in range(source.model.ntendon)]
+    lengths = tendon_lengths(source, tendons, place(source, qpos), source.major)
+    data = mujoco.MjData(source.model)
+    for pose, column in zip(qpos, lengths.T, strict=True):
+        data.qpos[:] = pose
+        mujoco.mj_fwdPosition(source.model, data)
+        assert np.abs(column - data.ten_length).max() < 1e-12
+
+
+def test_paths_are_as_long_as_tendons(arm, made, records):
+    source = load_mjcf(arm)
+    model = source.model
+    data, paths = mujoco.MjData(model), osimlite.paths(made.model)
+    owners = {"straight": "m_straight", "over": "m_over", "round": "m_round", "both": "linear"}
+    owners |= {"through": "m_through", "pulley": "m_pulley", "elastic": "elastic_spring"}
+    shifts = {"both": float(records["/tendon/both"].detail.split()[1])}
+    for pose in sample_qpos(source, 30, 9):
+        data.qpos[:] = pose
+        mujoco.mj_fwdPosition(model, data)
+        lengths = paths.lengths(made.coordinates.values(pose))
+        for name, owner in owners.items():
+            record = records.get(f"/tendon/{name}")
+            allowed = 3.0 * record.errors["length"].max if record and record.errors else 1e-12
+            off = (
+                lengths[f"/forceset/{owner}"] - shifts.get(name, 0.0) - data.tendon(name).length[0]
+            )
+            assert abs(off) <= allowed + 1e-12, name
+    assert records["/tendon/through"].errors["length"].rms < 1e-3
+    assert "polynomial" in records["/tendon/through"].done
+    assert "polynomial" in records["/tendon/pulley"].done
+    assert records["/tendon/loose"].cannot_say == "a tendon without a force"
+    assert records["/actuator/mixed"].how == "dropped"
+
+
+@pytest.mark.oracle
+@pytest.mark.parametrize("muscle_class", ["exact", "millard"])
+def test_forces_are_mujocos_in_opensim(arm, tmp_path, muscle_class):
+    pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
+    made = osimlite.from_mjcf(arm, muscle_class=muscle_class, armature="none", written_for=VERSION)
+    live = comparison.LiveForces(comparison.LiveModel(made, tmp_path), made)
+    random = np.random.default_rng(3)
+    allowed = dict.fromkeys(("motor", "servo", "speed", "pull", "linear", "push", "twist"), 1e-11)
+    muscles = ("m_straight", "m_round", "m_over", "m_joint", "m_through", "m_pulley")
+    allowed |= dict.fromkeys(muscles, 1e-11 if muscle_class == "exact" else 25.0)
+    if muscle_class == "exact":
+        allowed |= {"m_through": 0.02, "m_pulley": 0.5}
+        # OpenSim's way over a cylinder is not quite the shortest.
+        allowed |= {"m_over": 0.1}
+    if muscle_class == "millard":
+        allowed = {name: limit for name, limit in allowed.items() if name in muscles}
+    for pose in sample_qpos(load_mjcf(arm), 6, 5):
+        qvel, control = random.uniform(-1.0, 1.0, len(pose)), random.uniform(0.1, 1.0)
+        for name, limit in allowed.items():
+            theirs = comparison.actuator_torques(arm, pose, qvel, control, name)
+            ours = live.torques(pose, qvel, control, [name, f"{name}_bias"])
+            assert np.abs(ours - theirs).max() <= limit, name
+
+
+def test_muscles_have_fitted_curves(made, records):
+    muscle = made.model["/forceset/m_over"]
+    assert type(muscle).__name__ == "Millard2012EquilibriumMuscle"
+    assert muscle.ignore_tendon_compliance and not muscle.ignore_activation_dynamics
+    assert (muscle.activation_time_constant, muscle.deactivation_time_constant) == (0.015, 0.06)
+    # What the tendon is shorter than nothing, the fiber is shorter.
+    fiber, slack = 0.2 / 0.7, 0.15 - 0.6 * 0.2 / 0.7
+    assert slack < 0.0 < muscle.tendon_slack_length == 1e-4
+    assert muscle.optimal_fiber_length == pytest.approx(fiber + slack - 1e-4)
+    for name in ("m_straight", "m_over", "m_round"):
+        errors = records[f"/actuator/{name}"].errors
+        assert errors["force-velocity"].rms < 0.01
+        assert errors["passive force-length"].rms < 0.01
+        assert errors["active force-length"].rms < 0.06
+
+
+def test_the_model_simulates(made):
+    assert osimlite.validate(made.model).ok
+    trajectory = osimlite.simulate(made.model, to=0.02, controls={"m_straight": 0.3})
+    assert np.isfinite(trajectory.values).all()
+
+
+def test_the_version_is_asked_for_where_it_matters(tmp_path):
+    path = models.write_mjcf(tmp_path, models.SIDES)
+    with pytest.raises(SettingError, match=r"'t' by up to .* m; .* --written-for 3"):
+        osimlite.from_mjcf(path)
+    made = osimlite.from_mjcf(path, written_for=3)
+    assert "MuJoCo 3" in str(made.fidelity.to_json()) or made.fidelity.translated["/tendon/t"]
