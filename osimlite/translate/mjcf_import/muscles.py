@@ -161,6 +161,7 @@ def make_muscle(
         min_control=limits[0],
         max_control=limits[1],
         fiber_damping=0.0,
+        default_activation=0.0,
         default_fiber_length=data.fiber,
         minimum_activation=0.0,
         active_force_length_curve=active,

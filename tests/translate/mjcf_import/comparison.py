@@ -218,6 +218,9 @@ class LiveForces:
             live.coordinates[name].setSpeedValue(live.state, speed)
         for force in live.model.getForceSet():
             force.setAppliesForce(live.state, force.getName() in names)
+        for muscle in live.model.getMuscles():
+            if muscle.getConcreteClassName() == "Millard2012EquilibriumMuscle":
+                muscle.setActivation(live.state, control)
         live.model.realizeVelocity(live.state)
         controls = live.opensim.Vector(live.model.getNumControls(), control)
         live.model.setControls(live.state, controls)
