@@ -250,7 +250,9 @@ class _Selection:
             apart = arms[row][:, columns] - truth[row]
             if len(joints):
                 worst = int(np.argmax(np.abs(apart).max(0)))
-                errors["moment arm"] = Error.measure(apart[:, worst], "m" if turning[worst] else "1")
+                errors["moment arm"] = Error.measure(
+                    apart[:, worst], "m" if turning[worst] else "1"
+                )
             if row in polynomials:
                 path = polynomials[row][0]
                 function = path.length_function
