@@ -209,6 +209,8 @@ def _add_leg(model: Model, torso: Body, side: str, z: float, floor: ContactHalfS
             CoordinateLimitForce(
                 name=f"{name}_limit_{side}",
                 coordinate=angle,
+                # For rotations OpenSim has these limits in degrees, and the stiffness in N m per
+                # degree.
                 upper_stiffness=20.0,
                 upper_limit=high,
                 lower_stiffness=20.0,

@@ -110,6 +110,7 @@ def describe_model(name: str) -> str:
     parameters = ", ".join(
         f"{p.name}={p.default}" for p in inspect.signature(function).parameters.values()
     )
+    # Without its verb the summary begins in the middle of a sentence.
     summary = summary[:1].upper() + summary[1:]
     return f"{summary} ({parameters})" if parameters else summary
 
@@ -173,6 +174,7 @@ def _select_function(module: ModuleType, place: str) -> Callable[..., Any]:
 
     It is the one annotated to return a Model, or the only one.
     """
+    # A script may build its model at once, in a variable.
     ready = getattr(module, "model", None)
     if isinstance(ready, Model):
         return lambda: ready
@@ -193,6 +195,7 @@ def _select_function(module: ModuleType, place: str) -> Callable[..., Any]:
 def _returns_model(function: Callable[..., Any]) -> bool:
     try:
         return get_type_hints(function).get("return") is Model
+    # An annotation may name a type that is imported for type checkers only.
     except NameError:
         return False
 
@@ -230,6 +233,7 @@ def _parse_value(name: str, text: str, parameter: inspect.Parameter) -> Any:
             return int(text)
         return text if kind is str else float(text)
     except (KeyError, ValueError):
+        # Without a default, a text that is no number remains a text.
         if kind is None:
             return text
         noun = {bool: "true or false", int: "a whole number"}.get(kind, "a number")

@@ -115,6 +115,7 @@ def human_walker(
     model.name = "HumanWalker"
     for body in model.components(Body):
         if body.name == "Pelvis":
+            # Head, arms and trunk; the pelvis of the exercise is the only body above the hips.
             body.mass = 47.5
         elif body.name.endswith("Thigh"):
             body.mass = 7.9
@@ -127,6 +128,7 @@ def human_walker(
     for sphere in model.components(ContactSphere):
         if sphere.name.endswith("FootContact"):
             _, y, z = sphere.location
+            # A larger sphere with the same lowest point keeps the length of the leg.
             sphere.location = (foot_ahead, y - sphere.radius + foot_radius, z)
             sphere.radius = foot_radius
     for contact in model.components(HuntCrossleyForce):

@@ -50,6 +50,7 @@ class Exporter:
 
 def write_urdf(*model: Any, **choices: Any) -> Urdf:
     """Translate a model to URDF; see :func:`osimlite.to_urdf`."""
+    # Importing a translator takes time, and each command needs at most one.
     from osimlite.translate.export import to_urdf
 
     return to_urdf(*model, **choices)
@@ -240,5 +241,6 @@ def list_exporters(command: str) -> dict[str, Exporter]:
         Exporter by name.
     """
     selected = [exporter for exporter in EXPORTERS if exporter.command == command]
+    # Sorting is stable: the other formats keep their order.
     selected.sort(key=lambda exporter: not exporter.is_default)
     return {exporter.name: exporter for exporter in selected}

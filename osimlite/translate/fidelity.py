@@ -98,6 +98,7 @@ class Group:
             for what, error in record.errors.items():
                 # Moment arms about different coordinates are one quantity for a summary.
                 name = what.partition(" about ")[0]
+                # Tuples are compared by their first entry, the largest error.
                 result[name, error.unit] = max(error, result.get((name, error.unit), error))
         return [(name, error) for (name, _), error in result.items()]
 
@@ -190,6 +191,7 @@ class Fidelity:
         missing = []
         for path in paths:
             parts = path.split("/")
+            # Paths begin with a slash, so that the first part is empty.
             above = {"/".join(parts[:count]) for count in range(2, len(parts) + 1)} | {path}
             if path not in self.translated and not above & recorded:
                 missing.append(path)

@@ -216,6 +216,7 @@ def _build_custom_axes(
         name = words[0] if len(words) == 1 and words[0] in names else (names or [""])[0]
         if isinstance(function, LinearFunction):
             slope, offset = function.coefficients
+            # The sign is in the vector already; see :func:`_flip`.
             slope = 1.0 if slope == -1.0 else slope
             functions.append(
                 (
@@ -364,6 +365,7 @@ def _extend_spline(spline: SimmSpline, low: float, high: float) -> None:
     if low < x[0]:
         start = x[0]
         value, slope, bend, cubic = pieces[0]
+        # From the inner to the outer point, each of which becomes the first.
         for t in [fraction * (low - margin - start) for fraction in fractions]:
             x.insert(0, start + t)
             y.insert(0, value + t * (slope + t * (bend + t * cubic)))

@@ -113,6 +113,7 @@ class _Survey:
                 "that the model's units are words for people",
                 "numbers written as m, kg, s, rad",
             )
+        # In URDF gravity belongs to the simulator, not to the robot.
         x, y, z = self.model.gravity
         self.note(
             "gravity",
@@ -153,6 +154,7 @@ class _Survey:
                 )
             elif path != "/ground" and link.name != path.rsplit("/", 1)[1]:
                 self._record_new_name(path, f"link {link.name}")
+            # Forward dynamics is singular if nothing resists the last joint.
             if link.mass == 0.0 and link.name in self._moving_ends:
                 done = "written as it is; PyBullet holds its last joint still"
                 self.note("massless-end", path, "a body without mass at the end of a chain", done)
@@ -193,6 +195,7 @@ class _Survey:
                     f"links {' '.join(between)}",
                 )
             moving = {index for part in chain for index in part.coordinates}
+            # URDF has no ball joint.
             if moving and not joint.speeds_are_rates:
                 self.note(
                     "ball-joint",

@@ -88,6 +88,7 @@ def progress(engine: Any, feet: Sequence[str] | None = None) -> RunMeasure:
     def numbers(batch: Batch) -> Floats:
         rows = None if batch.numbers is None else np.arange(len(batch.starts))
         along = measure_along_slope(batch.engine, batch.runs.states, batch.numbers, rows)[0]
+        # A foot is as far as its foremost contact.
         places = np.stack([along[:, foot].max(axis=1) for foot in contacts], axis=1)
         result = zip(_list_walks(footing, batch), places.tolist(), strict=True)
         return np.array([_compute_progress(walk, ends) for walk, ends in result])

@@ -89,6 +89,7 @@ class StabilityOptimization:
                         self.best.fractions, INITIAL_STEP, None, seed, True, budget, TURN_TOLERANCE
                     ),
                 )
+            # With another seed the next round tries other points.
             seed += 1
 
     def _is_enough(self, found: ModelCycle) -> bool:

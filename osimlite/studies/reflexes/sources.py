@@ -231,6 +231,7 @@ def _make_angular_velocity_source(
         TURN,
         link,
         0,
+        # The axis is in the frame of the body, the kernels know its link only.
         tuple(frame[:3, :3] @ axis),
     )
 
@@ -242,8 +243,9 @@ _MUSCLE_CHANNELS = (
     Channel("S", _make_spindle_source, is_free=False),
     Channel("A", _select_muscle_factory("activation", SENSES.ACTIVATIONS), is_free=False),
 )
-"""Channels of reflexes on muscles: length, velocity, force, spindle rate and activation; SCONE's
-defaults.
+"""Channels of reflexes on muscles: length, velocity, force, spindle rate and activation.
+
+Offsets, and whether a term may be negative, are as in SCONE by default.
 """
 REFLEX_TYPES = {
     "MuscleReflex": ReflexType(_list_muscles, _MUSCLE_CHANNELS, corrects=False, is_own=True),

@@ -63,6 +63,7 @@ class Batch:
 
     def select_run(self, place: int) -> Batch:
         """Return a batch with one of the runs."""
+        # A list of one index keeps the axis of the runs.
         rows = [place]
         return replace(
             self,
@@ -71,6 +72,7 @@ class Batch:
             starts=self.starts[rows],
             runs=self.runs.select(rows),
             values=self.values[rows],
+            # The shared results are those of all runs.
             memory={},
         )
 
@@ -252,7 +254,9 @@ def largest_force(engine: Any, feet: Sequence[str] | None = None) -> RunMeasure:
         feet: unused.
     """
     return RunMeasure(
-        "largest_force", lambda batch: batch.runs.peaks[:, :, 0].max(axis=1, initial=0.0)
+        # A model without contacts has no peaks, hence the initial 0.
+        "largest_force",
+        lambda batch: batch.runs.peaks[:, :, 0].max(axis=1, initial=0.0),
     )
 
 
@@ -329,10 +333,12 @@ def _find_state(engine: Any, name: str) -> tuple[int | None, float]:
     Returns:
         Offset in the state and 0; for a locked coordinate None and its value, or 0 for its speed.
     """
+    # Other states, such as activations, come after the values and speeds of the coordinates.
     if name in engine.state.paths:
         return 2 * len(engine.order) + engine.state.paths.index(name), 0.0
     front, _, last = name.rpartition("/")
     if last not in ("value", "speed"):
+        # The name of a coordinate alone means its value.
         front, last = name, "value"
     place = engine.mechanism.coordinate_index(front)
     count = len(engine.order)

@@ -135,6 +135,7 @@ class Plan(IntegrationOptions):
             SettingError: a function of the plan cannot be pickled.
         """
         try:
+            # A model is a long XML text, which each process receives.
             return zlib.compress(pickle.dumps(self))
         # Lambdas and local functions raise one of these, depending on the version of Python.
         except (pickle.PicklingError, AttributeError, TypeError):
@@ -278,6 +279,7 @@ def plan(
     ):
         if value is not None and not (isfinite(value) and value > 0.0):
             raise SettingError(f"'{name}' is a positive number, not {value:g}")
+    # The accuracy is a relative error.
     if made.accuracy >= 1.0:
         raise SettingError(f"'accuracy' is less than 1, not {made.accuracy:g}")
     made.check_integration()
@@ -324,6 +326,7 @@ def _make_stop(mechanism: Mechanism, name: str, given: float | str, is_below: bo
     infos = {key: info for info in mechanism.coordinates for key in (info.name, info.path)}
     if name not in infos:
         raise SettingError(f"there is no coordinate '{name}'{suggest_name(name, infos)}")
+    # A stop that never acts would be a mistake that nobody sees.
     if infos[name].locked:
         raise SettingError(
             f"the coordinate '{name}' is locked, so that it stops nothing; name one that moves"

@@ -80,6 +80,7 @@ def run_cma(ask: CostFunction, search: Search, *, keeps_best: bool = False) -> s
         options["CMA_elitist"] = True
     es = strategy.CMAEvolutionStrategy(search.start, search.sigma, options)
     if keeps_best:
+        # The start is the best point so far; the first population contains it as it is.
         es.inject([search.start], force=True)
     while not es.stop():
         points = es.ask()
@@ -102,8 +103,10 @@ def run_sobol_cma(ask: CostFunction, search: Search) -> str:
         search: settings.
     """
     _require_two_variables(search)
+    # The default size of a population in CMA-ES.
     size = search.popsize or 4 + int(3.0 * np.log(len(search.start)))
     points = Sobol(search.seed, len(search.start)).draw_points(0, SOBOL_POPULATIONS * size)
+    # With the start among the points the search never ends worse than it began.
     points[0] = search.start
     costs = np.concatenate(
         [ask(points[first : first + size]) for first in range(0, len(points), size)]
@@ -131,17 +134,21 @@ def run_differential_evolution(ask: CostFunction, search: Search) -> str:
         )
     rng = np.random.default_rng(search.seed)
     size = len(search.start)
+    # scipy needs a population of at least five.
     first = rng.random((max(5, search.popsize or 10 * size), size))
     first[0] = search.start
     result = optimize.differential_evolution(
+        # A vectorized function receives the points as columns.
         lambda points: ask(np.atleast_2d(points.T)),
         [(0.0, 1.0)] * size,
         init=first,
+        # A generation has several evaluations, so that the budget ends the search first.
         maxiter=search.budget,
         tol=search.tolerance if search.tolerance is not None else 0.01,
         atol=search.tolerance or 0.0,
         vectorized=True,
         updating="deferred",
+        # The final search by L-BFGS-B would evaluate one point at a time.
         polish=False,
         rng=rng,
     )
@@ -163,6 +170,7 @@ def run_nelder_mead(ask: CostFunction, search: Search) -> str:
     simplex = np.tile(search.start, (size + 1, 1))
     for k in range(size):
         simplex[k + 1, k] += (
+            # A step that would leave the range goes the other way.
             search.sigma if simplex[k + 1, k] + search.sigma <= 1.0 else -search.sigma
         )
     result = optimize.minimize(
@@ -199,6 +207,7 @@ def run_lbfgs(ask: CostFunction, search: Search) -> str:
         jac=search.gradient,
         method="L-BFGS-B",
         bounds=[(0.0, 1.0)] * len(search.start) if search.is_bounded else None,
+        # The budget ends the search by an exception here, too.
         options={"ftol": tolerance, "gtol": tolerance, "maxfun": 10**9, "maxiter": 10**9},
     )
     return f"converged: {result.message}"

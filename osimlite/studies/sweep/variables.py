@@ -161,6 +161,7 @@ class Variable:
 
     def interpolate(self, fraction: Floats) -> Floats:
         """Return the values at fractions of the range, clipped to it, and exact at either end."""
+        # exp(log(x)) is not exactly x, so that the ends are set explicitly.
         result = np.clip(self.extrapolate(fraction), self.low, self.high)
         return np.where(fraction <= 0.0, self.low, np.where(fraction >= 1.0, self.high, result))
 
@@ -253,6 +254,7 @@ def resolve_variables(
         for name, meaning in known:
             if meaning is not None:
                 made = _make_variable(name, *meaning, given)
+                # Radians and degrees are easily confused in initial angles.
                 if isinstance(made.target, Start) and not made.target.is_speed:
                     made = replace(made, warning=_describe_suspect_range(made, given, mechanism))
                 result.append(made)
@@ -347,6 +349,7 @@ def _describe_unknown_name(
     known += [
         f"{key}/control" for item in model.components(Actuator) for key in (item.name, item.path)
     ]
+    # Properties are many; they are searched only if the name is a path.
     known += list_property_paths(model) if "/" in name else []
     near = suggest_name(name, known)
     return SettingError(
@@ -462,6 +465,7 @@ def _parse_number(name: str, part: object, unit: str) -> float:
         given = parse_quantity(str(part))
     if given is None or not math.isfinite(given.number):
         raise SettingError(f"'{part}' is no number for '{name}'; give one such as 0.5 or 30deg")
+    # A plain number is in the unit of the variable.
     if given.unit is None:
         return given.number
     # Some properties of OpenSim, such as limits of CoordinateLimitForce, are in degrees.

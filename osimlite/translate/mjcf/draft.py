@@ -373,6 +373,7 @@ class Draft:
             element,
             "body",
             name=self.make_name("body", f"{name}_speck"),
+            # MuJoCo cancels the weight of the body.
             gravcomp=1,
             **format_pose(frame),
         )

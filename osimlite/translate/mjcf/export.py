@@ -106,6 +106,7 @@ class Mjcf:
             joint: line.slope * values[place] + line.start
             for place, (joint, line) in self.leads.items()
         }
+        # The robot has the exact functions; `leads` adds joints that it does not have.
         result = leads | self.robot.joint_values(values)
         for joint, follower in self.followers.items():
             if joint not in result:

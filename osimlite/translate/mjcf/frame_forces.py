@@ -189,6 +189,7 @@ def add_body_actuator(draft: Draft, force: BodyActuator, path: str) -> str:
         raise Untranslatable("its point is given in ground, so that it wanders through the body")
     site = _add_point_site(draft, force, path, "socket_body", force.point)
     axes = draft.add_site(path, *GROUND_FRAME) if force.spatial_force_is_global else None
+    # MuJoCo's gear has the force first, and then the torque.
     units = np.eye(6)[[3, 4, 5, 0, 1, 2]]
     made = [
         _add_site_motor(draft, f"{path}_{word}", unit, site, axes)

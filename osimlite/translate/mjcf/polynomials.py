@@ -44,6 +44,7 @@ def find_polynomial(function: f.Function) -> Polynomial | None:
         case f.Constant(value):
             return Polynomial((value,))
         case f.Polynomial(coefficients):
+            # OpenSim lists the coefficient of the highest power first.
             return Polynomial(coefficients[::-1]).trim()
         case f.MultivariatePolynomial(coefficients, powers) if all(
             len(item) == 1 for item in powers
@@ -95,6 +96,7 @@ def fit_quartic(function: f.Function, span: tuple[float, float], unit: str) -> F
         off = np.abs(basis @ result - y)
         if off.max() < least:
             best, least = result, off.max()
+        # All weights of an exact fit would vanish.
         if not off.any():
             break
         weights *= off

@@ -111,6 +111,7 @@ def multiply_each_pose(rows: Array, matrices: Array) -> Array:
     """
     if rows.ndim < 3:
         return np.asarray((rows[..., None, :] @ matrices)[..., 0, :])
+    # `@` multiplies stacks of matrices, whose stacked axis, the poses, must come first.
     return np.asarray((rows.swapaxes(0, 1) @ matrices).swapaxes(0, 1))
 
 
@@ -130,6 +131,7 @@ def measure_arm_errors(mechanism: Mechanism, arms: Array, truth: PathSamples) ->
     for place, off, wanted in zip(
         list_free_coordinates(mechanism), (arms - truth.arms).T, truth.arms.T, strict=True
     ):
+        # A path crosses few coordinates; about the others there is nothing to compare.
         if np.abs(off).max() > EXACT_TOLERANCE_M or np.abs(wanted).max() > EXACT_TOLERANCE_M:
             rotational = mechanism.coordinates[place].motion_type == "rotational"
             result[place] = Error.measure(off, "m" if rotational else "1")
@@ -199,6 +201,7 @@ def draw_poses(paths: Paths, count: int, seed: int = 0) -> tuple[Poses, Mapping[
         np.stack([state.jacobians @ own for state, own in zip(states, rates, strict=True)], axis=1),
         rates,
     )
+    # A copy makes the values of one path contiguous.
     lengths = paths.system.measure_poses(values).T.copy()
     arms = (
         np.nan_to_num(paths.compute_moment_arms(values, couplings)[:, :, moving])

@@ -86,6 +86,8 @@ class WrapGeom:
         """
         if self.side is None:
             return replace(self, frame=frame, radius=radius)
+        # The direction of the side site in the frame of the surface; its distance grows with the
+        # radius.
         seen = self.frame[:3, :3].T @ (self.side.place - self.frame[:3, 3])
         side = replace(
             self.side, place=frame[:3, :3] @ (seen * (radius / self.radius)) + frame[:3, 3]
@@ -163,6 +165,7 @@ def _measure_section(
         Lengths (k, P) (m) and moment arms (k, P, m).
     """
     one, two = (_locate_in_ground(spot, poses)[None] for spot in (first, second))
+    # Directions in which the tension pulls at either end.
     way, back = two - one, one - two
     lengths, arms = np.zeros(()), np.zeros(())
     chosen: Any = ...
@@ -192,8 +195,11 @@ def _measure_section(
             for at in (result.first, result.second)
         )
         way, back = leaves - one, returns - two
+        # Where the tendon does not touch the surface, it is straight, and only `way` counts.
         lengths = np.where(touches, result.length.reshape(touches.shape) + norm(back), 0.0)
         for place, pull in ((leaves, way), (returns, back)):
+            # At the surface the tendon pulls the opposite way. Virtual work makes the generalized
+            # force of a unit tension the moment arm.
             arms = arms - _compute_generalized_forces(
                 body, place, np.where(touches[..., None], unit(pull), 0.0), poses
             )
@@ -215,6 +221,7 @@ def iterate_sections(tendon: Tendon) -> Iterator[tuple[TendonSite, WrapGeom | No
         else:
             if last is not None:
                 yield last, around, part
+            # A surface belongs to one section only.
             last, around = part, None
 
 
