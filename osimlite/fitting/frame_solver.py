@@ -65,6 +65,7 @@ class FrameSolver:
                 )
         if not self.markers and not sensors:
             raise SettingError(f"'{model.name}' has no markers; add some, or name sensors to fit")
+        # One by one, because among known names an unknown one would be left out without an error.
         frames = {
             name: find_sensor_frames(model, mechanism, (name,))[name] for name in self.sensors
         }
@@ -78,6 +79,7 @@ class FrameSolver:
             [SensorTarget(frame, weighed[name]) for name, frame in frames.items()],
             constraints=constraints,
         )
+        # At time 0, because the time of the first frame is not known yet.
         self._begin = compute_first_pose(self._mechanism, 0.0, constraints)
         self._frame = self._fit.create_single_frame_fit()
         self.reset()

@@ -131,6 +131,7 @@ class Measurements:
         Raises:
             OsimliteError: the data and the model share no name.
         """
+        # The data determine the order, as the positions of a frame are in it.
         names = [
             name for name in self.names if name in model and (selected is None or name in selected)
         ]

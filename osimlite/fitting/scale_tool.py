@@ -115,6 +115,7 @@ def scale(
         measurements = _create_measurements(measurements)
         for body in (body for item in measurements for body in item.body_scale_set.objects):
             expect_body(body.name)
+    # Factors by hand need no measured markers.
     data = None if static is None else MarkerData.from_source(static)
     wanted = list(measurements)
     if (wanted or place) and data is None:

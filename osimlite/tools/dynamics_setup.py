@@ -101,6 +101,7 @@ def build_model(job: Job) -> Model:
     model = job.read_model()
     add_forces(model, paths, replace=setup.replace_force_set)
     for controller in setup.controller_set.objects:
+        # The setup keeps its controllers as they are in its file.
         controller_copy = _resolve_files(job, controller.copy_deep())
         actuators = list(model.components(Actuator))
         # Older setups request all actuators by one word; their names are known from the model

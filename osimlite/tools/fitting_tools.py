@@ -180,6 +180,7 @@ def run_imu_inverse_kinematics_tool(job: Job, outcome: Outcome) -> None:
         "" if name.strip() in NO_FILE else name.strip()
         for name in (setup.output_motion_file, setup.results_directory)
     )
+    # The setup may be from Windows.
     beside, _, name = requested.replace("\\", "/").rpartition("/")
     name = name or f"ik_{file.stem}"
     tables = {

@@ -61,6 +61,7 @@ class Job:
             return None
         there = self.file.parent / name
         here = Path(name)
+        # A file that is in neither folder is reported in that of the setup.
         return here if not os.path.exists(there) and os.path.exists(here) else there
 
     def require_path(self, *tags: str) -> Path:

@@ -59,6 +59,7 @@ def find_named_files(setup: str, rule: str) -> Iterator[str]:
             else:
                 folder = os.path.dirname(file)
                 results = str(getattr(subject.top, "results_directory", "")).strip()
+                # Which of the two folders a tool uses depends on the property.
                 yield os.path.join(folder, item.name.strip())
                 yield os.path.join(folder, results, item.name.strip())
         for item in subject.find_named_files("file"):

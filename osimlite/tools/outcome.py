@@ -95,6 +95,7 @@ class Outcome:
                 f"output_precision is {precision}; set the number of digits after the decimal "
                 f"point, for example {PRECISION} or 16"
             )
+        # Some analyses explain their missing numbers themselves.
         if (missing := self._note_missing(path, table)) and "NaN" not in description:
             description = f"{description}\n{missing}" if description else f"\n{missing}\n"
         self.tables[path.name] = replace(table, file=str(path))
@@ -147,6 +148,7 @@ class Outcome:
         if not missing.any():
             return ""
         names = join_words([f"'{table.columns[index]}'" for index in np.flatnonzero(missing)])
+        # One message suffices: all tables of a motion lack numbers for the same reason.
         if not any("NaN" in words for _, words in self.told):
             self.add_message(
                 "not a number", f"{path.name} has NaN where there is no value: {names}"

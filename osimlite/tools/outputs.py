@@ -59,6 +59,7 @@ def find_reader(motion: Motion, component: Component, name: str) -> Reader | Non
         return lambda motion, muscle, path: _read_muscle_output(
             motion, muscle, path, MUSCLE_OUTPUTS[name]
         )
+    # In OpenSim every state is an output of its component, too.
     if f"{path}/{name}" in motion.histories:
         return lambda motion, _, path: motion.histories[f"{path}/{name}"][:, None]
     return None
@@ -196,6 +197,7 @@ def _read_force_energy(motion: Motion, force: Force, path: str) -> Array:
     """Return the potential energy of a force, J."""
 
     def compute(part: Motion) -> Array:
+        # A muscle without equilibrium stores an unknown energy.
         if path in part.left_out:
             return np.full((len(part.times), 1), np.nan)
         return np.array(
@@ -232,6 +234,7 @@ def _read_excitation(motion: Motion, muscle: Muscle, path: str) -> Array:
 
     def compute(part: Motion) -> Array:
         names = part.simulation.forces.controls.names
+        # A muscle that is off has no control.
         if path not in names:
             return np.full((len(part.times), 1), np.nan)
         return part.evaluate_kernels([part.system.control_offsets[names.index(path)]])
@@ -244,6 +247,7 @@ def _create_reaction_reader(side: str) -> Reader:
 
     def read(motion: Motion, joint: Joint, path: str) -> Array:
         force, moment, _ = JointWrenches.compute_along(motion).get_reaction(joint, side)
+        # OpenSim's SpatialVec has the moment first.
         return np.hstack((moment, force))
 
     return read
@@ -281,6 +285,7 @@ def _read_muscle_output(
         if motion.system.has_quantity(path, name)
     ]
     known = motion.read_records([path], *LAW_RECORDS, *extra)
+    # Fibers without equilibrium have NaN, of which numpy would warn.
     with np.errstate(invalid="ignore", divide="ignore"):
         quantities = known | compute_quantities(known, [muscle])
         turning = (

@@ -389,6 +389,8 @@ def _render_section(title: str, panels: Mapping[str, list[_Curve]]) -> Iterator[
     if not panels:
         return
     lines = [line for group in panels.values() for line in group]
+    # The panels of a section share their axis, so that one curve without cycles puts all of them
+    # over time.
     cyclic = all(
         line.steps.get(side) and line.steps[side].cycles
         for line in lines
@@ -435,6 +437,7 @@ def _draw_curve(panel: Any, line: _Curve, *, cyclic: bool) -> None:
     cycles = [
         np.interp(first + (last - first) * PERCENT / 100.0, line.times, line.column)
         for first, last in line.steps[line.side or "r"].cycles
+        # Loads may be measured before and after the motion, too.
         if line.times[0] <= first and last <= line.times[-1]
     ]
     for cycle in cycles:

@@ -252,6 +252,7 @@ def _find_base(model: Model, owner: Any, socket: str) -> Any:
     """Return the body, or ground, to which the frame of a socket is fixed."""
     tree = model.tree()
     frame: Any = tree.target(owner, socket, getattr(owner, socket))
+    # An offset frame may be fixed to another one.
     while isinstance(frame, PhysicalOffsetFrame):
         frame = tree.target(frame, "socket_parent", frame.socket_parent)
     return frame
@@ -271,6 +272,7 @@ def _replace_joints_with_welds(
             raise ModelError(
                 f"the model has no joint '{path}'{suggest_name(path, [*joints, *names])}"
             )
+        # Joints may be connected to frames of other components, which the weld leaves as they are.
         frames: list[PhysicalOffsetFrame] = []
         for socket in ("socket_parent_frame", "socket_child_frame"):
             frame = tree.target(joint, socket, getattr(joint, socket))
@@ -321,6 +323,7 @@ def replace_paths(model: Model, paths: Any) -> None:
                 f"'{path.name}'{suggest_name(path.name, [*forces])}"
             )
         force.geometry_path = path.copy_deep()
+        # In its file the name of a path says to which force it belongs.
         force.geometry_path.name = "path"
 
 
@@ -331,6 +334,7 @@ def _add_external_loads(model: Model, operator: p.ModOpAddExternalLoads, folder:
     loads = read_document(Source.from_file(file), of=ExternalLoads).top
     assert isinstance(loads, ExternalLoads)
     loads.name = "externalloads"  # OpenSim drops the name in the file.
+    # The model is in another folder than the loads.
     loads.datafile = str((file.parent / loads.datafile.strip()).absolute())
     model.add(loads)
 

@@ -110,6 +110,7 @@ def find_change(name: str, value: str) -> Change:
     """
     if (made := CHANGES_BY_WORD.get(name, {}).get(value)) is not None:
         return made()
+    # A word and a file may replace the same part: a file has a suffix.
     if name in OPERATORS_BY_NAME and (name not in CHANGES_BY_WORD or Path(value).suffix):
         return _create_change(OPERATORS_BY_NAME[name](value))
     names = sorted({*CHANGES_BY_WORD, *OPERATORS_BY_NAME})

@@ -346,6 +346,7 @@ def _plan_static_optimization(
                 yield "reserves", partial(_measure_reserves, tool, file, others)
             else:
                 yield "activations", partial(_measure_activations, tool, file)
+        # StaticOptimization writes no states of fibers.
         yield "passive forces", partial(measure_passive_forces, tool, None)
 
 
@@ -372,6 +373,7 @@ def _plan_results_without_setup(
 ) -> Iterator[PlannedMeasurement]:
     """Yield the measurements of results without a setup, by their names and labels."""
     has = {tool.tag for tool in folder.tools}
+    # With a setup, its own results are measured already.
     if not has & {"RRATool", "CMCTool"}:
         for file in folder.find_files("_Actuation_force.sto", "_StaticOptimization_force.sto"):
             if file not in claimed:

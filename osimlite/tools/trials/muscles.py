@@ -30,6 +30,8 @@ def measure_passive_forces(tool: TrialTool, states: Path | None) -> Numbers:
         tool: tool with the model.
         states: file of states; None for the motion of the tool.
     """
+    # States of a simulation have the actual fiber lengths; without them the fibers are in
+    # equilibrium.
     file = states or tool.find_input("states_file") or tool.require_input(*MOTIONS)
     is_states = states is not None or file == tool.find_input("states_file")
     table = compute_passive_forces(tool, file, is_states=is_states)
@@ -38,6 +40,7 @@ def measure_passive_forces(tool: TrialTool, states: Path | None) -> Numbers:
     }
     told = 0
     for name in table.columns:
+        # A muscle without equilibrium has NaN.
         column = np.where(np.isfinite(table[name]), table[name], 0.0)
         row = int(np.argmax(column))
         share = 100.0 * float(column[row]) / strengths[name] if strengths.get(name) else 0.0
@@ -76,6 +79,7 @@ def compute_passive_forces(tool: TrialTool, file: Path, *, is_states: bool) -> S
     if not count or not any(True for _ in tool.model.components(Muscle)):
         raise MissingInput(f"{tool} has no muscles, or '{file}' has no row in its time range")
     analysis = MuscleAnalysis(name="muscles", moment_arm_coordinate_list=(), compute_moments=False)
+    # The largest force changes slowly, so that some rows suffice.
     analysis.step_interval = max(1, count // MAX_ROWS)
     setup = AnalyzeTool(
         name="trial",
