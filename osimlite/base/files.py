@@ -102,6 +102,10 @@ def _read_stream(stream: BinaryIO, size: int, path: str | Path) -> bytes:
 def expect_size(size: int, path: str | Path) -> int:
     """Return the largest number of bytes that are read of a file.
 
+    Args:
+        size: size of the file, bytes.
+        path: path of the file.
+
     Raises:
         SpecialFileError: the file has more bytes.
     """
@@ -120,7 +124,12 @@ def expect_size(size: int, path: str | Path) -> int:
 
 
 def get_relative_path(path: str | Path, folder: str | Path) -> str:
-    """Return a path relative to a folder, with slashes; on another drive of Windows the absolute path."""
+    """Return a path relative to a folder, with slashes; on another drive of Windows the absolute path.
+
+    Args:
+        path: the path.
+        folder: the folder.
+    """
     try:
         return Path(os.path.relpath(path, folder)).as_posix()
     except ValueError:

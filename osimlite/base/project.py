@@ -48,6 +48,10 @@ def get_max_file_size(folder: Path) -> int:
 def parse_max_file_size(file: Path, table: dict[str, Any]) -> int:
     """Return the largest number of bytes of a file by the settings in `file`.
 
+    Args:
+        file: settings file, for messages.
+        table: its content.
+
     Raises:
         OsimliteError: the setting `largest-file` is invalid.
     """

@@ -43,7 +43,12 @@ def mark_used(path: Path) -> None:
 
 
 def is_due(folder: Path, now: float) -> bool:
-    """Return whether the last removal is more than a day ago or unknown."""
+    """Return whether the last removal is more than a day ago or unknown.
+
+    Args:
+        folder: folder of the cache.
+        now: present time, s since the epoch.
+    """
     try:
         return not 0.0 <= now - os.lstat(folder / MARKER).st_mtime < DAY_S
     except OSError:

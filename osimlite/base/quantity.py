@@ -61,7 +61,12 @@ def warn_of_unit(message: str) -> None:
 
 
 def warn_caller(message: str, category: type[DoubtfulWarning] = DoubtfulWarning) -> None:
-    """Issue a warning at the line of the user's program that called osimlite."""
+    """Issue a warning at the line of the user's program that called osimlite.
+
+    Args:
+        message: text of the warning.
+        category: class of the warning.
+    """
     level = 1
     frame = sys._getframe()
     package_folder = str(Path(__file__).parents[1])

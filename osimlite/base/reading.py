@@ -58,6 +58,10 @@ def make_missing_error(path: str | Path, *, may_be_folder: bool = False) -> Miss
 def read_at_most(path: str | Path, limit: int) -> bytes:
     """Return the first `limit` bytes of a regular file, or all of it if it is shorter.
 
+    Args:
+        path: the file.
+        limit: number of bytes.
+
     Raises:
         SpecialFileError: the path is a pipe, a device or a similar file.
         MissingFileError: the file does not exist or is not readable.

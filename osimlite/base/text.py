@@ -150,32 +150,59 @@ def measure_similarity(word: str) -> Callable[[str], float]:
 
 
 def suggest_name(word: str, known: Iterable[str]) -> str:
-    """Return ``"; did you mean 'x'?"``, or an empty text if no known name is similar."""
+    """Return ``"; did you mean 'x'?"``, or an empty text if no known name is similar.
+
+    Args:
+        word: unknown word.
+        known: valid names.
+    """
     result = find_nearest(word, known)
     return f"; did you mean '{result}'?" if result else ""
 
 
 def suggest_path(name: str, paths: Collection[str]) -> str:
-    """Suggest a path that contains a name (``/jointset/knee/angle/value`` for ``angle``) or is similar."""
+    """Suggest a path that contains a name (``/jointset/knee/angle/value`` for ``angle``) or is similar.
+
+    Args:
+        name: unknown name.
+        paths: valid paths.
+    """
     within = next((f"; did you mean '{path}'?" for path in paths if name in path.split("/")), "")
     return within or suggest_name(name, paths)
 
 
 def suggest_or_list(word: str, known: Iterable[str], *more: str) -> str:
-    """Return ``"; did you mean 'x'?"``, or ``"; there is x, y and z"`` if no known name is similar."""
+    """Return ``"; did you mean 'x'?"``, or ``"; there is x, y and z"`` if no known name is similar.
+
+    Args:
+        word: unknown word.
+        known: valid names.
+        more: further texts to list.
+    """
     names = list(known)
     return suggest_name(word, names) or f"; there is {join_words([*names, *more])}"
 
 
 def format_range(low: float, high: float, form: str) -> str:
-    """Return ``"0.1 to 0.5"``; ``"0.3"`` if both numbers are formatted equally, ``"-"`` for NaN."""
+    """Return ``"0.1 to 0.5"``; ``"0.3"`` if both numbers are formatted equally, ``"-"`` for NaN.
+
+    Args:
+        low: lower number.
+        high: upper number.
+        form: format specification, such as ".3g".
+    """
     return (
         "-" if low != low else " to ".join(dict.fromkeys((format(low, form), format(high, form))))
     )
 
 
 def format_count(number: int, noun: str) -> str:
-    """Return a number with a noun: ``"1 step"``, ``"2 steps"``, ``"2 bodies"``."""
+    """Return a number with a noun: ``"1 step"``, ``"2 steps"``, ``"2 bodies"``.
+
+    Args:
+        number: the number.
+        noun: the noun in the singular.
+    """
     many = f"{noun[:-1]}ies" if noun.endswith("y") else f"{noun}s"
     return f"{number} {noun if number == 1 else many}"
 
@@ -194,7 +221,12 @@ def make_unique_name(name: str, taken: Container[str | None], first: int = 1) ->
 
 
 def join_words(words: Iterable[str], *, most: int = 8) -> str:
-    """Return words as ``"a, b and c"``; those after the first `most` are counted only."""
+    """Return words as ``"a, b and c"``; those after the first `most` are counted only.
+
+    Args:
+        words: the words.
+        most: number of words to list; all by default.
+    """
     items = list(words)
     if len(items) > most:
         items = [*items[:most], f"{len(items) - most} more"]

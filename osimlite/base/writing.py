@@ -62,6 +62,10 @@ def _make_folder_error(path: str | Path) -> OsimliteError:
 def write_atomically(path: str | Path, content: str | bytes) -> None:
     """Write a file under a temporary name, then rename it.
 
+    Args:
+        path: the file.
+        content: its content; text is written in UTF-8.
+
     Raises:
         OsimliteError: the folder is missing or cannot be written to; nothing has changed then.
     """
@@ -110,6 +114,10 @@ def open_into(folder: str | Path, name: str) -> Iterator[BinaryIO]:
 
     The new file replaces a regular file or a link; the target of the link stays unchanged.
 
+    Args:
+        folder: the folder.
+        name: name of the file.
+
     Raises:
         OsimliteError: the folder is missing or cannot be written to, or something else than a
             regular file has the name; nothing has changed then.
@@ -123,6 +131,11 @@ def open_into(folder: str | Path, name: str) -> Iterator[BinaryIO]:
 
 def write_into(folder: str | Path, name: str, content: str | bytes) -> Path:
     """Write a file in a folder under a name that the program chose, and return its path.
+
+    Args:
+        folder: the folder.
+        name: name of the file.
+        content: its content.
 
     Raises:
         OsimliteError: as of :func:`open_into`.
@@ -158,6 +171,10 @@ def write_cached(path: Path, content: str | bytes) -> None:
     """Write an entry of a cache, and make its folder; the entry is left out if that is not possible.
 
     Once a day entries that were not used for long are removed first.
+
+    Args:
+        path: path of the entry.
+        content: its content.
     """
     with suppress(OSError, OsimliteError):
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -110,7 +110,6 @@ def _suggest_built_in(error: OsimliteError, command: str) -> str:
         )
     # The cutoff (percent of similarity) is high because file names are often similar by chance, such
     # as arm26 and arm.
-    # Names of files are often near by chance, such as arm26 and arm.
     similar = find_nearest(name, BUILT_IN, cutoff=80.0)
     if similar is None:
         return ""
@@ -144,30 +143,21 @@ def _run(words: list[str]) -> None:
 
     # Imports create many objects and free none. With the default threshold the garbage collector
     # would scan them again and again.
-    # What is imported makes many objects and drops none: the collector would look through them
-    # again and again.
     gc.set_threshold(300_000)
     # At exit Python collects once more, which takes a quarter of the time of a short command; frozen
     # objects are not scanned.
-    # At the end Python would look through all that was made once more, a quarter of the time of a
-    # short command.
     atexit.register(gc.freeze)
     # rich accepts every value of COLUMNS, also 0 and a million.
-    # What draws tables takes any width at its word.
     width = os.environ.get("COLUMNS", "")
     if not (width.isdecimal() and len(width) < 5 and int(width)):
         os.environ.pop("COLUMNS", None)
     # pydantic searches all installed packages for plug-ins; osimlite uses none.
-    # Plug-ins of pydantic, for which it searches every installed package, have nothing to do here.
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     # The matrices of mechanisms are too small for several threads: those of OpenBLAS would busy-wait
     # and occupy a core.
-    # Matrices of mechanisms are small: the threads of OpenBLAS would only wait, and keep a core
-    # busy with that.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     words = [ALIASES.get(words[0], words[0]), *words[1:]] if words else ["--help"]
     # Import the module of the requested command only. The help needs all of them.
-    # Only the command that is asked for is loaded; without one, all are, for the help.
     names = words[:1] if words[:1] and words[0] in COMMANDS else COMMANDS
     try:
         if "--version" in words and {*words} <= VERSION_OPTIONS:
@@ -188,7 +178,6 @@ def _run(words: list[str]) -> None:
             )
             warnings.simplefilter("once", DoubtfulWarning)
             # Options report suspicious numbers themselves, as errors.
-            # Options refuse such a number, or were given its unit.
             warnings.simplefilter("ignore", UnitWarning)
             if names != COMMANDS and COMPLETION_VARIABLE not in os.environ:
                 command = load_command(words[0])
@@ -232,7 +221,6 @@ def _exit_with_message(error: BaseException, words: list[str]) -> NoReturn:
         ):
             raise error
         # Python flushes standard output at exit and would report the closed pipe again.
-        # Python would complain once more when it closes standard output.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         raise SystemExit(1) from None
     if isinstance(error, ModuleNotFoundError):
@@ -246,7 +234,6 @@ def _exit_with_message(error: BaseException, words: list[str]) -> NoReturn:
         )
         raise SystemExit(2) from None
     # typer's copy of click does not export the class of these errors, so recognise them by a method.
-    # The library that reads options does not tell under what name it can be caught.
     if not hasattr(error, "format_message"):
         raise error
     context = getattr(error, "ctx", None)

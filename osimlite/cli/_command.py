@@ -184,8 +184,6 @@ class Command:
     def complete(self, words: Sequence[str]) -> list[str]:
         """Return the words of a command line with the values of options that are given without one."""
         # Most command lines need no completion, and reading the parameters imports their modules.
-        # Most command lines have no option that could lack a value, and need no look at the
-        # parameters here.
         if not any(
             word[:2] == "--" and following[0:1] == "-"
             for word, following in pairwise([*words, "-"])

@@ -56,7 +56,6 @@ def escape_output() -> Iterator[None]:
     """Replace standard output and standard error by escaping streams."""
     streams = sys.stdout, sys.stderr
     # A Windows program without a console has None for both.
-    # A program without a console has no streams.
     sys.stdout, sys.stderr = (stream and cast(TextIO, EscapingStream(stream)) for stream in streams)
     try:
         yield
@@ -162,7 +161,6 @@ def print_diff(before: str, after: str, old: str, new: str) -> None:
     import io
 
     # ``str.splitlines`` would also split at form feeds and other characters; a diff splits at \\n.
-    # A text breaks its lines at \\n; what else looks like a break to Python is written out.
     first, second = (list(io.StringIO(text, newline="\n")) for text in (before, after))
     for line in difflib.unified_diff(first, second, old, new):
         body = line.rstrip("\r\n")
@@ -176,7 +174,6 @@ def print_for_programs(text: str) -> None:
         _before_output()
     sys.stdout.flush()
     # Tests replace standard output by streams without bytes.
-    # What takes the place of standard output in tests may be without bytes.
     if hasattr(sys.stdout, "buffer"):
         sys.stdout.buffer.write(text.encode())
         sys.stdout.buffer.flush()
@@ -202,7 +199,6 @@ def wants_colour() -> bool:
     from rich.console import detect_legacy_windows
 
     # Consoles of Windows before version 10 print colour codes as text.
-    # An old console prints the codes of colours instead of obeying them.
     return not detect_legacy_windows()
 
 

@@ -259,8 +259,6 @@ def choose_output_folder(file: Path, output: Path | None) -> Path:
         return output
     # The user did not choose the default name: a link of this name in a downloaded folder must not
     # redirect results.
-    # The user did not name it: a link of this name in a stranger's folder must not decide where
-    # results go.
     expect_folder_inside(Path(file.stem))
     return Path(file.stem)
 
@@ -365,13 +363,11 @@ def parse_quantities(
                 continue
             result[name] = convert_value(mechanism, name, text)
             # Only values are compared with the coordinate's range; speeds have none.
-            # A speed has no range.
             info = mechanism.coordinates[mechanism.coordinate_index(name)]
             if option == "--set" and (odd := describe_suspect_value(info, name, text)):
                 raise SettingError(f"{option}: {odd} (if not, write {text.strip()}rad)")
         except ModelError as error:
             # The command is wrong and not the model, so this must not be a ModelError.
-            # The model is as it should be; it is the command that asks for what is not there.
             raise OsimliteError(f"{option}: {error.message}{suggest_name(name, states)}") from None
         except ValueError:
             raise SettingError(

@@ -167,7 +167,6 @@ def _make_model(source: str, given: Mapping[str, str], parameters: Mapping[str, 
     from osimlite.models.source import make_model
 
     # Functions may require int parameters, so whole numbers are written without a decimal point.
-    # A parameter that is a whole number is written as one.
     words = {
         name: repr(int(value) if value.is_integer() else value)
         for name, value in parameters.items()

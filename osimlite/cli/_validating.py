@@ -84,7 +84,6 @@ def validate_paths(
         raise OsimliteError("standard input cannot be fixed in place; use --diff")
     if "-" in paths and stdin_filename is not None:
         # The other files of the project see this content in place of the file on disk.
-        # It is what this file would be, were it written now.
         unsaved[os.path.realpath(stdin_filename)] = read_standard_input()
         paths = [stdin_filename if path == "-" else path for path in paths]
     skipped: list[str] = []

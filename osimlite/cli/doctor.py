@@ -236,8 +236,6 @@ def examine_package(name: str) -> Package:
     modules = _list_modules(tuple(sys.path)).get(name.lower(), [])
     # The module with the package's name is the main one of several. A few packages have none: pillow
     # provides PIL, pyyaml provides yaml.
-    # Some bring more than the module that bears their name; a few have none of it (PIL of pillow,
-    # yaml of pyyaml).
     named = name.lower().replace("-", "_")
     main = (
         named
@@ -245,13 +243,11 @@ def examine_package(name: str) -> Package:
         else next(module for module in modules if not module.startswith("_"))
     )
     # -P: do not import from the current folder.
-    # -P: what lies in the current folder is not what was installed.
     done = subprocess.run(
         [sys.executable, "-P", "-c", f"import {main}"],
         capture_output=True,
         check=False,
         # Some packages start processes or load libraries from the current folder, which may be untrusted.
-        # Packages start processes and look for libraries in the current folder.
         cwd=Path(__file__).parent,
         env={**os.environ, SAFE_PATH: "1"},
     )

@@ -89,7 +89,12 @@ def validate(
 def assert_valid(
     model: Model | str | Path, *, ignore: tuple[str, ...] | list[str] | str | None = None
 ) -> None:
-    """Fail a test with all findings unless a model has neither errors nor warnings."""
+    """Fail a test with all findings unless a model has neither errors nor warnings.
+
+    Args:
+        model: the model.
+        ignore: codes or names of rules to ignore.
+    """
     report = validate(model, ignore=ignore)
     bad = report.at_least(Severity.WARNING)
     assert not bad, "\n".join(map(str, bad))

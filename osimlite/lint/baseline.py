@@ -16,7 +16,12 @@ _FORMAT = 1
 
 
 def write_baseline(path: str | Path, report: Report) -> int:
-    """Write the findings of a report as the baseline, and return how many there are."""
+    """Write the findings of a report as the baseline, and return how many there are.
+
+    Args:
+        path: file of the baseline.
+        report: the findings.
+    """
     counts = Counter(map(_make_key, report.findings))
     findings = [[*key, count] for key, count in sorted(counts.items())]
     text = json.dumps({"format": _FORMAT, "findings": findings}, indent=1) + "\n"
@@ -26,6 +31,10 @@ def write_baseline(path: str | Path, report: Report) -> int:
 
 def subtract_baseline(path: str | Path, report: Report) -> Report:
     """Return the report without the findings of the baseline; line numbers may differ.
+
+    Args:
+        path: file of the baseline.
+        report: the findings.
 
     Raises:
         OsimliteError: the file is missing or is no baseline.

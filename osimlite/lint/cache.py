@@ -41,7 +41,12 @@ class Cache:
         self._stamps: dict[str, Stamp] = {}
 
     def get(self, file: str, key: str) -> Report | None:
-        """Return the cached report of a file; None without a valid entry for this key."""
+        """Return the cached report of a file; None without a valid entry for this key.
+
+        Args:
+            file: path of the file.
+            key: key of the entry, from `make_key`.
+        """
         try:
             match json.loads(read_file(self._entry(file))):
                 case {
@@ -122,7 +127,12 @@ class Cache:
 
 
 def make_key(file: str, config: Config) -> str:
-    """Return what a cache entry depends on: the path, the configuration, and the version of the code."""
+    """Return what a cache entry depends on: the path, the configuration, and the version of the code.
+
+    Args:
+        file: path of the file.
+        config: configuration of its check.
+    """
     severity = sorted((word, str(level)) for word, level in config.severity.items())
     thresholds = sorted((name, float(number)) for name, number in config.thresholds.items())
     setting = (

@@ -51,7 +51,12 @@ class Config:
         return selected and not any(rule.matches(word) for word in self.ignore)
 
     def severity_of(self, rule: Rule, own: Severity) -> Severity:
-        """Return the severity of a finding, given the severity `own` of its rule."""
+        """Return the severity of a finding, given the severity `own` of its rule.
+
+        Args:
+            rule: the rule.
+            own: severity that the finding has without settings.
+        """
         for word, severity in self.severity.items():
             if rule.matches(word):
                 return severity

@@ -24,7 +24,12 @@ from osimlite.schema.registry import register_plugin_classes
 
 
 def check_source(source: Source, config: Config | None = None) -> Report:
-    """Check a text: a table if its file name says so, otherwise a document."""
+    """Check a text: a table if its file name says so, otherwise a document.
+
+    Args:
+        source: the text.
+        config: configuration of the check.
+    """
     subject = make_subject(source, config)
     report = run_rules(subject)
     if report.findings and source.file is not None:
@@ -34,7 +39,12 @@ def check_source(source: Source, config: Config | None = None) -> Report:
 
 @pause_collector()
 def make_subject(source: Source, config: Config | None = None) -> CheckTarget:
-    """Return the check target of a text, chosen by the name of its file."""
+    """Return the check target of a text, chosen by the name of its file.
+
+    Args:
+        source: the text.
+        config: configuration of the check.
+    """
     use_classes(config)
     if source.file is not None and is_table(source.file):
         from osimlite.lint.table import Table
@@ -46,7 +56,12 @@ def make_subject(source: Source, config: Config | None = None) -> CheckTarget:
 
 
 def load_subject(file: str, config: Config | None = None) -> CheckTarget:
-    """Return the check target of a file, chosen by its name; MissingFileError if the file is missing."""
+    """Return the check target of a file, chosen by its name; MissingFileError if the file is missing.
+
+    Args:
+        file: path of the file.
+        config: configuration of the check.
+    """
     try:
         return make_subject(Source.from_file(file), config)
     except SpecialFileError as fault:

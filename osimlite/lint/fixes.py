@@ -15,7 +15,14 @@ from osimlite.lint.project_files import is_table
 def replace_text(
     source: Source | None, place: Position | None, text: str | None, *, safe: bool = True
 ) -> Fix | None:
-    """Return the fix that replaces the text at a position; None without a source, position or text."""
+    """Return the fix that replaces the text at a position; None without a source, position or text.
+
+    Args:
+        source: the text; None for a model made in Python.
+        place: position of the old text.
+        text: new text; None without a suggestion.
+        safe: whether the fix is certain.
+    """
     if source is None or place is None or text is None:
         return None
     start = source.line_start(place.line) + place.column - 1
@@ -25,7 +32,15 @@ def replace_text(
 def replace_name(
     source: Source | None, place: Position, named: object, text: str, *, certain: bool
 ) -> Fix | None:
-    """Return the fix that replaces a name; None if another text is at the position."""
+    """Return the fix that replaces a name; None if another text is at the position.
+
+    Args:
+        source: the text; None for a model made in Python.
+        place: position of the name.
+        named: present name.
+        text: new name.
+        certain: whether the fix is safe also if more than the letter case differs.
+    """
     if source is None or not isinstance(named, str) or "'" in text or '"' in text:
         return None
     start = source.line_start(place.line) + place.column - 1
@@ -39,7 +54,14 @@ def replace_name(
 def rename_tag(
     source: Source | None, number: int, tag: str | None, *, safe: bool = True
 ) -> Fix | None:
-    """Return the fix that gives an element another tag."""
+    """Return the fix that gives an element another tag.
+
+    Args:
+        source: the text; None for a model made in Python.
+        number: index of the element.
+        tag: new tag; None without a suggestion.
+        safe: whether the fix is certain.
+    """
     if source is None or tag is None:
         return None
     span = source.spans[number]
@@ -50,7 +72,12 @@ def rename_tag(
 
 
 def remove_element(source: Source | None, number: int) -> Fix | None:
-    """Return the fix that deletes an element, with its line if nothing else is on it."""
+    """Return the fix that deletes an element, with its line if nothing else is on it.
+
+    Args:
+        source: the text; None for a model made in Python.
+        number: index of the element.
+    """
     if source is None:
         return None
     span = source.spans[number]
@@ -61,6 +88,10 @@ def comment_out(source: Source | None, number: int) -> Fix | None:
     """Return the fix that makes an element of text an XML comment, or deletes it if it is empty.
 
     A text that a comment cannot hold is left as it is: there is no fix then.
+
+    Args:
+        source: the text; None for a model made in Python.
+        number: index of the element.
     """
     if source is None:
         return None
@@ -76,7 +107,13 @@ def comment_out(source: Source | None, number: int) -> Fix | None:
 
 
 def remove_attribute(source: Source | None, number: int, name: str) -> Fix | None:
-    """Return the fix that deletes an attribute."""
+    """Return the fix that deletes an attribute.
+
+    Args:
+        source: the text; None for a model made in Python.
+        number: index of the element.
+        name: name of the attribute.
+    """
     if source is None:
         return None
     result = source.get_attributes(number).get(name)
@@ -84,12 +121,22 @@ def remove_attribute(source: Source | None, number: int, name: str) -> Fix | Non
 
 
 def remove_text(source: Source, start: int, end: int) -> Fix:
-    """Return the fix that deletes a text without meaning."""
+    """Return the fix that deletes a text without meaning.
+
+    Args:
+        source: the text.
+        start: offset of the first character.
+        end: offset after the last character.
+    """
     return Fix((_delete_range(source.text, start, end),), True)
 
 
 def select_edits(findings: Iterable[Finding], *, unsafe: bool = False) -> tuple[list[Edit], int]:
     """Select the edits of all fixes that do not overlap an earlier fix.
+
+    Args:
+        findings: findings with fixes.
+        unsafe: whether to select fixes that are not safe, too.
 
     Returns:
         The edits sorted by position, and the number of fixes.
@@ -121,6 +168,11 @@ def _touches(edit: Edit, chosen: list[Edit]) -> bool:
 def apply_fixes(source: Source, report: Report, *, unsafe: bool = False) -> tuple[bytes, int]:
     """Return the bytes of a file after its fixes; raises as `apply_fixes_in_pieces` does.
 
+    Args:
+        source: the text.
+        report: findings with fixes.
+        unsafe: whether to apply fixes that are not safe, too.
+
     Returns:
         The bytes, and the number of fixes.
     """
@@ -132,6 +184,11 @@ def apply_fixes_in_pieces(
     source: Source, report: Report, *, unsafe: bool = False
 ) -> tuple[list[bytes | memoryview], int]:
     """Return the bytes of a file after its fixes in pieces, which are views for a table; a document keeps its encoding.
+
+    Args:
+        source: the text.
+        report: findings with fixes.
+        unsafe: whether to apply fixes that are not safe, too.
 
     Returns:
         The pieces, and the number of fixes.

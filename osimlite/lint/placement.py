@@ -82,7 +82,12 @@ FrameLocation = tuple[Component, FramePose] | None
 
 
 def make_offset(angles: Vector, position: Vector) -> FramePose:
-    """Return the pose of a frame with an offset and body-fixed X-Y-Z angles."""
+    """Return the pose of a frame with an offset and body-fixed X-Y-Z angles.
+
+    Args:
+        angles: body-fixed X-Y-Z angles, rad.
+        position: offset, m.
+    """
     (s1, c1), (s2, c2), (s3, c3) = map(_sine_cosine, angles)
     return FramePose(rotation_from_xyz(s1, c1, s2, c2, s3, c3), position)
 
@@ -92,7 +97,12 @@ def _sine_cosine(angle: float) -> tuple[float, float]:
 
 
 def locate_frame(subject: Subject, frame: Component | None) -> FrameLocation:
-    """Return the body or ground that a frame is fixed to, and its pose there; None if unknown."""
+    """Return the body or ground that a frame is fixed to, and its pose there; None if unknown.
+
+    Args:
+        subject: the check target.
+        frame: the frame.
+    """
     pose, seen = FramePose(), 0
     while isinstance(frame, PhysicalOffsetFrame) and seen < 100:
         pose = make_offset(frame.orientation, frame.translation).compose(pose)
@@ -253,6 +263,10 @@ def _compute_joint_pose(
 
 def find_rotation_axes(subject: Subject, joint: Joint) -> list[tuple[str, Vector]]:
     """Return the rotation axes of a gimbal or custom joint in the default pose.
+
+    Args:
+        subject: the check target.
+        joint: the joint.
 
     Returns:
         The coordinate of each rotation and its axis, a unit vector in the parent frame. Empty for a

@@ -35,6 +35,11 @@ def coordinate_name(column: str) -> str:
 def compute_poses_of_motion(setup: Setup, motion: Table, time: float) -> dict[int, FramePose]:
     """Return the pose in ground of each body at a time of a motion.
 
+    Args:
+        setup: setup of a tool.
+        motion: table of coordinates.
+        time: time, s.
+
     Returns:
         The poses by the identity of the body.
     """

@@ -58,7 +58,12 @@ def is_opensim_xml(beginning: bytes) -> bool:
 
 
 def find_misspelt_name(word: str, known: Iterable[str]) -> str | None:
-    """Return the known name that differs from a word in letter case and at most two letters; None without one."""
+    """Return the known name that differs from a word in letter case and at most two letters; None without one.
+
+    Args:
+        word: the word.
+        known: known names.
+    """
     from rapidfuzz.distance import OSA
     from rapidfuzz.process import extractOne
 

@@ -38,7 +38,12 @@ class Settings:
     target_version: str = ""
 
     def config_for(self, path: str | Path, overriding: Config) -> Config:
-        """Return the configuration of one file; `overriding` has precedence over the project."""
+        """Return the configuration of one file; `overriding` has precedence over the project.
+
+        Args:
+            path: path of the file.
+            overriding: configuration of the command line.
+        """
         return Config(
             overriding.select or self.select,
             (*self.ignore, *self._find_ignored_codes(Path(path)), *overriding.ignore),

@@ -79,7 +79,11 @@ class Setup(Subject):
 
     @cached_property
     def by_class(self) -> dict[type[Object], list[Object]]:
-        """Objects of the document by their exact class."""
+        """Return the objects of the document by their exact class.
+
+        Returns:
+            Objects of each class in the order of the document.
+        """
         result: dict[type[Object], list[Object]] = {}
         for item in self.items:
             result.setdefault(type(item), []).append(item)
@@ -139,7 +143,12 @@ class Setup(Subject):
         )
 
     def iterate_with_tables(self, items: Iterable[Any], tag: str) -> Iterator[tuple[Any, Table]]:
-        """Yield objects with the table that a property names; objects without a readable table are left out."""
+        """Yield objects with the table that a property names; objects without a readable table are left out.
+
+        Args:
+            items: objects that name tables.
+            tag: attribute of the property with the name.
+        """
         for item in items:
             table = self.read_table(getattr(item, tag))
             if table is not None and table.labels:
@@ -174,7 +183,11 @@ class Setup(Subject):
 
     @cached_property
     def tool(self) -> tuple[str, Object] | None:
-        """Tool of this document, or the first one that reads it, with the path of its setup."""
+        """Return the tool of this document, or the first one that reads it.
+
+        Returns:
+            Path of the tool's setup, and the tool; None without one.
+        """
         return next(self.find_readers(), None)
 
     def find_readers(self) -> Iterator[tuple[str, Object]]:
@@ -323,7 +336,12 @@ def get_content_type(spec: FieldSpec) -> str:
 
 
 def list_files(item: Object, rule: str) -> Iterator[tuple[FieldSpec, str]]:
-    """Yield every file that an object names by a rule."""
+    """Yield every file that an object names by a rule.
+
+    Args:
+        item: the object.
+        rule: rule of the reference, such as "file".
+    """
     for spec in get_file_specs(type(item), rule):
         value = getattr(item, spec.name)
         for name in value if isinstance(value, tuple) else (value,):
@@ -332,7 +350,12 @@ def list_files(item: Object, rule: str) -> Iterator[tuple[FieldSpec, str]]:
 
 
 def find_motion_file(file: str, tool: Object) -> str:
-    """Return the path of the coordinates that a tool reads; empty if it reads none."""
+    """Return the path of the coordinates that a tool reads; empty if it reads none.
+
+    Args:
+        file: path of the setup.
+        tool: the tool.
+    """
     name = next(
         (name for spec, name in list_files(tool, "file") if get_content_type(spec) == "motion"), ""
     )
@@ -340,7 +363,12 @@ def find_motion_file(file: str, tool: Object) -> str:
 
 
 def select_members(owner: Any, target: str) -> list[Any]:
-    """Return the objects of a set or list that have a class; a text may contain others."""
+    """Return the objects of a set or list that have a class; a text may contain others.
+
+    Args:
+        owner: set or list.
+        target: name of the class.
+    """
     return [
         item for item in (owner if isinstance(owner, list) else owner.objects) if is_a(item, target)
     ]

@@ -197,7 +197,12 @@ class Subject(CheckTarget):
         return describe_object(item if item.name and item is not owner else owner)
 
     def describe_property(self, item: Object, spec: FieldSpec) -> str:
-        """Return the name of a property for messages, such as ``mass of Body 'pelvis'``."""
+        """Return the name of a property for messages, such as ``mass of Body 'pelvis'``.
+
+        Args:
+            item: the object.
+            spec: its property.
+        """
         return f"{spec.tag} of {describe_object(item) if item.name else self.describe(item)}"
 
     def describe_part(self, item: Object) -> str:
@@ -209,13 +214,23 @@ class Subject(CheckTarget):
         )
 
     def target_of(self, owner: Component, tag: str) -> Component | None:
-        """Return the component that a single reference of `owner` resolves to; None without one."""
+        """Return the component that a single reference of `owner` resolves to; None without one.
+
+        Args:
+            owner: component that has the reference.
+            tag: tag of the property.
+        """
         spec = type(owner).field_specs().get(tag)
         value = None if spec is None else getattr(owner, spec.name)
         return self.tree.resolve(Use(owner, owner, spec, value)).target if spec and value else None
 
     def word_at(self, item: Object, tag: str, index: int) -> tuple[str | None, int]:
         """Return a word of a list in the text, and how many equal words precede it.
+
+        Args:
+            item: the object.
+            tag: tag of the property.
+            index: index of the word.
 
         Returns:
             The word or None, and the count.
@@ -238,7 +253,12 @@ class Subject(CheckTarget):
         ]
 
     def has_note(self, item: Object, spec: FieldSpec) -> bool:
-        """Return whether the reader made a note about the text of this property."""
+        """Return whether the reader made a note about the text of this property.
+
+        Args:
+            item: the object.
+            spec: its property.
+        """
         return (id(item), spec.name) in self._noted
 
     @cached_property
@@ -250,7 +270,12 @@ class Subject(CheckTarget):
         }
 
     def element_of(self, item: Object, tag: str) -> int | None:
-        """Return the index of the element that gives a property of an object; None without one."""
+        """Return the index of the element that gives a property of an object; None without one.
+
+        Args:
+            item: the object.
+            tag: tag of the property.
+        """
         if self.source is None or item._index is None:
             return None
         return self.source.child(item._index, tag)
@@ -331,7 +356,12 @@ class Subject(CheckTarget):
         return "name" in self.source.get_attributes(item._index)
 
     def attribute_name(self, number: int, name: str) -> Position | None:
-        """Return the position of the name of an attribute."""
+        """Return the position of the name of an attribute.
+
+        Args:
+            number: index of the element.
+            name: name of the attribute.
+        """
         if self.source is None:
             return None
         result = self.source.get_attributes(number).get(name)

@@ -162,7 +162,12 @@ class Table(CheckTarget):
         return Fix((Edit(start, start + len(old.encode()), text),), safe)
 
     def insert_line(self, number: int, line: str) -> Fix:
-        """Return the fix that inserts a line before another."""
+        """Return the fix that inserts a line before another.
+
+        Args:
+            number: number of the line before which the new one is inserted.
+            line: text of the new line.
+        """
         start = self.line_start(number)
         return Fix((Edit(start, start, line + ("\r\n" if b"\r\n" in self.data[:1000] else "\n")),))
 

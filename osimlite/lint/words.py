@@ -21,7 +21,12 @@ def add_article(noun: str) -> str:
 
 
 def format_quantity(value: float | tuple[float, ...], unit: str | None = None) -> str:
-    """Format a number, or several, with few digits and the unit."""
+    """Format a number, or several, with few digits and the unit.
+
+    Args:
+        value: number or numbers.
+        unit: unit; empty without one.
+    """
     values = value if isinstance(value, tuple) else (value,)
     text = " ".join(
         f"{item:.6g}" if item == item and abs(item) != float("inf") else format_shortest(item)
@@ -42,7 +47,12 @@ def format_value(value: object) -> str:
 
 
 def find_nearest_name(text: str, right: list[str]) -> str | None:
-    """Return the nearest valid text; paths are compared by their last names. None if none is near."""
+    """Return the nearest valid text; paths are compared by their last names. None if none is near.
+
+    Args:
+        text: wrong text.
+        right: valid texts.
+    """
     whole = find_nearest(text, right, cutoff=70)
     last = text.rstrip("/").rpartition("/")[2]
     by_last = {word.rpartition("/")[2]: word for word in reversed(right)}
@@ -55,12 +65,22 @@ def find_nearest_name(text: str, right: list[str]) -> str | None:
 
 
 def suggest_names(wrong: Iterable[str], right: Iterable[str]) -> str:
-    """Return a question with suggestions for wrong texts, to end a message; empty without suggestions."""
+    """Return a question with suggestions for wrong texts, to end a message; empty without suggestions.
+
+    Args:
+        wrong: wrong texts.
+        right: valid texts.
+    """
     known = sorted(right)
     near = [f"'{name}' for '{text}'" for text in wrong if (name := find_nearest_name(text, known))]
     return f"; is it {join_words(near)}?" if near else ""
 
 
 def pick_closest(text: str, right: list[str]) -> str:
-    """Return the text that is most similar to another."""
+    """Return the text that is most similar to another.
+
+    Args:
+        text: the text.
+        right: texts to choose from.
+    """
     return right[0] if len(right) == 1 else find_nearest(text, right, cutoff=0) or right[0]

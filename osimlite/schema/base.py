@@ -42,6 +42,10 @@ def are_equal(left: Any, right: Any) -> bool:
     """Return whether two stored values are equal; NaN equals NaN.
 
     A component that is given as a reference is compared by its name.
+
+    Args:
+        left: first value.
+        right: second value.
     """
     if left is right:
         return True
@@ -192,8 +196,6 @@ class Object(BaseModel, metaclass=ObjectType):
         """
         # Default objects and lists are made on first access (see `__getattr__`), because most are never
         # used.
-        # Default objects and lists are made when someone asks for them, see `__getattr__`: most are
-        # never asked for.
         state = get_defaults(cls)[0].copy()
         state.update(values)
         self = _new(cls)
@@ -337,7 +339,6 @@ class Object(BaseModel, metaclass=ObjectType):
         if outermost:
             # References to components outside of the copied object keep pointing to the originals; those
             # inside point to the copies.
-            # Components that are only named, not owned, are not part of the copy.
             for state, name in naming:
                 value = state[name]
                 words = value if isinstance(value, tuple) else (value,)
@@ -425,7 +426,7 @@ class Unknown(ModelComponent, abstract=True):
 
     @property
     def objects(self) -> ObjectList[Any]:
-        """Empty list: in the place of a set, an unknown class has no known members."""
+        """Empty list, so that an unknown class may replace a set; its members are part of `content`."""
         return ObjectList()
 
 

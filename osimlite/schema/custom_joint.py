@@ -27,7 +27,7 @@ class TransformAxis(Object):
 
     @property
     def names(self) -> list[str]:
-        """Names of the coordinates."""
+        """Names of the coordinates on which the function depends."""
         return [word if isinstance(word, str) else word.name for word in self.coordinates]
 
     @classmethod

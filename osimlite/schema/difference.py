@@ -128,7 +128,7 @@ class _Comparison:
     def _pair(
         self, path: str, place: str, old: Object | None, new: Object | None
     ) -> Iterator[Difference]:
-        """Compare two objects, one of which may be missing."""
+        """Compare two objects, either of which may be missing."""
         if old is not None and new is not None:
             yield from self._object(path, place, old, new)
         elif old is not None or new is not None:

@@ -135,7 +135,7 @@ class StepFunction(Function):
     """Value after the step."""
 
     def find_contradictions(self) -> Iterator[Contradiction]:
-        """Its change takes some time, forwards or backwards."""
+        """Yield a transition without duration, which OpenSim rejects; it may go forwards or backwards."""
         if self.transition_start_time == self.transition_end_time:
             yield (
                 "transition_end_time",

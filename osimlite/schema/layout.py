@@ -63,8 +63,6 @@ class Include(NamedTuple):
     def __deepcopy__(self, memo: object) -> Include:
         # The copy is never modified. Copying it with every object around it would make copies of deeply
         # nested files grow without bound.
-        # What was read does not change. Were it copied with each object around it, files that name
-        # each other deeply would be copied without end.
         return self
 
 

@@ -182,7 +182,6 @@ class Model(ModelComponent):
             if isinstance(component, Joint) and "coordinates" not in component.model_fields_set:
                 # OpenSim's API gives new joints such coordinate names, too. Reading a file that leaves the
                 # coordinates out gives equal names in all joints instead.
-                # As in OpenSim's API: a file that leaves them out would call them all alike.
                 for number, coordinate in enumerate(component.coordinates):
                     if coordinate.name == f"_coord_{number}":
                         coordinate.name = f"{component.name}_coord_{number}"

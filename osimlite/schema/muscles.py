@@ -304,7 +304,7 @@ class Millard2012EquilibriumMuscle(Muscle):
 
     @property
     def is_classic(self) -> bool:
-        """Whether the tendon is elastic and fibers have no damping, so that the equations are singular without active force."""
+        """True if the tendon is elastic and fibers have no damping, so that the equations are singular without active force."""
         return not self.ignore_tendon_compliance and self.fiber_damping < 0.001
 
     @property

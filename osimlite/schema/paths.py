@@ -177,7 +177,7 @@ class GeometryPath(AbstractGeometryPath):
 
 
 class FunctionBasedPath(AbstractGeometryPath):
-    """A path of which only length, lengthening speed and moment arms are known, as functions of coordinates."""
+    """Path given by length, lengthening speed and moment arms as functions of coordinates, without points."""
 
     coordinate_paths: CoordinatePaths = ()
     """Paths of the coordinates that are the arguments of all functions, in this order."""

@@ -81,8 +81,6 @@ def _resolve_socket(tree: Tree, text: str, owner: Component, target: str) -> Res
     if target == "Frame":
         # OpenSim connects each geometry of a frame to that frame, whatever path the file gives. This does
         # not apply to geometry among the frame's subcomponents.
-        # While connecting, a frame puts itself into the socket of every geometry it draws, whatever
-        # path the file gives; not of one that it merely holds among its components.
         parent = tree.parent_of(owner)
         if (
             parent is not None

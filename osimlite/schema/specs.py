@@ -53,7 +53,7 @@ class FieldSpec(NamedTuple):
 
     @property
     def legacy(self) -> bool:
-        """Whether the property belongs to OpenSim's first property system."""
+        """True if the property belongs to OpenSim's first property system."""
         return bool(getattr(self.kind, "legacy", False))
 
     @property

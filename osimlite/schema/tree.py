@@ -206,8 +206,6 @@ class Tree:
             if cls.name_reference is not None and holder.name:
                 yield Use(holder, owner, get_name_spec(cls), holder.name)
             # Read values from the instance dictionary; getattr takes several times as long.
-            # Plain values are in the dictionary of their object; through getattr they would cost
-            # several times as much.
             state = holder.__dict__
             for spec in get_reference_specs(cls):
                 value = state[spec.name]
@@ -237,8 +235,6 @@ class Tree:
             return RULES[rule](self, text, owner, target)
         # An absolute path leads to the same component from everywhere, and often hundreds of points name
         # one body, so cache the result.
-        # An absolute path leads to the same component from everywhere, and hundreds of points name
-        # one body.
         known = self._resolved.get((rule, target, text))
         if known is None:
             known = self._resolved[rule, target, text] = RULES[rule](self, text, owner, target)

@@ -125,7 +125,7 @@ class Analysis:
 
     @property
     def needs_measuring(self) -> bool:
-        """Whether some rule needs measurements of paths or muscles that are not cached."""
+        """True if some rule needs measurements of paths or muscles that are not cached."""
         subject = self.document
         if (
             subject is None
@@ -147,7 +147,7 @@ class Analysis:
 
     @property
     def is_checked(self) -> bool:
-        """Whether the rules have checked this version."""
+        """True if the rules have checked this version."""
         return "report" in self.__dict__
 
     @property
@@ -162,7 +162,7 @@ class Analysis:
 
     @property
     def is_readable(self) -> bool:
-        """Whether the text is a well-formed OpenSim document."""
+        """True if the text is a well-formed OpenSim document."""
         return self.document is not None
 
     @property

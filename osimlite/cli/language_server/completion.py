@@ -175,8 +175,6 @@ def _make_item(
     place = analysis.text.range(cursor.start, cursor.end)
     # Editors match the typed text against `filter_text`, which therefore has the opening bracket if
     # the inserted text has one.
-    # Editors look for what was typed in the text that is to be filtered by; that has the bracket
-    # where one is put in.
     return types.CompletionItem(
         label,
         kind=kind,

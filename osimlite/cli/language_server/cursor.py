@@ -31,7 +31,6 @@ class Element(NamedTuple):
     number: int  # index in document order, as the reader counts
     name: str  # attribute `name`
     # class of the object; None for a property or an unknown tag
-    # the class of the object it is; None for a property, and for what is not known
     cls: type[Object] | None
     spec: FieldSpec | None  # the property, or the one that holds the object; None if unknown
 
@@ -41,10 +40,8 @@ class Cursor(NamedTuple):
 
     kind: Kind
     # enclosing elements, outermost first; without the element itself if the cursor is in its tag
-    # the elements around it, outermost first; for a tag, the element itself is not among them
     around: tuple[Element, ...]
     # offset of the start of the word: a tag, an attribute value or a word of text
-    # offset of the beginning of the word there: a tag, an attribute's value, a word of a text
     start: int
     end: int  # offset after the word
     word: str  # the word; of a tag only its name
@@ -82,7 +79,6 @@ def find_cursor(text: str, offset: int) -> Cursor:
     special = _SPECIAL.search(text, behind, offset)
     if special is not None:
         # Comments that are closed before the cursor are part of the markup that was scanned above.
-        # What begins so and has ended is behind already.
         return Cursor("comment", around, special.start(), offset, "")
     start = text.rfind("<", behind, offset)
     if start < 0:
@@ -164,7 +160,6 @@ def _identify_element(
         return find_class(tag), None
     if around.cls is None:
         # The enclosing element is a property that holds objects, or an unknown tag.
-        # A property that holds objects, or what is not known.
         return find_class(tag), around.spec
     spec = get_field_specs(around.cls).get(tag)
     if spec is None:

@@ -59,7 +59,6 @@ def list_code_actions(analysis: Analysis, uri: str, wanted: types.Range) -> list
     result: list[types.CodeAction] = []
     if not analysis.is_checked:
         # Do not run the rules here: the editor requests actions again after diagnostics arrive.
-        # The editor asks again when it is told of the findings.
         return result
     first, last = analysis.text.offset(wanted.start), analysis.text.offset(wanted.end)
     for finding in analysis.report:

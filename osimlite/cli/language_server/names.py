@@ -64,7 +64,6 @@ def find_name_reference(cursor: Cursor) -> Reference | None:
         return None
     # For some classes the property that holds them, or the set they are in, declares what their
     # name refers to.
-    # Of some classes only the property says so that holds them, or the set that they are in.
     held = (
         element.spec.names for element in reversed(cursor.around[-2:]) if element.spec is not None
     )
@@ -116,7 +115,6 @@ def _find_owner(analysis: Analysis, tree: Tree, holder: Element | None) -> Compo
     if (item is None or type(item) is not holder.cls) and holder.name:
         # The readable version is older than the text, so indices of elements may have shifted; look
         # for an object of the same name and class.
-        # Elements before it may have come and gone since; its name tells which it is.
         item = next(
             (c for c in tree.components if c.name == holder.name and type(c) is holder.cls), None
         )

@@ -59,7 +59,6 @@ def parse_real(word: str) -> float:
     try:
         value = float(word)
         # Python also accepts underscores between digits and the digits of other scripts.
-        # Python also takes an underscore between digits, and the digits of other scripts.
         if -math.inf < value < math.inf and "_" not in word and word.isascii():
             return value
     except ValueError:
@@ -69,7 +68,6 @@ def parse_real(word: str) -> float:
         return special
     prefix = _PREFIX.match(word)
     # OpenSim does not read a number with an exponent without digits, such as 1e.
-    # Of an exponent without digits OpenSim makes nothing.
     if (
         prefix is None
         or math.isinf(float(prefix[0]))

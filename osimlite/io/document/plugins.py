@@ -471,7 +471,7 @@ class _Declarations:
         return value
 
     def make_error(self, message: str, *words: str) -> OsimliteError:
-        """Return an error at the last of some words, each of which is searched after the one before.
+        """Return an error at the last of some words, each searched after the one before.
 
         Args:
             message: the message.

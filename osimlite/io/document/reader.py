@@ -426,6 +426,10 @@ def _make_syntax_error(source: Source, line: int, column: int, message: str) -> 
 def read_version(source: Source, root: etree._Element) -> int:
     """Return the version of a document.
 
+    Args:
+        source: the text, for positions in errors.
+        root: root element.
+
     Raises:
         DocumentError: the text is not an OpenSim document.
         VersionError: the version is missing, not a whole number, or too old.

@@ -76,7 +76,7 @@ class Source:
 
     @cached_property
     def text(self) -> str:
-        """Return the decoded text."""
+        """Return the text decoded by its encoding."""
         return _decode_text(self.data, self.encoding)
 
     @classmethod
@@ -129,7 +129,7 @@ class Source:
 
     @property
     def well_formed(self) -> bool:
-        """Whether the parser has found the text well-formed."""
+        """True if the parser has found the text well-formed."""
         return self.elements is not None
 
     @cached_property

@@ -121,6 +121,11 @@ def list_lines(element: etree._Element, depth: int, *, comments: bool = True) ->
     """Return the lines of an element in OpenSim's layout.
 
     White space stays unchanged where text and elements mix.
+
+    Args:
+        element: the element.
+        depth: number of tabs before the element.
+        comments: whether to keep comments.
     """
     indent = "\t" * depth
     if not is_element(element):

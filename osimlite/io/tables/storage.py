@@ -167,6 +167,10 @@ def find_named_file(folder: Path, name: str) -> Path:
     """Return the path of a file that a document names.
 
     It is searched in the folder of the document, then in the current folder.
+
+    Args:
+        folder: folder of the document.
+        name: name of the file in the document.
     """
     there, here = folder / name, Path(name)
     return there if there.is_file() or not here.is_file() else here
@@ -174,6 +178,10 @@ def find_named_file(folder: Path, name: str) -> Path:
 
 def expect_plain_labels(name: str, columns: Sequence[str]) -> None:
     """Refuse names that a table cannot hold: a tab ends a label, and a line end the header.
+
+    Args:
+        name: name of the table.
+        columns: labels of the columns.
 
     Raises:
         OsimliteError: a name has a tab or a line end.
@@ -188,6 +196,12 @@ def expect_plain_labels(name: str, columns: Sequence[str]) -> None:
 
 def expect_numbers(name: str, columns: Sequence[str], times: Array, rows: Array) -> None:
     """Refuse a result that is no number: this is the guard of all tables that are no input.
+
+    Args:
+        name: name of the result, for the message.
+        columns: labels of the columns.
+        times: times of the rows (t,), s.
+        rows: the numbers (t, k).
 
     Raises:
         SimulationError: a value is NaN or infinite; with its column and time.

@@ -16,7 +16,7 @@ _NO_NUMBER = re.compile(r"[-+]?1\.#(IND|QNAN|SNAN|INF)\d*", re.IGNORECASE)
 
 
 class TableStream:
-    """Storage file of which one row at a time is read.
+    """Storage file that is read one row at a time.
 
     Close it after use, or use it in a ``with`` statement.
     """
@@ -124,7 +124,12 @@ def _make_format_error(beginning: bytes) -> str:
 
 
 def find_word_start(text: str, word: int) -> int:
-    """Column (from 1) at which a word (from 0) of a line starts."""
+    """Column (from 1) at which a word (from 0) of a line starts.
+
+    Args:
+        text: the line.
+        word: index of the word.
+    """
     return [match.start() for match in re.finditer(r"\S+", text)][word] + 1
 
 

@@ -60,6 +60,10 @@ class MuscleFibers(NamedTuple):
     def equilibrate(self, length: float, states: dict[str, float]) -> dict[str, float]:
         """Return the equilibrium states at a path length (m); NaN without equilibrium.
 
+        Args:
+            length: length of the path, m.
+            states: initial values by the names of the states.
+
         Returns:
             The values by the names of the states.
         """
@@ -72,6 +76,10 @@ class MuscleFibers(NamedTuple):
 
     def evaluate_law(self, length: float, states: dict[str, float]) -> dict[str, float]:
         """Evaluate the muscle law for a path at rest.
+
+        Args:
+            length: length of the path, m.
+            states: values by the names of the states.
 
         Returns:
             The outputs by name; tension in `max_isometric_force`, fiber length in optimal lengths.

@@ -147,7 +147,12 @@ def _find_poses(paths: Paths, start: Array, place: int, values: Array, is_tied: 
 
 
 def find_tied_coordinates(paths: Paths, start: Array) -> Array:
-    """Return whether each coordinate (n,) is in the equations of a constraint."""
+    """Return whether each coordinate (n,) is in the equations of a constraint.
+
+    Args:
+        paths: the paths of the model.
+        start: default pose (n,).
+    """
     constraints = paths.mechanism.constraints
     if not constraints:
         return np.zeros(len(start), dtype=bool)

@@ -52,7 +52,11 @@ def compare_wrappings(
         moved = [sweep for sweep in free if sweep.moved[path]]
 
         def describe_pose(k: int, moved: Sequence[Sweep] = moved) -> tuple[Pose, Array]:
-            """Return pose k with irrelevant coordinates at their defaults, and for messages."""
+            """Describe pose k for messages, with irrelevant coordinates at their defaults.
+
+            Returns:
+                The pose in words, and the values of all coordinates (n,).
+            """
             if k == 0:
                 return Pose(), start
             for sweep in looked_at:

@@ -237,7 +237,12 @@ def report_missing_wrapper(subject: Subject, report: FindingCollector) -> None:
 
 
 def find_wrapper(note: Note, owner: Object) -> str | None:
-    """Return the list of `owner` that should contain an object placed directly in it; None without one."""
+    """Return the list of `owner` that should contain an object placed directly in it; None without one.
+
+    Args:
+        note: note of the reader about the object.
+        owner: object that contains it.
+    """
     if note.value is None or find_part(note, owner) is not None:
         return None
     lists = (
@@ -257,7 +262,12 @@ def find_wrapper(note: Note, owner: Object) -> str | None:
 
 
 def find_part(note: Note, owner: Object) -> FieldSpec | None:
-    """Return the property that would accept this object under its name; None without one."""
+    """Return the property that would accept this object under its name; None without one.
+
+    Args:
+        note: note of the reader about the object.
+        owner: object that contains it.
+    """
     if note.value is None:
         return None
     for spec in get_field_specs(type(owner)).values():

@@ -76,7 +76,7 @@ class InverseDynamicsTool(DynamicsTool):
 
 
 class AbstractTool(Object, abstract=True):
-    """What the tools that run a model through time are told."""
+    """Settings that all tools which simulate a model have in common."""
 
     model_file: LegacyInputModel = ""
     """The model, found from the folder of the setup file, as are all files."""

@@ -72,7 +72,7 @@ class IKTaskSet(Set):
 
 
 class InverseKinematicsToolBase(Tool, abstract=True):
-    """What both tools of inverse kinematics are told."""
+    """Settings that both tools for inverse kinematics have in common."""
 
     model_file: InputModel = ""
     """The model, found from the folder that OpenSim runs in."""

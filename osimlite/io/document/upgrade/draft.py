@@ -237,13 +237,23 @@ class Draft:
         return new
 
     def rename(self, element: Element, tag: str) -> None:
-        """Give an element a new tag."""
+        """Give an element a new tag.
+
+        Args:
+            element: the element.
+            tag: its new tag.
+        """
         element.tag = tag
         self._register_tag(tag)
         self.touched[element] = None
 
     def move(self, element: Element, parent: Element) -> None:
-        """Move an element to the end of `parent`."""
+        """Move an element to the end of `parent`.
+
+        Args:
+            element: the element.
+            parent: its new parent.
+        """
         element.tail = None
         parent.append(element)
         self.touched[element] = None
@@ -255,7 +265,13 @@ class Draft:
         parent.remove(element)
 
     def rename_child(self, parent: Element, old: str, new: str) -> bool:
-        """Rename the first child with the tag `old` to `new`; return whether there was one."""
+        """Rename the first child with the tag `old` to `new`; return whether there was one.
+
+        Args:
+            parent: parent of the child.
+            old: present tag.
+            new: new tag.
+        """
         child = parent.find(old)
         if child is None:
             return False
@@ -275,7 +291,14 @@ class Draft:
                 self.record_change(component)
 
     def get_list(self, parent: Element, tag: str, *, source: Element) -> Element:
-        """Return the child with a tag that lists objects; create it if it is missing."""
+        """Return the child with a tag that lists objects; create it if it is missing.
+
+        Args:
+            parent: parent of the list.
+            tag: tag of the list.
+            source: element of the old document that a new list comes from, for positions in
+                messages.
+        """
         result = parent.find(tag)
         return self.add(parent, tag, source=source) if result is None else result
 
@@ -283,6 +306,10 @@ class Draft:
         """Return whether an element is of a class or of a class derived from it.
 
         For an unknown class, the set that contains the element decides.
+
+        Args:
+            element: the element.
+            family: name of the class.
         """
         if find_families(element.tag):
             return family in find_families(element.tag)
@@ -291,7 +318,13 @@ class Draft:
         return owner is not None and _MEMBER_FAMILIES.get(owner.tag) == family
 
     def record_refusal(self, owner: Element, element: Element, message: str) -> None:
-        """Record that OpenSim fails over an element when it upgrades the owner."""
+        """Record that OpenSim fails over an element when it upgrades the owner.
+
+        Args:
+            owner: object that OpenSim upgrades then.
+            element: element over which it fails.
+            message: what is wrong, one clause.
+        """
         self.refusals.append(Refusal(self.numbers[owner], self.numbers[element], message))
 
     def record_change(
@@ -323,7 +356,12 @@ def list_members(owner: Element) -> Iterator[Element]:
 
 
 def find_with_child(owners: Iterable[Element], tag: str) -> Iterator[tuple[Element, Element]]:
-    """Yield each owner that has a child with a tag, together with the first such child."""
+    """Yield each owner that has a child with a tag, together with the first such child.
+
+    Args:
+        owners: the elements.
+        tag: tag of the child.
+    """
     for owner in owners:
         child = owner.find(tag)
         if child is not None:
@@ -336,7 +374,12 @@ def list_elements(parent: Element) -> list[Element]:
 
 
 def get_child_text(parent: Element, tag: str) -> str | None:
-    """Return the text of the first child with a tag, white space collapsed; None without such a child."""
+    """Return the text of the first child with a tag, white space collapsed; None without such a child.
+
+    Args:
+        parent: the element.
+        tag: tag of the child.
+    """
     child = parent.find(tag)
     return None if child is None else get_text(child)
 
@@ -349,7 +392,12 @@ def get_text(element: Element) -> str:
 
 
 def parse_reals(text: str | None, count: int) -> list[float] | None:
-    """Return the numbers in a text; None unless there are exactly `count` readable numbers."""
+    """Return the numbers in a text; None unless there are exactly `count` readable numbers.
+
+    Args:
+        text: the text; None for none.
+        count: required number of values.
+    """
     words = split_words(text or "")
     if len(words) != count:
         return None

@@ -56,7 +56,12 @@ _MARKS = (
 
 
 def find_newer_content(root: Element, version: int) -> NewerContent | None:
-    """Return the first element of a document that is newer than its version, or None."""
+    """Return the first element of a document that is newer than its version, or None.
+
+    Args:
+        root: root element.
+        version: version that the document states.
+    """
     for element in root.iter(etree.Element):
         for tags in _get_marks(element.tag):
             for child in element.iterchildren(etree.Element):
