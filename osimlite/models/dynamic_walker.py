@@ -148,10 +148,12 @@ def dynamic_walker(
 
 
 def _make_sphere(name: str, body: Body, location: tuple[float, float, float]) -> ContactSphere:
+    """Return a contact sphere of hip, knee or foot, at a location (m) in its body."""
     return ContactSphere(name=name, socket_frame=body, location=location, radius=0.05)
 
 
 def _make_contact(sphere: ContactSphere, plane: ContactGeometry) -> HuntCrossleyForce:
+    """Return the contact force between a sphere and the platform."""
     material = HuntCrossleyForce.ContactParameters(
         geometry=(sphere, plane),
         # Numbers of the exercise.
@@ -169,6 +171,7 @@ def _make_contact(sphere: ContactSphere, plane: ContactGeometry) -> HuntCrossley
 
 
 def _make_limit(coordinate: Coordinate, *, upper: float, lower: float) -> CoordinateLimitForce:
+    """Return the elastic stops of a joint at two angles (deg)."""
     return CoordinateLimitForce(
         name=coordinate.name.replace("_rz", "LimitTorque"),
         coordinate=coordinate,

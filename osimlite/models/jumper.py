@@ -256,6 +256,15 @@ def _add_muscle(
     places: dict[str, tuple[Body, float]],
     side: str,
 ) -> None:
+    """Add a muscle to one leg.
+
+    Args:
+        model: model that is built.
+        name: name of the muscle.
+        muscle: its parameters.
+        places: body and lateral position (m) of path points, by the name of the body.
+        side: suffix of the leg.
+    """
     points: list[AbstractPathPoint] = [
         PathPoint(
             name=f"{name}-P{number}",
@@ -293,10 +302,12 @@ def _add_body(model: Model, name: str, mass: float, center: Vec3, inertia: float
 
 
 def _add_shape(model: Model, body: Body, name: str, at: Vec3, shape: Geometry) -> None:
+    """Attach a shape to a body at a position (m) in it."""
     model.add(PhysicalOffsetFrame(name=name, socket_parent=body, translation=at)).attach(shape)
 
 
 def _add_contact(model: Model, sphere: ContactSphere, floor: ContactHalfSpace) -> None:
+    """Add a sphere of a foot, and its contact force with the floor."""
     material = HuntCrossleyForce.ContactParameters(
         geometry=(sphere, floor),
         stiffness=2e7,

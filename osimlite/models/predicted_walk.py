@@ -214,6 +214,7 @@ def write_study(model: Model, file: Path) -> list[Path]:
 
 
 def _list_muscles(model: Model) -> list[DeGrooteFregly2016Muscle]:
+    """Return the muscles of a model that have the class DeGrooteFregly2016Muscle."""
     return [
         force for force in model.force_set.objects if isinstance(force, DeGrooteFregly2016Muscle)
     ]

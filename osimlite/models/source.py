@@ -116,6 +116,7 @@ def describe_model(name: str) -> str:
 
 
 def _find_function(source: str) -> Callable[..., Any]:
+    """Return the function that a source names; an error lists what a source can be."""
     target = BUILT_IN.get(source, source)
     place, _, name = target.rpartition(":")
     # Without a colon the target is a file, whose function is found by itself.
@@ -160,6 +161,7 @@ def _import_built_in(module: str, source: str) -> ModuleType:
 
 
 def _list_functions(module: ModuleType) -> dict[str, Callable[..., Any]]:
+    """Return the public functions that a module defines, by name."""
     return {
         name: value
         for name, value in vars(module).items()
@@ -193,6 +195,7 @@ def _select_function(module: ModuleType, place: str) -> Callable[..., Any]:
 
 
 def _returns_model(function: Callable[..., Any]) -> bool:
+    """Return whether a function is annotated to return a Model."""
     try:
         return get_type_hints(function).get("return") is Model
     # An annotation may name a type that is imported for type checkers only.
@@ -203,6 +206,7 @@ def _returns_model(function: Callable[..., Any]) -> bool:
 def _parse_arguments(
     function: Callable[..., Any], parameters: Mapping[str, str], source: str
 ) -> dict[str, Any]:
+    """Return the arguments of a model function; all parameters without a default must be given."""
     known = inspect.signature(function).parameters
     arguments = {}
     for name, text in parameters.items():
@@ -223,6 +227,7 @@ def _parse_arguments(
 
 
 def _parse_value(name: str, text: str, parameter: inspect.Parameter) -> Any:
+    """Return the value of a parameter, of the type of its default."""
     default = parameter.default
     # The type of the default decides how a text is read.
     kind: type | None = None if default in (inspect.Parameter.empty, None) else type(default)

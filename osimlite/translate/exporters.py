@@ -84,6 +84,7 @@ def write_screenshot(shown: Shown, path: Path, *, at: float | None) -> str:
 
 
 def _megabytes(path: Path) -> str:
+    """Return the size of a file in words."""
     return f"{path.stat().st_size / 1e6:.1f} MB"
 
 

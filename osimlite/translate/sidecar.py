@@ -64,6 +64,7 @@ def format_coordinates(robot: Robot, file: str) -> str:
 
 
 def _list_coordinates(robot: Robot) -> list[dict[str, Any]]:
+    """Return an entry for each coordinate: its path, unit, default values and joints."""
     drives: dict[int, list[str]] = {}
     for joint in robot.moving:
         for place in joint.coordinates:
@@ -88,6 +89,7 @@ def _list_coordinates(robot: Robot) -> list[dict[str, Any]]:
 
 
 def _list_joints(robot: Robot) -> list[dict[str, Any]]:
+    """Return an entry for each moving joint: its coordinates and its function of them."""
     following = mimics(robot)
     coordinates = robot.mechanism.coordinates
     result: list[dict[str, Any]] = []
@@ -113,6 +115,7 @@ def _list_joints(robot: Robot) -> list[dict[str, Any]]:
 
 
 def _list_couplers(robot: Robot) -> list[dict[str, Any]]:
+    """Return an entry for each coupler: its coordinates and its function."""
     coordinates = robot.mechanism.coordinates
     return [
         {
@@ -126,6 +129,7 @@ def _list_couplers(robot: Robot) -> list[dict[str, Any]]:
 
 
 def _format_json(value: Any) -> str:
+    """Return a value as JSON text, without NaN and infinity, which JSON lacks."""
     return json.dumps(replace_non_finite(value), allow_nan=False)
 
 

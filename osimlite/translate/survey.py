@@ -86,6 +86,7 @@ class _Survey:
         self.note = fidelity.add
 
     def run(self) -> None:
+        """Record what became of every component, kind by kind."""
         self.fidelity.translated["/"] = f"robot {self.robot.name}"
         self._record_gravity()
         self._record_links()
@@ -104,6 +105,7 @@ class _Survey:
         account_for_rest(self.tree, self.fidelity)
 
     def _record_gravity(self) -> None:
+        """Record the gravity, and units other than those of the SI."""
         units = f"{self.model.length_units} {self.model.force_units}".lower().split()
         # OpenSim's unit names have no effect on computations; all files are read as SI.
         if units not in (["meters", "n"], ["m", "n"]):
@@ -124,6 +126,7 @@ class _Survey:
         )
 
     def _record_links(self) -> None:
+        """Record what became of each body, and of the parts of bodies in closed loops."""
         carriers = {body.path: body.mobilizer.joint for body in self.robot.mechanism.bodies}
         for path, (link, _) in self.robot.link_of.items():
             if path not in self.tree.by_path:
@@ -175,6 +178,7 @@ class _Survey:
         return {joint.child for joint in self.robot.moving} - carriers
 
     def _record_joints(self) -> None:
+        """Record the joints of the robot by which each joint of the model was replaced."""
         massless = {link.name for link in self.robot.links if not link.bodies}
         for joint in self.tree.components:
             if not isinstance(joint, Joint):
@@ -206,6 +210,7 @@ class _Survey:
                 )
 
     def _record_coordinate(self, index: int, coordinate: Coordinate, path: str) -> None:
+        """Record the joint of a coordinate, and what of the coordinate is lost."""
         unit = (
             "m" if self.robot.mechanism.coordinates[index].motion_type == "translational" else "rad"
         )
@@ -238,6 +243,7 @@ class _Survey:
         self._record_functions(driven, path)
 
     def _record_range(self, coordinate: Coordinate, path: str, unit: str, *, hard: bool) -> None:
+        """Record that URDF has hard limits only."""
         low, high = coordinate.range
         text = f"{low:g} to {high:g} {unit}"
         self.note(
@@ -251,6 +257,7 @@ class _Survey:
             self.note("clamped", path, "clamped range in user interfaces", "left out", text)
 
     def _record_start(self, coordinate: Coordinate, path: str, unit: str) -> None:
+        """Record default values and speeds, which URDF lacks."""
         # URDF has no initial position.
         if coordinate.default_value != 0.0:
             self.note(
@@ -270,6 +277,7 @@ class _Survey:
             )
 
     def _record_functions(self, driven: list[RobotJoint], path: str) -> None:
+        """Record joints that are functions of a coordinate."""
         for part in driven:
             if part.function == IDENTITY:
                 continue
@@ -285,6 +293,7 @@ class _Survey:
             )
 
     def _record_couplers(self) -> None:
+        """Record coordinates that are functions of others."""
         for coupler in couplers(self.robot):
             driven = [
                 part.name for part in self.robot.moving if coupler.dependent in part.coordinates
@@ -307,9 +316,11 @@ class _Survey:
 
     @cached_property
     def _mimics(self) -> dict[str, Mimic]:
+        """Joints that mimic another one, by name."""
         return mimics(self.robot)
 
     def _record_frames(self) -> None:
+        """Record frames that are no links."""
         mechanism = self.robot.mechanism
         for frame in self.tree.components:
             path = self.tree.path_of(frame) or ""
@@ -335,4 +346,5 @@ class _Survey:
             )
 
     def _record_new_name(self, path: str, name: str) -> None:
+        """Record a new name."""
         self.note("name", path, "the name of a component as it is", "renamed", name)

@@ -231,6 +231,7 @@ def find_basin_offsets(
 
 
 def _find_index(engine: BatchEngine, name: str) -> int:
+    """Return the index in the state of a coordinate, or of its speed (`NAME/speed`)."""
     coordinate, slash, kind = name.rpartition("/")
     is_speed = bool(slash) and kind == "speed"
     place = engine.mechanism.coordinate_index(coordinate if is_speed else name)
@@ -240,6 +241,7 @@ def _find_index(engine: BatchEngine, name: str) -> int:
 
 
 def _make_axis(engine: BatchEngine, place: int, value: float, reach: float, grid: int) -> Axis:
+    """Return the axis of a state entry, with values up to `reach` to either side of its own."""
     n = len(engine.order)
     info = engine.mechanism.coordinates[engine.order[place % n]]
     unit = "rad" if info.motion_type == "rotational" else "m"

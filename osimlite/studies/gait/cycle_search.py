@@ -522,6 +522,7 @@ class _ClosingProblem:
         self.scale = np.concatenate((np.ones(self._size), np.full(len(inside), FRACTION_SCALE)))
 
     def _get_step_map(self, fractions: Floats, state: Floats) -> StepMap:
+        """Return the step map of the model at some fractions; the latest ones are kept."""
         key = fractions.tobytes()
         if key not in self._maps:
             # The solver evaluates residual and Jacobian of the latest models only.

@@ -93,6 +93,7 @@ class StabilityOptimization:
             seed += 1
 
     def _is_enough(self, found: ModelCycle) -> bool:
+        """Return whether a cycle is as stable as the search requires."""
         return found.cost < self._search.stable
 
     def _evaluate_cost(self, fractions: Floats, rounds: bool) -> float:

@@ -160,6 +160,7 @@ def _resolve_task(
 
 
 def _check_render_mode(mode: str | None) -> str | None:
+    """Return a mode of rendering that is supported, or raise an error of Gymnasium."""
     if mode not in (None, "rgb_array"):
         raise gymnasium.error.UnsupportedMode(f"pictures come as 'rgb_array', not as '{mode}'")
     return mode
@@ -369,10 +370,12 @@ class MuscleVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
 
 
 def _make_single(name: str) -> Callable[..., MuscleEnv]:
+    """Return the function with which Gymnasium makes one environment of a task."""
     return lambda **options: MuscleEnv(TASKS[name], **options)
 
 
 def _make_vector(name: str) -> Callable[..., MuscleVectorEnv]:
+    """Return the function with which Gymnasium makes several environments of a task."""
     return lambda num_envs=1, **options: MuscleVectorEnv(num_envs, TASKS[name], **options)
 
 

@@ -79,6 +79,7 @@ PowerTerms = Iterable[tuple[int, Array, Array]]
 
 
 def _read_integer(node: Node, key: str, least: int) -> int:
+    """Return a setting that is a whole number from `least` to `MAX_CONTROL_POINTS`."""
     number = node.number(key)
     if number not in range(least, MAX_CONTROL_POINTS + 1):
         raise node.error(
@@ -108,6 +109,7 @@ def _read_control_points(node: Node, parameters: Parameters, before: str) -> tup
 
 
 def _read_piecewise_constant(node: Node, parameters: Parameters, before: str) -> PowerTerms:
+    """Return the terms of a function that keeps each value until the next time."""
     times, values = _read_control_points(node, parameters, before)
     # Steps of constants: each point adds the difference to the previous value from its time on.
     return [(0, *each) for each in zip(times, np.diff(values, axis=0, prepend=0.0), strict=True)]
@@ -128,6 +130,7 @@ def _read_piecewise_linear(node: Node, parameters: Parameters, before: str) -> P
 
 
 def _read_polynomial(node: Node, parameters: Parameters, before: str) -> PowerTerms:
+    """Return the terms of a polynomial of time; each coefficient is a parameter."""
     degree = _read_integer(node, "degree" if node.get("order") is None else "order", 0)
     for k in range(degree + 1):
         node.text(f"coefficient{k}")
@@ -314,6 +317,7 @@ class Reflexes:
 
     # ---------------------------------------------------------------------------------------------- reading
     def _add_conditional(self, node: Node, parameters: Parameters) -> None:
+        """Add the reflexes that act in some states of a leg."""
         side = node.text("legs", "")
         for mask in node.text("states").replace(";", ",").split(","):
             names = mask.split()
@@ -337,6 +341,7 @@ class Reflexes:
     def _add_reflexes(
         self, node: Node, parameters: Parameters, prefix: str, leg: int, states: int
     ) -> None:
+        """Add the reflexes of a controller for one leg and some of its states, a bit each."""
         symmetric = node.flag("symmetric", self.symmetric)
         blocks = [node, *(block for _, block in node.select_all("Reflexes"))]
         for block in blocks:
@@ -420,6 +425,7 @@ class Reflexes:
 
     @staticmethod
     def _read_delay(node: Node, parameters: Parameters, before: str) -> Array:
+        """Return the delay (s) of a reflex for each candidate."""
         delay = parameters.get_number(node, "delay", 0.0, before + "delay")
         if np.any(delay < 0.0):
             raise node.error(f"a delay of {delay.min():g} s knows what is to come")
@@ -444,6 +450,7 @@ class Reflexes:
         states: int,
         symmetric: bool,
     ) -> None:
+        """Add one reflex of a leg, with a term for each of its channels."""
         kind = REFLEX_TYPES[name]
         node.read_keys.update(kind.settings)
         target, number, before = self._resolve_target_and_source(node, prefix, leg, symmetric, kind)

@@ -132,6 +132,7 @@ class Feedback:
         )
 
     def _read(self, model: Model, engine: Any) -> tuple[SensedModel, Reflexes, Parameters]:
+        """Read the controller for a model; return the sensors, the reflexes and the parameters."""
         sensed = SensedModel(model, engine, 1, self.step, self._legs)
         parameters = Parameters(self._values)
         reflexes = Reflexes(self._node, self._kind, sensed, parameters)

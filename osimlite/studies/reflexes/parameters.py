@@ -127,6 +127,7 @@ class Parameters:
     def _request_parameter(
         self, part: Node, name: str, mean: float, std: float, low: float, high: float
     ) -> Array:
+        """Return the values (count,) of a parameter, and note its definition."""
         if not low <= mean <= high:
             raise part.error(
                 f"the parameter '{name}' begins at {mean:g}, which is not from {low:g} to {high:g}"

@@ -235,6 +235,7 @@ class _Budget:
     parts: int = MAX_PARTS
 
     def take_file(self, path: Path) -> None:
+        """Count a file, and raise an error if there are too many."""
         self.files -= 1
         if self.files < 0:
             raise DocumentError(
@@ -243,6 +244,7 @@ class _Budget:
             )
 
     def take_part(self, node: Node) -> None:
+        """Count a part of a scenario, and raise an error if there are too many."""
         self.parts -= 1
         if self.parts < 0:
             raise node.error(
@@ -271,6 +273,7 @@ def make_node(data: Mapping[str, Any]) -> Node:
 
 
 def _list_parts(key: str, value: Any) -> Iterator[tuple[str, Node]]:
+    """Yield the parts that a value of YAML means: one, or one for each mapping of a list."""
     if isinstance(value, Mapping):
         yield key, make_node(value)
     elif isinstance(value, list | tuple) and any(isinstance(item, Mapping) for item in value):
@@ -286,6 +289,7 @@ def _list_parts(key: str, value: Any) -> Iterator[tuple[str, Node]]:
 def _read_source(
     path: Path, base: Path, constants: dict[str, str], depth: int, budget: _Budget
 ) -> Node:
+    """Read a file of any supported format, with all files that it includes."""
     budget.take_file(path)
     try:
         text = read_file(path).decode()
@@ -397,6 +401,7 @@ class _TokenReader:
         self.index = 0
 
     def next(self) -> str:
+        """Return the next token, and move on."""
         if self.index >= len(self.tokens):
             raise DocumentError(
                 "the file ends in the middle of something", file=str(self.path), line=self.line()
@@ -405,9 +410,11 @@ class _TokenReader:
         return self.tokens[self.index - 1][0]
 
     def line(self) -> int:
+        """Return the number of the line of the latest token."""
         return self.tokens[min(self.index, len(self.tokens)) - 1][1] if self.tokens else 1
 
     def fill(self, node: Node, level: int) -> None:
+        """Read the parts of a node up to its closing brace."""
         if level > MAX_NESTING:
             raise node.error(f"the braces nest more than {MAX_NESTING} levels deep")
         while self.index < len(self.tokens) and self.tokens[self.index][0] != "}":
@@ -439,6 +446,7 @@ class _TokenReader:
                 node.parts.append((key.strip('"'), part))
 
     def _read_value(self) -> str:
+        """Return a value: a word, the words of a list, or the value of a constant."""
         value = self.next()
         if value == "[":
             words = []
@@ -459,6 +467,7 @@ class _TokenReader:
         return value.strip('"')
 
     def _read_included(self, name: str) -> Node:
+        """Return the contents of an included file."""
         included = _resolve_include(name, self.path, self.base)
         return _read_source(included, self.base, self.constants, self.depth + 1, self.budget)
 

@@ -90,14 +90,17 @@ class ReflexType(NamedTuple):
 
 
 def _list_muscles(sensed: SensedModel) -> list[str]:
+    """Return the names of the muscles, in the order of their indices."""
     return sensed.names[: len(sensed.muscles)]
 
 
 def _list_coordinates(sensed: SensedModel) -> list[str]:
+    """Return the names of the coordinates, in the order of their indices."""
     return sensed.coordinates
 
 
 def _list_bodies(sensed: SensedModel) -> list[str]:
+    """Return the names of the bodies, in the order of their indices."""
     return [body.name for body in sensed.mechanism.bodies]
 
 

@@ -143,6 +143,7 @@ def expand_nodes(name: str) -> list[str]:
 
 
 def _parse_time(name: str, word: str) -> float:
+    """Return the time (s) behind the @ of a name."""
     try:
         time = float(word)
     except ValueError:
@@ -275,6 +276,7 @@ class VariedControls:
     def _make_function(
         self, kind: str, parts: Sequence[tuple[float, int]], interpolation: str
     ) -> Function:
+        """Return a control as a function of time, whose numbers each run sets."""
         times, places = zip(*parts, strict=True)
         function: Function
         if kind == OFFSET:

@@ -128,11 +128,14 @@ class Expression:
         )
 
     def _evaluate_columns(self, times: Floats, columns: Sequence[Floats]) -> Any:
+        """Evaluate the expression from the histories (t,) of its quantities."""
         # A division by zero gives NaN or infinity, which counts as a run without a result.
         with np.errstate(all="ignore"):
             return self._evaluate_node(self._tree, times, columns)
 
     def _evaluate_node(self, node: ast.AST, times: Floats, columns: Sequence[Floats]) -> Any:
+        """Evaluate a part of the expression: a number, or a history (t,)."""
+
         def evaluate(part: ast.AST) -> Any:
             return self._evaluate_node(part, times, columns)
 
@@ -222,6 +225,7 @@ def list_driven_names(engine: Any) -> set[str]:
 
 
 def _read_state(place: int, engine: Any, moments: Moments) -> Floats:
+    """Return the history (t,) of an entry of the state."""
     return np.array([y[place] for _, y in moments])
 
 
@@ -233,6 +237,7 @@ def _read_constant(place: int | None, engine: Any, moments: Moments) -> Floats:
 
 
 def _compute_control(place: int, engine: Any, moments: Moments) -> Floats:
+    """Return the history (t,) of a control."""
     result = []
     for t, y in moments:
         # Controls are computed with the forces.
@@ -242,18 +247,22 @@ def _compute_control(place: int, engine: Any, moments: Moments) -> Floats:
 
 
 def _compute_force(place: int, engine: Any, moments: Moments) -> Floats:
+    """Return the history (t,) of a column of the forces' records."""
     return np.array([engine.force_records(t, y)[place] for t, y in moments])
 
 
 def _compute_probe(place: int, engine: Any, moments: Moments) -> Floats:
+    """Return the history (t,) of a value of the probes."""
     return np.array(list(compute_probe_rows(engine, moments, moments)))[:, place]
 
 
 def _locate_marker(path: str, engine: Any, moments: Moments) -> Floats:
+    """Return the positions (t, 3) of a marker in ground (m)."""
     return locate_station(engine, moments, *engine.mechanism.stations[path])
 
 
 def _locate_body(number: int, engine: Any, moments: Moments) -> Floats:
+    """Return the positions (t, 3) of a body's mass centre in ground (m)."""
     return locate_station(
         engine, moments, number, engine.mechanism.bodies[number].mass_properties.center
     )
@@ -262,4 +271,5 @@ def _locate_body(number: int, engine: Any, moments: Moments) -> Floats:
 def _select_axis(
     motion: Callable[[Any, Moments], Floats], axis: int, engine: Any, moments: Moments
 ) -> Floats:
+    """Return the history (t,) of one component of a position."""
     return motion(engine, moments)[:, axis]

@@ -51,6 +51,7 @@ class _UnknownEvents(list[Any]):
     """Events of a neighbouring run, which is not simulated: any access is an error."""
 
     def _refuse(self, *_: object) -> NoReturn:
+        """Raise an error for a measure that asks for events."""
         raise UnsupportedError(
             "events of a run have no derivatives; take another measure, or another --method"
         )
@@ -179,6 +180,7 @@ class Gradients:
         return result
 
     def _make_neighbour(self, values: list[float]) -> _Neighbour:
+        """Return the model and the initial state for some values of the variables."""
         variant = self._variants.make_variant(values)
         start = self._variants.make_start(variant, values)
         return _Neighbour(
@@ -186,6 +188,7 @@ class Gradients:
         )
 
     def _run(self, here: _Neighbour) -> Runs:
+        """Simulate one model from its initial state."""
         plan = self._plan
         return run_many(
             here.variant.engine,
@@ -215,6 +218,7 @@ class Gradients:
         return times, np.array(states)
 
     def _get_tangent_steps(self, variant: Variant) -> TangentSteps:
+        """Return the derivatives of steps for a model; those of the latest structure are kept."""
         if self._steps is None or self._steps[0] != variant.structure:
             engine = variant.engine
             packed = pack(

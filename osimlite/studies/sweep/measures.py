@@ -211,6 +211,7 @@ EVENTS_PER_SECOND = 100
 
 
 def _estimate_event_count(to: float) -> int:
+    """Return the number of events to record in a run of a duration (s)."""
     return 40 + round(EVENTS_PER_SECOND * to)
 
 
@@ -283,10 +284,12 @@ def energy(engine: Any, feet: Sequence[str] | None = None) -> RunMeasure:
 
 
 def _read_end_states(place: int | None, locked: float, batch: Batch) -> Floats:
+    """Return an entry of the last states (W,), or the value of a locked coordinate."""
     return np.full(len(batch.starts), locked) if place is None else batch.runs.states[:, place]
 
 
 def _measure_expression(expression: Expression, batch: Batch) -> list[float]:
+    """Return the value of an expression for each run, from its saved states and its last one."""
     result = []
     runs, times = batch.runs, batch.report_times
     for k, (end, state) in enumerate(zip(runs.times.tolist(), runs.states.tolist(), strict=True)):
@@ -301,6 +304,7 @@ def _measure_expression(expression: Expression, batch: Batch) -> list[float]:
 
 
 def _call_for_each_run(function: Callable[[Run], float], batch: Batch) -> list[float]:
+    """Return the value of a function of the user for each run."""
     result = []
     names, contacts = batch.names, batch.engine.contacts
     for k in range(len(batch.starts)):
@@ -348,6 +352,7 @@ def _find_state(engine: Any, name: str) -> tuple[int | None, float]:
 
 
 def _import_function(name: str) -> Callable[[Run], float]:
+    """Return the function that `module:function` or `file.py:function` names."""
     place, _, function = name.rpartition(":")
     module = run_python_file(Path(place)) if place.endswith(".py") else import_user_module(place)
     result = getattr(module, function, None)

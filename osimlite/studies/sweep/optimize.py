@@ -103,6 +103,7 @@ class Optimum(ResultTable):
     _repr_html_ = make_notebook_repr("optimum")
 
     def _get_results_path(self) -> Path:
+        """Return the path of the table of evaluations."""
         return self.history
 
 

@@ -319,14 +319,16 @@ def _make_controlled_model(
 def _make_stops(
     mechanism: Mechanism, levels: Mapping[str, float | str], is_below: bool
 ) -> list[Stop]:
+    """Return the stops for levels by the names of coordinates."""
     return [_make_stop(mechanism, name, level, is_below) for name, level in levels.items()]
 
 
 def _make_stop(mechanism: Mechanism, name: str, given: float | str, is_below: bool) -> Stop:
+    """Return the stop at a level (rad, m, or text with a unit) of a coordinate that moves."""
     infos = {key: info for info in mechanism.coordinates for key in (info.name, info.path)}
     if name not in infos:
         raise SettingError(f"there is no coordinate '{name}'{suggest_name(name, infos)}")
-    # A stop that never acts would be a mistake that nobody sees.
+    # A stop at a coordinate that does not move can only be a mistake.
     if infos[name].locked:
         raise SettingError(
             f"the coordinate '{name}' is locked, so that it stops nothing; name one that moves"

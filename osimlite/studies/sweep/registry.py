@@ -94,6 +94,7 @@ def list_measure_names() -> list[str]:
 
 
 def _load_provider(table: dict[str, T], name: str) -> T | None:
+    """Import modules until one of them registers a name; return its entry, or None."""
     for module in PROVIDERS:
         import_module(module)
         if name in table:

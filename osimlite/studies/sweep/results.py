@@ -41,6 +41,7 @@ _log = logging.getLogger(__name__)
 
 
 def _load_arrow() -> Any:
+    """Return the module pyarrow, which is optional."""
     return require("pyarrow", extra="sweep", purpose="a table of results")
 
 
@@ -255,6 +256,7 @@ class PartialTable:
             )
 
     def _write_batch(self, item: Any) -> None:
+        """Append a record of rows with its length and checksum."""
         body = item.serialize().to_pybytes()
         self.stream.write(RECORD_HEAD.pack(_MARK, len(body), _compute_checksum(body)) + body)
         self.stream.flush()
@@ -307,6 +309,7 @@ class PartialTable:
         self._release(removing=self.rows == 0)
 
     def _release(self, *, removing: bool = False) -> None:
+        """Close the file, remove it if requested, and release the lock."""
         with suppress(OSError, AttributeError):
             # The user has been told about a full disk already; and there may be no stream yet.
             self.stream.close()
@@ -349,6 +352,7 @@ class PartialTable:
             os.truncate(self.partial, end)
 
     def _count(self, batch: Any) -> None:
+        """Count the rows of a record."""
         self.rows += batch.num_rows
 
 
@@ -390,6 +394,7 @@ def _read_records(path: Path) -> Iterator[tuple[bytes, int]]:
 
 
 def _compute_checksum(body: bytes) -> bytes:
+    """Return the checksum of a record (16 bytes)."""
     return blake2b(body, digest_size=16).digest()
 
 

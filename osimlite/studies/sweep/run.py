@@ -100,6 +100,7 @@ class Outcome(ResultTable):
     _repr_html_ = make_notebook_repr("runs")
 
     def _get_results_path(self) -> Path:
+        """Return the path of the table of results."""
         return self.path
 
 
@@ -232,6 +233,7 @@ class _Dispatcher:
             raise
 
     def _submit_tasks(self) -> None:
+        """Submit tasks until the workers have enough of them."""
         # Results after a slow run wait in memory for it, so that their number must be bounded.
         farthest = self.saved + 64 * max(MAX_TASK_SIZE, self.size)
         while (
@@ -269,6 +271,7 @@ class _Dispatcher:
         self._report_progress()
 
     def _report_progress(self) -> None:
+        """Report how many runs are finished, those of earlier sessions included."""
         if self.progress is not None:
             there = self.outcome.before + sum(self.outcome.status.values())
             self.progress(there, self.samples.count)

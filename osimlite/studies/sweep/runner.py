@@ -217,6 +217,7 @@ class Runner:
             self._apply_measure(made, batch, rows, block)
 
     def _get_observers(self, structure: bytes, engine: Any) -> _Observers:
+        """Return the measures and watches for a structure of the model, from a cache."""
         result = self._looks.get(structure)
         if result is None:
             # Parameters of a function may give every sample a structure of its own.
@@ -247,6 +248,7 @@ class Runner:
     def _simulate(
         self, engine: Any, look: _Observers, variants: Sequence[Variant], starts: Floats
     ) -> tuple[Runs, Endings]:
+        """Simulate a batch of models of one structure from their initial states (W, y)."""
         if self.plan.engine != "compiled":
             return self._simulate_one_by_one(engine, variants, starts)
         from osimlite.simulation.batches import ENDINGS, run_many
@@ -293,6 +295,7 @@ class Runner:
         return runs, why
 
     def _stack_numbers(self, variants: Sequence[Variant]) -> Floats | None:
+        """Return the numbers of the compiled engines (W, m); None if no number varies."""
         return (
             None if self.variants.is_fixed else np.stack([variant.numbers for variant in variants])
         )

@@ -67,6 +67,7 @@ class Samples:
         return np.stack(columns, axis=1) if columns else fractions
 
     def _compute_fractions(self, first: int, last: int, varied: Sequence[int]) -> Floats:
+        """Return samples as fractions of the ranges (last - first, d), by the selected method."""
         if self.sampler == "grid":
             return self._compute_grid(first, last, varied)
         if self.sampler == "sobol":

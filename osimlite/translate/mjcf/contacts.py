@@ -71,6 +71,7 @@ def add_contacts(draft: Draft) -> None:
 
 
 def _add_surface(draft: Draft, geometry: ContactGeometry, path: str) -> None:
+    """Add the geom of a contact geometry, if MuJoCo has one for it."""
     body, placed = draft.find_placement(geometry, "socket_frame")
     made = _make_geom(
         draft, geometry, path, still=not draft.bodies[body].xpath("ancestor-or-self::body/joint")

@@ -395,6 +395,7 @@ class Draft:
 
     @cached_property
     def _transforms_at_zero(self) -> dict[str, Array]:
+        """Transforms (4, 4) of all links in ground by name, with all joints at zero."""
         placed = {self.robot.links[0].name: np.eye(4)}
         for joint in self.robot.joints:
             placed[joint.child] = placed[joint.parent] @ joint.across(0.0)

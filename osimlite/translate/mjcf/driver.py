@@ -223,6 +223,7 @@ class Driver:
     # ---------------------------------------------------------------------------------------------- callbacks
     @contextmanager
     def _call_back(self) -> Iterator[None]:
+        """Let MuJoCo call the driver for forces and activations within a `with` block."""
         mujoco = self._mujoco
         before = mujoco.get_mjcb_control(), mujoco.get_mjcb_act_dyn()
 
@@ -394,6 +395,7 @@ class Driver:
         self._mujoco.mj_setConst(self.model, self.data)
 
     def _make_follower(self, name: str) -> _FollowerJoint:
+        """Return the addresses and the function of a joint that follows others."""
         follower = self.mjcf.followers[name]
         own = self.model.joint(name)
         names = follower.arguments or (() if follower.leader is None else (follower.leader,))

@@ -222,6 +222,7 @@ def to_mjcf(
 
 
 def _add_settings(draft: Draft) -> None:
+    """Write the options of the simulation, and the sections of the file in their order."""
     root = draft.root
     root.set("model", xml_name(draft.mechanism.name))
     root.append(Comment(f" Written by osimlite {__version__} for MuJoCo {draft.options.version}. "))

@@ -85,6 +85,7 @@ def _fit_piece(piece: Tendon, wrong: Residuals) -> Tendon:
 
 
 def _compute_error(residuals: Array) -> float:
+    """Return the root of the summed mean squares of residuals (P, r)."""
     return float(np.sqrt(np.square(residuals).mean(0).sum()))
 
 
@@ -104,6 +105,7 @@ def _choose_sides(piece: Tendon, wrong: Residuals) -> Tendon:
 
 
 def _is_free(part: TendonSite | WrapGeom) -> bool:
+    """Return whether a fit may move a part: a surface with a fixed side, or an unnamed site."""
     if isinstance(part, WrapGeom):
         return part.side is None or part.side.slides is None
     return not part.name

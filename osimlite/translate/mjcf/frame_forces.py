@@ -149,6 +149,7 @@ def add_straight_tendon(draft: Draft, path: str, sites: list[str], **law: float)
 def _add_site_motor(
     draft: Draft, path: str, gear: Array, site: str, axes: str | None = None
 ) -> str:
+    """Add a motor at a site with a gear (6,), along the axes of another site if one is named."""
     name = draft.make_name("actuator", path)
     add_element(
         draft.get_section("actuator"), "motor", name=name, site=site, refsite=axes, gear=gear
@@ -165,6 +166,7 @@ def _add_point_site(draft: Draft, owner: Component, path: str, socket: str, poin
 
 
 def _normalize_axis(axis: tuple[float, float, float]) -> Array:
+    """Return a direction as a unit vector (3,)."""
     length = float(np.linalg.norm(axis))
     if length == 0.0:
         raise Untranslatable("its direction is zero")

@@ -104,4 +104,5 @@ def fit_quartics(data: bytes) -> tuple[Array, Array]:
 
 
 def _pad_coefficients(polynomial: Polynomial) -> Array:
+    """Return the coefficients (5,) of a polynomial, constant first."""
     return np.pad(polynomial.coef, (0, DEGREE + 1 - len(polynomial.coef)))

@@ -186,6 +186,7 @@ class _Writer:
         return name
 
     def _write_site(self, path: str, spot: TendonSite) -> str:
+        """Write a site of a tendon, with the bodies that move it, and return its name."""
         if spot.slides is None:
             return self.draft.add_site(path, spot.body, spot.place, group=WRAP_GROUP)
         assert spot.drive is not None
@@ -218,6 +219,7 @@ class _Writer:
         return site
 
     def _write_geom(self, path: str, around: WrapGeom) -> str:
+        """Write the geom of a surface, and return its name."""
         # Muscles share wrap objects; equal geoms are written once.
         key = (
             around.body,

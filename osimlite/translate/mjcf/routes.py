@@ -159,6 +159,7 @@ class Router:
         return np.concatenate((lengths[:, None], arms), axis=1)
 
     def _find_touches(self, number: int) -> Touch:
+        """Return the poses in which the path touches a surface, with the tangent points."""
         one = len(self.route.points) + 2 * number
         body = self.route.surfaces[number].tangent.body
         result = []
@@ -380,6 +381,7 @@ def make_site(point: Node) -> TendonSite:
 
 
 def _choose_option(options: Sequence[Tendon], choose: Choose) -> Tendon:
+    """Return the option that a function chooses."""
     return choose(options)
 
 
@@ -399,4 +401,5 @@ def _find_last_site(tendon: Tendon) -> int:
 
 
 def _join_pieces(slots: Sequence[Tendon]) -> Tendon:
+    """Return one tendon of several pieces."""
     return tuple(chain.from_iterable(slots))

@@ -224,6 +224,7 @@ def _project_to_plane(across: Array | None, points: Array) -> Array:
 
 
 def _dot(a: Array, b: Array) -> Array:
+    """Return the scalar products (...,) of vectors (..., n)."""
     return np.einsum("...i,...i->...", a, b)
 
 
@@ -243,6 +244,7 @@ def _compute_angle(a: Array, b: Array) -> Array:
 
 
 def _cross(a: Array, b: Array) -> Array:
+    """Return the z components (...,) of the cross products of vectors in the x-y plane."""
     return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
 
 
