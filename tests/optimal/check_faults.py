@@ -64,9 +64,9 @@ def test_a_fault_is_told(kind, tmp_path):
         try:
             told = any(said_of(study))
         except Exception as error:
-            raise AssertionError(f"{sort}: {change.file}: {change.what}") from error
+            raise AssertionError(f"{group}: {change.file}: {change.what}") from error
         if change.sure and not told:
-            untold.append(f"{sort}: {change.file}: {change.what}")
+            untold.append(f"{group}: {change.file}: {change.what}")
         file.write_bytes(whole.texts[change.file].encode())
         os.utime(file, (10 * number + 5, 10 * number + 5))
     assert not untold, "\n".join(untold)
