@@ -13,9 +13,9 @@ from collections.abc import Iterator
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
 from mkdocs.structure.pages import Page
-from typer.testing import CliRunner
 
-from osimlite.cli import COMMANDS, create_app
+from osimlite.cli import COMMANDS, load_command
+from osimlite.cli._help import format_help
 from osimlite.lint.pages import format_group_page
 from osimlite.lint.registry import all_rules, rule_groups
 from osimlite.schema.base import Object
@@ -69,11 +69,7 @@ def commands() -> str:
 
 
 def _help(command: str) -> str:
-    environment = {"COLUMNS": str(WIDTH), "TERM": "dumb", "NO_COLOR": "1"}
-    done = CliRunner(env=environment).invoke(
-        create_app(), [command, "--help"], prog_name="osimlite"
-    )
-    return "\n".join(line.rstrip() for line in done.output.strip().splitlines())
+    return format_help(command, load_command(command), WIDTH).rstrip()
 
 
 def components() -> str:

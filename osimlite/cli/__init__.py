@@ -70,6 +70,14 @@ def load_command(name: str) -> Command:
     return getattr(import_module(f"osimlite.cli.{function}"), function)
 
 
+def _print_help(name: str, command: Command) -> None:
+    """Print the help of a command."""
+    from osimlite.cli._console import count_columns, show, wants_colour
+    from osimlite.cli._help import format_help
+
+    show(format_help(name, command, count_columns(), bold=wants_colour()))
+
+
 def _print_version(*, verbose: bool) -> None:
     """Print the version; with `verbose` also what runs the kernels and why."""
     from osimlite import __version__
@@ -181,6 +189,9 @@ def _run(words: list[str]) -> None:
             warnings.simplefilter("ignore", UnitWarning)
             if names != COMMANDS and COMPLETION_VARIABLE not in os.environ:
                 command = load_command(words[0])
+                if {"--help", "-h"} & {*words}:
+                    _print_help(words[0], command)
+                    raise SystemExit(0)
                 words = [words[0], *command.complete(words[1:])]
                 values = command.read(words[1:])
                 if values is not None:

@@ -6,9 +6,10 @@ from collections import defaultdict
 
 import pytest
 from typer.main import get_command
-from typer.testing import CliRunner
 
-from osimlite.cli import COMMANDS, create_app
+from osimlite.cli import COMMANDS, create_app, load_command
+from osimlite.cli._help import format_help
+from tests.cli.command import run
 
 MEANINGS = {
     "--to": "seconds, but the format of translate and convert",
@@ -34,17 +35,39 @@ MEANINGS = {
 """Options whose help differs between commands, and why."""
 
 
+SCREEN_LINES = 50
+"""Lines of a terminal that fills a laptop's screen."""
+
+
 @pytest.fixture(scope="module")
 def application():
     return create_app()
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_help_fits_80_columns(application, command, monkeypatch):
-    monkeypatch.setenv("COLUMNS", "80")
-    done = CliRunner().invoke(application, [command, "--help"])
-    assert done.exit_code == 0
-    assert "…" not in done.output and max(map(len, done.output.splitlines())) <= 80
+def test_help_fits_80_columns_and_two_screens(command):
+    lines = format_help(command, load_command(command), 80).splitlines()
+    assert max(map(len, lines)) <= 80
+    assert len(lines) <= 2 * SCREEN_LINES
+
+
+def test_help_names_every_option_with_its_default(application):
+    for name, command in get_command(application).commands.items():
+        text = format_help(name, load_command(name), 80)
+        for option in command.params:
+            if option.param_type_name == "option" and option.name != "help":
+                assert all(word in text for word in (*option.opts, *option.secondary_opts))
+    text = format_help("sweep", load_command("sweep"), 80)
+    assert "--to SECONDS" in text and "[default: 2.0]" in text and "\033" not in text
+    assert "\033[1m--to SECONDS\033[0m" in format_help(
+        "sweep", load_command("sweep"), 80, bold=True
+    )
+
+
+def test_help_is_printed_without_typer(tmp_path):
+    for words in (("optimize", "--help"), ("run-tool", "-h"), ("ik", "a.osim", "--help")):
+        done = run(*words, folder=tmp_path)
+        assert (done.code, done.err) == (0, "") and done.out.startswith("Usage: osimlite ")
 
 
 def test_an_option_is_the_same_in_every_command(application):
