@@ -91,6 +91,9 @@ def open_process_pool(
         workers: number of local processes; default one for each core.
         cluster: address of a Dask scheduler; default local processes.
 
+    Yields:
+        The pool.
+
     Raises:
         SettingError: both a cluster and a number of workers are given, or the number is below one.
         OsimliteError: the cluster cannot be reached.

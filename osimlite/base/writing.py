@@ -329,6 +329,9 @@ class ResultWriter:
             path: path in the document.
             lines: the text in parts.
 
+        Yields:
+            Stream of the complete temporary file, which is closed already.
+
         Raises:
             WriteRefusedError: the file may not be written.
             OsimliteError: it cannot be written.
@@ -524,6 +527,12 @@ def make_folder(path: str | Path) -> Path:
 @contextmanager
 def prepare_folder(path: str | Path) -> Iterator[Path]:
     """Make a folder before long work begins, and remove it if the work fails without a file.
+
+    Args:
+        path: the folder.
+
+    Yields:
+        The folder.
 
     Raises:
         OsimliteError: the folder cannot be made or written to; the message says why.

@@ -99,7 +99,11 @@ class _Tour:
 
     @contextmanager
     def step(self, title: str) -> Iterator[Callable[..., None]]:
-        """Announce a step, and yield a function that prints its result and files."""
+        """Announce a step of the tour.
+
+        Yields:
+            Function that prints the result of the step and the files written.
+        """
         self.steps += 1
         say(f"{self.steps}. {title}")
         start = time.perf_counter()

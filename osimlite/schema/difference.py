@@ -66,7 +66,11 @@ class _Comparison:
             yield Difference(path, "", None, _describe_type(self.new.by_path[path]))
 
     def _object(self, path: str, way: str, old: Object, new: Object) -> Iterator[Difference]:
-        """Compare two objects at the same position; `way` is the property that leads to them."""
+        """Compare two objects at the same position; `way` is the property that leads to them.
+
+        Yields:
+            Differences of their class and properties.
+        """
         if _describe_type(old) != _describe_type(new):
             yield Difference(path, way or "class", _describe_type(old), _describe_type(new))
             if way:
@@ -103,6 +107,9 @@ class _Comparison:
         """Compare objects without a path; components are compared at their own path.
 
         `named` says whether the names of the objects count.
+
+        Yields:
+            Differences of the objects.
         """
         before = [item for item in old if self.old is None or not isinstance(item, Component)]
         after = [item for item in new if self.new is None or not isinstance(item, Component)]
@@ -128,7 +135,11 @@ class _Comparison:
     def _pair(
         self, path: str, place: str, old: Object | None, new: Object | None
     ) -> Iterator[Difference]:
-        """Compare two objects, either of which may be missing."""
+        """Compare two objects, either of which may be missing.
+
+        Yields:
+            Differences of the objects.
+        """
         if old is not None and new is not None:
             yield from self._object(path, place, old, new)
         elif old is not None or new is not None:

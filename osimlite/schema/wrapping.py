@@ -77,7 +77,7 @@ class WrapTorus(WrapObject):
     """Radius of the circle in the middle of the tube."""
 
     def find_contradictions(self) -> Iterator[Contradiction]:
-        """Without a hole it is no torus."""
+        """Yield radii that leave no hole: the outer one must be larger than the inner one."""
         inner, outer = self.inner_radius, self.outer_radius
         if outer <= inner < inf:
             yield (

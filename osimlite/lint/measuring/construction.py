@@ -97,7 +97,11 @@ class _Construction:
 
     # ------------------------------------------------------------------------------------- forces
     def gather(self, builder: ElementBuilder, elements: list[ForceElement]) -> Iterator[Obstacle]:
-        """Make the elements of all forces and probes; yield the reasons why some have none."""
+        """Make the elements of all forces and probes.
+
+        Yields:
+            Reasons why some forces or probes have no element.
+        """
         try:
             # Building the controllers first reports an error of a controller once, and not again
             # for each actuator that it drives.
@@ -170,7 +174,11 @@ class _Construction:
 
     # ------------------------------------------------------------------------------ accelerations
     def evaluate(self, mechanism: Mechanism, q: Array, forces: Forces) -> Iterator[Obstacle]:
-        """Evaluate the accelerations in the default pose, and yield what is wrong with them."""
+        """Evaluate the accelerations in the default pose.
+
+        Yields:
+            What makes the accelerations fail.
+        """
         try:
             u = mechanism.project_speeds(q, {})
             system = System(mechanism, forces, code=READY_CODE)
