@@ -50,7 +50,11 @@ class Release(NamedTuple):
 
 
 def sources(clone: Path, tag: str) -> Iterator[tuple[str, str]]:
-    """The name and the text of every source file of a release, tests left out."""
+    """Read the source files of a release, without tests.
+
+    Yields:
+        Name and text of each file.
+    """
     listing = subprocess.run(
         ["git", "-C", clone, "ls-tree", "-r", "--name-only", tag, "OpenSim"],
         capture_output=True,

@@ -228,6 +228,7 @@ class Command:
                 if not is_list:
                     arguments.pop(0)
             else:
+                # Short options with "=" are left to typer.
                 spelling, equals, word = word.partition("=")
                 if spelling not in options or (equals and not spelling.startswith("--")):
                     return None
@@ -235,6 +236,7 @@ class Command:
                 kind, is_list = parameter.scalar()
                 if not equals and kind is not bool:
                     word = next(rest, "-")
+                # A value that starts with "-" may be a negative number or a forgotten value; typer decides.
                 if word.startswith("-") or (equals and kind is bool):
                     return None
             value = flag if kind is bool else parameter.value(kind, word)

@@ -273,6 +273,7 @@ class FactTable:
         rows = [(escape_unprintable(name), escape_unprintable(words)) for name, words in self.rows]
         width = max((len(name) for name, _ in rows), default=0)
         width_left = count_columns() - width - 2
+        # Narrow columns need broken words, and characters of other scripts can be two columns wide.
         if width_left < 30 or not all(name.isascii() and words.isascii() for name, words in rows):
             self._show_any(rows)
             return

@@ -113,6 +113,7 @@ def validate_paths(
     if statistics:
         show(_format_statistics(report, everything))
     else:
+        # Narrower lines break every message, and longer ones are hard to read.
         width = min(max(get_terminal_width(), 40), 120)
         text = render(report, format, colour=wants_colour(), width=width, everything=everything)
         (show if format in FOR_PEOPLE else print_for_programs)(text)

@@ -119,6 +119,7 @@ def gait(
             options.parse_quantities(start_speed, simulation.mechanism, "--set-speed"),
         )
         engine: Any = simulation.engine
+        # Check the names of the variables before the walk, not after it.
         find_basin_offsets(engine, basin_x, basin_y)
         result, step_map = simulate_walk(engine, state, foot, to, settle, accuracy)
         result.skipped = simulation.forces.skipped

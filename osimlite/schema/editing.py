@@ -51,6 +51,7 @@ def rename_component(model: Model, component: Component, name: str) -> None:
     component.name = name
     tree = model.tree()
     for use, target in texts:
+        # A reference that still leads to its component keeps its text.
         if target is None or find_named_component(tree, use) is target:
             continue
         assert isinstance(use.value, str)

@@ -170,6 +170,7 @@ class Model(ModelComponent):
                 members = type(holder).field_specs().get("objects")
                 if (
                     members is not None
+                    # The set for components of any class comes last, for those that no other set accepts.
                     and spec.name != "component_set"
                     and isinstance(component, members.accepts)  # type: ignore[arg-type]
                 ):

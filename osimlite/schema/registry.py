@@ -193,6 +193,7 @@ def get_plugin_classes() -> Mapping[str, type[Object]]:
 
 def register_plugin_classes(classes: Mapping[str, type[Object]]) -> None:
     """Register classes of plug-ins by tag, in place of those registered before."""
+    # Unchanged classes keep the caches.
     if classes != _further:
         _further.clear()
         _further.update(classes)

@@ -92,6 +92,7 @@ def get_field_specs(cls: type[Object]) -> dict[str, FieldSpec]:
         specs.append(
             FieldSpec(name, tag, kind, accepts, default, info.default_factory, declared, names)
         )
+    # OpenSim prints the properties of its first system after those of the second; the sort is stable.
     specs.sort(key=lambda spec: spec.legacy)
     return {spec.tag: spec for spec in specs}
 

@@ -38,6 +38,7 @@ def list_outputs(cls: type[Component]) -> dict[str, Output]:
 
 def list_states(component: Component) -> list[str]:
     """Return the names of the state variables of one component, in OpenSim's order."""
+    # A class without states of its own has those of its nearest base.
     known = (
         base.__dict__["facts"].states
         for base in type(component).__mro__

@@ -143,6 +143,7 @@ class Tree:
 
     def renew(self) -> Tree:
         """Return the tree of the model in its present state; paths are reused if only numbers have changed."""
+        # A changed number leaves paths and names as they are, so a copy of the index is enough.
         if not self._is_renewable:
             return Tree(self.model, self)
         tree = copy(self)
@@ -230,6 +231,7 @@ class Tree:
             text: the text.
             owner: component that has the property.
         """
+        # Only ASCII white space is removed: for OpenSim a no-break space is a letter.
         text, rule, target = text.strip(" \t\n\r\f\v"), reference.rule, reference.target
         if not text.startswith("/") or rule not in PATH_RULES or target == "Frame":
             return RULES[rule](self, text, owner, target)
@@ -325,6 +327,7 @@ class Tree:
             ):
                 continue
             text = self.format_reference(use.owner, reference, component)
+            # A bare name may lead to an earlier component of the same name.
             if self.lookup(reference, text, use.owner).target is component:
                 names.add(text)
         spellings = sorted(names)

@@ -252,6 +252,7 @@ class Analysis:
     def find_target(self, offset: int) -> Target | None:
         """Return what the name at an offset refers to, or the component whose start tag is there."""
         for use, start, end in self.uses:
+            # The cursor after the last character still belongs to the word.
             if start <= offset <= end:
                 return self.resolve_use(use)
         for number, item in self.objects.items():

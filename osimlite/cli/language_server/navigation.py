@@ -69,6 +69,7 @@ def list_folding_ranges(analysis: Analysis) -> list[types.FoldingRange]:
             if last > line:
                 result.append(types.FoldingRange(line, last, kind=types.FoldingRangeKind.Comment))
         # A closing tag without an opening one is ignored; elements that are never closed do not fold.
+        # A closing tag without an open element is ignored; elements inside that are not closed end here.
         elif piece.kind == "close" and any(tag == piece.tag for tag, _ in open_lines):
             tag, first = open_lines.pop()
             while tag != piece.tag:

@@ -139,6 +139,7 @@ class Server(LanguageServer):
             return
         self._check_durations[uri] = min(time.monotonic() - began, MAX_CHECK_DELAY_S)
         self._publish(uri, result)
+        # Completion and names use the last readable version while the text is half typed.
         if analysis.is_readable:
             self.project.last_readable[uri] = analysis
             if self.project.publish_unsaved(analysis):
@@ -207,6 +208,7 @@ def _register_file_events(server: Server) -> None:
     @server.feature(types.TEXT_DOCUMENT_DID_OPEN)
     async def open_document(_: Server, params: types.DidOpenTextDocumentParams) -> None:
         document = params.text_document
+        # UTF-16 is the default of the protocol if editor and server have not agreed on another encoding.
         server.project.unit = server.workspace.position_encoding or types.PositionEncodingKind.Utf16
         server.analyse(document.uri, Text(document.text, server.project.unit))
         server.check(document.uri)

@@ -44,6 +44,7 @@ class Text:
             return start + min(position.character, len(line))
         units = 0
         for index, character in enumerate(line):
+            # A position inside of a surrogate pair moves to the end of the character.
             if units >= position.character:
                 return start + index
             units += self._width(character)

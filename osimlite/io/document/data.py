@@ -116,6 +116,7 @@ def from_data(data: Mapping[str, Any]) -> Model:
         raise ModelError(
             f"a model is a mapping from properties to values, not {_describe_type(data)}"
         )
+    # Editors use the key "$schema" to find the JSON schema.
     data = {key: value for key, value in data.items() if key != "$schema"}
     try:
         model = _Reader().convert_object(data, Model, "model")

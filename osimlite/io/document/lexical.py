@@ -359,6 +359,7 @@ def _build_formatter(kind: FieldType, like_opensim: bool) -> Callable[[Any], str
     assert isinstance(kind, Value)
     if kind.scalar == "double":
         word: Callable[[Any], str] = format_17_digits if like_opensim else format_shortest
+        # OpenSim prints lists of the first property system with six digits.
         if like_opensim and kind.legacy and kind.shape == "list":
             word = format_6_digits
     elif kind.scalar == "bool":

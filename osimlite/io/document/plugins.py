@@ -192,6 +192,7 @@ class _Declarations:
                 raise self.make_error(
                     f"{join_words(self.pending)} derive from each other, or hold each other", name
                 )
+            # A class that refers to itself while it is being made is found by this list.
             self.pending.append(name)
             self.found[name] = self.make_class(name)
             self.pending.pop()

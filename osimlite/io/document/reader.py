@@ -366,6 +366,7 @@ def parse_source(source: Source, *, recover: bool = False) -> etree._Element:
     Raises:
         NotWellFormedError: the text is not well-formed (without `recover`), or declares entities.
     """
+    # lxml gets UTF-8 whatever the text declares, because the encoding was detected before.
     data = source.data if source.encoding in ("utf-8", "utf-8-sig") else source.text.encode()
     data = replace_colons(data)
     # OpenSim accepts blank lines before the XML declaration, with or without a byte-order mark

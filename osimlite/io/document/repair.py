@@ -105,6 +105,7 @@ def read_repaired(
     ):
         raise fault
     notes = []
+    # The elements around the repairs are found in one pass, which needs ascending offsets.
     repairs.sort(key=lambda repair: repair.offset)
     for repair, number in zip(
         repairs, find_elements_at(source, [repair.offset for repair in repairs]), strict=True
@@ -146,6 +147,7 @@ def repair_text(text: str) -> tuple[str, list[Repair]]:
     text = _BLANK_CONTROLS.sub(" ", text)
     for match in _NO_CHARACTER.finditer(text):
         repairs.append(Repair("overlooked", match.start(), match[0], "OpenSim keeps it"))
+    # XML cannot contain these characters; a replacement of the same length keeps all positions.
     text = _NO_CHARACTER.sub(_REPLACEMENT, text)
     unended = _OPEN_DECLARATION.match(text)
     if unended is not None:

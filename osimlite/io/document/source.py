@@ -254,6 +254,7 @@ class Source:
         inner = self.text[span.tag_end : span.inner_end]
         if word:
             places = [m.start() for m in re.finditer(rf"(?<!\S){re.escape(word)}(?!\S)", inner)]
+            # The word may be a part of a longer one, such as a number before a comma.
             places = places or [m.start() for m in re.finditer(re.escape(word), inner)]
             if places:
                 return self.position(span.tag_end + places[min(nth, len(places) - 1)], len(word))

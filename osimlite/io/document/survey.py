@@ -64,6 +64,7 @@ def survey_source(source: Source, *, of: type[Object] = Model) -> Survey:
         if fault.meant != ROOT:
             return result
         root = parse_source(source)
+        # The root is probably a misspelt <OpenSimDocument>: read on as if it were not.
         root.tag = ROOT
         return _add_document(result, root, of)
 

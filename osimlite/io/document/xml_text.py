@@ -142,6 +142,7 @@ def list_lines(element: etree._Element, depth: int, *, comments: bool = True) ->
     if not len(element):
         text = "" if element.text is None or element.text.isspace() else escape_text(element.text)
         return [f"{head}>{text}</{tag}>" if element.text is not None else f"{head} />"]
+    # Indentation would change the text of an element with mixed content.
     if any(text and not text.isspace() for text in texts):
         inner = escape_text(element.text or "")
         for child in element:

@@ -115,7 +115,7 @@ def _name_errors(name: str) -> Iterator[None]:
 class _File:
     def __init__(self, content: bytes, *, all_digits: bool = False) -> None:
         self.all_digits, self.left = all_digits, MAX_BYTES
-        # What is appended may be no XML at all, so it is cut out before the rest is read.
+        # Appended data may be raw bytes, which are not XML, so they are cut out before parsing.
         self.appended = b""
         mark = content.find(b"<AppendedData")
         if mark >= 0:
