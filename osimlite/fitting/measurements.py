@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from osimlite.base.records import dataclass
 from osimlite.base.text import join_words, suggest_name
 from osimlite.errors import DocumentError, OsimliteError, SettingError
+from osimlite.io.tables.storage import expect_increasing_times
 from osimlite.mechanics.multibody.spatial import Array
 
 
@@ -41,15 +42,7 @@ class Measurements:
                 f"times, {self.noun}s and {' × '.join(map(str, self.shape))} numbers; got "
                 f"{' × '.join(map(str, self.values.shape))}"
             )
-        steps = np.diff(self.times)
-        # NaN in the times gives NaN steps, which fail the comparison.
-        if not (steps > 0.0).all() or not np.isfinite(self.times).all():
-            frame = int(np.argmin(steps > 0.0)) + 2 if len(steps) else 1
-            raise DocumentError(
-                f"the times of the frames must increase, but frame {frame} is not later than the "
-                "one before",
-                file=self.file,
-            )
+        expect_increasing_times(self.times, self.file)
 
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, ArrayLike], times: ArrayLike | None) -> Self:

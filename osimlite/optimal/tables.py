@@ -13,7 +13,7 @@ import numpy as np
 from osimlite.base.records import replace
 from osimlite.errors import DocumentError
 from osimlite.fitting.marker_data import MarkerData
-from osimlite.io.tables.storage import StoTable, read_sto
+from osimlite.io.tables.storage import StoTable, expect_increasing_times, read_sto
 from osimlite.mechanics.multibody.constraints import Coupler
 from osimlite.mechanics.multibody.functions import Function
 from osimlite.mechanics.multibody.mechanism import Mechanism
@@ -219,8 +219,7 @@ def check_columns(table: StoTable, columns: Sequence[str]) -> None:
     if len(table.times) < MIN_SPLINE_TIMES:
         message = f"the table has {len(table.times)} times; splines of fifth degree need at least {MIN_SPLINE_TIMES}"
         raise DocumentError(message, file=table.file)
-    if not (np.diff(table.times) > 0.0).all():
-        raise DocumentError("the times do not increase", file=table.file)
+    expect_increasing_times(table.times, table.file)
     for name in columns:
         if name not in table.columns:
             raise DocumentError(f"the table has no column '{name}'", file=table.file)

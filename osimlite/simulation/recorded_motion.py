@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from osimlite.base.records import dataclass, replace
 from osimlite.base.text import format_count, join_words, suggest_name
 from osimlite.errors import DocumentError, ModelError, SettingError
-from osimlite.io.tables.storage import StoTable, expect_numbers, read_sto
+from osimlite.io.tables.storage import StoTable, expect_increasing_times, expect_numbers, read_sto
 from osimlite.mechanics.multibody.dynamics import MassCentres
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.smoothing_spline import derivatives_of_samples
@@ -214,12 +214,7 @@ class RecordedMotion(Movement):
                 rows=np.delete(table.rows, again, axis=0),
             )
             values = np.delete(values, again, axis=0)
-        late = np.flatnonzero(np.diff(table.times) <= 0.0)
-        if len(late):
-            raise DocumentError(
-                f"the time {table.times[late[0] + 1]:g} does not come after {table.times[late[0]]:g}; sort the rows",
-                file=table.file,
-            )
+        expect_increasing_times(table.times, table.file)
         gaps = np.argwhere(~(np.abs(values) < MAX_COORDINATE))
         if len(gaps):
             row, place = gaps[0]

@@ -164,7 +164,7 @@ def test_weights_count() -> None:
         ),
         (lambda t: t.replace("one\t", "two\t"), "two markers have the name two"),
         (lambda t: "".join(t.splitlines(keepends=True)[:6]), "markers but no frames"),
-        (lambda t: t.replace("\n2\t0.5", "\n2\t-0.5"), "frame 2 is not later than"),
+        (lambda t: t.replace("\n2\t0.5", "\n2\t-0.5"), "the time -0.5 does not come after"),
         (
             lambda t: t.replace("\n2\t0.5\t", "\n2\t0.5\tgap"),
             r":8: 'gap.*' in column 3 is not a number",

@@ -110,6 +110,9 @@ def test_data_that_cannot_be_used(model, tmp_path):
     data(tmp_path, np.ones((2, 9)), (0.5, 0.5))
     with pytest.raises(DocumentError, match=r"the time 0\.5 does not come after 0\.5"):
         read_external_loads(mechanism, path)
+    data(tmp_path, np.ones((2, 9)), (0.5, np.inf))
+    with pytest.raises(DocumentError, match="the time of row 2 is inf s; correct it"):
+        read_external_loads(mechanism, path)
     data(tmp_path, np.ones((0, 9)), ())
     with pytest.raises(DocumentError, match="no rows"):
         read_external_loads(mechanism, path)

@@ -14,11 +14,14 @@ from osimlite.base.files import open_atomically
 from osimlite.base.lazy import make_plot
 from osimlite.base.records import dataclass, field
 from osimlite.base.text import format_count
-from osimlite.errors import OsimliteError, SettingError, SimulationError
+from osimlite.errors import DocumentError, OsimliteError, SettingError, SimulationError
 from osimlite.io.tables.headers import list_suffixes
 from osimlite.io.tables.table_stream import TableStream
 from osimlite.io.tables.tabular import Tabular
 from osimlite.mechanics.multibody.spatial import Array
+
+MAX_TIME_S = 1e25
+"""Time beyond which no motion lasts: the fifth power of a step, which splines need, is still finite."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,6 +195,30 @@ def expect_plain_labels(name: str, columns: Sequence[str]) -> None:
             raise OsimliteError(
                 f"a table cannot have the name {label!r}, which holds a tab or a line end; rename it in the model"
             )
+
+
+def expect_increasing_times(times: Array, file: str | None) -> None:
+    """Refuse times of an input through which no function can be fitted.
+
+    Args:
+        times: times (n,), s.
+        file: path of the table, for messages.
+
+    Raises:
+        DocumentError: a time is not finite, is beyond `MAX_TIME_S`, or does not come after the one
+            before.
+    """
+    odd = np.flatnonzero(~(np.abs(times) < MAX_TIME_S))
+    if len(odd):
+        raise DocumentError(
+            f"the time of row {odd[0] + 1} is {times[odd[0]]:g} s; correct it", file=file
+        )
+    late = np.flatnonzero(np.diff(times) <= 0.0)
+    if len(late):
+        before, after = times[late[0] : late[0] + 2]
+        raise DocumentError(
+            f"the time {after:g} does not come after {before:g}; sort the rows", file=file
+        )
 
 
 def expect_numbers(name: str, columns: Sequence[str], times: Array, rows: Array) -> None:

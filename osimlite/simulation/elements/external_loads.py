@@ -17,7 +17,12 @@ from osimlite.base.text import find_nearest, join_words
 from osimlite.errors import DocumentError, ModelError, SettingError
 from osimlite.io.document.cache import cache_by_file, read_object
 from osimlite.io.tables.c3d import ENDING, read_c3d_forces
-from osimlite.io.tables.storage import StoTable, find_named_file, read_sto
+from osimlite.io.tables.storage import (
+    StoTable,
+    expect_increasing_times,
+    find_named_file,
+    read_sto,
+)
 from osimlite.mechanics.multibody.functions import Constant, Function, PiecewiseLinear
 from osimlite.mechanics.multibody.mechanism import FramePlacement, Mechanism
 from osimlite.mechanics.multibody.smoothing_spline import natural_splines
@@ -226,12 +231,7 @@ class _Columns:
 
     def __init__(self, table: StoTable, forces: Sequence[ExternalForce]) -> None:
         self.table, self._forces = table, forces
-        late = np.flatnonzero(np.diff(table.times) <= 0.0)
-        if len(late):
-            before, after = table.times[late[0] : late[0] + 2]
-            raise DocumentError(
-                f"the time {after:g} does not come after {before:g}; sort the rows", file=table.file
-            )
+        expect_increasing_times(table.times, table.file)
         if not len(table.times):
             raise DocumentError("the table has no rows", file=table.file)
 

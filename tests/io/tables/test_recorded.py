@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -133,6 +134,10 @@ def test_what_is_no_motion_is_refused(arm, tmp_path: Path):
     write_sto(path, "motion", [0.0, 0.2, 0.1], ("elbow_0",), [[1.0], [2.0], [3.0]])
     with pytest.raises(DocumentError, match=r"the time 0\.1 does not come after 0\.2"):
         RecordedMotion.read(arm, path)
+    for times, row in (((0.0, math.inf), 2), ((-1e308, 0.1), 1), ((math.nan, 0.1), 1)):
+        write_sto(path, "motion", times, ("elbow_0",), [[1.0], [2.0]])
+        with pytest.raises(DocumentError, match=rf"the time of row {row} is .* s; correct it"):
+            RecordedMotion.read(arm, path)
     write_sto(
         path,
         "motion",
