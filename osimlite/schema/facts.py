@@ -22,6 +22,8 @@ BELOW_QUARTER_TURN: Final = "0 to 1.5707963267948866"
 """Range of pennation angles in radians; OpenSim's check requires slightly less than pi / 2."""
 UP_TO_QUARTER_TURN: Final = "0 to 1.5707963267948966"
 """Range of angles from 0 to pi / 2 in radians."""
+LEAST_TIME_CONSTANT: Final = "> 2.0097183471152322e-14"
+"""In seconds: OpenSim refuses time constants up to SimTK::SignificantReal."""
 
 OWN, HOLDER, PATH = "own", "holder", "path"
 MEAN, ALONG, ACROSS, AXES = "mean", "along", "across", "axes"

@@ -21,6 +21,7 @@ from osimlite.schema.default_curves import (
 from osimlite.schema.facts import (
     BELOW_QUARTER_TURN,
     IDLE,
+    LEAST_TIME_CONSTANT,
     NAN,
     NO_EQUILIBRIUM,
     PATH,
@@ -199,6 +200,8 @@ class Thelen2003Muscle(ActivationFiberLengthMuscle):
             "pennation_angle_at_optimal": BELOW_QUARTER_TURN,
             "maximum_pennation_angle": UP_TO_QUARTER_TURN,
             "minimum_activation": "0.01 to 1",
+            "activation_time_constant": LEAST_TIME_CONSTANT,
+            "deactivation_time_constant": LEAST_TIME_CONSTANT,
         },
         refused="optimal_fiber_length pennation_angle_at_optimal FmaxTendonStrain FmaxMuscleStrain KshapeActive "
         "KshapePassive Af Flen fv_linear_extrap_threshold maximum_pennation_angle activation_time_constant "
@@ -258,6 +261,8 @@ class Millard2012EquilibriumMuscle(Muscle):
         domains={
             "pennation_angle_at_optimal": BELOW_QUARTER_TURN,
             "maximum_pennation_angle": UP_TO_QUARTER_TURN,
+            "activation_time_constant": LEAST_TIME_CONSTANT,
+            "deactivation_time_constant": LEAST_TIME_CONSTANT,
         },
         refused="optimal_fiber_length pennation_angle_at_optimal activation_time_constant "
         "deactivation_time_constant minimum_activation maximum_pennation_angle",

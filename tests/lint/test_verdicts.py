@@ -58,6 +58,15 @@ def test_a_rule_that_reads_the_model_needs_no_numeric_library(tmp_path: Path):
         assert not any(code.startswith(("OSIM42", "OSIM53")) for code in found), case.name
 
 
+def test_a_force_that_is_not_finite_is_reported_beside_ignored_elements():
+    """An element that OpenSim ignores, in the same force, does not explain NaN."""
+    force = (
+        '<ExpressionBasedCoordinateForce name="f"><coordinate>q</coordinate>'
+        "<expression>log(q-0.3)</expression><Colour>red</Colour></ExpressionBasedCoordinateForce>"
+    )
+    assert {"OSIM101", "OSIM532"} <= set(check(small_model(forces=force)).codes)
+
+
 def test_the_message_says_which_constraint_and_how_far():
     case = next(case for case in CASES if case.name == "a distance on one body")
     (finding,) = check(case.text).errors

@@ -401,8 +401,8 @@ def cables() -> list[Case]:
         is_plane, is_ring = kind == "ContactHalfSpace", kind == "ContactTorus"
         inside = "0.4 -0.02 0" if is_plane else "0.1 0.01 0" if is_ring else "0.05 0.02 0"
         middle = "0 0 0.2" if is_ring else "0 0 0"
+        cases.append(Case(f"a path over a {kind}", cable(kind, "0.4 0.02 0"), "", RUNS))
         if not is_plane:
-            cases.append(Case(f"a path over a {kind}", cable(kind, "0.4 0.02 0"), "", RUNS))
             cases.append(
                 Case(
                     f"a hint in the middle of a {kind}",
@@ -720,6 +720,120 @@ def others() -> list[Case]:
     ]
 
 
+def magnitudes() -> list[Case]:
+    """Return numbers that are too large or too small for what OpenSim computes with them."""
+
+    def muscle(kind: str, **more: object) -> str:
+        sizes = {"max_isometric_force": 100, "optimal_fiber_length": 0.1}
+        inside = "".join(
+            f"<{key}>{value}</{key}>"
+            for key, value in {**sizes, "tendon_slack_length": 0.15, **more}.items()
+        )
+        path = path_of((GROUND, "0.05 0.5 0"), (A, "0.05 0 0"))
+        return small_model(forces=f'<{kind} name="f">{path}{inside}</{kind}>')
+
+    def stop(**more: object) -> str:
+        sizes = {"upper_limit": 120, "lower_limit": -30, "transition": 10}
+        return small_model(forces=_tag("CoordinateLimitForce", coordinate="q", **{**sizes, **more}))
+
+    thelen, millard, degroote = (
+        "Thelen2003Muscle",
+        "Millard2012EquilibriumMuscle",
+        "DeGrooteFregly2016Muscle",
+    )
+    table = [
+        ("a transition that is lost beside a limit", stop(transition=1e-20), "OSIM206", FAILS),
+        ("a limit beside which the transition is lost", stop(upper_limit=1e20), "OSIM206", FAILS),
+        ("a lower limit beside which it is lost", stop(lower_limit=-1e20), "OSIM206", FAILS),
+        ("a transition that is just seen", stop(transition=1e-12), "", RUNS),
+        ("a large limit", stop(upper_limit=1e16), "", RUNS),
+        ("stiffness beyond all bounds", stop(upper_stiffness="1e308"), "OSIM207", FAILS),
+        (
+            "gravity whose square is infinite",
+            small_model(extra="<gravity>0 -1e200 0</gravity>"),
+            "OSIM207",
+            FAILS,
+        ),
+        ("little gravity", small_model(extra="<gravity>0 -1e-200 0</gravity>"), "", RUNS),
+        (
+            "a tendon too short to count",
+            muscle(millard, tendon_slack_length=1e-200),
+            "OSIM207",
+            FAILS,
+        ),
+        (
+            "fibers too short to count",
+            muscle(millard, optimal_fiber_length="1e-320"),
+            "OSIM207",
+            FAILS,
+        ),
+        ("a tendon without end", muscle(degroote, tendon_slack_length="1e308"), "OSIM207", FAILS),
+        ("fibers that are too stiff", muscle(degroote, fiber_damping="1e308"), "OSIM207", FAILS),
+    ]
+    for kind in (thelen, millard):
+        for what in ("activation_time_constant", "deactivation_time_constant"):
+            table += [
+                (
+                    f"{kind}: {what} below OpenSim's least",
+                    muscle(kind, **{what: 2e-14}),
+                    "OSIM206",
+                    FAILS,
+                ),
+                (f"{kind}: {what} above it", muscle(kind, **{what: 2.1e-14}), "", RUNS),
+            ]
+    return [Case(*row) for row in table]
+
+
+def not_a_number_unused() -> list[Case]:
+    """Return NaN in what is on, and in what is off."""
+    forces = {
+        "SpringGeneralizedForce": {"coordinate": "q", "stiffness": "NaN"},
+        "PointToPointSpring": {
+            "socket_body1": GROUND,
+            "socket_body2": A,
+            "point1": "1 0 0",
+            "stiffness": "NaN",
+            "rest_length": 0.1,
+        },
+        "BushingForce": {
+            "socket_frame1": GROUND,
+            "socket_frame2": A,
+            "rotational_stiffness": "NaN 1 1",
+        },
+        "CoordinateActuator": {"coordinate": "q", "optimal_force": "NaN"},
+    }
+    cases = []
+    for kind, properties in forces.items():
+        for applied, verdict in (("true", FAILS), ("false", RUNS)):
+            text = small_model(forces=_tag(kind, appliesForce=applied, **properties))
+            cases.append(Case(f"NaN in {kind}, applied {applied}", text, "OSIM205", verdict))
+    path = path_of((GROUND, "0.05 0.5 0"), (A, "0.05 0 0"))
+    springy = (
+        "<resting_length>NaN</resting_length><stiffness>1</stiffness><dissipation>0</dissipation>"
+    )
+    spring = f'<PathSpring name="f"><appliesForce>false</appliesForce>{path}{springy}</PathSpring>'
+    cases.append(
+        Case("NaN that OpenSim refuses even so", small_model(forces=spring), "OSIM205", FAILS)
+    )
+    actuator = '<CoordinateActuator name="act"><coordinate>q</coordinate></CoordinateActuator>'
+    for function, refused in (
+        ('<Constant name="g"><value>NaN</value></Constant>', False),
+        ('<Sine name="g"><amplitude>Inf</amplitude></Sine>', False),
+        ('<LinearFunction name="g"><coefficients>NaN 0</coefficients></LinearFunction>', True),
+    ):
+        for enabled in ("true", "false"):
+            controller = (
+                f'<PrescribedController name="c"><enabled>{enabled}</enabled>'
+                "<socket_actuators>/forceset/act</socket_actuators>"
+                f'<FunctionSet name="ControlFunctions"><objects>{function}</objects></FunctionSet>'
+                "</PrescribedController>"
+            )
+            verdict = FAILS if refused or enabled == "true" else RUNS
+            text = small_model(forces=actuator, controllers=controller)
+            cases.append(Case(f"{function}, enabled {enabled}", text, "OSIM205", verdict))
+    return cases
+
+
 CASES = [
     *expressions(),
     *constraints(),
@@ -731,5 +845,7 @@ CASES = [
     *frames(),
     *poses(),
     *others(),
+    *magnitudes(),
+    *not_a_number_unused(),
 ]
 """All of them."""

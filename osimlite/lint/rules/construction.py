@@ -9,6 +9,7 @@ from osimlite.base.text import format_count
 from osimlite.lint.construction import CONSTRUCTION, Obstacle, Stage, obstacles_of
 from osimlite.lint.diagnostic import Severity
 from osimlite.lint.registry import ERROR, INFO, WARNING, FindingCollector, rule
+from osimlite.lint.rules.functions import is_unused
 from osimlite.lint.subject import Subject
 from osimlite.schema.base import Unknown
 from osimlite.schema.registry import get_plugin_classes
@@ -149,8 +150,10 @@ def report_impossible_force(subject: Subject, report: FindingCollector) -> None:
     """
     doubtful = {item.component for item in report.findings if item.code == "OSIM207"}
     for obstacle in _select_unreported(subject, report, Stage.FORCE):
-        if obstacle.path in doubtful:
-            # OpenSim computes with numbers that make no sense; osimlite does not.
+        item = subject.tree.by_path.get(obstacle.path)
+        if obstacle.path in doubtful or (item is not None and is_unused(subject, item)):
+            # OpenSim computes with numbers that make no sense, and never asks a force that is
+            # disabled; osimlite makes it for its states.
             message = f"osimlite cannot compute this, OpenSim can: {obstacle.message}"
             _report(subject, report, obstacle, message, severity=WARNING)
         else:
@@ -271,6 +274,9 @@ def _select_unreported(
 ) -> Iterator[Obstacle]:
     """Yield the obstacles of a stage whose cause no other rule has reported."""
     errors = [item for item in report.findings if item.severity == ERROR]
+    if stage == Stage.ACCELERATION:
+        # An element that OpenSim ignores does not make what it computes NaN.
+        errors = [item for item in errors if not item.code.startswith("OSIM10")]
     places = {item.component for item in errors if item.component}
     # A file that is missing stops what needs it.
     causes = [*errors, *(item for item in report.findings if item.code.startswith("OSIM7"))]

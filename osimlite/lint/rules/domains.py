@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 from osimlite.base.text import find_nearest, join_words
 from osimlite.lint.registry import ERROR, WARNING, FindingCollector, rule
+from osimlite.lint.rules.functions import UNUSED, is_unused
 from osimlite.lint.subject import Subject, cache_per_subject
 from osimlite.lint.words import format_quantity, format_value
 from osimlite.schema.base import Object
@@ -58,8 +59,8 @@ def report_not_finite(subject: Subject, report: FindingCollector) -> None:
 
     OpenSim accepts it in a single number or a vector without a message, and everything computed
     from it becomes NaN: the simulation runs to its end without a result. It rejects a file with
-    such a number in a list, such as the points of a function. In properties for drawing and in
-    bounds it is a warning: the motion is not affected.
+    such a number in a list, such as the points of a function. In properties for drawing, in bounds,
+    and in forces and controllers that are disabled, it is a warning: the motion is not affected.
 
     ```xml
     - <gravity>0 NaN 0</gravity>
@@ -77,19 +78,19 @@ def report_not_finite(subject: Subject, report: FindingCollector) -> None:
             if math.isnan(number) or (math.isinf(number) and not _may_be_infinite(item, spec))
         ]
         if bad:
-            consequence = _describe_nan_consequence(item, spec, bad[0])
+            consequence = _describe_nan_consequence(subject, item, spec, bad[0])
             report(
                 f"{subject.describe_property(item, spec)} is {format_value(value)}: {consequence}",
                 item,
                 tag=spec.tag,
                 word=_find_word(subject, item, spec, bad[0]),
-                severity=WARNING
-                if consequence in (_DRAWN_CONSEQUENCE, _BOUND_CONSEQUENCE)
-                else None,
+                severity=WARNING if consequence in _MILD_CONSEQUENCES else None,
             )
 
 
-def _describe_nan_consequence(item: Object, spec: FieldSpec, number: float) -> str:
+def _describe_nan_consequence(
+    subject: Subject, item: Object, spec: FieldSpec, number: float
+) -> str:
     """Return what OpenSim 4.6 does with NaN or infinity in a property (measured)."""
     assert isinstance(spec.kind, Value)
     if spec.kind.legacy and spec.kind.shape == "list":
@@ -98,7 +99,11 @@ def _describe_nan_consequence(item: Object, spec: FieldSpec, number: float) -> s
         return "OpenSim rejects the model"
     if not _DRAWN.isdisjoint(get_class_names(type(item))):
         return _DRAWN_CONSEQUENCE
-    return _BOUND_CONSEQUENCE if _may_be_infinite(item, spec) else _NAN_CONSEQUENCE
+    if _may_be_infinite(item, spec):
+        return _BOUND_CONSEQUENCE
+    if number != number and spec.name in _NAN_REFUSED.get(type(item).__name__, "").split():
+        return "OpenSim rejects the model"
+    return UNUSED if is_unused(subject, item) else _NAN_CONSEQUENCE
 
 
 @rule("OSIM206", "impossible-value", severity=ERROR)
@@ -106,7 +111,8 @@ def report_impossible_value(subject: Subject, report: FindingCollector) -> None:
     """A number makes OpenSim fail or compute NaN.
 
     Reports values outside their domain that OpenSim is known to reject or to compute wrong results
-    with: contact stiffness 0, a negative mass, a limit without transition.
+    with: contact stiffness 0, a negative mass, a limit without transition, or with one that is lost
+    in the rounding of the limit.
 
     OpenSim gives no message for most of them. A contact stiffness of 0 gives 0/0 as soon as the
     surfaces touch.
@@ -122,6 +128,28 @@ def report_impossible_value(subject: Subject, report: FindingCollector) -> None:
     for item, spec, value, verdict in find_outside_domain(subject):
         if verdict.known:
             _report_domain(subject, report, item, spec, value, verdict)
+    for item in subject.find_by_class("CoordinateLimitForce"):
+        _report_lost_transition(subject, report, item)
+
+
+def _report_lost_transition(subject: Subject, report: FindingCollector, force: Any) -> None:
+    """Report a transition that a limit is too large to add to: OpenSim needs two different ends."""
+    if not (math.isfinite(force.transition) and force.transition > 0.0):
+        return
+    for name, sign in (("upper_limit", 1.0), ("lower_limit", -1.0)):
+        limit = getattr(force, name)
+        # OpenSim converts limits of angles to radians, which may change how the sum is rounded.
+        is_lost = all(
+            scale * limit + sign * scale * force.transition == scale * limit
+            for scale in (1.0, math.pi / 180.0)
+        )
+        if math.isfinite(limit) and is_lost:
+            report(
+                f"transition of {subject.describe_part(force)} is {force.transition:g}, which is "
+                f"lost beside its {name} of {limit:g}: OpenSim rejects the model",
+                force,
+                tag="transition",
+            )
 
 
 @rule("OSIM207", "doubtful-value", severity=WARNING)
@@ -129,10 +157,12 @@ def report_doubtful_value(subject: Subject, report: FindingCollector) -> None:
     """A number is outside the sensible range of its property.
 
     Reports numbers outside the domain that the property declares: a negative radius or dissipation,
-    an opacity of 3; and numbers of 1e20 and more.
+    an opacity of 3; numbers of 1e20 and more; and positive sizes of 1e-20 and less. From 1e100, and
+    up to 1e-100, it is an error.
 
     OpenSim computes with it anyway: a negative dissipation adds energy in each impact, and a sphere
-    with a negative radius touches nothing.
+    with a negative radius touches nothing. Powers of numbers beyond 1e100 are infinite: OpenSim
+    computes NaN, or fails.
 
     ```xml
     - <ContactSphere name="heel"> <socket_frame>/bodyset/shank</socket_frame> <radius>-0.05</radius> </ContactSphere>
@@ -145,13 +175,33 @@ def report_doubtful_value(subject: Subject, report: FindingCollector) -> None:
     for item, spec, value in _find_large_numbers(subject):
         huge = [number for number in _to_numbers(value) if HUGE <= abs(number) < math.inf]
         if huge and not _may_be_infinite(item, spec):
-            report(
-                f"{subject.describe_property(item, spec)} is {format_value(value)}: no physical "
-                "quantity of a motion is this large",
-                item,
-                tag=spec.tag,
-                word=_find_word(subject, item, spec, huge[0]),
-            )
+            is_overflow = max(map(abs, huge)) >= OVERFLOWS
+            _report_size(subject, report, item, spec, huge[0], "large", is_error=is_overflow)
+    for item, spec, value in _find_small_sizes(subject):
+        _report_size(subject, report, item, spec, value, "small", is_error=value <= 1.0 / OVERFLOWS)
+
+
+def _report_size(
+    subject: Subject,
+    report: FindingCollector,
+    item: Object,
+    spec: FieldSpec,
+    number: float,
+    what: str,
+    *,
+    is_error: bool,
+) -> None:
+    """Report a number that is too large or too small."""
+    value = item.__dict__[spec.name]
+    more = f"; its powers are {'infinite' if what == 'large' else 'zero'}" if is_error else ""
+    report(
+        f"{subject.describe_property(item, spec)} is {format_value(value)}: no physical "
+        f"quantity of a motion is this {what}{more}",
+        item,
+        tag=spec.tag,
+        word=_find_word(subject, item, spec, number),
+        severity=ERROR if is_error and not is_unused(subject, item) else None,
+    )
 
 
 @rule("OSIM208", "unknown-choice", severity=ERROR)
@@ -197,6 +247,13 @@ HUGE = 1e20
 """No quantity of a motion, in whatever unit, is as large."""
 
 
+OVERFLOWS = 1e100
+"""Formulas of muscles and contacts have third and fourth powers, which overflow beyond this number."""
+
+TINY = 1e-20
+"""No size of a part of a body, in whatever unit, is as small."""
+
+
 class DomainVerdict(NamedTuple):
     """A number outside its domain: the number, the domain, what OpenSim makes of it, and whether that is known."""
 
@@ -209,6 +266,18 @@ class DomainVerdict(NamedTuple):
 _NAN_CONSEQUENCE = "everything computed from it becomes NaN, without a message"
 _DRAWN_CONSEQUENCE = "it cannot be drawn"
 _BOUND_CONSEQUENCE = "whatever uses it as a bound fails"
+_NAN_REFUSED = {
+    "PathSpring": "resting_length stiffness dissipation",
+    "ClutchedPathSpring": "stiffness dissipation relaxation_time_constant initial_stretch",
+    "Thelen2003Muscle": "FmaxTendonStrain FmaxMuscleStrain KshapeActive KshapePassive Af Flen "
+    "fv_linear_extrap_threshold",
+    "DeGrooteFregly2016Muscle": "activation_time_constant deactivation_time_constant fiber_damping "
+    "default_activation default_normalized_tendon_force active_force_width_scale "
+    "passive_fiber_strain_at_one_norm_force tendon_strain_at_one_norm_force "
+    "activation_dynamics_smoothing",
+}
+"""By class, the properties in which OpenSim 4.6 refuses NaN, even in a disabled force (measured)."""
+_MILD_CONSEQUENCES = (_DRAWN_CONSEQUENCE, _BOUND_CONSEQUENCE, UNUSED)
 _DRAWN = {
     "Geometry",
     "Appearance",
@@ -328,6 +397,19 @@ def _list_domains(cls: type[Object]) -> tuple[tuple[FieldSpec, Callable[[float],
         if domain and spec.kind.scalar in ("double", "int"):
             result.append((spec, make_domain_test(domain)))
     return tuple(result)
+
+
+def _find_small_sizes(subject: Subject) -> Iterator[tuple[Object, FieldSpec, float]]:
+    """Yield every number that has to be positive and is smaller than any size."""
+    for cls, items in subject.by_class.items():
+        for spec, inside in _list_domains(cls):
+            # A domain that excludes 0 and includes this number is one of sizes.
+            if inside(0.0) or not inside(TINY):
+                continue
+            for item in items:
+                value = item.__dict__[spec.name]
+                if value.__class__ is float and 0.0 < value <= TINY:
+                    yield item, spec, value
 
 
 def _find_large_numbers(subject: Subject) -> Iterator[tuple[Object, FieldSpec, Any]]:

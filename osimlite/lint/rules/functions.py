@@ -70,7 +70,7 @@ def report_unsorted_abscissae(subject: Subject, report: FindingCollector) -> Non
                 consequence = (
                     UNUSED
                     if is_off
-                    else "OpenSim rejects it"
+                    else _describe_refusal(subject, function)
                     if rejected
                     else "the function is constant there"
                     if level
@@ -403,14 +403,14 @@ def _find_linear_functions(subject: Subject) -> Iterator[tuple[Object, int, Line
 UNUSED: Final = "its owner is disabled, so OpenSim does not compute it"
 
 
-def is_unused(subject: Subject, function: Object) -> bool:
-    """Return whether OpenSim never computes a function, since what it belongs to is off.
+def is_unused(subject: Subject, part: Object) -> bool:
+    """Return whether OpenSim never computes a function or a force, since what it belongs to is off.
 
     That is a force that is not applied or a controller that is not enabled. Functions of
     coordinates and constraints are made with the system, even where they are off, and the
     integrator asks each enabled controller, even if no actuator does.
     """
-    user = _find_user(subject, function)
+    user = None if subject.model is None else _find_user(subject, part)
     if isinstance(user, Force):
         return not user.appliesForce
     return isinstance(user, Controller) and not user.enabled

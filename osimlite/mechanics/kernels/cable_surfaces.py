@@ -37,6 +37,8 @@ ELLIPSOID = 2.0
 """Kind of surface: an ellipsoid."""
 TORUS = 3.0
 """Kind of surface: a torus about z."""
+PLANE = 4.0
+"""Kind of surface: the boundary x = 0 of a half-space that is solid where x is positive."""
 KIND = 0
 """Index in the numbers of a surface of its kind."""
 RADIUS = 1
@@ -135,6 +137,8 @@ def surface_value(p: Floats, a: Vector) -> float:
     if p[KIND] == TORUS:
         across = p[RADIUS] - sqrt(x * x + y * y)
         result = 1.0 - (across * across + z * z) / (p[TUBE] * p[TUBE])
+    if p[KIND] == PLANE:
+        result = x
     return float(result)
 
 
@@ -150,6 +154,8 @@ def surface_gradient(p: Floats, a: Vector) -> Vector:
         scale, distance = -2.0 / (p[TUBE] * p[TUBE]), sqrt(x * x + y * y)
         inwards = 1.0 - p[RADIUS] / distance
         return scale * inwards * x, scale * inwards * y, scale * z
+    if p[KIND] == PLANE:
+        return 1.0, 0.0, 0.0
     return times(-2.0, multiply_elementwise(vector(p, WEIGHTS), a))
 
 

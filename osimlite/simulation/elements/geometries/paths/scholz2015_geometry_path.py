@@ -33,6 +33,7 @@ from osimlite.mechanics.kernels.cable_surfaces import (
     CYLINDER,
     ELLIPSOID,
     END,
+    PLANE,
     POINT,
     SPHERE,
     START,
@@ -266,16 +267,14 @@ def _is_enclosed(builder: ElementBuilder, point_item: Any, geometry: ContactGeom
         builder.resolve_target(geometry, "socket_frame", geometry.socket_frame)
     )
     surface = _list_surface_numbers(geometry)
-    if surface is None and not isinstance(geometry, ContactHalfSpace):
+    if surface is None:
         return False
     for q in poses:
         state = mechanism.at(q)
         frame = state.transform(body) @ make_offset(geometry.location, geometry.orientation)
         placed = state.transform(point.body) @ np.array([*point.runs, 1.0])
         x, y, z = (frame[:3, :3].T @ (placed[:3] - frame[:3, 3])).tolist()
-        # A half-space is solid where x is positive.
-        depth = x if surface is None else surface_value(np.array(surface), (x, y, z))
-        if depth > 0.0:
+        if surface_value(np.array(surface), (x, y, z)) > 0.0:
             return True
     return False
 
@@ -341,6 +340,9 @@ def _list_surface_numbers(geometry: ContactGeometry) -> tuple[float, ...] | None
         )
     if isinstance(geometry, ContactTorus):
         return TORUS, geometry.torus_radius, geometry.tube_radius, 0.0, 0.0, 0.0
+    if isinstance(geometry, ContactHalfSpace):
+        # The numbers of its size are not used; its weights of 0 leave it without curvature.
+        return PLANE, 1.0, 1.0, 0.0, 0.0, 0.0
     return None
 
 
@@ -350,6 +352,8 @@ def _is_middle(surface: tuple[float, ...], hint: Array) -> bool:
     if kind == TORUS:
         across = float(np.hypot(hint[0], hint[1]))
         return across == 0.0 or (across == radius and hint[2] == 0.0)
+    if kind == PLANE:
+        return False
     return not (np.array(weights) * hint).any()
 
 
@@ -360,6 +364,8 @@ def _find_nearest_point(surface: tuple[float, ...], hint: Array) -> Array:
         ring = hint * (1.0, 1.0, 0.0)
         ring *= radius / np.linalg.norm(ring)
         return ring + square * (hint - ring) / np.linalg.norm(hint - ring)
+    if kind == PLANE:
+        return hint * (0.0, 1.0, 1.0)
     k = np.array(weights)
     # The nearest point x satisfies x (1 + t k) = hint.
     t, nearest = 0.0, hint
