@@ -8,6 +8,7 @@ import textwrap
 from functools import cache
 from importlib import import_module
 
+from osimlite.base.syntax_trees import parse_module
 from osimlite.schema.base import Object
 from osimlite.schema.fields import ObjectField, Reference, Value
 from osimlite.schema.specs import FieldSpec, get_field_specs
@@ -89,7 +90,7 @@ def _read_descriptions(module: str) -> dict[tuple[str, str], str]:
         source = inspect.getsource(import_module(module))
     except OSError:
         return result
-    for node in ast.parse(source).body:
+    for node in parse_module(source).body:
         if not isinstance(node, ast.ClassDef):
             continue
         for field, text in zip(node.body, node.body[1:], strict=False):

@@ -15,8 +15,8 @@ from functools import cached_property
 from types import ModuleType
 from typing import Any, TypeVar
 
+from osimlite.base.syntax_trees import parse_module
 from osimlite.errors import UnsupportedError
-from osimlite.mechanics.codegen.sources import parse_python
 from osimlite.mechanics.kernels.layout import Record
 
 Function = Callable[..., Any]
@@ -116,7 +116,7 @@ def find_tree(function: Function) -> ast.FunctionDef:
     lines = linecache.getlines(file, function.__globals__)
     # linecache returns the same list until the file changes.
     if file not in _parsed or _parsed[file][0] is not lines:
-        trees = list_functions(parse_python("".join(lines)))
+        trees = list_functions(parse_module("".join(lines)))
         starts = [
             min([tree.lineno, *(part.lineno for part in tree.decorator_list)]) for tree in trees
         ]

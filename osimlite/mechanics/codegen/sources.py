@@ -11,7 +11,6 @@ from __future__ import annotations
 import ast
 import hashlib
 import inspect
-import threading
 from collections.abc import Iterator
 from functools import cache
 from operator import itemgetter
@@ -19,20 +18,8 @@ from textwrap import dedent
 from types import FunctionType
 from typing import Any
 
+from osimlite.base.syntax_trees import parse_module
 from osimlite.mechanics.kernels.layout import Record
-
-_parser_lock = threading.Lock()
-
-
-def parse_python(text: str) -> ast.Module:
-    """Return the syntax tree of Python text, for one thread at a time.
-
-    Laws are compiled by several threads. CPython 3.11 counts the depth of its conversion to tree
-    objects once per interpreter; a thread that is interrupted in the middle, by a callback of the
-    garbage collector for example, makes another one fail ("recursion depth mismatch").
-    """
-    with _parser_lock:
-        return ast.parse(text)
 
 
 @cache
@@ -86,7 +73,7 @@ def _describe_function(function: FunctionType) -> tuple[Any, ...]:
 @cache
 def _normalize_source(function: FunctionType) -> str:
     """Return the text of a function without comments and docstring, in one layout."""
-    (tree,) = parse_python(dedent(inspect.getsource(function))).body
+    (tree,) = parse_module(dedent(inspect.getsource(function))).body
     assert isinstance(tree, ast.FunctionDef)
     if ast.get_docstring(tree, clean=False) is not None:
         del tree.body[0]

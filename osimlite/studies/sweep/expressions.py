@@ -27,6 +27,7 @@ from typing import Any
 
 import numpy as np
 
+from osimlite.base.syntax_trees import parse_expression
 from osimlite.base.text import suggest_name
 from osimlite.errors import SettingError
 from osimlite.simulation.link_motion import Moments, locate_mass_centers, locate_station
@@ -102,7 +103,7 @@ class Expression:
         marks += r"|(?P<number>(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?)|(?P<word>[^\W\d][\w.|]*)"
         python = re.sub(marks, replace_name, text).replace("^", "**")
         try:
-            self._tree = ast.parse(python.strip(), mode="eval").body
+            self._tree = parse_expression(python.strip()).body
         except SyntaxError:
             raise SettingError(
                 f"the measure '{text}' is no expression; write it as in max(NAME) - 2*end(NAME)"

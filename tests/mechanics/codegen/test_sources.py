@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-import ast
-import gc
 import inspect
 import linecache
-import time
-from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 from textwrap import dedent
 
 import pytest
 
-from osimlite.mechanics.codegen.sources import compute_digest, parse_python
+from osimlite.mechanics.codegen.sources import compute_digest
 from osimlite.mechanics.kernels import constrained_dynamics, linear_algebra, pointers
 from osimlite.mechanics.kernels.table import LAW_MODULES
 from osimlite.simulation.elements.laws import find_function
@@ -92,21 +87,3 @@ def test_what_a_process_keeps_concerns_nobody(changed):
 
 def test_every_law_differs():
     assert len(set(digests().values())) == len(LAW_MODULES)
-
-
-def test_threads_that_are_interrupted_while_they_parse_do_not_disturb_each_other():
-    text = Path(__file__).read_text() * 5
-
-    def interrupt(phase, info):
-        time.sleep(1e-5)
-
-    thresholds = gc.get_threshold()
-    gc.callbacks.append(interrupt)
-    gc.set_threshold(50)
-    try:
-        with ThreadPoolExecutor(4) as pool:
-            trees = list(pool.map(lambda _: parse_python(text), range(24)))
-    finally:
-        gc.set_threshold(*thresholds)
-        gc.callbacks.remove(interrupt)
-    assert len({ast.dump(tree) for tree in trees}) == 1
