@@ -229,6 +229,21 @@ def test_the_time_of_a_text_is_that_of_its_length(word: str, fixtures: Path) -> 
     assert long < 10.0 * short + 1.0
 
 
+def test_the_time_of_many_attributes_is_that_of_their_number(fixtures: Path) -> None:
+    text = (fixtures / "pipelines" / "pendulum" / "model.osim").read_text()
+    place = text.index("<JointSet")
+
+    def check(count: int) -> float:
+        element = "<note " + " ".join(f'a{k}="{k}"' for k in range(count)) + "/>"
+        source = Source((text[:place] + element + text[place:]).encode(), "it.osim")
+        begin = time.process_time()
+        check_source(source)
+        return time.process_time() - begin
+
+    check(1)
+    assert check(20000) < 10.0 * check(5000) + 0.3
+
+
 @pytest.mark.parametrize(
     ("text", "blank"),
     [

@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from functools import cache, lru_cache
 from pathlib import Path
+from typing import Any, cast
 
 from lxml import etree
 
@@ -17,6 +18,9 @@ from osimlite.errors import ModelError
 from osimlite.io.document.names import decode_name, replace_colons
 
 DIGEST_SIZE = 6
+
+MANY_ATTRIBUTES = 100
+"""Number of attributes from which an element is read by XPath; elements of OpenSim have three."""
 
 _COMMENT = re.compile(rb"<!--([^-]*+(?:-[^-]++)*+)-->")
 
@@ -155,4 +159,9 @@ def list_lines(element: etree._Element, depth: int, *, comments: bool = True) ->
 
 
 def _list_attributes(element: etree._Element) -> list[tuple[str, str]]:
-    return [(decode_name(str(key)), str(text)) for key, text in element.items()]
+    """Return the names and values of the attributes of an element, in their order."""
+    if len(element.attrib) < MANY_ATTRIBUTES:
+        return [(decode_name(str(key)), str(text)) for key, text in element.items()]
+    # lxml looks each value up by its name, which takes quadratic time; XPath walks along them.
+    values = cast("list[Any]", element.xpath("@*"))
+    return [(decode_name(str(value.attrname)), str(value)) for value in values]
