@@ -32,9 +32,12 @@ def parse_expression(text: str) -> ast.Expression:
     """Return the syntax tree of one expression.
 
     Raises:
-        SyntaxError: the text is not an expression of Python.
+        SyntaxError: the text is not an expression of Python, or nests too deeply.
     """
-    return _parse(lambda: ast.parse(text, mode="eval"))
+    try:
+        return _parse(lambda: ast.parse(text, mode="eval"))
+    except (RecursionError, MemoryError):
+        raise SyntaxError("the expression nests too deeply") from None
 
 
 def _parse(parse: Callable[[], _Tree]) -> _Tree:

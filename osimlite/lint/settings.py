@@ -90,14 +90,12 @@ def _parse_settings(file: Path, table: dict[str, Any]) -> Settings:
                 file=str(file),
             )
     try:
+        ignores = _read_table(table, "per-file-ignores")
         return Settings(
             file,
             parse_codes(_read_texts(table, "select")),
             parse_codes(_read_texts(table, "ignore")),
-            {
-                pattern: parse_codes(words)
-                for pattern, words in _read_table(table, "per-file-ignores").items()
-            },
+            {pattern: parse_codes(_read_texts(ignores, pattern)) for pattern in ignores},
             {
                 parse_codes([code])[0]: _parse_severity(word)
                 for code, word in _read_table(table, "severity").items()

@@ -60,4 +60,6 @@ def test_faults_of_the_text_are_raised():
     with pytest.raises(SyntaxError):
         parse_expression("a = 1")
     with pytest.raises(SyntaxError):
+        parse_expression("a" + " + a" * 20000)
+    with pytest.raises(SyntaxError):
         parse_module("def f(:")

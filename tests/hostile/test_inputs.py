@@ -283,6 +283,8 @@ BROKEN_SETTINGS = [
     ("osimlite.toml", "largest-file = nan", False),
     ("osimlite.toml", "select = [1]", False),
     ("osimlite.toml", "severity = {OSIM101 = []}", False),
+    ("osimlite.toml", "per-file-ignores = {a = 5}", False),
+    ("osimlite.toml", "per-file-ignores = {a = [[1]]}", False),
 ]
 
 

@@ -96,8 +96,8 @@ MODELS = {
         "<radius>0.12</radius></ContactSphere>",
         _obstacle_of("x") + _obstacle_of("y", "<contact_hint>0 0.1 0</contact_hint>"),
     ),
-    "a half-space as an obstacle": _lay_cable(
-        '<ContactHalfSpace name="x"><socket_frame>/ground</socket_frame><location>9 0 0</location></ContactHalfSpace>',
+    "a mesh as an obstacle": _lay_cable(
+        '<ContactMesh name="x"><socket_frame>/ground</socket_frame><location>9 0 0</location></ContactMesh>',
         _obstacle_of("x"),
     ),
     "an unknown constraint": small_model(constraints='<NoSuchConstraint name="c" />'),

@@ -234,8 +234,8 @@ def report_impassable_obstacle(subject: Subject, report: FindingCollector) -> No
     """A path cannot wrap over an obstacle.
 
     Reports paths over obstacles (Scholz2015GeometryPath) with a point, or another obstacle, inside
-    an obstacle in the default pose, as written or as assembled; and paths whose search fails
-    because a `contact_hint` is in the middle of the surface or unsuitable.
+    an obstacle in the default pose, as written or as assembled; paths over a ContactMesh; and paths
+    whose search fails because a `contact_hint` is in the middle of the surface or unsuitable.
 
     OpenSim rejects the model: it computes the path when it initialises the system. A GeometryPath,
     in contrast, goes straight through a surface that contains one of its points (OSIM616).

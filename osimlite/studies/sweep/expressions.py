@@ -52,6 +52,8 @@ FUNCTIONS: dict[str, Callable[[Any], Any]] = {
     name: getattr(np, name) for name in ("abs", "sqrt", "exp", "log", "sin", "cos", "tan")
 }
 """Functions of one number, which apply to each moment."""
+MAX_DEPTH = 200
+"""Levels of an expression: each takes two calls of Python, which allows a thousand."""
 OPERATORS: dict[type[ast.AST], Callable[..., Any]] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
@@ -108,6 +110,10 @@ class Expression:
             raise SettingError(
                 f"the measure '{text}' is no expression; write it as in max(NAME) - 2*end(NAME)"
             ) from None
+        if _measure_depth(self._tree) > MAX_DEPTH:
+            raise SettingError(
+                f"the measure '{text[:40]}…' nests more than {MAX_DEPTH} levels deep; write it shorter"
+            )
         # A trial with two moments shows whether the result is a number or a history.
         if np.ndim(self._evaluate_columns(np.arange(2.0), [np.ones(2)] * len(self._quantities))):
             raise SettingError(
@@ -157,6 +163,15 @@ class Expression:
         raise SettingError(
             f"the measure '{self._text}' is no expression; there are + - * / ^ and functions of one number"
         )
+
+
+def _measure_depth(tree: ast.AST) -> int:
+    """Return how many levels of expressions nest in each other."""
+    depth, level = 0, [tree]
+    while level:
+        depth += 1
+        level = [part for node in level for part in ast.iter_child_nodes(node)]
+    return depth
 
 
 def list_quantities(engine: Any) -> Mapping[str, Quantity]:

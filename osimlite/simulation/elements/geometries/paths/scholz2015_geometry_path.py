@@ -200,8 +200,8 @@ def read_cable(builder: ElementBuilder, owner: Any) -> Cable:
     """The elements of an owner's path.
 
     Raises:
-        UnsupportedError: there is an obstacle of a kind that a cable cannot run over.
-        ModelError: the path does not begin and end with a point, or something makes no sense.
+        ModelError: the path does not begin and end with a point, a cable cannot run over an obstacle
+            of this class, or something makes no sense.
     """
     elements = tuple(
         _read_point(builder, item)
@@ -230,9 +230,8 @@ def check_cable(builder: ElementBuilder, owner: Any) -> None:
     """Check whether OpenSim can lay a path over its obstacles, and name a point that is inside one.
 
     Raises:
-        UnsupportedError: osimlite cannot compute a cable over one of the obstacles, but OpenSim may.
-        ModelError: a point is inside an obstacle, a contact hint has no nearest point on the surface,
-            or the search fails.
+        ModelError: a point is inside an obstacle, an obstacle is a mesh, a contact hint has no nearest
+            point on the surface, or the search fails.
     """
     items = list(owner.geometry_path.path_elements)
     for index, item in enumerate(items):
@@ -293,8 +292,11 @@ def _read_obstacle(builder: ElementBuilder, owner: Any, item: Any) -> Obstacle:
     geometry = builder.resolve_target(item, "socket_contact_geometry", item.socket_contact_geometry)
     surface = _list_surface_numbers(geometry)
     if surface is None:
-        raise builder.unsupported_error(
-            owner, f" over the {get_class_name(geometry)} '{geometry.name}'"
+        # OpenSim asks each obstacle for the equation of its surface, which meshes do not have.
+        raise ModelError(
+            f"the obstacle '{geometry.name}' of the path of '{builder.path(owner)}' is a "
+            f"{get_class_name(geometry)}, over which no path runs; use a sphere, cylinder, "
+            "ellipsoid, torus or half-space"
         )
     builder.check_finite(geometry, (*surface, *geometry.location, *geometry.orientation))
     if min(surface[1:3]) <= 0.0 or min(surface) < 0.0:
