@@ -1,12 +1,13 @@
 """Damage files at random, run a command on each, and look for crashes, hangs and changed files.
 
 One process serves all commands of a kind and is started anew when it dies or hangs, so that
-thousands of commands take minutes. `python -m tests.hostile.mutations 500` prints the table of all
-kinds.
+thousands of commands take minutes. `python -m tests.hostile.mutations 500 [--seed 7] [.mot ...]`
+prints the table of all kinds, or of those that are named.
 """
 
 from __future__ import annotations
 
+import argparse
 import contextlib
 import hashlib
 import json
@@ -81,8 +82,8 @@ KINDS = {
     ".c3d": Kind(
         ".c3d",
         ("trials/force_plate.c3d", "trials/two_markers.c3d", "trials/no_plate.c3d"),
-        _PENDULUM,
-        (("ik", "model.osim", "@", *_OUT),),
+        ("@markers.osim",),
+        (("ik", "markers.osim", "@", *_OUT),),
     ),
     ".b3d": Kind(".b3d", ("@b3d",), (), (("convert", "@", *_OUT),)),
     ".trc": Kind(
@@ -338,6 +339,10 @@ def _made(name: str) -> bytes:
             return MARKERS.encode()
         case "id":
             return SETUP.encode()
+        case "markers.osim":
+            # The markers have the names of those in the files.
+            text = (FIXTURES / _PENDULUM[0]).read_text()
+            return text.replace('"m0"', '"one"').replace('"m1"', '"two"').encode()
         case "mesh.osim":
             return MESH_MODEL.encode()
         case "b3d":
@@ -375,10 +380,15 @@ def _keep(file: Path, number: int) -> None:
 
 def main() -> None:
     """Print the table of all kinds, or of those that are named."""
-    count, names = int(sys.argv[1]), sys.argv[2:] or list(KINDS)
-    for name in names:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("count", type=int)
+    parser.add_argument("names", nargs="*", default=list(KINDS))
+    parser.add_argument("--seed", type=int, default=1)
+    chosen = parser.parse_intermixed_args()
+    count = chosen.count
+    for name in chosen.names:
         begin = time.monotonic()
-        counts, faults = run_kind(name, count)
+        counts, faults = run_kind(name, count, chosen.seed)
         ends = ", ".join(f"{counts[code]} x {code}" for code in sorted(counts))
         sys.stdout.write(
             f"{name:8} {count} mutations: {ends}; {len(faults)} faults ({time.monotonic() - begin:.0f} s)\n"

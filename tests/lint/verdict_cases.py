@@ -674,6 +674,8 @@ def poses() -> list[Case]:
         ),
         Case("a ball at 90 degrees", joint("BallJoint", "1.5707963267948966"), "", RUNS),
         Case("a ball at -90 degrees", joint("BallJoint", "-1.5707963267948966"), "", RUNS),
+        Case("a ball at 270 degrees", joint("BallJoint", "4.71238898038469"), "", RUNS),
+        Case("a ball at -450 degrees", joint("BallJoint", "-7.853981633974483"), "", RUNS),
         Case("a gimbal at 1.57", joint("GimbalJoint", "1.57"), "", RUNS),
         Case("a massless body between parallel axes", between, "OSIM424", FAILS),
     ]
@@ -710,6 +712,20 @@ def others() -> list[Case]:
             small_model(forces=motor, controllers=reflex(disabled)),
             "OSIM544",
             FAILS,
+        ),
+        Case(
+            "a correction without states",
+            small_model(controllers='<CorrectionController name="c"/>'),
+            "OSIM531",
+            FAILS,
+        ),
+        Case(
+            "a correction that is off",
+            small_model(
+                controllers=f'<CorrectionController name="c">{disabled}</CorrectionController>'
+            ),
+            "",
+            RUNS,
         ),
         Case(
             "a class after 4.6",

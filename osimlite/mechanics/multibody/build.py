@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import copysign, pi
+from math import copysign, pi, remainder
 
 import numpy as np
 
@@ -381,16 +381,18 @@ RIGHT_ANGLE_GAP = 1e-6
 
 
 def avoid_right_angle(angle: float) -> float:
-    """Return an angle that is at least `RIGHT_ANGLE_GAP` away from 90 and -90 degrees (rad).
+    """Return an angle that is at least `RIGHT_ANGLE_GAP` away from 90 degrees, 270 and so on (rad).
 
     OpenSim describes ball and free joints by quaternions, which have no singular pose. The rates of
     three angles are infinite where the second is exactly a right angle. A motion that starts next
     to it is the same within the gap.
     """
-    gap = 0.5 * pi - abs(angle)
-    if abs(gap) >= RIGHT_ANGLE_GAP:
+    # From -90 to 90 degrees, with the same sine but for its sign.
+    from_straight = remainder(angle, pi)
+    gap = 0.5 * pi - abs(from_straight)
+    if gap >= RIGHT_ANGLE_GAP:
         return angle
-    return copysign(0.5 * pi - RIGHT_ANGLE_GAP, angle)
+    return angle - copysign(RIGHT_ANGLE_GAP - gap, from_straight)
 
 
 def mass_properties(body: Body, path: str) -> MassProperties:

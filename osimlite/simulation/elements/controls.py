@@ -10,13 +10,17 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from osimlite.base.records import dataclass, replace
-from osimlite.errors import UnsupportedError
+from osimlite.errors import ModelError, UnsupportedError
 from osimlite.mechanics.kernels.layout import ITEM, WORK
 from osimlite.mechanics.multibody.function_tables import table_of_one
 from osimlite.mechanics.multibody.functions import Function
 from osimlite.schema.actuators import Actuator
 from osimlite.schema.base import Unknown
-from osimlite.schema.controller_types import ControlSetController, TrackingController
+from osimlite.schema.controller_types import (
+    ControlSetController,
+    CorrectionController,
+    TrackingController,
+)
 from osimlite.schema.sets import Controller
 from osimlite.simulation.elements.integral import evaluate_function
 from osimlite.simulation.elements.registry import CONTROLLERS
@@ -167,6 +171,11 @@ def _iterate_drives(builder: ElementBuilder) -> Iterator[tuple[Controller, Drive
                 builder.drives[path] = list(drive_by(builder, controller))
             yield from ((controller, drive) for drive in builder.drives[path])
             continue
+        if isinstance(controller, CorrectionController):
+            raise ModelError(
+                f"the CorrectionController '{builder.path(controller)}' follows the states of a "
+                "ForwardTool, which a model alone does not have: OpenSim crashes; disable it"
+            )
         why = f" driven by the {type(controller).__name__} '{builder.path(controller)}'"
         if isinstance(controller, TrackingController):
             why += ", whose desired motion is known to its tool only"
