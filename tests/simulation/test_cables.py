@@ -8,8 +8,8 @@ import pytest
 
 import osimlite
 from osimlite import ContactHalfSpace, ContactSphere
-from osimlite.errors import ModelError, UnsupportedError
-from osimlite.schema.contact import ContactCylinder, ContactEllipsoid, ContactTorus
+from osimlite.errors import ModelError
+from osimlite.schema.contact import ContactCylinder, ContactEllipsoid, ContactMesh, ContactTorus
 from osimlite.simulation.stepper import IntegrationError
 from tests.simulation.support import LEFT, RIGHT, cable, over, point
 
@@ -38,7 +38,23 @@ def test_impossible(elements, surface, says):
 
 
 def test_a_surface_that_no_path_runs_over():
-    with pytest.raises(UnsupportedError, match="over the ContactHalfSpace 'o'"):
+    with pytest.raises(ModelError, match="is a ContactMesh, over which no path runs"):
+        osimlite.paths(cable(LEFT, over(), RIGHT, surface=ContactMesh()))
+
+
+@pytest.mark.parametrize("hint", [None, (0.0, 0.1, 0.0), (0.0, 0.0, 0.0)])
+def test_a_path_beside_a_half_space_is_straight(hint: tuple[float, float, float] | None):
+    """OpenSim lays the path on the plane at the hint, from which it lifts off at once."""
+    obstacle = over() if hint is None else over(hint)
+    beside, alone = (
+        osimlite.paths(cable(LEFT, *between, RIGHT, surface=ContactHalfSpace(location=(9, 0, 0))))
+        for between in ([obstacle], [])
+    )
+    assert beside.lengths({})["/forceset/s"] == pytest.approx(alone.lengths({})["/forceset/s"])
+
+
+def test_a_point_inside_a_half_space():
+    with pytest.raises(ModelError, match="cannot be laid over its obstacles"):
         osimlite.paths(cable(LEFT, over(), RIGHT, surface=ContactHalfSpace()))
 
 
