@@ -42,15 +42,22 @@ def test_a_surface_that_no_path_runs_over():
         osimlite.paths(cable(LEFT, over(), RIGHT, surface=ContactMesh()))
 
 
-@pytest.mark.parametrize("hint", [None, (0.0, 0.1, 0.0), (0.0, 0.0, 0.0)])
-def test_a_path_beside_a_half_space_is_straight(hint: tuple[float, float, float] | None):
+@pytest.mark.parametrize("hint", [(nan, nan, nan), (0.0, 0.1, 0.0)])
+def test_a_path_beside_a_half_space_is_straight(hint: tuple[float, float, float]):
     """OpenSim lays the path on the plane at the hint, from which it lifts off at once."""
-    obstacle = over() if hint is None else over(hint)
+    plane = ContactHalfSpace(location=(0, -0.5, 0), orientation=(0, 0, -pi / 2))
     beside, alone = (
-        osimlite.paths(cable(LEFT, *between, RIGHT, surface=ContactHalfSpace(location=(9, 0, 0))))
-        for between in ([obstacle], [])
+        osimlite.paths(cable(LEFT, *between, RIGHT, surface=plane))
+        for between in ([over(hint)], [])
     )
     assert beside.lengths({})["/forceset/s"] == pytest.approx(alone.lengths({})["/forceset/s"])
+
+
+def test_a_path_that_is_normal_to_a_plane_at_its_hint():
+    with pytest.raises(ModelError, match="cannot be laid over its obstacles"):
+        osimlite.paths(
+            cable(LEFT, over((0, 0.1, 0)), RIGHT, surface=ContactHalfSpace(location=(9, 0, 0)))
+        )
 
 
 def test_a_point_inside_a_half_space():

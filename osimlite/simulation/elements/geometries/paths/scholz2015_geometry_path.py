@@ -181,7 +181,12 @@ class Cable:
         ]
         _, path = self.make_records(Places(mechanism, {}, placements))
         ints, work = np.array([0] * ITEM.OWN + list(path.ints)), np.zeros(path.record_size)
-        cable_path(ints, np.array(path.numbers), work, np.zeros(1), np.zeros(1), 0)
+        try:
+            cable_path(ints, np.array(path.numbers), work, np.zeros(1), np.zeros(1), 0)
+        except ArithmeticError:
+            # As Python, kernels raise where machine code gets NaN: a path that is normal to a plane
+            # at its hint has no direction on it.
+            return None
         if np.isnan(work[LENGTH]):
             return None
         kept = ints[ELEMENTS + KEPT :: ELEMENT_INTS].tolist()
@@ -354,9 +359,7 @@ def _is_middle(surface: tuple[float, ...], hint: Array) -> bool:
     if kind == TORUS:
         across = float(np.hypot(hint[0], hint[1]))
         return across == 0.0 or (across == radius and hint[2] == 0.0)
-    if kind == PLANE:
-        return False
-    return not (np.array(weights) * hint).any()
+    return kind != PLANE and not (np.array(weights) * hint).any()
 
 
 def _find_nearest_point(surface: tuple[float, ...], hint: Array) -> Array:
