@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from math import isfinite
 
 from osimlite.base.text import format_count
+from osimlite.errors import ModelError
 from osimlite.lint.construction import CONSTRUCTION, Obstacle, Stage, obstacles_of
 from osimlite.lint.diagnostic import Severity
 from osimlite.lint.registry import ERROR, INFO, WARNING, FindingCollector, rule
 from osimlite.lint.rules.functions import is_unused
 from osimlite.lint.subject import Subject
 from osimlite.schema.base import Unknown
+from osimlite.schema.controller_types import PrescribedController
+from osimlite.schema.functions import ExpressionBasedFunction
+from osimlite.schema.prescribed import PrescribedForce
 from osimlite.schema.registry import get_plugin_classes
 
 _QUOTED = re.compile(r"'([^']+)'")
@@ -183,6 +188,41 @@ def report_no_acceleration(subject: Subject, report: FindingCollector) -> None:
             _report(subject, report, obstacle, obstacle.message)
     for obstacle in _select_unreported(subject, report, Stage.RATE):
         _report(subject, report, obstacle, obstacle.message, severity=WARNING)
+    for function in _find_infinite_formulas(subject):
+        report(
+            f"expression of {subject.describe_part(function)} is '{function.expression}', which is "
+            "no finite number at 0 s, so every acceleration is NaN or infinite",
+            function,
+            tag="expression",
+        )
+
+
+def _find_infinite_formulas(subject: Subject) -> Iterator[ExpressionBasedFunction]:
+    """Yield the formulas of time, of prescribed forces and controls, that have no value at 0 s.
+
+    Simulations do not compute them, so that evaluating the accelerations does not find them.
+    """
+    for function in subject.find_instances(ExpressionBasedFunction):
+        owner = subject.owner(function)
+        is_of_time = isinstance(owner, PrescribedForce | PrescribedController)
+        if not is_of_time or len(function.variables) != 1 or is_unused(subject, function):
+            continue
+        # Reading formulas takes the kernels, and few models have them.
+        from osimlite.mechanics.multibody.formula import Formula
+
+        try:
+            Formula.parse(function.expression, function.variables, "it")
+        except ModelError:
+            # Another rule reports what cannot be read.
+            continue
+        at_zero = f"{function.expression};{function.variables[0]}=0"
+        try:
+            *_, last = Formula.parse(at_zero, (), "it").steps
+            if last.law == "number" and not isfinite(last.value):
+                yield function
+        except ModelError:
+            # A part such as 0/0 is not a number.
+            yield function
 
 
 @rule("OSIM533", "not-computed", severity=INFO, about=CONSTRUCTION)
