@@ -67,6 +67,18 @@ def test_a_force_that_is_not_finite_is_reported_beside_ignored_elements():
     assert {"OSIM101", "OSIM532"} <= set(check(small_model(forces=force)).codes)
 
 
+def test_a_coupler_without_coordinates():
+    """OpenSim reads memory that it has not set: it runs, or computes NaN."""
+    constraint = (
+        '<CoordinateCouplerConstraint name="f"><coupled_coordinates_function><LinearFunction>'
+        "<coefficients>1 0</coefficients></LinearFunction></coupled_coordinates_function>"
+        "<independent_coordinate_names></independent_coordinate_names>"
+        "<dependent_coordinate_name>s</dependent_coordinate_name></CoordinateCouplerConstraint>"
+    )
+    (finding,) = check(small_model(constraints=constraint)).errors
+    assert finding.code == "OSIM604" and "has not set" in finding.message
+
+
 def test_the_message_says_which_constraint_and_how_far():
     case = next(case for case in CASES if case.name == "a distance on one body")
     (finding,) = check(case.text).errors

