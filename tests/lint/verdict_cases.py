@@ -819,7 +819,7 @@ def magnitudes() -> list[Case]:
 
 def not_a_number_unused() -> list[Case]:
     """Return NaN in what is on, and in what is off."""
-    forces = {
+    forces: dict[str, dict[str, object]] = {
         "SpringGeneralizedForce": {"coordinate": "q", "stiffness": "NaN"},
         "PointToPointSpring": {
             "socket_body1": GROUND,
