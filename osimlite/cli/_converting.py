@@ -15,7 +15,7 @@ from osimlite.cli._console import add_row, create_console, create_table, say
 from osimlite.cli.translate import tabulate
 from osimlite.errors import SettingError
 from osimlite.translate.exporters import EXPORTERS, Exporter
-from osimlite.translate.importers import OSIM, PROJECT, find_format, list_importers
+from osimlite.translate.importers import MARKERS, OSIM, PROJECT, find_format, list_importers
 
 if TYPE_CHECKING:
     from osimlite.schema.model import Model
@@ -86,7 +86,7 @@ class Request:
             raise SettingError(
                 f"the format of '{file.name}' is unknown; name it with --from: {', '.join(sorted(sources))}"
             )
-        targets = {OSIM, PROJECT, *(exporter.name for exporter in EXPORTERS)}
+        targets = {OSIM, MARKERS, PROJECT, *(exporter.name for exporter in EXPORTERS)}
         if target is not None and target not in targets:
             raise SettingError(f"--to: unknown format '{target}'{suggest_name(target, targets)}")
         by_suffix = None if output is None else _find_target(output, found)
@@ -96,7 +96,9 @@ class Request:
             raise SettingError(
                 "the format to write is unknown; name a file with -o, such as robot.urdf, or a format with --to"
             )
-        if PROJECT in (goal, default) and goal != default:
+        # Only importers of models lead to other formats than their own.
+        no_models = {MARKERS, PROJECT}
+        if {goal, default} & no_models and goal != default:
             raise SettingError(f"a file of the format '{found}' cannot be written as '{goal}'")
         if goal == found:
             raise SettingError(
@@ -181,7 +183,7 @@ class Request:
     ) -> Conversion:
         """Write a model in the format of an exporter."""
         folders = options.list_mesh_folders(self.file, geometry)
-        if exporter.command == "translate":
+        if exporter.command != "view":
             moved = {"motion": motion} if exporter.takes_motion else {}
             made = exporter.write(
                 model, folder=self.file.parent, name=self.name, geometry=folders, **moved, **choices
@@ -218,8 +220,8 @@ class Request:
 def _find_target(output: Path, source: str) -> str | None:
     """Return the name of the format that the suffix of an output file means; None for a folder."""
     suffix = output.suffix.lower()
-    if suffix == ".osim":
-        return OSIM
+    if suffix in (".osim", ".trc"):
+        return suffix[1:]
     for exporter in EXPORTERS:
         if exporter.suffix and suffix == exporter.suffix.lower() and exporter.name != source:
             return exporter.name
@@ -228,8 +230,8 @@ def _find_target(output: Path, source: str) -> str | None:
 
 def _get_suffix(target: str) -> str:
     """Return the suffix of the main file of a format, in lower case; "" for a folder."""
-    if target == OSIM:
-        return ".osim"
+    if target in (OSIM, MARKERS):
+        return f".{target}"
     return next((each.suffix.lower() for each in EXPORTERS if each.name == target), "")
 
 

@@ -17,10 +17,16 @@ if TYPE_CHECKING:
 
 def _list_choices() -> Iterator[OptionSpec]:
     """Yield the options of all formats."""
-    for importer in IMPORTERS:
-        yield from importer.choices
-    for exporter in EXPORTERS:
-        yield from exporter.choices
+    seen = set()
+    for choices in [
+        *(importer.choices for importer in IMPORTERS),
+        *(exporter.choices for exporter in EXPORTERS),
+    ]:
+        for choice in choices:
+            # A format that is read and written has some options for both.
+            if choice.name not in seen:
+                seen.add(choice.name)
+                yield choice
 
 
 @command_with(_list_choices)

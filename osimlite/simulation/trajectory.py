@@ -170,6 +170,23 @@ class Trajectory(Tabular):
         assert self._report is not None
         return self._report.summary()
 
+    def to_bvh(self, path: str | Path, *, scale: float = 100.0) -> None:
+        """Write skeleton and motion as a BVH file, for Blender and other animation programs.
+
+        Args:
+            path: the file.
+            scale: numbers of the file per metre; 100 writes centimetres.
+
+        Raises:
+            OsimliteError: the file cannot be written.
+        """
+        from osimlite.base.files import write_atomically
+        from osimlite.io.bvh import format_bvh
+        from osimlite.simulation.bvh_export import make_bvh
+
+        motion = make_bvh(self.mechanism, self.times, self.values, scale=scale).motion
+        write_atomically(path, "".join(format_bvh(motion)))
+
     def to_sto(self, path: str | Path) -> None:
         """Write the states with OpenSim's column names; the file is complete or not written at all.
 

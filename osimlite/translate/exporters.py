@@ -15,6 +15,7 @@ from osimlite.base.options import OptionSpec
 from osimlite.base.records import dataclass
 
 if TYPE_CHECKING:
+    from osimlite.translate.bvh import Bvh
     from osimlite.translate.export import Urdf
     from osimlite.translate.mjcf.export import Mjcf
     from osimlite.view.shown import Shown
@@ -37,7 +38,7 @@ class Exporter:
     # Of the format in `osimlite translate --to`, or of the option of `osimlite view` that names
     # the file.
     name: str
-    command: str  # "translate" or "view"
+    command: str  # "translate" or "view"; "convert" if only `osimlite convert` writes it
     help: str  # what is written
     write: Callable[..., Any]
     choices: tuple[OptionSpec, ...] = ()  # options that this format has
@@ -61,6 +62,13 @@ def write_mjcf(*model: Any, **choices: Any) -> Mjcf:
     from osimlite.translate.mjcf.export import to_mjcf
 
     return to_mjcf(*model, **choices)
+
+
+def write_bvh(*model: Any, **choices: Any) -> Bvh:
+    """Translate a model and its motion to BVH; see :func:`osimlite.translate.bvh.to_bvh`."""
+    from osimlite.translate.bvh import to_bvh
+
+    return to_bvh(*model, **choices)
 
 
 def write_page(shown: Shown, path: Path) -> str:
@@ -160,6 +168,15 @@ MJCF_CHOICES = (
 )
 """Options of the format MJCF."""
 
+BVH_SCALE = OptionSpec(
+    "scale",
+    float | None,
+    "Numbers of a BVH file per metre.",
+    shown="100, centimetres",
+    group="BVH",
+)
+"""Option of the format BVH, for reading and writing."""
+
 EXPORTERS: list[Exporter] = [
     Exporter(
         "urdf",
@@ -181,6 +198,17 @@ EXPORTERS: list[Exporter] = [
         title="MJCF (MuJoCo)",
         suffix=".xml",
         carries="bodies, joints, constraints, muscles with wrapping, actuators, springs, contacts, meshes",
+    ),
+    Exporter(
+        "bvh",
+        "convert",
+        "<file>.bvh for animation programs",
+        write_bvh,
+        (BVH_SCALE,),
+        title="BVH (Blender)",
+        suffix=".bvh",
+        carries="skeleton and motion of all bodies; no masses, muscles or shapes",
+        takes_motion=True,
     ),
     Exporter(
         "glb",

@@ -14,8 +14,10 @@ from typing import TYPE_CHECKING, Any, Protocol
 from osimlite.base.options import OptionSpec
 from osimlite.base.reading import read_at_most
 from osimlite.base.records import dataclass
+from osimlite.translate.exporters import BVH_SCALE
 
 if TYPE_CHECKING:
+    from osimlite.translate.bvh import BvhMarkers
     from osimlite.translate.fidelity import Fidelity
     from osimlite.translate.mjcf_import.convert import Osim
 
@@ -24,6 +26,9 @@ BEGINNING_BYTES = 4096
 
 OSIM = "osim"
 """Name of OpenSim's model format."""
+
+MARKERS = "trc"
+"""Name of the target that is a file of markers (.trc)."""
 
 PROJECT = "project"
 """Name of the target that is a folder with models, data and setup files of OpenSim."""
@@ -60,7 +65,7 @@ class Importer:
     name: str  # of the format in `osimlite convert --from`
     title: str  # name of the format in words
     suffixes: tuple[str, ...]  # in lower case
-    target: str  # OSIM or PROJECT
+    target: str  # OSIM, MARKERS or PROJECT
     carries: str  # what is carried over
     read: Callable[..., Imported]
     # Texts of which one occurs in the first BEGINNING_BYTES; empty if the suffix is enough.
@@ -152,6 +157,14 @@ B3D_CHOICES = (
 )
 """Options of the format of AddBiomechanics."""
 
+
+def read_bvh(path: Path, **choices: Any) -> BvhMarkers:
+    """Read joint centres of a BVH file; see :class:`osimlite.translate.bvh.BvhMarkers`."""
+    from osimlite.translate.bvh import BvhMarkers
+
+    return BvhMarkers(path, **choices)
+
+
 IMPORTERS: list[Importer] = [
     Importer(
         "b3d",
@@ -171,6 +184,15 @@ IMPORTERS: list[Importer] = [
         read_mjcf,
         marks=(b"<mujoco",),
         choices=MJCF_CHOICES,
+    ),
+    Importer(
+        "bvh",
+        "BVH (Blender)",
+        (".bvh",),
+        MARKERS,
+        "positions of joints as markers, for ik and fit; no rotations about bones",
+        read_bvh,
+        choices=(BVH_SCALE,),
     ),
 ]
 """All formats that are read, besides OpenSim's own; the order is that of the list of formats."""

@@ -86,6 +86,7 @@ KINDS = {
         (("ik", "markers.osim", "@", *_OUT),),
     ),
     ".b3d": Kind(".b3d", ("@b3d",), (), (("convert", "@", *_OUT),)),
+    ".bvh": Kind(".bvh", ("@bvh",), (), (("convert", "@", *_OUT),)),
     ".trc": Kind(
         ".trc",
         ("@trc", "setups/walk.trc"),
@@ -142,6 +143,27 @@ MARKERS = (
 ) + "".join(
     f"{k + 1}\t{0.01 * k:.2f}\t0.1\t-0.5\t0\t0.2\t-{1.0 + 0.01 * k:.2f}\t0\n" for k in range(5)
 )
+SKELETON = """HIERARCHY
+ROOT hip
+{
+  OFFSET 0 0 0
+  CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation
+  JOINT knee
+  {
+    OFFSET 0 -40 0
+    CHANNELS 3 Zrotation Xrotation Yrotation
+    End Site
+    {
+      OFFSET 0 -40 0
+    }
+  }
+}
+MOTION
+Frames: 2
+Frame Time: 0.01
+1 2 3 10 20 30 5 6 7
+1 2 4 10 21 30 5 6 8
+"""
 MESH_MODEL = """<OpenSimDocument Version="40600"><Model name="m"><Ground name="ground"><attached_geometry>
 <Mesh name="g"><mesh_file>it.vtp</mesh_file></Mesh></attached_geometry></Ground></Model></OpenSimDocument>
 """
@@ -349,6 +371,8 @@ def _made(name: str) -> bytes:
             from tests.io.b3d_files import make_subject
 
             return make_subject((4, 3))
+        case "bvh":
+            return SKELETON.encode()
         case "yaml":
             return to_yaml(osimlite.read(FIXTURES / _PENDULUM[0])).encode()
         case "human.osim":

@@ -1,0 +1,315 @@
+"""Reading and writing of BVH files: a skeleton of joints, and their motion.
+
+A joint has a fixed offset from its parent, and channels that change from frame to frame: rotations
+(degrees), applied in the order of the channels, and for some joints positions. A position channel
+replaces the offset along its axis, as in Blender and bvhio.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from osimlite.base.files import read_file
+from osimlite.base.records import dataclass, field
+from osimlite.errors import DocumentError
+from osimlite.io.tables.storage import format_number
+from osimlite.mechanics.multibody.spatial import Array
+
+ROTATIONS = ("Zrotation", "Xrotation", "Yrotation")
+"""Rotation channels that are written, in the usual order of BVH files."""
+
+POSITIONS = ("Xposition", "Yposition", "Zposition")
+"""Position channels that are written."""
+
+MAX_JOINTS = 10_000
+"""Largest accepted number of joints; more are a sign of damage."""
+
+
+@dataclass(frozen=True, eq=False)
+class BvhJoint:
+    """Joint of a skeleton.
+
+    Attributes:
+        name: name of the joint.
+        parent: index of the parent; -1 for a root.
+        offset: position in the axes of the parent (3,), in the unit of the file.
+        channels: names of the channels in the order of their numbers.
+        end: position of the end of a bone without further joints (3,); None if there are joints.
+    """
+
+    name: str
+    parent: int
+    offset: Array
+    channels: tuple[str, ...] = ()
+    end: Array | None = None
+
+    @property
+    def has_position(self) -> bool:
+        """Whether the joint has position channels."""
+        return any(channel in POSITIONS for channel in self.channels)
+
+
+@dataclass(frozen=True, eq=False)
+class BvhMotion:
+    """Skeleton and motion of a BVH file.
+
+    Attributes:
+        joints: the joints, each after its parent.
+        frame_time: time between two frames, s.
+        values: numbers of all channels (frames, channels), joint by joint.
+        file: path of the file; None if it was not read.
+    """
+
+    joints: tuple[BvhJoint, ...]
+    frame_time: float
+    values: Array
+    file: str | None = field(default=None, compare=False)
+
+    @property
+    def times(self) -> Array:
+        """Times of the frames (n,), s, from 0."""
+        return np.asarray(self.frame_time * np.arange(len(self.values)), dtype=float)
+
+    def compute_poses(self) -> tuple[Array, Array]:
+        """Return rotation matrices (frames, joints, 3, 3) and positions (frames, joints, 3) of all joints.
+
+        Both are in the axes of the file, positions in its unit.
+        """
+        count = len(self.values)
+        rotations = np.empty((count, len(self.joints), 3, 3))
+        positions = np.empty((count, len(self.joints), 3))
+        column = 0
+        for index, joint in enumerate(self.joints):
+            turn = np.broadcast_to(np.eye(3), (count, 3, 3))
+            place = np.tile(joint.offset, (count, 1))
+            for channel in joint.channels:
+                axis = "XYZ".index(channel[0])
+                if channel.endswith("position"):
+                    place[:, axis] = self.values[:, column]
+                else:
+                    turn = turn @ _rotate(axis, np.radians(self.values[:, column]))
+                column += 1
+            if joint.parent >= 0:
+                above = rotations[:, joint.parent]
+                place = positions[:, joint.parent] + np.einsum("nij,nj->ni", above, place)
+                turn = above @ turn
+            rotations[:, index], positions[:, index] = turn, place
+        return rotations, positions
+
+
+def _rotate(axis: int, angles: Array) -> Array:
+    """Return rotations (n, 3, 3) about a coordinate axis by angles (n,), rad."""
+    i, j = ((1, 2), (2, 0), (0, 1))[axis]
+    result = np.zeros((len(angles), 3, 3))
+    result[:, axis, axis] = 1.0
+    result[:, i, i] = result[:, j, j] = np.cos(angles)
+    result[:, j, i] = np.sin(angles)
+    result[:, i, j] = -np.sin(angles)
+    return result
+
+
+def find_angles(rotations: Array) -> Array:
+    """Return the angles (n, 3), degrees, of the channels `ROTATIONS` for rotations (n, 3, 3).
+
+    The angles are those of Rz(a) Rx(b) Ry(c). They continue from frame to frame without jumps by
+    360 degrees. Where b is a right angle, c is 0.
+    """
+    b = np.arcsin(np.clip(rotations[:, 2, 1], -1.0, 1.0))
+    is_locked = np.hypot(rotations[:, 2, 0], rotations[:, 2, 2]) < 1e-9
+    a = np.where(
+        is_locked,
+        np.arctan2(rotations[:, 1, 0], rotations[:, 0, 0]),
+        np.arctan2(-rotations[:, 0, 1], rotations[:, 1, 1]),
+    )
+    c = np.where(is_locked, 0.0, np.arctan2(-rotations[:, 2, 0], rotations[:, 2, 2]))
+    angles = np.unwrap(np.stack([a, b, c], axis=1), axis=0)
+    return np.asarray(np.degrees(angles), dtype=float)
+
+
+def format_bvh(motion: BvhMotion) -> Iterator[str]:
+    """Yield the text of a file in parts."""
+    children: dict[int, list[int]] = {}
+    for index, joint in enumerate(motion.joints):
+        children.setdefault(joint.parent, []).append(index)
+    yield "HIERARCHY\n"
+    # Pairs of a joint and whether its block only has to be closed.
+    waiting = [(index, False, 0) for index in reversed(children.get(-1, []))]
+    while waiting:
+        index, is_end, depth = waiting.pop()
+        indent = "\t" * depth
+        if is_end:
+            yield f"{indent}}}\n"
+            continue
+        joint = motion.joints[index]
+        yield f"{indent}{'JOINT' if depth else 'ROOT'} {joint.name}\n{indent}{{\n"
+        yield f"{indent}\tOFFSET {_format_numbers(joint.offset)}\n"
+        yield f"{indent}\tCHANNELS {len(joint.channels)} {' '.join(joint.channels)}\n"
+        if joint.end is not None:
+            yield f"{indent}\tEnd Site\n{indent}\t{{\n{indent}\t\tOFFSET {_format_numbers(joint.end)}\n{indent}\t}}\n"
+        waiting.append((index, True, depth))
+        waiting += [(child, False, depth + 1) for child in reversed(children.get(index, []))]
+    yield f"MOTION\nFrames: {len(motion.values)}\nFrame Time: {format_number(motion.frame_time)}\n"
+    for row in motion.values:
+        yield f"{_format_numbers(row)}\n"
+
+
+def _format_numbers(numbers: Sequence[float] | Array) -> str:
+    """Return numbers with all digits, separated by blanks."""
+    return " ".join(format_number(float(number)) for number in numbers)
+
+
+class _Reader:
+    """Words of a file, with the lines that they are in."""
+
+    def __init__(self, path: str | Path) -> None:
+        self.file = str(path)
+        text = read_file(path).decode("utf-8", "replace").lstrip("\ufeff")
+        self.lines = text.splitlines()
+        self.words = [
+            (word, number) for number, line in enumerate(self.lines, 1) for word in line.split()
+        ]
+        self.position = 0
+
+    def fail(self, message: str) -> DocumentError:
+        """Return an error at the present word."""
+        index = min(self.position, len(self.words) - 1)
+        line = self.words[index][1] if self.words else None
+        return DocumentError(message, file=self.file, line=line)
+
+    def peek(self) -> str:
+        """Return the next word without taking it; "" at the end."""
+        return self.words[self.position][0] if self.position < len(self.words) else ""
+
+    def take(self, expected: str = "") -> str:
+        """Return the next word; raise an error if another one was expected."""
+        word = self.peek()
+        if not word or (expected and word.lower() != expected.lower()):
+            wanted = f"'{expected}'" if expected else "more"
+            present = f"'{word}'" if word else "the end of the file"
+            raise self.fail(f"expected {wanted}, found {present}")
+        self.position += 1
+        return word
+
+    def take_number(self) -> float:
+        """Return the next word as a finite number."""
+        word = self.peek()
+        try:
+            number = float(word)
+        except ValueError:
+            number = math.nan
+        if not math.isfinite(number):
+            raise self.fail(f"expected a number, found '{word}'")
+        self.position += 1
+        return number
+
+    def take_count(self) -> int:
+        """Return the next word as a number of things."""
+        word = self.peek()
+        if not (word.isascii() and word.isdigit() and len(word) < 10):
+            raise self.fail(f"expected a number of things, found '{word}'")
+        self.position += 1
+        return int(word)
+
+    def take_vector(self) -> Array:
+        """Return the next three words as numbers (3,)."""
+        return np.array([self.take_number() for _ in range(3)])
+
+    def take_name(self) -> str:
+        """Return the words up to the next brace, which are a name that can have blanks."""
+        words = []
+        while self.peek() not in ("{", ""):
+            words.append(self.take())
+        return " ".join(words)
+
+
+def read_bvh(path: str | Path) -> BvhMotion:
+    """Read a BVH file.
+
+    Args:
+        path: the file.
+
+    Raises:
+        MissingFileError: the file does not exist or cannot be read.
+        DocumentError: it is not a BVH file, or is damaged; the message names the line.
+    """
+    reader = _Reader(path)
+    reader.take("HIERARCHY")
+    joints: list[BvhJoint] = []
+    while reader.peek().upper() == "ROOT":
+        reader.take()
+        _read_joints(reader, joints)
+    if not joints:
+        raise reader.fail("the file has no ROOT joint")
+    reader.take("MOTION")
+    reader.take("Frames:")
+    count = reader.take_count()
+    reader.take("Frame")
+    reader.take("Time:")
+    frame_time = reader.take_number()
+    if frame_time <= 0.0:
+        raise reader.fail(f"the frame time is {frame_time:g} s; it must be positive")
+    width = sum(len(joint.channels) for joint in joints)
+    rest = len(reader.words) - reader.position
+    if rest != count * width:
+        raise reader.fail(
+            f"{count} frames of {width} channels are {count * width} numbers, but {rest} words follow"
+        )
+    values = np.array([reader.take_number() for _ in range(rest)]).reshape(count, width)
+    return BvhMotion(tuple(joints), frame_time, values, str(path))
+
+
+def _read_joints(reader: _Reader, joints: list[BvhJoint]) -> None:
+    """Read a root and everything below it."""
+    parents: list[int] = []
+    while True:
+        if len(joints) >= MAX_JOINTS:
+            raise reader.fail(f"the file has more than {MAX_JOINTS} joints")
+        name = reader.take_name()
+        reader.take("{")
+        reader.take("OFFSET")
+        offset = reader.take_vector()
+        channels = tuple(_take_channel(reader) for _ in range(_take_channel_count(reader)))
+        parent = parents[-1] if parents else -1
+        joints.append(BvhJoint(name or f"joint_{len(joints)}", parent, offset, channels))
+        parents.append(len(joints) - 1)
+        if reader.peek().lower() == "end":
+            reader.take()
+            reader.take_name()
+            reader.take("{")
+            reader.take("OFFSET")
+            last = joints[-1]
+            joints[-1] = BvhJoint(
+                last.name, last.parent, last.offset, last.channels, reader.take_vector()
+            )
+            reader.take("}")
+        while parents and reader.peek() == "}":
+            reader.take()
+            parents.pop()
+        if not parents:
+            return
+        reader.take("JOINT")
+
+
+def _take_channel_count(reader: _Reader) -> int:
+    """Read the number of channels; a joint without the keyword has none."""
+    if reader.peek().upper() != "CHANNELS":
+        return 0
+    reader.take()
+    count = reader.take_count()
+    if count > 6:
+        raise reader.fail(f"a joint has {count} channels; there are six at most")
+    return count
+
+
+def _take_channel(reader: _Reader) -> str:
+    """Read the name of a channel."""
+    word = reader.peek()
+    known = {name.lower(): name for name in (*POSITIONS, *ROTATIONS)}
+    if word.lower() not in known:
+        raise reader.fail(f"unknown channel '{word}'; channels are {', '.join(known.values())}")
+    reader.take()
+    return known[word.lower()]

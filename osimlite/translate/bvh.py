@@ -1,0 +1,156 @@
+"""Motions for animation programs: a model and its motion as a BVH file, and BVH files as markers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from osimlite.base.files import make_folder, open_atomically
+from osimlite.base.records import dataclass
+from osimlite.errors import SettingError
+from osimlite.io.bvh import BvhMotion, format_bvh, read_bvh
+from osimlite.io.tables.writers import write_trc
+from osimlite.mechanics.multibody import build_mechanism
+from osimlite.schema.frames import Body
+from osimlite.schema.model import Model
+from osimlite.simulation.bvh_export import CENTIMETRES, make_bvh
+from osimlite.simulation.recorded_motion import RecordedMotion
+from osimlite.simulation.robot.names import UniqueNames
+from osimlite.translate.fidelity import LEFT_OUT, Fidelity
+
+CONTENTS = ("muscles, forces and shapes", LEFT_OUT)
+"""What a skeleton cannot say, and what is done about it."""
+
+
+@dataclass(frozen=True)
+class Bvh:
+    """A model and its motion as BVH.
+
+    Attributes:
+        name: name of the file without suffix.
+        motion: skeleton and motion.
+        fidelity: record of what was translated, approximated or left out.
+    """
+
+    name: str
+    motion: BvhMotion
+    fidelity: Fidelity
+
+    def write(self, folder: str | Path) -> list[Path]:
+        """Write ``<name>.bvh`` into a folder, which is made if it does not exist."""
+        path = make_folder(folder) / f"{self.name}.bvh"
+        with open_atomically(path) as stream:
+            for part in format_bvh(self.motion):
+                stream.write(part.encode())
+        return [path]
+
+
+def to_bvh(
+    model: Model,
+    *,
+    motion: str | Path | None = None,
+    scale: float = CENTIMETRES,
+    name: str | None = None,
+    folder: str | Path | None = None,
+    geometry: Sequence[str | Path] = (),
+) -> Bvh:
+    """Return a model and its motion as BVH.
+
+    Args:
+        model: the model.
+        motion: file of the coordinates over time (.sto, .mot); None for one frame, the default pose.
+        scale: numbers of the file per metre.
+        name: name of the file without suffix; that of the model by default.
+        folder: not used; exporters have it in common.
+        geometry: not used; exporters have it in common.
+
+    Raises:
+        SettingError: the scale is not positive.
+        ModelError: the model is not a mechanism.
+    """
+    if not 0.0 < scale < np.inf:
+        raise SettingError(f"--scale takes a positive number, not {scale:g}")
+    mechanism = build_mechanism(model)
+    times, values = np.zeros(1), np.asarray(mechanism.assemble({}), dtype=float)[None, :]
+    if motion is not None:
+        recorded = RecordedMotion.read(mechanism, motion).assembled()
+        times, values = np.asarray(recorded.times), np.asarray(recorded.values)
+    result = make_bvh(mechanism, times, values, scale=scale)
+    fidelity = Fidelity(mechanism.name, "bvh")
+    for body, joint in zip(mechanism.bodies, result.names, strict=True):
+        fidelity.translated[body.path] = f"joint {joint}"
+        if joint in result.translating:
+            fidelity.add(
+                "translation",
+                body.path,
+                "a bone whose joint moves in its parent, which some programs ignore",
+                "position channels: poses are exact where they are read",
+            )
+    known = fidelity.translated.keys()
+    for component in model.body_set.objects:
+        if isinstance(component, Body) and component.path not in known:
+            fidelity.add("body", component.path, "a body that is part of another one", LEFT_OUT)
+    if any(True for _ in model.force_set.objects):
+        fidelity.add("force", "/forceset", *CONTENTS)
+    if result.is_resampled:
+        fidelity.add(
+            "times",
+            "/",
+            "frames at unequal times",
+            "coordinates interpolated linearly to equal time steps",
+            f"{len(values)} rows became {len(result.motion.values)} frames",
+        )
+    return Bvh(name or mechanism.name or "model", result.motion, fidelity)
+
+
+class BvhMarkers:
+    """Joint centres of a BVH file as markers, for `ik` and `fit`.
+
+    Args:
+        path: the file.
+        name: name of the written file without suffix; that of the file by default.
+        scale: numbers of the file per metre.
+
+    Raises:
+        DocumentError: the file is not a BVH file, or is damaged.
+    """
+
+    def __init__(
+        self, path: str | Path, name: str | None = None, scale: float = CENTIMETRES
+    ) -> None:
+        if not 0.0 < scale < np.inf:
+            raise SettingError(f"--scale takes a positive number, not {scale:g}")
+        self.motion = read_bvh(path)
+        self.name = name or Path(path).stem
+        self._scale = scale
+        self.fidelity = Fidelity(self.name, "trc")
+        names = UniqueNames()
+        self.markers = [names(joint.name) for joint in self.motion.joints]
+        self.positions = self.motion.compute_poses()[1] / scale
+        for marker in self.markers:
+            self.fidelity.translated[f"/{marker}"] = f"marker {marker}"
+        self.fidelity.add(
+            "rotation",
+            "/",
+            "rotations of bones about their own axes",
+            f"{LEFT_OUT}: joint centres do not show them",
+        )
+
+    @property
+    def summary(self) -> dict[str, object]:
+        """Facts for ``summary.json``."""
+        return {
+            "joints": len(self.markers),
+            "frames": len(self.motion.values),
+            "frame_time_s": self.motion.frame_time,
+            "numbers_per_metre": self._scale,
+        }
+
+    def write(self, folder: str | Path) -> list[Path]:
+        """Write the markers into a folder, which is made if it does not exist."""
+        path = make_folder(folder) / f"{self.name}.trc"
+        rows = self.positions.reshape(len(self.positions), -1)
+        write_trc(path, self.motion.times.tolist(), self.markers, rows)
+        return [path]
