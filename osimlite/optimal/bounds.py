@@ -29,7 +29,7 @@ MAX_TENDON_FORCE = 5.0
 
 @dataclass(frozen=True)
 class Bounds:
-    """Bounds of one variable.
+    """Bounds of one variable, in the unit of the variable.
 
     Attributes:
         within: bounds over the whole motion.
@@ -43,29 +43,45 @@ class Bounds:
 
     @classmethod
     def from_ranges(cls, within: Range, first: Range = FREE, last: Range = FREE) -> Bounds:
-        """Return bounds whose ends are never wider than the rest, as in Moco.
+        """Return bounds in which the ends of the motion are never wider than the motion, as in Moco.
 
         Args:
             within: bounds over the motion.
             first: bounds at the start.
             last: bounds at the end.
+
+        Returns:
+            Bounds; those at the ends lie within those over the motion.
         """
         return cls(within, _intersect(first, within), _intersect(last, within))
 
 
 def _intersect(inner: Range, outer: Range) -> Range:
-    """Return the part of one range within another."""
+    """Return the part of one range within another; its ends are reversed if both have nothing in common."""
     return max(inner[0], outer[0]), min(inner[1], outer[1])
 
 
 def read_range(bounds: Any) -> Range | None:
-    """Return the range of a ``MocoBounds`` or of a list of one or two numbers; None if it is empty."""
+    """Return the range of a ``MocoBounds`` or of a list of one or two numbers.
+
+    Args:
+        bounds: bounds of the study.
+
+    Returns:
+        Range, whose ends are equal for one number; None if there is no number.
+    """
     limits = tuple(getattr(bounds, "bounds", bounds))
     return None if not limits else (float(limits[0]), float(limits[-1]))
 
 
 class _VariableInfos:
-    """Entries of a study for some variables: those by name override those by pattern."""
+    """Entries of a study for states or controls; entries by name override those by pattern.
+
+    Args:
+        patterns: entries by pattern; of several that match a name the last one counts.
+        infos: entries by name.
+        names: paths of the variables.
+    """
 
     def __init__(
         self,
@@ -80,7 +96,15 @@ class _VariableInfos:
         self.infos |= {info.name: info for info in infos}
 
     def bounds(self, name: str, default: Range) -> Bounds:
-        """Return the bounds of a variable; those that the study leaves open are `default`."""
+        """Return the bounds of a variable.
+
+        Args:
+            name: path of the variable.
+            default: bounds over the motion if the study gives none.
+
+        Returns:
+            Bounds of the variable; ends without an entry have those over the motion.
+        """
         info = self.infos.get(name)
         if info is None:
             return Bounds.from_ranges(default)
@@ -138,6 +162,8 @@ def find_state_bounds(
         Bounds by path.
     """
     infos = _VariableInfos(phase.state_infos_pattern, phase.state_infos, names)
+    # Coordinates have a range, but the schema of coordinates has none for speeds: the phase gives
+    # one for all of them.
     speeds = read_range(phase.default_speed_bounds) or FREE
     result = {}
     for name in names:
@@ -168,20 +194,35 @@ def find_state_bounds(
 
 
 def compute_scaling(low: float, high: float) -> tuple[float, float]:
-    """Compute the factor and the offset of a variable, ``w = factor x + offset``, as Moco does.
+    """Compute the factor and the offset of a variable ``w = factor x + offset``, as Moco does.
+
+    Args:
+        low: lower bound of w.
+        high: upper bound of w.
 
     Returns:
-        Width of the bounds, and the negative of their middle; (1, 0) without finite bounds, (1,
-        bound) if both bounds are equal.
+        Width of the bounds, and the negative of their middle; (1, 0) without finite bounds, and
+        (1, bound) if both bounds are equal.
     """
     width = high - low
     if not math.isfinite(width):
         return 1.0, 0.0
+    # The offset has Moco's sign. It does not center x on zero, but costs on squares of x must agree
+    # with Moco.
     return (width, -0.5 * (high + low)) if width else (1.0, high)
 
 
 def compute_midpoint(low: Array, high: Array) -> Array:
-    """Return the middle between bounds, the only bound, or zero: where a search starts."""
+    """Return the point where a search starts without a guess.
+
+    Args:
+        low: lower bounds (n,).
+        high: upper bounds (n,).
+
+    Returns:
+        Middle between the bounds (n,); the finite bound if there is only one, and zero without any.
+    """
+    # Infinite bounds become 0 before the sum, as inf - inf would be NaN.
     has_low = np.isfinite(low)
     has_high = np.isfinite(high)
     ends = np.where(has_low, low, 0.0), np.where(has_high, high, 0.0)

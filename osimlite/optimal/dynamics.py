@@ -14,15 +14,23 @@ if TYPE_CHECKING:
 
 
 class Dynamics:
-    """Rates of the states and residuals at a point.
+    """Rates of the states and residuals of the equations of motion at a point.
 
-    Multipliers are variables at all points and act as generalized forces ``Gᵀ multipliers``. The
-    model's constraints are equations at the points of the mesh (M. Posa et al., ICRA 2016), or at
-    all points for accelerations if states are projected onto the constraints at the end of
-    intervals (R. Bordalba et al., IEEE Transactions on Robotics 39, 2023).
+    Multipliers are variables at all points. As in Moco they push with the generalized forces ``-Gᵀ
+    multipliers``, N or N m. The model's constraints are equations at the points of the mesh (M.
+    Posa et al., ICRA 2016), or at all points for accelerations if states are projected onto the
+    constraints at the end of intervals (R. Bordalba et al., IEEE Transactions on Robotics 39,
+    2023).
+
+    Args:
+        problem: problem with the functions of the model.
 
     Attributes:
+        problem: problem with the functions of the model.
+        functions: CasADi functions of the model.
         is_implicit: whether accelerations are variables.
+        size: number of coordinates.
+        tendons: equations of the muscles with implicit tendon dynamics.
     """
 
     def __init__(self, problem: Problem) -> None:
@@ -38,12 +46,26 @@ class Dynamics:
         return [(item.path, item) for item in self.functions.forces.elements]
 
     def compute_path_lengths(self, point: Point) -> tuple[Formula, Formula]:
-        """Compute lengths (m) and lengthening speeds (m/s) of the paths of ``functions.path_names``."""
+        """Compute the lengths and speeds of the paths of ``functions.path_names``.
+
+        Args:
+            point: point of the grid.
+
+        Returns:
+            Lengths (m, 1), m, and lengthening speeds (m, 1), m/s.
+        """
         lengths, speeds, _ = self.functions.paths(point.t, point.x, point.p)
         return lengths, speeds
 
     def compute_rates(self, point: Point) -> Formula:
-        """Compute the time derivative of the complete state."""
+        """Compute the time derivative of the complete state (n, 1): speeds, accelerations, auxiliary rates.
+
+        With explicit dynamics the accelerations are symbols, and the point receives the equations
+        that determine them.
+
+        Args:
+            point: point of the grid.
+        """
         size = self.size
         f = self.functions
         speeds = point.x[size : 2 * size]
@@ -64,30 +86,49 @@ class Dynamics:
         )
 
     def _insert_tendon_rates(self, point: Point, rates: Formula) -> Formula:
-        """Return the rates with those rates of tendon forces that are variables."""
+        """Return the rates with those rates of tendon forces that are variables in their places.
+
+        Args:
+            point: point of the grid.
+            rates: rates of the complete state (n, 1), which this changes.
+        """
         for number, path in enumerate(self.tendons.paths):
             place = self.functions.states.index(f"{path}/normalized_tendon_force")
             rates[place] = point.derivatives[self._first_rate + number]
         return rates
 
     def _compute_auxiliary_rates(self, point: Point) -> Formula:
-        """Compute the rates of the auxiliary states by the force laws."""
+        """Compute the rates of the auxiliary states by the force laws, in the order of the states."""
         none = casadi.SX.zeros(len(self.functions.states))
         f = self.functions
+        # The residual of an auxiliary state is its rate less the law's rate: at zero rates it is
+        # the negative of the law's rate.
         return -f.residual(point.t, point.x, none, point.u, point.p, point.multipliers)[
             2 * self.size :
         ]
 
     def correct_rates(self, point: Point) -> Formula:
-        """Return the rates with the velocity correction that keeps states on the constraints (Posa et al.)."""
+        """Return the rates with the velocity correction that keeps states on the constraints (Posa et al.).
+
+        Args:
+            point: point of the grid.
+
+        Returns:
+            Rates (n, 1), whose first part is ``speeds + Gᵀ slacks`` where the point has slacks.
+        """
         rates = point.rates
+        # With projection the slacks move states at the end of an interval instead:
+        # compute_projection_errors.
         if self.problem.uses_projection or not point.slacks.numel():
             return rates
         g = self.functions.constraints(point.t, point.x, rates, point.p)[3]
         return casadi.vertcat(rates[: self.size] + g.T @ point.slacks, rates[self.size :])
 
     def compute_residuals(self, point: Point) -> tuple[list[str], Formula]:
-        """Compute the residuals that are zero at all points.
+        """Compute the residuals that are zero at all points: of implicit dynamics, then of implicit tendons.
+
+        Args:
+            point: point of the grid.
 
         Returns:
             Names of the residuals, and the residuals (k, 1).
@@ -97,6 +138,8 @@ class Dynamics:
             return names, errors
         f = self.functions
         size = self.size
+        # The interval ends at the state before projection, so that its equations of motion hold
+        # there.
         point = point.before_projection
         rows = f.residual(point.t, point.x, point.rates, point.u, point.p, point.multipliers)[
             size : 2 * size
@@ -119,6 +162,8 @@ class Dynamics:
         labels = self.problem.constraint_names
         if not problem.has_constraints or not (is_mesh or problem.uses_projection):
             return [], casadi.SX(0, 1)
+        # Positions and speeds hold for the projected state; the accelerations belong to the state
+        # at which the interval ended.
         position, velocity, _, _ = self._evaluate_constraints(point)
         acceleration = self._evaluate_constraints(point.before_projection)[2]
         if not is_mesh:
@@ -137,12 +182,14 @@ class Dynamics:
             frame: path of the frame along whose axes the load is expressed.
 
         Returns:
-            Function that returns moment (N m) and force (N), (6, 1).
+            Function of a point that returns the column of moment (N m) and force (N), (6, 1).
         """
         load = self.functions.joint_load(path, side)
 
         def formula(point: Point) -> Formula:
             force, moment = load(point.t, point.x, point.rates, point.u, point.p, point.multipliers)
+            # The kernels give loads in ground; the transposed rotation expresses them along the
+            # axes of the frame.
             turn = point.frame(frame).rotation.T
             return casadi.vertcat(turn @ moment, turn @ force)
 
@@ -154,18 +201,22 @@ class Dynamics:
         """Return the function of a point for the generalized forces that the motion needs.
 
         Args:
-            pushing: paths of forces that act; gravity acts as well.
+            pushing: paths of the forces that act; gravity acts as well.
             coordinates: paths of the coordinates.
 
         Returns:
-            Function that returns the generalized forces still missing, N and N m.
+            Function of a point that returns the generalized forces still missing (k, 1), N and N m.
         """
         missing = self.functions.generalized_forces(pushing)
         rows = [*map(self.functions.coordinates.index, coordinates)]
         return lambda point: missing(point.t, point.x, point.rates, point.u, point.p)[rows]
 
     def _evaluate_constraints(self, point: Point) -> Sequence[Formula]:
-        """Return the errors of positions, speeds and accelerations, and the Jacobian G of the constraints."""
+        """Return the errors of the model's constraints at a point.
+
+        Returns:
+            Errors of positions, speeds and accelerations (c, 1) each, and the Jacobian G (c, n).
+        """
         result: Sequence[Formula] = self.functions.constraints(
             point.t, point.x, point.rates, point.p
         )
@@ -175,6 +226,9 @@ class Dynamics:
         """Compute the errors of projected values and speeds: ``x - projections - Gᵀ slacks``.
 
         The first half of the slacks moves values and the second half speeds, as in Moco.
+
+        Args:
+            point: end of an interval.
 
         Returns:
             Names of the errors, and the errors (k, 1).

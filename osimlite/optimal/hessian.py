@@ -11,10 +11,17 @@ from osimlite.optimal.sparse import SparseMatrix
 
 
 class Hessian:
-    """Upper triangle of the second derivatives of ``factor f + multipliers · g``, as CasADi's Ipopt wants it.
+    """Upper triangle of the second derivatives of ``factor f + multipliers · g``, which CasADi's Ipopt reads.
+
+    Args:
+        program: nonlinear program.
 
     Attributes:
+        program: nonlinear program.
         sparsity: sparsity pattern of the result of `compute_entries`.
+
+    Raises:
+        UnsupportedError: a goal is not linear in its integral, which would couple all points.
     """
 
     def __init__(self, program: Program) -> None:
@@ -23,8 +30,10 @@ class Hessian:
         for group in program.groups:
             group.make_hessian()
         rows, columns = program._entries("hessian_rows", "hessian_columns")
+        # E depends on the variables at both ends (`direct` of them), then on the integrals.
         direct = len(program.end_columns)
         pattern = program._end_hessian_pattern
+        # The product of two integrals depends on each pair of points: a dense Hessian.
         if pattern[direct:, direct:].any():
             raise program.problem.unsupported_error(
                 program.problem.solver,
@@ -40,11 +49,14 @@ class Hessian:
             for _, k in self._mixed
         ]
         self._far = far
+        # Each pair is sorted, as an entry of the upper triangle has its row before its column.
         near = [
             np.sort([np.full(len(each), program.end_columns[i]), each], axis=0)
             for (i, _), each in zip(self._mixed, far, strict=True)
         ]
         parts = [(rows, columns), (inner, outer), *((pair[0], pair[1]) for pair in near)]
+        # One integer per place, column by column as in CasADi's patterns: equal places of several
+        # parts are added.
         keys = np.concatenate([c.astype(np.int64) * width + r for r, c in parts])
         unique, inverse = np.unique(keys, return_inverse=True)
         self._map = SparseMatrix.from_entries(
@@ -55,12 +67,15 @@ class Hessian:
         )
 
     def compute_entries(self, w: Array, factor: float, multipliers: Array) -> Array:
-        """Return the entries of the upper triangle in the order of `sparsity`.
+        """Compute the entries of the upper triangle.
 
         Args:
             w: variables (n,).
             factor: factor of the objective.
             multipliers: multipliers of the constraints (m,).
+
+        Returns:
+            Entries in the order of `sparsity`.
         """
         program = self.program
         direct = len(self.program.end_columns)
@@ -69,6 +84,8 @@ class Hessian:
         multipliers_of_points = multipliers[: program._row_count]
         at_ends = multipliers[program._row_count :]
         cost, end_slopes = (part.T for part in program._end_slope(*end_arguments))
+        # E is linear in the integrals: its derivative by an integral acts like the multiplier of
+        # its row.
         of_integrals = factor * cost.ravel()[direct:] + at_ends @ end_slopes[:, direct:]
         row_multipliers = program._b.multiply_transpose(
             np.concatenate([multipliers_of_points, of_integrals])
@@ -87,6 +104,7 @@ class Hessian:
         if self._mixed:
             integrals = program._compute_slopes(w)[3]
             for (i, k), far in zip(self._mixed, self._far, strict=True):
+                # The product rule gives both (i, j) and (j, i); on the diagonal both are one entry.
                 twice = np.where(far == program.end_columns[i], 2.0, 1.0)
                 parts.append(ends[i, direct + k] * integrals[k, far] * twice)
         return self._map @ np.concatenate(parts)

@@ -1,4 +1,4 @@
-"""MocoInverse: muscle controls in a prescribed motion."""
+"""MocoInverse: controls of actuators for a prescribed motion."""
 
 from __future__ import annotations
 
@@ -47,10 +47,13 @@ def build_inverse_problem(
 
     Args:
         tool: settings.
-        file: setup file of the settings; None if there is none.
+        file: setup file of the settings; None for settings that were not read from a file.
         folder: folder of the files that settings without a file name.
         more: function that changes the study before the problem is built: goals, bounds, solver.
         scaled: as for :func:`osimlite.moco.solve`.
+
+    Returns:
+        Problem whose functions are a :class:`~osimlite.optimal.prescribed_motion.PrescribedMotion`.
 
     Raises:
         OsimliteError: the settings or their files are invalid.
@@ -74,6 +77,7 @@ def build_inverse_problem(
         solver.optim_max_iterations = tool.max_iterations
     study = make_study(tool, model, solver)
     phase = study.problem.phases
+    # ModOpAddReserves names its actuators so. They are weighted apart, as they must not replace muscles.
     reserves = MocoWeight(name=".*/reserve_.*", weight=tool.reserves_weight)
     effort = MocoControlGoal(name="excitation_effort")
     effort.control_weights_pattern = MocoWeightSet(
@@ -110,7 +114,7 @@ def solve_inverse(
     refine: float | str | Refinement | None = None,
     scaled: Mapping[str, str] | None = None,
 ) -> MocoSolution:
-    """Find the muscle controls of a prescribed motion, as OpenSim's MocoInverse.
+    """Find the controls of muscles and other actuators for a prescribed motion, as OpenSim's MocoInverse.
 
     Args:
         tool: settings.
@@ -119,6 +123,9 @@ def solve_inverse(
         tell: function that is called with the progress after each iteration.
         refine: as for :func:`osimlite.moco.solve`.
         scaled: as for :func:`osimlite.moco.solve`.
+
+    Returns:
+        Solution, whose states include the values and speeds of the prescribed motion.
 
     Raises:
         OsimliteError: as for :func:`build_inverse_problem`.
@@ -134,12 +141,15 @@ def solve_inverse_problem(
     tell: Callable[[Progress], None] | None,
     refine: float | str | Refinement | None = None,
 ) -> MocoSolution:
-    """Solve the problem of a MocoInverse; the solution includes the values and speeds of the prescribed motion.
+    """Solve the problem of a MocoInverse.
 
     Args:
         problem: problem of :func:`build_inverse_problem`.
         tell: function that is called with the progress after each iteration.
         refine: as for :func:`osimlite.moco.solve`.
+
+    Returns:
+        Solution, whose states include the values and speeds of the prescribed motion.
     """
     motion: PrescribedMotion = problem.functions
     solution = solve_program(Program(problem), None, tell, refine)
@@ -155,6 +165,11 @@ def _read_kinematics(
     context: StudyContext, tool: MocoInverse, model: Model
 ) -> tuple[StoTable, Callable[[Array], Array]]:
     """Read the kinematics of a MocoInverse.
+
+    Args:
+        context: tool with its folder, for messages.
+        tool: settings.
+        model: processed model.
 
     Returns:
         The table, and the motion of all coordinates: splines through poses that fulfil the model's
@@ -178,6 +193,8 @@ def _read_kinematics(
     values[:, [names.index(name) for name in tracked]] = np.column_stack(
         [table[name] for name in tracked]
     )
+    # Measured values fulfil the constraints only nearly, and coordinates without a column start at
+    # their default value.
     poses = np.array(
         [mechanism.assemble(q, t) for t, q in zip(table.times.tolist(), values, strict=True)]
     )

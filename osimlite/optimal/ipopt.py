@@ -97,16 +97,20 @@ class SolverResult:
 def find_violations(
     program: Program, w: Array, rows: Array | None = None, most: int = 10
 ) -> list[Violation]:
-    """Return the largest violations of the constraints, the largest first.
+    """Find the largest violations of the constraints, the largest first.
 
     Args:
         program: nonlinear program.
         w: variables (n,).
-        rows: values of g at `w`; None to compute them.
+        rows: values of g at `w` (m,); None to compute them.
         most: maximum number of violations.
+
+    Returns:
+        Violations of constraints that do not hold.
     """
     rows = program.compute_values(w)[1] if rows is None else rows
     size = np.maximum(np.maximum(program.lower - rows, rows - program.upper), 0.0)
+    # NaN would be last in the order; as the largest violation it is reported first.
     size = np.where(np.isfinite(size), size, np.inf)
     result = []
     for row in np.argsort(-size)[:most]:
@@ -130,9 +134,12 @@ def run_ipopt(
 
     Args:
         program: nonlinear program.
-        guess: initial variables (n,).
+        guess: initial variables (n,); those outside their bounds are moved onto them.
         report: function that is called with the progress after each iteration.
         near: whether the guess is nearly a solution, so that Ipopt must not move it off its bounds.
+
+    Returns:
+        Variables with Ipopt's status; of a search without success, the best iterate.
 
     Raises:
         SimulationError: the objective or a constraint is not a number.
@@ -205,7 +212,7 @@ def _uses_exact_hessian(program: Program) -> bool:
 
 
 def _make_options(program: Program) -> dict[str, Any]:
-    """Return Ipopt's options, set as Moco sets them."""
+    """Return Ipopt's options: those of Moco, except where a comment says otherwise."""
     settings = program.problem.solver
     options = dict[str, Any]()
     is_exact = _uses_exact_hessian(program)
@@ -249,7 +256,14 @@ def _describe_invalid_number(program: Program, guess: Array) -> str:
 
 
 class _ArrayCallback(casadi.Callback):  # type: ignore[misc]
-    """CasADi function that a Python function computes from NumPy arrays."""
+    """CasADi function that a Python function computes from NumPy arrays.
+
+    Args:
+        name: name of the CasADi function.
+        inputs: sparsity of each argument by its name.
+        outputs: sparsity of each result by its name.
+        law: function of one array of nonzeros per argument that returns those of each result.
+    """
 
     def __init__(
         self, name: str, inputs: dict[str, Any], outputs: dict[str, Any], law: Callable[..., Any]
@@ -302,6 +316,21 @@ class _SearchCallbacks:
 
     Ipopt searches for scaled variables x, from which the variables follow as ``w = factors x +
     offsets``.
+
+    Args:
+        program: nonlinear program.
+        report: function that is called with the progress after each iteration.
+
+    Attributes:
+        stops: whether Ipopt stops after the current iteration.
+        count: number of iterations so far.
+        best: variables w of the best iterate (n,); None before the first iteration.
+        factors: factors of the scaling (n,).
+        offsets: offsets of the scaling (n,).
+        objective: CasADi function of f and g.
+        gradient: CasADi function of the gradient of f by x.
+        jacobian: CasADi function of the Jacobian of g by x.
+        record_iteration: CasADi function that Ipopt calls after each iteration.
     """
 
     def __init__(self, program: Program, report: Callable[[Progress], None] | None) -> None:
@@ -313,6 +342,8 @@ class _SearchCallbacks:
         self._best = (np.inf, np.inf)
         self.factors, self.offsets = program.layout.scaling
         columns = np.array(program.jacobian_sparsity.get_triplet()[1], dtype=int)
+        # By the chain rule, a column of the Jacobian by x is that by w times the factor of its
+        # variable.
         self._column_factors = self.factors[columns]
         width = len(program.layout.lower)
         rows = len(program.labels)
@@ -335,6 +366,8 @@ class _SearchCallbacks:
             {"g": _make_dense_column(rows), "jac_g_x": program.jacobian_sparsity},
             self._jacobian,
         )
+        # CasADi passes all results of its solver to the callback of an iteration, so that it has
+        # one argument for each.
         result_names = [casadi.nlpsol_out(index) for index in range(casadi.nlpsol_n_out())]
         outputs = {name: _make_dense_column(sizes.get(name, 0)) for name in result_names}
         self.record_iteration = _ArrayCallback(
@@ -353,6 +386,7 @@ class _SearchCallbacks:
         costs, rows = self._values_at(x)
         return costs.sum(), rows
 
+    # The first result of CasADi's signature is f again, or g below: Ipopt gets both from `objective`.
     def _gradient(self, x: Array, *_: Array) -> tuple[Any, ...]:
         return 0.0, self._slopes_at(x)[0] * self.factors
 
@@ -361,7 +395,16 @@ class _SearchCallbacks:
 
     # ---------------------------------------------------------------------------------------- after an iteration
     def _record_iteration(self, x: Array, f: Array, rows: Array, *_: Array) -> tuple[Any, ...]:
-        """Keep the best iterate, report the progress, and tell Ipopt whether to stop."""
+        """Keep the best iterate, report the progress, and tell Ipopt whether to stop.
+
+        Args:
+            x: scaled variables (n,).
+            f: objective (1,).
+            rows: values of g (m,).
+
+        Returns:
+            1 to stop the search, else 0.
+        """
         objective = float(f[0])
         worst = find_violations(self.program, self.unscale(x), rows, most=1)
         size = worst[0].size if worst else 0.0
@@ -395,11 +438,12 @@ class _SearchCallbacks:
 
 
 def _make_hessian_callback(program: Program, search: _SearchCallbacks) -> Any:
-    """Return the CasADi function of the scaled Hessian of the Lagrangian."""
+    """Return the CasADi function of the Hessian of the Lagrangian by the scaled variables, upper triangle."""
     hessian = Hessian(program)
     first, second = (
         search.factors[np.array(indices, dtype=int)] for indices in hessian.sparsity.get_triplet()
     )
+    # Names and order of these arguments are CasADi's signature of the function hess_lag.
     inputs = {
         "x": _make_dense_column(len(program.layout.lower)),
         "p": casadi.Sparsity(0, 0),

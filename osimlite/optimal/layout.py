@@ -25,13 +25,21 @@ PROJECTION_SUFFIX = "/projection"
 class Layout:
     """Vector of variables: initial and final time, parameters, then the variables of each point in turn.
 
+    Args:
+        problem: problem with the bounds of all variables.
+
     Attributes:
+        problem: problem with the bounds of all variables.
         names: names of the variables of a point, by kind.
-        shared: number of variables before those of the first point.
+        bounds: bounds of the variables of a point, by kind.
+        shared: number of variables before those of the first point: times and parameters.
         point_indices: indices of the variables of each point.
         indices: indices (points, names) of the variables by kind; -1 where a point has none.
         lower: lower bounds (n,).
         upper: upper bounds (n,).
+
+    Raises:
+        DocumentError: the bounds of a variable exclude each other.
     """
 
     def __init__(self, problem: Problem) -> None:
@@ -122,7 +130,12 @@ class Layout:
     def has_kind(self, kind: str, point: int) -> bool:
         """Return whether a point has variables of a kind.
 
-        Velocity corrections are at points between nodes, projections at the ends of intervals.
+        Velocity corrections are at points between nodes, projections and their slacks at the ends
+        of intervals.
+
+        Args:
+            kind: one of `VARIABLE_KINDS`.
+            point: index of the point.
         """
         if kind == "slacks" and not self.problem.uses_projection:
             return not self.problem.grid.is_mesh[point]
@@ -132,10 +145,13 @@ class Layout:
 
     @cached_property
     def scaling(self) -> tuple[Array, Array]:
-        """Factors (n,) and offsets (n,) with which the search scales the variables.
+        """Factors and offsets with which the search scales the variables; 1 and 0 if it does not.
 
         Each variable is scaled by its own bounds; Moco 4.6 takes those of the last variable of a
         kind for all of that kind.
+
+        Returns:
+            Factors (n,), and offsets (n,), see :func:`~osimlite.optimal.bounds.compute_scaling`.
         """
         scale = np.ones(len(self.lower))
         shift = np.zeros(len(self.lower))
@@ -150,13 +166,17 @@ class Layout:
         return scale, shift
 
     def make_guess(self) -> Array:
-        """Return the middle between the bounds of each variable, as Moco's default guess."""
+        """Return the middle between the bounds of each variable (n,), as Moco's default guess."""
         return compute_midpoint(self.lower, self.upper)
 
     def guess_from_trajectory(self, trajectory: Any) -> Array:
-        """Return the variables of a trajectory, interpolated by splines.
+        """Return the variables of a trajectory, interpolated by splines at the points of the grid.
 
-        Variables that the trajectory lacks are in the middle between their bounds.
+        Args:
+            trajectory: trajectory with its times, columns and parameters.
+
+        Returns:
+            Variables (n,); those that the trajectory lacks are in the middle between their bounds.
         """
         result = self.make_guess()
         times = trajectory.times
@@ -164,6 +184,7 @@ class Layout:
         at = times[0] + self.problem.grid.fractions * (times[-1] - times[0])
         for kind in VARIABLE_KINDS:
             for number, name in enumerate(self.names[kind]):
+                # Files hold no states before projection; the projected ones are near them.
                 column = trajectory.columns.get(name.removesuffix(PROJECTION_SUFFIX))
                 if column is not None:
                     indices = self.indices[kind][:, number]
@@ -174,7 +195,7 @@ class Layout:
         return result
 
     def describe_variable(self, index: int) -> str:
-        """Return the name of a variable."""
+        """Return the name of a variable by its index, for messages."""
         if index < self.shared:
             return ["initial time", "final time", *self.problem.parameters][index]
         for kind in VARIABLE_KINDS:
@@ -185,13 +206,17 @@ class Layout:
 
 
 def _resample(times: Array, column: Array, at: Array) -> Array:
-    """Interpolate a column: by a natural spline of fifth degree as Moco, linearly if there are few times.
+    """Interpolate a column: by a natural spline of fifth degree as Moco, linearly with few times.
 
     Args:
         times: times (n,), s.
         column: values (n,); those that are not finite are skipped.
         at: times of the result (m,), s.
+
+    Returns:
+        Values at these times (m,).
     """
+    # On the same grid the values are kept, so that a solution evaluates to what was written.
     if len(times) == len(at) and np.allclose(times, at, rtol=0.0, atol=1e-12):
         return column
     known = np.isfinite(column)

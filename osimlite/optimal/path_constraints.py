@@ -34,7 +34,12 @@ if TYPE_CHECKING:
 def build_control_bound_rows(
     constraint: MocoControlBoundConstraint, problem: Problem
 ) -> ConstraintRows:
-    """Return the difference of each control from each of the bounding functions."""
+    """Return the difference of each control from each of the bounding functions of time.
+
+    Args:
+        constraint: constraint of the study.
+        problem: problem with the controls.
+    """
     paths = [str(path) for path in constraint.control_paths]
     for path in paths:
         problem.check_name(constraint, path, problem.controls, "control")
@@ -44,7 +49,12 @@ def build_control_bound_rows(
 def build_state_bound_rows(
     constraint: MocoStateBoundConstraint, problem: Problem
 ) -> ConstraintRows:
-    """Return the difference of each state from each of the bounding functions."""
+    """Return the difference of each state from each of the bounding functions of time.
+
+    Args:
+        constraint: constraint of the study.
+        problem: problem with the states.
+    """
     paths = [str(path) for path in constraint.state_paths]
     for path in paths:
         problem.check_name(constraint, path, problem.functions.states, "state")
@@ -54,7 +64,12 @@ def build_state_bound_rows(
 def build_output_bound_rows(
     constraint: MocoOutputBoundConstraint, problem: Problem
 ) -> ConstraintRows:
-    """Return the difference of the output from each of the bounding functions."""
+    """Return the difference of the output from each of the bounding functions of time.
+
+    Args:
+        constraint: constraint of the study.
+        problem: problem with the components.
+    """
     value = build_output_formula(constraint, problem)
     paths = [constraint.output_path]
     return build_bound_rows(constraint, problem, paths, lambda point, _: value(point))
@@ -63,7 +78,15 @@ def build_output_bound_rows(
 def build_frame_distance_rows(
     constraint: MocoFrameDistanceConstraint, problem: Problem
 ) -> ConstraintRows:
-    """Return the squared distances, m², of pairs of frame origins, as OpenSim bounds them."""
+    """Return the squared distances, m², of pairs of frame origins, as OpenSim bounds them.
+
+    Args:
+        constraint: constraint of the study.
+        problem: problem with the frames.
+
+    Raises:
+        DocumentError: a frame does not exist, or the distances of a pair exclude each other.
+    """
     pairs = []
     limits = []
     for pair in constraint.frame_pairs:
@@ -78,6 +101,7 @@ def build_frame_distance_rows(
                 f"minimum_distance {near:g} m and maximum_distance {far:g} m exclude each other",
             )
         pairs.append(ends)
+        # A squared distance has a slope everywhere, unlike the distance at zero.
         limits.append((near * near, far * far))
     project = make_projection(constraint, problem)
 
@@ -103,6 +127,9 @@ def build_bound_rows(
         paths: paths of the variables.
         variable: function of a point and a path that returns the variable.
 
+    Returns:
+        Rows in the unit of the variables: those of the first variable first.
+
     Raises:
         DocumentError: the constraint has no function, or a wrong set of them.
     """
@@ -116,6 +143,7 @@ def build_bound_rows(
             raise problem.invalid_error(
                 constraint, "equality_with_lower requires a lower_bound and no upper_bound"
             )
+        # Both bounds of the difference are zero: the variable equals the function.
         functions = [(constraint.lower_bound, (0.0, 0.0))]
     series = [
         problem.add_time_function(

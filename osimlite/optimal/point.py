@@ -1,4 +1,4 @@
-"""Formulas at one point of the grid, of which goals and constraints are made."""
+"""Formulas at one point of the grid, from which goals and constraints are made."""
 
 from __future__ import annotations
 
@@ -36,9 +36,13 @@ class TimeFunction:
     factor: int | None = None
 
     def expand(self, t: Formula, known: Formula) -> Formula:
-        """Return the value by a Taylor expansion about the time `known[0]`.
+        """Return the value by a Taylor expansion about the time ``known[0]``.
 
-        The expansion is renewed for each time, so that value and both derivatives are exact.
+        The expansion is renewed for each time, so that value and both derivatives are exact there.
+
+        Args:
+            t: time, s.
+            known: data of the functions of time, see :class:`Point`.
         """
         first = 1 + 3 * self.number
         since = t - known[0]
@@ -46,29 +50,37 @@ class TimeFunction:
 
 
 class Frame(NamedTuple):
-    """Pose and velocity of a frame in ground."""
+    """Pose and velocity of a frame in ground.
 
-    position: Formula  # (3, 1), m
-    rotation: Formula  # (3, 3)
-    velocity: Formula  # of its origin (3, 1), m/s
-    angular_velocity: Formula  # (3, 1), rad/s
+    Attributes:
+        position: position of the origin (3, 1), m.
+        rotation: rotation matrix from the frame to ground (3, 3).
+        velocity: velocity of the origin (3, 1), m/s.
+        angular_velocity: angular velocity (3, 1), rad/s.
+    """
+
+    position: Formula
+    rotation: Formula
+    velocity: Formula
+    angular_velocity: Formula
 
 
 @dataclass(eq=False)
 class Point:
-    """Symbols at one time of the motion, and formulas that follow from them.
+    """Symbols of the variables at one time of the motion, and formulas of them.
 
     Attributes:
         problem: optimal control problem.
         t: time, s, followed by the time-dependent loads of the model (`problem.functions.loads`).
-        x: complete state in the order of `problem.functions.states`, prescribed states included.
-        u: controls in the order of `problem.functions.controls`.
-        multipliers: multipliers of the model's constraints.
+        x: complete state (n, 1) in the order of `problem.functions.states`.
+        u: controls (m, 1) in the order of `problem.functions.controls`; 0 for actuators that do not
+            act.
+        multipliers: multipliers of the model's constraints (c, 1).
         derivatives: accelerations and rates of auxiliary states that are variables; empty if
             explicit.
         slacks: velocity corrections or projection slacks, if the point has them.
         p: values of the model's parameters, one for each number of the model.
-        parameters: parameters of the problem.
+        parameters: parameters of the problem; each may stand for several of `p`.
         known: data of the functions of time: the time of the expansion, and value, first and second
             derivative of each function there.
         projections: values and speeds at the end of the interval before they are projected onto the
@@ -93,17 +105,18 @@ class Point:
 
     @cached_property
     def before_projection(self) -> Point:
-        """The same point with the values and speeds before projection."""
+        """Return the same point with the values and speeds before projection; itself without projections."""
         size = self.projections.numel()
         x = casadi.vertcat(self.projections, self.x[size:])
+        # The copy shares `linear_systems`, to which its own accelerations are added.
         return replace(self, x=x, _outputs={}) if size else self
 
     def state(self, path: str) -> Formula:
-        """Return the state with a path."""
+        """Return the state with a path such as ``/jointset/knee/knee_angle/value``."""
         return self.x[self.problem.functions.states.index(path)]
 
     def control(self, path: str) -> Formula:
-        """Return the control with a path."""
+        """Return the control with the path of its actuator."""
         return self.u[self.problem.functions.controls.index(path)]
 
     def evaluate(self, series: TimeFunction) -> Formula:
@@ -113,17 +126,17 @@ class Point:
 
     @cached_property
     def rates(self) -> Formula:
-        """Time derivative of the complete state by the dynamics of the problem."""
+        """Return the time derivative of the complete state (n, 1) by the dynamics of the problem."""
         return self.problem.dynamics.compute_rates(self)
 
     @property
     def accelerations(self) -> Formula:
-        """Accelerations of the coordinates, in the order of `problem.functions.coordinates`."""
+        """Return the accelerations (k, 1) in the order of `problem.functions.coordinates`, m/s² or rad/s²."""
         size = len(self.problem.functions.coordinates)
         return self.rates[size : 2 * size]
 
     def output(self, name: str) -> dict[str, Formula]:
-        """Return a group of outputs of the model by label.
+        """Return a group of outputs of the model.
 
         Args:
             name: name of a result of ``functions.outputs``.
@@ -141,12 +154,14 @@ class Point:
         return {label: self._outputs[name][place] for place, label in enumerate(labels)}
 
     def frame(self, path: str) -> Frame:
-        """Return the pose and velocity of a frame of the model."""
+        """Return the pose and velocity of a frame of the model by its path."""
         found = self.problem.functions.frames([path])(self.t, self.x, self.p)
+        # Each frame is a column of nine numbers, the rotation matrix column by column.
         return Frame(found[0], casadi.reshape(found[1], 3, 3), *found[2:])
 
     def acceleration(self, frame: Frame) -> Formula:
-        """Return the acceleration of the origin of a frame (3, 1), m/s²."""
+        """Return the acceleration of the origin of a frame in ground (3, 1), m/s²."""
+        # The velocity depends on time by the state alone, so that the chain rule gives its rate.
         return casadi.jtimes(frame.velocity, self.x, self.rates)
 
     def mass_center(self) -> Formula:
@@ -184,7 +199,7 @@ CONSTRAINT_FIRST = "endpoint_constraint", "cost"
 
 @dataclass(frozen=True, eq=False)
 class GoalTerms:
-    """Formulas of a goal.
+    """Terms of one goal as formulas.
 
     As a cost, a goal with several values counts by their sum; a goal that is a constraint by
     default by the sum of their squares.
@@ -192,7 +207,8 @@ class GoalTerms:
     Attributes:
         value: function of both ends and the integral that returns the value or the column of
             values.
-        integrand: function of a point whose integral `value` needs; None if there is none.
+        integrand: function of a point whose integral `value` needs; None for a goal without
+            integral.
         modes: modes that the goal can have, its default first: COST_ONLY, COST_FIRST,
             CONSTRAINT_FIRST.
         is_sum: whether the integrand is summed over all points instead of integrated.
@@ -206,11 +222,11 @@ class GoalTerms:
 
 @dataclass(frozen=True, eq=False)
 class ConstraintRows:
-    """Formulas of a path constraint.
+    """Rows of one path constraint as formulas.
 
     Attributes:
         labels: names of the values, for messages.
-        formula: function of a point that returns the column of values.
+        formula: function of a point that returns the column of values (k, 1).
         limits: lower and upper bound of each value.
     """
 
@@ -222,14 +238,19 @@ class ConstraintRows:
 def make_integral_terms(
     integrand: Callable[[Point], Formula], modes: tuple[str, ...] = COST_ONLY
 ) -> GoalTerms:
-    """Return the terms of a goal that is the integral of an integrand over time."""
+    """Return the terms of a goal that is the integral of an integrand over time.
+
+    Args:
+        integrand: function of a point that returns a number.
+        modes: modes of the goal, its default first.
+    """
     return GoalTerms(lambda ends: ends.integral, integrand, modes)
 
 
 def make_projection(
     part: MocoContactTrackingGoal | MocoFrameDistanceConstraint, problem: Problem
 ) -> Callable[[Formula], Formula]:
-    """Return the function that projects vectors in ground (3, 1) as the property ``projection`` says.
+    """Return the function that projects vectors in ground (3, 1) by the property ``projection``.
 
     Args:
         part: goal or constraint with the property.

@@ -20,7 +20,7 @@ SX: Any = casadi.SX
 
 
 class BufferedFunction:
-    """CasADi function on NumPy arrays, called through buffers: its own call spends more time on conversions.
+    """CasADi function on NumPy arrays, called through buffers: CasADi's own call mostly converts arguments.
 
     Args:
         function: CasADi function of dense matrices.
@@ -37,20 +37,33 @@ class BufferedFunction:
                 self._buffer.set_res(k, array.reshape(-1).data)
 
     def __call__(self, *values: Array) -> list[Array]:
-        """Return the results; the rows of arguments and results are the columns of CasADi's matrices."""
+        """Return the results for some arguments.
+
+        Args:
+            values: array of each argument; its rows are the columns of CasADi's matrix.
+
+        Returns:
+            Array of each result, whose rows are the columns of CasADi's matrix.
+        """
         for buffer, array in zip(self._inputs, values, strict=True):
             buffer[:] = array.reshape(-1)
         self._run()
+        # The next call overwrites the buffers.
         return [array.copy() for array in self._results]
 
 
 def cache_last(law: Callable[[Array], Any]) -> Callable[[Array], Any]:
-    """Return a function that caches its result for the last array it was called with."""
+    """Return a function that caches its result for the last array it was called with.
+
+    Args:
+        law: function of an array.
+    """
     cached: Any = None
 
     def result(x: Array) -> Any:
         nonlocal cached
         if cached is None or not np.array_equal(cached[0], x):
+            # The caller may change its array in place: Ipopt reuses the memory of x.
             cached = x.copy(), law(x)
         return cached[1]
 
@@ -63,6 +76,20 @@ class PointFormula:
     Accelerations are not eliminated in the formulas: they are symbols that linear equations with a
     symmetric matrix determine (`Point.linear_systems`), which is factorized once for values, first
     and second derivatives.
+
+    Args:
+        program: nonlinear program.
+        number: index of one of the points.
+        size: number of variables of each point.
+
+    Attributes:
+        projected: number of values and speeds before projection; 0 without projection.
+        labels: labels of the rows between rates and integrands.
+        limits: lower and upper bound of each of these rows.
+        rows: number of all results of F.
+        jacobian_entries: rows and columns of the entries of the Jacobian by (s, z).
+        value: CasADi function F(s, z, fraction, known).
+        slope: CasADi function of the entries of the Jacobian, with the same arguments.
     """
 
     def __init__(self, program: Program, number: int, size: int) -> None:
@@ -141,16 +168,26 @@ class PointFormula:
         self.slope = self._make_function("J", self._inputs, casadi.vertcat(*jacobian.nonzeros()))
 
     def _make_function(self, name: str, arguments: list[Any], column: Any) -> Any:
-        """Return a CasADi function in whose formula the solutions replace the symbols of the linear equations."""
+        """Return a CasADi function in which solutions replace the symbols of the linear equations.
+
+        Args:
+            name: name of the function.
+            arguments: symbols of its arguments.
+            column: formula of its result.
+        """
         return casadi.Function(
             name, arguments, [casadi.substitute(column, self._implicit, self._implicit_value)]
         )
 
     @cached_property
     def curvature(self) -> tuple[Any, list[Any]]:
-        """CasADi function of the upper triangle of the second derivatives, with its rows and columns.
+        """CasADi function of the upper triangle of the second derivatives of ``multipliers · F``.
 
         It is only made when it is used, as it takes longest.
+
+        Returns:
+            Function of the arguments of F and of the multipliers of its results, and rows and
+            columns of the entries of its result.
         """
         multipliers = SX.sym("multipliers", self.rows)
         adjoints = SX.sym("adjoints", self._implicit.numel())
@@ -177,9 +214,22 @@ class PointFormula:
 class PointGroup:
     """F and its derivatives at all points of a grid that have the same variables.
 
-    Attributes:
+    Args:
+        program: nonlinear program.
         numbers: indices of the points.
-        columns: indices of the variables of each point.
+
+    Attributes:
+        numbers: indices of the points (k,).
+        columns: indices of the variables of each point (k, z).
+        formula: formulas of one point.
+        projected: number of values and speeds before projection.
+        labels: labels of the rows of a point.
+        limits: lower and upper bound of each row of a point.
+        rows: number of results of F at a point.
+        jacobian_rows: row of each entry of a point's Jacobian.
+        jacobian_columns: column of each entry among the variables (s, z).
+        value: function F of all points.
+        slope: function of the entries of the Jacobians of all points.
     """
 
     def __init__(self, program: Program, numbers: list[int]) -> None:
@@ -187,6 +237,7 @@ class PointGroup:
         layout = program.layout
         self.numbers = np.array(numbers, dtype=int)
         self.columns = np.array([layout.point_indices[number] for number in numbers])
+        # Programs on finer meshes share the formulas of a point, which do not depend on the mesh.
         key = bool(problem.grid.is_mesh[numbers[0]]), layout.has_kind("projections", numbers[0])
         if key not in problem.formulas:
             problem.formulas[key] = PointFormula(program, numbers[0], self.columns.shape[1])
@@ -201,13 +252,16 @@ class PointGroup:
         )
 
     def evaluate(self, program: Program, w: Array, fractions: Array, z: Array) -> Array:
-        """Compute F (n, rows) at other fractions of time (n,).
+        """Compute F at other fractions of time.
 
         Args:
             program: nonlinear program of the group.
-            w: variables, of which times and parameters count.
-            fractions: fractions of the motion (n,), from 0 to 1.
-            z: variables of the points (n, ...).
+            w: variables of the program (n,), from which times and parameters are taken.
+            fractions: fractions of the motion (k,), from 0 to 1.
+            z: variables of the points (k, z).
+
+        Returns:
+            Results of F (k, rows).
         """
         arguments = program._arguments_at(w, fractions, z)
         return BufferedFunction(self.formula.value.map(len(fractions)))(*arguments)[0]

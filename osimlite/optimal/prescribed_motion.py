@@ -50,11 +50,14 @@ RELATIVE_ZERO = 1e-13
 
 
 def read_position_motion(part: PositionMotion, model: Model) -> Motion | str:
-    """Return the motion of all coordinates; the path of the first coordinate without a function if there is one.
+    """Return the motion of all coordinates of a PositionMotion.
 
     Args:
         part: PositionMotion of the model.
         model: model.
+
+    Returns:
+        The motion; instead the path of the first coordinate without a function if one has none.
     """
     functions: dict[str, Any] = {item.name: item for item in part.functions.objects}
     paths = [info.path for info in build_mechanism(model).coordinates]
@@ -79,11 +82,16 @@ class PrescribedMotion:
 
     Attributes:
         mechanism: mechanism of the model.
+        coordinates: empty, as no coordinate varies.
         states: paths of the auxiliary states, the only ones that vary.
+        system_states: the same, as OpenSim orders them.
         controls: paths of the controls of the actuators.
         bench: CasADi functions of the test bench.
         carriages: index of each actuator's carriage among the coordinates of the bench.
+        path_names: paths of the actuators.
+        is_muscle: whether each actuator is a muscle.
         moving: names of the coordinates that can move.
+        constraint_count: number of equations of the model's constraints.
         numbers: cached `_tabulate_numbers`.
     """
 
@@ -93,6 +101,8 @@ class PrescribedMotion:
         self.mechanism = build_mechanism(model, opensim_derivatives=True)
         self._motion = motion
         options: dict[str, Any] = {"folder": folder}
+        # Two systems: with isometric muscles a force is the tension along the path, and only the
+        # complete muscles have path lengths.
         self._force_balance = StaticOptimization(
             model, self.mechanism, muscles="isometric", **options
         )
@@ -101,6 +111,8 @@ class PrescribedMotion:
         actuators = [item for item in model.components(Actuator) if item.appliesForce]
         self._paths = [tree.path_of(item) or "" for item in actuators]
         own = [_name_on_bench(k) for k in range(len(actuators))]
+        # Paths of the model contain slashes and may repeat names, so that the bench has names of
+        # its own.
         self.bench = make_casadi_model(build_test_bench(actuators, own))
         size = len(self.bench.coordinates)
         known = dict(zip(own, self._paths, strict=True))
@@ -143,8 +155,9 @@ class PrescribedMotion:
     def _tabulate_numbers(self, times: Array) -> Array:
         """Compute the numbers of the motion at times (t,), one row each.
 
-        A row holds lengths and speeds of m paths, the generalized forces that n coordinates need,
-        the generalized force (n) of each path with 1 N (m, n), and the Jacobian of the constraints.
+        A row holds lengths (m) and speeds (m/s) of m paths, the generalized forces that n
+        coordinates need, the generalized forces (n, m) of the actuators with 1 N each, and the
+        Jacobian G (c, n) of the constraints; matrices row by row.
         """
         values, speeds, accelerations = self._motion(times)
         needed, *matrices = self._force_balance.compute_balance(
@@ -188,6 +201,7 @@ class PrescribedMotion:
         indices = [force_model.controls.index(path) for path in self._paths]
         count = len(self._paths)
         found = []
+        # A linear function is known by its value without forces and with each force alone.
         for unit in np.eye(1 + count + self.constraint_count):
             u = np.zeros(len(force_model.controls))
             u[indices] = unit[1 : 1 + count]
@@ -196,7 +210,14 @@ class PrescribedMotion:
         return np.vstack(found).T
 
     def tabulate_states(self, times: Array) -> dict[str, Array]:
-        """Return values and speeds of all coordinates at times (t,) by the path of the state."""
+        """Tabulate values and speeds of all coordinates.
+
+        Args:
+            times: times (t,), s.
+
+        Returns:
+            Values (t,) by the path of the state; m, rad, m/s, rad/s.
+        """
         values, speeds, _ = self._motion(times)
         infos = self.mechanism.coordinates
         own = (
@@ -208,13 +229,21 @@ class PrescribedMotion:
 
 
 class PrescribedDynamics(Dynamics):
-    """Equations at a point of a prescribed motion."""
+    """Equations at a point of a prescribed motion.
+
+    Args:
+        problem: problem with a prescribed motion.
+
+    Raises:
+        UnsupportedError: the initial or the final time varies.
+    """
 
     functions: Any
 
     def __init__(self, problem: Problem) -> None:
         super().__init__(problem)
         self.is_implicit, self._first_rate = False, 0
+        # The numbers of the motion are tabulated once, at the times of the grid.
         if any(low != high for low, high in problem.times):
             raise problem.unsupported_error(
                 problem.phase, "initial and final time must be fixed with a prescribed motion"
@@ -226,9 +255,15 @@ class PrescribedDynamics(Dynamics):
         self._entries = self._add_series(given.numbers)
 
     def _add_series(self, numbers: Callable[[Array], Array]) -> list[TimeFunction | None]:
-        """Return functions of time for numbers (t, m) of times (t,), and None for zeros.
+        """Add functions of time for numbers that change along the motion.
 
         Most actuators act on few coordinates, so that most numbers are zero at all times.
+
+        Args:
+            numbers: function of times (t,) that returns numbers (t, m).
+
+        Returns:
+            Function of time for each number; None for one that is zero at all times.
         """
         found = numbers(self._times)
         matters = np.abs(found).max(axis=0) > RELATIVE_ZERO * np.abs(found).max()
@@ -242,18 +277,32 @@ class PrescribedDynamics(Dynamics):
         return self.functions.list_forces()
 
     def compute_path_lengths(self, point: Point) -> tuple[Formula, Formula]:
-        """Return the prescribed lengths (m) and lengthening speeds (m/s) of the actuators' paths."""
+        """Return the prescribed lengths and speeds of the actuators' paths.
+
+        Args:
+            point: point of the grid.
+
+        Returns:
+            Lengths (m, 1), m, and lengthening speeds (m, 1), m/s.
+        """
         count = len(self.functions.path_names)
         return self._select_entries(point, 0, count), self._select_entries(point, count, count)
 
     def _select_entries(self, point: Point, first: int, count: int) -> Formula:
-        """Return the numbers of the motion from an index on."""
+        """Return the column of `count` numbers of the motion from the index `first` on."""
         return _stack_series(point, self._entries[first : first + count])
 
     def _compute_bench_residual(self, point: Point) -> Formula:
-        """Compute the residual of the bench at zero rates: forces on the carriages, and rates of auxiliary states."""
+        """Compute the residual of the test bench with all rates at zero.
+
+        Returns:
+            Residuals (n, 1) in the order of the bench's states: those of the carriages' speeds are
+            the forces on the carriages, and those of the auxiliary states their rates, both with
+            the negative sign.
+        """
         bench = self.functions.bench
         lengths, speeds = self.compute_path_lengths(point)
+        # From the order of the actuators to that of the bench's coordinates.
         indices = np.argsort(self.functions.carriages)
         x = casadi.vertcat(lengths[indices.tolist()], speeds[indices.tolist()], point.x)
         return bench.residual(
@@ -266,12 +315,15 @@ class PrescribedDynamics(Dynamics):
         )
 
     def compute_rates(self, point: Point) -> Formula:
-        """Compute the rates of the auxiliary states."""
+        """Compute the rates of the auxiliary states (n, 1), the only states."""
         count = len(self.functions.path_names)
         return self._insert_tendon_rates(point, -self._compute_bench_residual(point)[2 * count :])
 
     def compute_residuals(self, point: Point) -> tuple[list[str], Formula]:
         """Compute the generalized forces that actuators and constraints leave missing, and tendon residuals.
+
+        Args:
+            point: point of the grid.
 
         Returns:
             Names of the residuals, and the residuals (k, 1).
@@ -282,17 +334,26 @@ class PrescribedDynamics(Dynamics):
         first = 2 * count + len(moving)
         size = count * len(moving)
         needed = self._select_entries(point, 2 * count, len(moving))
+        # CasADi fills matrices column by column, so that rows of the table become columns; hence
+        # the transpose.
         pushes = casadi.reshape(self._select_entries(point, first, size), count, -1).T
         bound = casadi.reshape(
             self._select_entries(point, first + size, point.multipliers.numel() * len(moving)),
             len(moving),
             -1,
         )
+        # Multipliers push with -Gᵀ multipliers here, as in StaticOptimization.
         rows = needed - pushes @ self._compute_actuator_forces(point) + bound @ point.multipliers
         return [*(f"{name} residual" for name in moving), *names], casadi.vertcat(rows, errors)
 
     def make_joint_load(self, path: str, side: str, frame: str) -> Callable[[Point], Formula]:
-        """Return the function of a point for the load of a joint in the motion; see :class:`Dynamics`."""
+        """Return the function of a point for the load of a joint in the motion, (6, 1).
+
+        Args:
+            path: as for :meth:`Dynamics.make_joint_load`.
+            side: as for :meth:`Dynamics.make_joint_load`.
+            frame: as for :meth:`Dynamics.make_joint_load`.
+        """
         load = self.functions.force_model.joint_load(path, side)
         turned = self.functions.force_model.frames([frame])
 
@@ -307,7 +368,12 @@ class PrescribedDynamics(Dynamics):
     def make_generalized_forces(
         self, pushing: Sequence[str], coordinates: Sequence[str]
     ) -> Callable[[Point], Formula]:
-        """Return the function of a point for the generalized forces in the motion; see :class:`Dynamics`."""
+        """Return the function of a point for the generalized forces that the motion needs, (k, 1).
+
+        Args:
+            pushing: as for :meth:`Dynamics.make_generalized_forces`.
+            coordinates: as for :meth:`Dynamics.make_generalized_forces`.
+        """
         missing = self.functions.force_model.generalized_forces(pushing)
         rows = [self.functions.force_model.coordinates.index(path) for path in coordinates]
         return self._make_linear_formula(
@@ -317,7 +383,12 @@ class PrescribedDynamics(Dynamics):
     def _make_linear_formula(
         self, function: Callable[..., Array], size: int
     ) -> Callable[[Point], Formula]:
-        """Return the function of a point for a column (size, 1) that depends linearly on forces."""
+        """Return the function of a point for a column (size, 1) that depends linearly on forces.
+
+        Args:
+            function: as for :meth:`PrescribedMotion.compute_linear_response`.
+            size: number k of its results.
+        """
         entries = self._add_series(
             cache_last(partial(self.functions.compute_linear_response, function))
         )
@@ -329,7 +400,7 @@ class PrescribedDynamics(Dynamics):
         return formula
 
     def _compute_actuator_forces(self, point: Point) -> Formula:
-        """Compute the forces of the actuators (m, 1), N or N m."""
+        """Compute the forces of the actuators (m, 1), N or N m; tensions of muscles are positive."""
         count = len(self.functions.path_names)
         force = -self._compute_bench_residual(point)[count : 2 * count][self.functions.carriages]
         # Muscles pull the carriage back, so that a positive force has the other sign.
@@ -375,6 +446,7 @@ def build_test_bench(actuators: Sequence[Any], names: Sequence[str]) -> Model:
             name=f"{name}_slider", socket_parent_frame=model.ground, socket_child_frame=body
         )
         slider.coordinates[0].name = name
+        # A path of length zero would have no direction.
         slider.coordinates[0].default_value = 1.0
         model.add(slider)
         if isinstance(item, Muscle):

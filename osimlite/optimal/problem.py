@@ -72,19 +72,28 @@ class Problem(StudyContext):
 
     Attributes:
         study: study; `phase` and `solver` are its parts.
+        tables: tables by goal name that replace the files of the goals' references.
         model: model after the model processor.
+        components: components of the model by path.
         functions: CasADi functions of the model
-            (:class:`~osimlite.derivatives.functions.CasadiModel`).
+            (:class:`~osimlite.derivatives.functions.CasadiModel`), or of the model along a
+            prescribed motion.
         states: bounds by path of the state, in the order of `functions.states`.
-        controls: bounds by path of the control; controls of actuators that do not act are zero.
+        controls: bounds by path of the control of each actuator that acts; the controls of others
+            are zero.
         times: ranges of the initial and the final time, s.
         parameters: ranges by name of the parameter.
+        parameter_owners: index of the parameter that stands for each of `functions.parameters`.
         constraint_names: names of the equations of the model's constraints, as OpenSim numbers
             them.
         grid: points of the motion.
+        dynamics: equations of motion at a point.
         goals: enabled goals with their terms.
         path_rows: rows of the path constraints.
         loads: functions of time of the model's forces (`functions.loads`).
+        time_functions: functions of time that formulas contain, in the order in which they were
+            added.
+        formulas: formulas of points that programs on several meshes share.
 
     Raises:
         UnsupportedError: the study contains something that is not supported here.
@@ -172,9 +181,12 @@ class Problem(StudyContext):
         Args:
             part: goal, for messages.
             by_name: weights by name.
-            by_pattern: weights by pattern; None if the goal has none.
+            by_pattern: weights by pattern; None if the goal has no such property.
             names: names that need a weight.
             what: what the names stand for, for messages.
+
+        Returns:
+            Weight of each name.
 
         Raises:
             DocumentError: a weight is for an unknown name.
@@ -194,6 +206,9 @@ class Problem(StudyContext):
         Args:
             values: function of times (n,) that returns value, first and second derivative (3, n).
             label: name of the column, which a scale factor of the goal may multiply.
+
+        Returns:
+            Function of time with its index in `time_functions`.
         """
         factor = self._factors.get(label)
         series = TimeFunction(
@@ -206,6 +221,13 @@ class Problem(StudyContext):
 
     def list_parameter_paths(self, parameter: MocoParameter) -> list[str]:
         """Return the paths of the numbers that a parameter stands for.
+
+        Args:
+            parameter: parameter of the study.
+
+        Returns:
+            Path of a component, its property and, for an element of a vector, the index:
+            ``/bodyset/torso/mass``.
 
         Raises:
             DocumentError: the parameter names no component.
@@ -228,7 +250,10 @@ class Problem(StudyContext):
         return process_model(processor, self.folder)
 
     def _read_times(self) -> tuple[Range, Range]:
-        """Return the ranges of the initial and the final time, s.
+        """Read the ranges of the initial and the final time.
+
+        Returns:
+            Range of the initial time, s, and of the final time, s.
 
         Raises:
             DocumentError: the motion cannot end after its start.
@@ -258,9 +283,16 @@ class Problem(StudyContext):
         return None
 
     def _make_functions(self, parameters: list[str], motion: Motion | None) -> Any:
-        """Return the CasADi functions of the model, or of the model along a prescribed motion."""
+        """Return the CasADi functions of the model, or of the model along a prescribed motion.
+
+        Args:
+            parameters: paths of the numbers that vary.
+            motion: prescribed motion; None if the coordinates vary.
+        """
         if motion is None:
             try:
+                # Loads that depend on time only come as numbers (`functions.loads`): their splines
+                # are costly as formulas.
                 functions = CasadiModel(self.model, parameters, self.folder, loads_given=True)
             except SettingError as error:
                 owners = (
@@ -296,7 +328,7 @@ class Problem(StudyContext):
                 raise self.invalid_error(self.phase, f"{message}; use a CustomJoint")
 
     def _check_settings(self) -> None:
-        """Check the settings of the solver."""
+        """Check that the study asks for a solver that is supported here."""
         if self.solver.optim_solver != "ipopt":
             raise self.unsupported_error(
                 self.solver,
@@ -304,7 +336,11 @@ class Problem(StudyContext):
             )
 
     def _make_solver_costs(self) -> Iterator[tuple[MocoGoal, GoalTerms]]:
-        """Yield the costs that settings of the solver add, named as in Moco."""
+        """Yield the costs that settings of the solver add, named as in Moco.
+
+        Yields:
+            Goal with the name and the weight, and its terms.
+        """
         solver = self.solver
         acceleration_count = len(self.functions.coordinates) if self.dynamics.is_implicit else 0
         if solver.minimize_lagrange_multipliers and not self.constraint_names:
@@ -350,15 +386,23 @@ class Problem(StudyContext):
             goal = MocoControlGoal(
                 name="state_projection", weight=solver.state_projection_distance_weight
             )
-            yield goal, replace(make_integral_terms(_squared_projection_distance), is_sum=True)
+            yield goal, replace(make_integral_terms(_compute_projection_distance), is_sum=True)
 
     def _is_acting(self, control: str) -> bool:
-        """Return whether the actuator of a control applies its force."""
+        """Return whether the actuator of a control applies its force.
+
+        Args:
+            control: path of the actuator, with the suffix of the control if it has several.
+        """
         owner: Any = self.components.get(control) or self.components[control.rpartition("_")[0]]
         return bool(owner.appliesForce)
 
     def _check_infos(self, controls: Sequence[str]) -> None:
-        """Check the names and patterns of the study's entries for states and controls."""
+        """Check the names and patterns of the study's entries for states and controls.
+
+        Args:
+            controls: paths of the controls that vary.
+        """
         for pattern in (*self.phase.state_infos_pattern, *self.phase.control_infos_pattern):
             self.compile_pattern(pattern, pattern.name)
         for infos, known, what in (
@@ -371,7 +415,7 @@ class Problem(StudyContext):
             raise self.unsupported_error(info, "input controls are not supported")
 
     def _name_constraints(self) -> list[str]:
-        """Return the names of the equations of the model's constraints, as OpenSim numbers them."""
+        """Name the equations of the model's constraints as OpenSim numbers them: constraint, then row."""
         count = self.functions.constraint_count
         if not count:
             return []
@@ -385,7 +429,11 @@ class Problem(StudyContext):
         ]
 
     def _check_constraint_method(self, count: int) -> None:
-        """Check the settings that keep states on the model's constraints."""
+        """Check the settings that keep states on the model's constraints.
+
+        Args:
+            count: number of equations of the constraints.
+        """
         solver = self.solver
         if solver.kinematic_constraint_method == "Bordalba2023":
             if not solver.enforce_constraint_derivatives:
@@ -464,37 +512,42 @@ class Problem(StudyContext):
 
     @property
     def model_weight(self) -> float:
-        """Weight of the model, N; its mass where there is no gravity, as in OpenSim."""
+        """Return the weight of the model, N; its mass where there is no gravity, as in OpenSim."""
         mechanism = self.functions.mechanism
         return float(mechanism.total_mass * (float(np.linalg.norm(mechanism.gravity)) or 1.0))
 
     @property
     def has_constraints(self) -> bool:
-        """Whether the model's constraints are equations of the problem."""
+        """Return whether the model's constraints are equations of the problem."""
+        # A prescribed motion fulfils the constraints already; only their multipliers vary.
         return bool(self.constraint_names) and not isinstance(self.functions, PrescribedMotion)
 
     @property
     def uses_projection(self) -> bool:
-        """Whether intervals lead to states that are projected onto the constraints (Bordalba et al. 2023)."""
+        """Return whether states are projected onto the constraints at the ends of intervals (Bordalba et al.)."""
         return self.has_constraints and self.solver.kinematic_constraint_method == "Bordalba2023"
 
     @property
     def projected_names(self) -> list[str]:
-        """Names of values and speeds before projection."""
+        """Return the names of values and speeds before projection; empty without projection."""
         count = 2 * len(self.functions.coordinates) if self.uses_projection else 0
         return [f"{name}{PROJECTION_SUFFIX}" for name in self.functions.states[:count]]
 
     @cached_property
     def slack_names(self) -> list[str]:
-        """Names of the velocity corrections; with projection those of values and speeds in turn, as in Moco."""
+        """Return the names of the slacks, as in Moco.
+
+        They are the velocity corrections of the constraints, or with projection the corrections of
+        values and speeds in turn; empty if the study has neither.
+        """
         if self.uses_projection:
             return [f"mu_{name}{end}" for name in self.constraint_names for end in ("", "_dot")]
         is_corrected = self.has_constraints and self.solver.enforce_constraint_derivatives
         return [f"gamma_{name}" for name in self.constraint_names] if is_corrected else []
 
 
-def _squared_projection_distance(point: Point) -> Formula:
-    """Return the squared distance by which states are projected at a point."""
+def _compute_projection_distance(point: Point) -> Formula:
+    """Return the squared distance by which states are projected at a point; zero at points without one."""
     return casadi.sumsqr(point.projections - point.x[: point.projections.numel()])
 
 
@@ -511,11 +564,20 @@ def _sum_scaled_squares(part: str | slice, by: tuple[float, float], point: Point
 
 
 def _number_equations(model: Model, count: int) -> Iterable[tuple[int, int]]:
-    """Return the number of its constraint and its row within the constraint for each equation."""
+    """Number the equations of a model's constraints.
+
+    Args:
+        model: model.
+        count: number of equations.
+
+    Returns:
+        Number of its constraint, and row within the constraint, of each equation.
+    """
     sizes = {"WeldConstraint": 6, "PointConstraint": 3}
     rows: list[tuple[int, int]] = []
     constraints: Mapping[str, Any] = {part.path: part for part in model.constraint_set.objects}
     enforced = [part for part in constraints.values() if part.isEnforced]
     for number, part in enumerate(enforced):
         rows += [(number, row) for row in range(sizes.get(type(part).tag, 1))]
+    # A constraint with another number of equations: their names count them one by one then.
     return rows if len(rows) == count else [(row, 0) for row in range(count)]

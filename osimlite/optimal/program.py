@@ -4,8 +4,8 @@ One CasADi function F(s, z_k) holds all that is nonlinear at point k of the grid
 duration, residuals, and integrands times the duration. s are the times and the parameters, z_k the
 variables of the point. The constraints are ``A w + B F`` with constant sparse A and B. Jacobian and
 Hessian are thus constant sparse maps of the derivatives of F at the points, and nothing is
-differentiated twice. Terms that depend on both ends are one more function,
-E(s, z_0, z_n, integrals).
+differentiated twice. Terms that depend on both ends are one more function, E(s, z_0, z_n,
+integrals).
 """
 
 from __future__ import annotations
@@ -32,15 +32,24 @@ MAX_CACHED_TIMES = 8
 class Program:
     """Nonlinear program: minimize f(w) subject to lower <= g(w) <= upper.
 
+    Args:
+        problem: optimal control problem.
+
     Attributes:
         problem: optimal control problem.
         layout: layout of the variables w.
+        known_size: number of data of the functions of time at a point.
+        integrals: goals with an integrand, with their terms.
         groups: groups of points with the same variables.
-        labels: labels of the rows of g.
-        times: fraction of time of each row of g, from 0 to 1; NaN for constraints on both ends.
-        lower: lower bounds of g.
-        upper: upper bounds of g.
+        labels: labels of the rows of g (m,).
+        times: fraction of time of each row of g (m,), from 0 to 1; NaN for constraints on both
+            ends.
+        lower: lower bounds of g (m,).
+        upper: upper bounds of g (m,).
         costs: names of the parts of f.
+        end_labels: labels of the endpoint constraints, the last rows of g.
+        end_columns: indices of the variables of E: times and parameters, first point, last point.
+        jacobian_sparsity: sparsity pattern of the Jacobian of g.
     """
 
     def __init__(self, problem: Problem) -> None:
@@ -86,6 +95,9 @@ class Program:
             fraction: fraction of time, from 0 to 1.
             known: symbols of the data of the functions of time.
             number: index of the point.
+
+        Returns:
+            Point whose controls are zero where the actuator does not act.
         """
         parts = {}
         first = 0
@@ -134,6 +146,7 @@ class Program:
             ends = Endpoints(start, end, totals[indices[0]] if indices else None)
             value = SX(terms.value(ends))
             if (goal.mode or terms.modes[0]) == "cost":
+                # The values of an endpoint constraint are errors of either sign.
                 value = value**2 if terms.modes[0] != "cost" else value
                 costs.append(goal.weight * casadi.sum1(self._divide_value(goal, value, ends)))
                 self.costs.append(goal.name)
@@ -150,6 +163,7 @@ class Program:
         arguments = [s, z0, z1, totals, *known]
         cost = casadi.densify(casadi.vertcat(*costs)) if costs else SX.zeros(0, 1)
         end_rows = casadi.densify(casadi.vertcat(*rows)) if rows else SX.zeros(0, 1)
+        # Accelerations at the ends are eliminated, as E is small and evaluated once.
         for symbol, equations in start.linear_systems + end.linear_systems:
             factors = casadi.ldl(casadi.jacobian(equations, symbol))
             solution = casadi.ldl_solve(-casadi.substitute(equations, symbol, 0), *factors)
@@ -163,6 +177,8 @@ class Program:
         )
         lagrangian = factor * total + casadi.dot(multipliers, end_rows)
         self._end_value = BufferedFunction(casadi.Function("E", arguments, [cost, end_rows]))
+        # Dense, as E depends on few variables; the pattern below tells which entries can be
+        # nonzero.
         slopes = [casadi.densify(casadi.jacobian(each, both)) for each in (total, end_rows)]
         self._end_slope = BufferedFunction(casadi.Function("dE", arguments, slopes))
         self._end_pattern = np.array(
@@ -179,7 +195,13 @@ class Program:
         self.upper = np.append(self.upper, [high for _, high in limits])
 
     def _divide_value(self, goal: Any, value: Any, ends: Endpoints) -> Any:
-        """Return the value of a goal after its divisions by displacement, duration and mass."""
+        """Return the value of a goal after its divisions by displacement, duration and mass.
+
+        Args:
+            goal: goal with the settings.
+            value: value or column of values.
+            ends: both ends of the motion.
+        """
         if goal.divide_by_displacement:
             value = value / casadi.norm_2(ends.end.mass_center() - ends.start.mass_center())
         if goal.divide_by_duration:
@@ -308,7 +330,12 @@ class Program:
         return row
 
     def _assemble_integrals(self, entries_b: list[tuple[Any, Any, Any]], starts: Array) -> None:
-        """Add a row for each integral: the integrands, the last results of F, times quadrature weights."""
+        """Add a row for each integral: integrands, the last results of F, times their quadrature weights.
+
+        Args:
+            entries_b: rows, columns and values of B, to which entries are added.
+            starts: index of the first result of F of each point.
+        """
         for k, (_, terms) in enumerate(self.integrals):
             for group in self.groups:
                 results = starts[group.numbers] + group.rows - len(self.integrals) + k
@@ -349,7 +376,7 @@ class Program:
         return np.concatenate(first), np.concatenate(second)
 
     def _map_jacobian(self) -> None:
-        """Make the sparse map from the Jacobians of the points to that of A w + B F."""
+        """Make the sparse map from the Jacobians of the points to that of A w + B F, and the part of A."""
         width = len(self.layout.lower)
         rows, columns = self._entries("jacobian_rows", "jacobian_columns")
         spread = self._b.select_columns(rows.astype(np.int64))
@@ -360,6 +387,8 @@ class Program:
                 constant.rows * np.int64(width) + constant.columns,
             ]
         )
+        # One integer per place of the Jacobian: entries of several points, and of A, at one place
+        # are added.
         unique, inverse = np.unique(keys, return_inverse=True)
         count = len(spread.rows)
         self._jacobian_map = SparseMatrix.from_entries(
@@ -380,6 +409,8 @@ class Program:
         pattern[:, self.end_columns] |= self._end_pattern[:, :direct]
         for k in range(len(self.integrals)):
             columns = self._jacobian_columns[self._jacobian_rows == self._row_count + k]
+            # An integral depends on the variables of all points, and so does each endpoint
+            # constraint on it.
             for row in np.flatnonzero(self._end_pattern[:, direct + k]):
                 pattern[row, columns] = True
         self._end_entries = np.nonzero(pattern)
@@ -398,7 +429,7 @@ class Program:
 
     # ------------------------------------------------------------------------------------------------- numbers
     def _sample_time_functions(self, times: Array) -> Array:
-        """Return the data of the functions of time (n, 3 k + 1) at times (n,)."""
+        """Return the data of the functions of time (n, 3 k + 1) at times (n,): the time, then three numbers each."""
         key = times.tobytes()
         if key not in self._time_data:
             # Ipopt's line search alternates between few sets of times.
@@ -409,7 +440,7 @@ class Program:
         return self._time_data[key]
 
     def _point_arguments(self, group: PointGroup, w: Array) -> list[Array]:
-        """Return the arguments of F for a group of points."""
+        """Return the arguments of F for a group of points, one row per point."""
         return self._arguments_at(w, self.problem.grid.fractions[group.numbers], w[group.columns])
 
     def _arguments_at(self, w: Array, fractions: Array, z: Array) -> list[Array]:
@@ -419,7 +450,15 @@ class Program:
         return [np.tile(s, len(fractions)), z, fractions, self._sample_time_functions(times)]
 
     def _evaluate_groups(self, name: str, w: Array) -> Array:
-        """Return the results of a function of all groups in one array."""
+        """Evaluate a function at all points.
+
+        Args:
+            name: "value" or "slope", the attribute of the groups with the function.
+            w: variables (n,).
+
+        Returns:
+            Results of all groups in one array, group by group and point by point.
+        """
         return np.concatenate(
             [
                 getattr(group, name)(*self._point_arguments(group, w))[0].ravel()
@@ -428,7 +467,7 @@ class Program:
         )
 
     def _end_arguments(self, w: Array, totals: Array) -> list[Array]:
-        """Return the arguments of E."""
+        """Return the arguments of E for variables w and integrals `totals`."""
         known = self._sample_time_functions(w[:2])
         first = self.layout.point_indices[0]
         last = self.layout.point_indices[-1]
@@ -441,7 +480,7 @@ class Program:
             w: variables (n,).
 
         Returns:
-            Parts of f in the order of `costs`, and g.
+            Parts of f in the order of `costs`, and g (m,).
         """
         rows = self._compute_rows(w)
         costs, end_rows = self._end_value(*self._end_arguments(w, rows[self._row_count :]))
@@ -454,7 +493,8 @@ class Program:
             w: variables (n,).
 
         Returns:
-            Gradient of f, and the entries of the Jacobian of g in the order of `jacobian_sparsity`.
+            Gradient of f (n,), and the entries of the Jacobian of g in the order of
+            `jacobian_sparsity`.
         """
         gradient, ends, numbers, _ = self._compute_slopes(w)
         entries = np.concatenate([numbers[self._of_g], ends[self._end_entries]])
@@ -464,8 +504,8 @@ class Program:
         """Compute the parts that gradient, Jacobian and Hessian share.
 
         Returns:
-            Gradient of f, rows of the endpoint constraints, entries of the Jacobian of A w + B F,
-            and the gradients of the integrals.
+            Gradient of f (n,), rows of the endpoint constraints (e, n), entries of the Jacobian of
+            A w + B F, and the gradients of the integrals (i, n).
         """
         width = len(w)
         direct = len(self.end_columns)
@@ -477,6 +517,7 @@ class Program:
         ] = numbers[is_integral]
         totals = self._compute_rows(w)[self._row_count :]
         cost, end_slopes = (part.T for part in self._end_slope(*self._end_arguments(w, totals)))
+        # The chain rule: E depends on variables directly, and by the integrals.
         gradient = cost.ravel()[direct:] @ integrals
         gradient[self.end_columns] += cost.ravel()[:direct]
         ends = end_slopes[:, direct:] @ integrals

@@ -55,7 +55,11 @@ class Refinement:
 
     @classmethod
     def parse(cls, value: float | str | Refinement) -> Refinement:
-        """Return the settings of a tolerance, or of a text such as ``1e-3`` or ``1e-3:limited-memory``.
+        """Return the settings that a user gives.
+
+        Args:
+            value: tolerance, or a text such as ``1e-3`` or ``1e-3:limited-memory``, or the
+                settings.
 
         Raises:
             SettingError: the text is invalid.
@@ -79,13 +83,21 @@ class Refinement:
 
 
 class Round(NamedTuple):
-    """Search on one mesh."""
+    """Search on one mesh.
+
+    Attributes:
+        intervals: number of intervals.
+        error: largest error of an interval, see :func:`estimate_errors`.
+        objective: value of the objective.
+        iterations: number of iterations.
+        duration: duration of the search, s.
+    """
 
     intervals: int
-    error: float  # the largest of an interval
+    error: float
     objective: float
     iterations: int
-    duration: float  # s
+    duration: float
 
     def __str__(self) -> str:
         steps = f"{self.iterations} iterations in {self.duration:.3g} s"
@@ -156,14 +168,24 @@ def check_refinable(problem: Problem) -> None:
 
 
 def estimate_errors(program: Program, w: Array) -> Array:
-    """Estimate the error of each interval (m,): that of the worst state, relative to 1 plus its largest absolute value."""
+    """Estimate the error of each interval: that of its worst state.
+
+    Args:
+        program: nonlinear program without implicit dynamics and projections.
+        w: variables of a solution (n,).
+
+    Returns:
+        Errors (m,), relative to 1 plus the largest absolute value of the state.
+    """
     grid = program.problem.grid
     layout = program.layout
     polynomial = _SolutionPolynomials(program, w)
     count = len(layout.names["states"])
+    # Points of meshes have all variables but slacks, so that their F holds anywhere in an interval.
     group = program.groups[0]
     rates = polynomial.rates
     sizes = 1.0 + np.abs(w[layout.indices["states"]]).max(axis=0)
+    # The integral of the missing rate over the interval is the error of the state at its end.
     result = np.zeros(len(grid.lengths))
     of_rates = _evaluate_basis(polynomial.nodes, SAMPLE_FRACTIONS)
     starts = np.concatenate([[0.0], np.cumsum(grid.lengths)[:-1]])
@@ -188,6 +210,9 @@ def split_intervals(grid: Grid, error: Array, tolerance: float) -> Array:
         grid: grid of the mesh.
         error: error of each interval (m,).
         tolerance: bound of the error.
+
+    Returns:
+        Ends of the intervals of the new mesh, from 0 to 1.
     """
     order = 1 + int(grid.scheme.rates.any(axis=0).sum())
     parts = np.ones(len(error), dtype=int)
@@ -203,8 +228,11 @@ def interpolate_solution(program: Program, w: Array, finer: Program) -> Array:
 
     Args:
         program: program of the solution.
-        w: variables of the solution.
+        w: variables of the solution (n,).
         finer: program on the other mesh.
+
+    Returns:
+        Variables of the other program.
     """
     grid = program.problem.grid
     layout = finer.layout
@@ -225,7 +253,15 @@ def interpolate_solution(program: Program, w: Array, finer: Program) -> Array:
 
 
 def _rebuild_program(problem: Problem, mesh: Array, hessian: str) -> Program:
-    """Return the program of the same problem on another mesh."""
+    """Return the program of the same problem on another mesh.
+
+    Args:
+        problem: problem.
+        mesh: ends of the intervals, from 0 to 1.
+        hessian: value of ``optim_hessian_approximation``.
+    """
+    # A shallow copy shares the model's functions and formulas; the solver's settings are the user's
+    # and are copied.
     other = copy(problem)
     other.grid = Grid.from_mesh(problem.grid.scheme, mesh)
     other.solver = problem.solver.copy_deep()
@@ -234,9 +270,15 @@ def _rebuild_program(problem: Problem, mesh: Array, hessian: str) -> Program:
 
 
 class _SolutionPolynomials:
-    """Polynomials of a solution between its points; states are integrals of the polynomials through their rates.
+    """Polynomials of a solution between its points; states are integrals of the polynomials of their rates.
+
+    Args:
+        program: program of the solution.
+        w: variables of the solution (n,).
 
     Attributes:
+        grid: grid of the solution.
+        scheme: transcription scheme.
         nodes: positions of those points of the scheme whose rates count (j,), from 0 to 1.
         rates: rates at the nodes times the duration of the motion (intervals, j, states).
     """
@@ -247,6 +289,7 @@ class _SolutionPolynomials:
         scheme = program.problem.grid.scheme
         self.grid = grid
         self.scheme = scheme
+        # Legendre's schemes ignore the rates at some ends of an interval.
         used = np.flatnonzero(scheme.rates.any(axis=0))
         self.nodes = scheme.fractions[used]
         points = np.array([grid.get_points(k) for k in range(len(grid.lengths))])
@@ -261,11 +304,14 @@ class _SolutionPolynomials:
         }
 
     def evaluate(self, fractions: Array, intervals: Any) -> dict[str, Array]:
-        """Return the variables (n, names) by kind.
+        """Evaluate the variables within intervals.
 
         Args:
             fractions: positions within the intervals (n,), from 0 to 1.
             intervals: indices of the intervals (n,).
+
+        Returns:
+            Variables (n, names) by kind.
         """
         result = {}
         for kind, values in self._values.items():

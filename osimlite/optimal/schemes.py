@@ -35,7 +35,12 @@ class Scheme:
 
 
 def make_scheme(name: str) -> Scheme:
-    """Return the scheme with a name that the schema allows."""
+    """Return the scheme with a name that the schema allows.
+
+    Args:
+        name: "trapezoidal", "hermite-simpson", or "legendre-gauss-3" and "legendre-gauss-radau-3"
+            with any degree.
+    """
     if name == "trapezoidal":
         half = np.array([0.5, 0.5])
         return Scheme(
@@ -57,7 +62,7 @@ def _make_legendre_scheme(name: str, degree: int, is_radau: bool) -> Scheme:
 
     Args:
         name: value of ``transcription_scheme``.
-        degree: degree of the polynomial.
+        degree: degree of the polynomial: number of collocation points.
         is_radau: whether the end of the interval is a collocation point (Radau).
     """
     roots = casadi.collocation_points(degree, "radau" if is_radau else "legendre")
@@ -66,9 +71,12 @@ def _make_legendre_scheme(name: str, degree: int, is_radau: bool) -> Scheme:
     fractions = np.array([0.0, *roots] if is_radau else [0.0, *roots, 1.0])
     states = np.zeros((degree, count))
     rates = np.zeros((degree, count))
+    # At each collocation point the rate equals the slope of the polynomial through the start and
+    # these points.
     states[:, : degree + 1] = -slopes.T
     rates[:, 1 : degree + 1] = np.eye(degree)
     if not is_radau:
+        # Gauss points exclude the end, whose state is that of the polynomial there.
         last = np.zeros((1, count))
         last[0, : degree + 1] = -end.ravel()
         last[0, -1] = 1.0
@@ -110,6 +118,9 @@ class Grid:
         Args:
             scheme: transcription scheme.
             mesh: ends of the intervals (m + 1,), from 0 to 1.
+
+        Returns:
+            Grid, in which neighbouring intervals share the point between them.
         """
         lengths = np.diff(mesh)
         steps = len(scheme.fractions) - 1
@@ -118,6 +129,7 @@ class Grid:
         )
         weights = np.zeros(len(fractions))
         for number, length in enumerate(lengths):
+            # Added, as a point between two intervals has weights of both.
             weights[number * steps : (number + 1) * steps + 1] += length * scheme.weights
         return cls(scheme, fractions, lengths, np.arange(len(fractions)) % steps == 0, weights)
 

@@ -26,7 +26,7 @@ class SimulationCheck:
 
     Attributes:
         times: times of the solution (n,), s.
-        apart: absolute difference of each coordinate by its path (n,), rad or m.
+        apart: absolute difference of each coordinate (n,) by its path, rad or m.
     """
 
     times: Array
@@ -34,13 +34,13 @@ class SimulationCheck:
 
     @property
     def largest(self) -> Array:
-        """Largest difference of all coordinates at each time (n,)."""
+        """Return the largest difference of all coordinates at each time (n,), rad or m."""
         result: Array = np.max([*self.apart.values()], axis=0)
         return result
 
     @property
     def matches_until(self) -> float:
-        """Last time, s, up to which no coordinate differs by more than `MATCH_TOLERANCE`."""
+        """Return the last time, s, up to which no coordinate differs by more than `MATCH_TOLERANCE`."""
         far = np.flatnonzero(self.largest > MATCH_TOLERANCE)
         return float(self.times[-1] if not len(far) else self.times[max(far[0] - 1, 0)])
 
@@ -62,6 +62,9 @@ def check_by_simulation(problem: Problem, trajectory: MocoTrajectory) -> Simulat
     Args:
         problem: problem with the model.
         trajectory: solution of the problem.
+
+    Returns:
+        Differences of the coordinates at the times of the solution.
 
     Raises:
         OsimliteError: the motion is prescribed, begins after 0 s, or has parameters; or the model

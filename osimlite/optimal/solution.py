@@ -56,21 +56,28 @@ class MocoSolution:
 
     @property
     def states(self) -> StoTable:
-        """Table of the states over time; m, rad, s, N."""
+        """Return the table of the states over time; m, rad, m/s, rad/s, and 1 for muscles."""
         return self.trajectory.table("states")
 
     @property
     def controls(self) -> StoTable:
-        """Table of the controls over time."""
+        """Return the table of the controls over time."""
         return self.trajectory.table("controls")
 
     @property
     def parameters(self) -> dict[str, float]:
-        """Values of the parameters by name."""
+        """Return the values of the parameters.
+
+        Returns:
+            Value of each parameter by its name.
+        """
         return self.trajectory.parameters
 
     def write(self, path: str | Path) -> None:
         """Write a solution file as Moco's, which OpenSim's MocoTrajectory reads.
+
+        Args:
+            path: path of the file, whose folder is made if it does not exist.
 
         Raises:
             OsimliteError: the file cannot be written.
@@ -99,8 +106,7 @@ def solve(
         refine: split intervals of the mesh until the error of each is below this, see
             :class:`Refinement`; None to keep the mesh.
         scaled: column of the goal's table that each scale factor of a goal multiplies, by the
-            factor's
-            name: what OpenSim's ``addScaleFactor`` receives, and no file contains.
+            factor's name: what OpenSim's ``addScaleFactor`` receives, and no file contains.
 
     Returns:
         The solution; `success` says whether it meets the tolerances, `violations` what it violates.
@@ -126,6 +132,9 @@ def build_problem(
         folder: folder of the files that a study without a file names; the current folder if None.
         scaled: as for :func:`solve`.
 
+    Returns:
+        Problem, which :func:`evaluate` can evaluate for several trajectories.
+
     Raises:
         OsimliteError: as for :func:`solve`.
     """
@@ -149,6 +158,10 @@ def solve_program(
         guess: as for :func:`solve`.
         tell: as for :func:`solve`.
         refine: as for :func:`solve`.
+
+    Returns:
+        Solution on the last mesh, with its violations and, if the goals say how it continues, its
+        stride.
     """
     problem = program.problem
     rounds = list[Round]()
@@ -167,6 +180,7 @@ def solve_program(
         program, result, rounds = solve_with_refinement(
             program, start, Refinement.parse(refine), tell
         )
+    # Rounds are empty without refinement.
     iterations = sum(each.iterations for each in rounds) or result.iterations
     duration = sum(each.duration for each in rounds) or result.duration
     costs, rows = program.compute_values(result.w)
@@ -255,7 +269,7 @@ def append_next_period(problem: Problem, trajectory: MocoTrajectory) -> MocoTraj
 
     A goal of half a stride thus gives the complete stride. A variable whose final value equals
     another's initial value (or its negative) continues as that one did. Variables without a pair,
-    such as the distance travelled, continue from their final value. Multipliers, slacks and
+    such as the distance travelled, change once more as in this period. Multipliers, slacks and
     derivatives are left out.
 
     Args:
@@ -277,6 +291,7 @@ def append_next_period(problem: Problem, trajectory: MocoTrajectory) -> MocoTraj
         column = trajectory.columns[name]
         pair = follows.get(name)
         if pair is None:
+            # Continued by its increase, such as the distance travelled.
             more = column + (column[-1] - column[0])
         else:
             more = (-1.0 if pair.negate else 1.0) * trajectory.columns[pair.initial_variable]

@@ -1,7 +1,7 @@
 """Constant sparse matrices that are multiplied by vectors.
 
-The few operations that a nonlinear program needs, by NumPy alone: to import `scipy.sparse` takes a
-fifth of the process that solves a small study.
+It holds the few operations that a nonlinear program needs, by NumPy alone: to import `scipy.sparse`
+takes a fifth of the process that solves a small study.
 """
 
 from __future__ import annotations
@@ -15,11 +15,18 @@ from osimlite.mechanics.multibody.spatial import Array
 
 @dataclass(frozen=True, eq=False)
 class SparseMatrix:
-    """A sparse matrix by its entries, each place once, row by row and column by column."""
+    """Sparse matrix as a list of its entries: each place once, row by row and column by column.
 
-    rows: NDArray[np.int64]  # of the entries (k,)
-    columns: NDArray[np.int64]  # of the entries (k,)
-    values: Array  # of the entries (k,)
+    Attributes:
+        rows: row of each entry (k,).
+        columns: column of each entry (k,).
+        values: value of each entry (k,).
+        shape: number of rows and of columns.
+    """
+
+    rows: NDArray[np.int64]
+    columns: NDArray[np.int64]
+    values: Array
     shape: tuple[int, int]
 
     @classmethod
@@ -29,10 +36,10 @@ class SparseMatrix:
         """Return the matrix of some entries; those at one place are added.
 
         Args:
-            rows: of the entries (k,).
-            columns: of the entries (k,).
-            values: of the entries (k,).
-            shape: of the matrix.
+            rows: row of each entry (k,).
+            columns: column of each entry (k,).
+            values: value of each entry (k,).
+            shape: number of rows and of columns.
         """
         width = max(shape[1], 1)
         keys = np.asarray(rows, dtype=np.int64) * width + np.asarray(columns, dtype=np.int64)
@@ -43,17 +50,21 @@ class SparseMatrix:
         )
 
     def __matmul__(self, vector: Array) -> Array:
-        """Return the product with a vector."""
+        """Return the product (rows,) with a vector (columns,)."""
         products = self.values * vector[self.columns]
         return np.asarray(np.bincount(self.rows, products, self.shape[0]), dtype=np.float64)
 
     def multiply_transpose(self, vector: Array) -> Array:
-        """Return the product of the transpose with a vector."""
+        """Return the product (columns,) of the transpose with a vector (rows,)."""
         products = self.values * vector[self.rows]
         return np.asarray(np.bincount(self.columns, products, self.shape[1]), dtype=np.float64)
 
     def select_columns(self, indices: NDArray[np.int64]) -> SparseMatrix:
-        """Return the matrix of some of the columns (c,), in their order; one may stand there several times."""
+        """Return the matrix of some columns, in their order.
+
+        Args:
+            indices: indices of the columns (c,); one may stand there several times.
+        """
         order = np.argsort(self.columns, kind="stable")
         starts = np.searchsorted(self.columns[order], np.arange(self.shape[1] + 1))
         counts = (starts[1:] - starts[:-1])[indices]

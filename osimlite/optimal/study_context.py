@@ -22,7 +22,11 @@ from osimlite.schema.specs import FieldSpec, get_value_specs
 
 @contextmanager
 def name_file_in_errors(file: object) -> Iterator[None]:
-    """Add the file, if it is one, to errors that name none."""
+    """Add a file to errors that name none.
+
+    Args:
+        file: file of a study; anything but a path is left alone.
+    """
     try:
         yield
     except OsimliteError as error:
@@ -39,11 +43,15 @@ MAX_MESH_VALUES = 2_000_000
 
 
 class StudyContext:
-    """Study or tool of Moco, with the file and the folder that it belongs to.
+    """A study or a tool of Moco, with the file and the folder that it belongs to.
 
     Args:
-        file: file of the study; None if there is none.
+        file: file of the study; None for a study that was not read from a file.
         folder: folder of the files that a study without a file names; the current folder if None.
+
+    Attributes:
+        file: file of the study, or None.
+        folder: folder in which files are looked for first.
     """
 
     def __init__(self, file: str | Path | None, folder: Path | None) -> None:
@@ -51,11 +59,21 @@ class StudyContext:
         self.folder = self.file.parent if self.file is not None else folder or Path(".")
 
     def locate_file(self, name: str) -> Path:
-        """Return the path of a file that the study names, looked for in its folder, then in the current one."""
+        """Return the path of a file that the study names.
+
+        Args:
+            name: path as in the study, looked for in its folder, then in the current one.
+        """
         return find_named_file(self.folder, name.strip())
 
     def _locate_part(self, part: Object) -> dict[str, Any]:
-        """Return file and line of a part of the study: objects know no lines, but their tags and names are in the text."""
+        """Find a part of the study in its file.
+
+        Objects know no lines, but their tags and names are in the text.
+
+        Returns:
+            Entries ``file`` and ``line`` of an error; empty for a study without a file.
+        """
         if self.file is None:
             return {}
         tags = re.compile(rf"<{re.escape(_get_tag(part))}(\s[^>]*)?/?>")
@@ -69,12 +87,22 @@ class StudyContext:
         return {"file": str(self.file), "line": found[0][0] if found else 1}
 
     def unsupported_error(self, part: Object, reason: str) -> UnsupportedError:
-        """Return the error for a part that is valid in OpenSim and not supported here."""
+        """Return the error for a part that OpenSim accepts and osimlite does not support.
+
+        Args:
+            part: part of the study.
+            reason: what osimlite does not support, and what to do.
+        """
         name = f" '{part.name}'" if part.name else ""
         return UnsupportedError(f"{_get_tag(part)}{name}: {reason}", **self._locate_part(part))
 
     def invalid_error(self, part: Object, reason: str) -> DocumentError:
-        """Return the error for a part that is invalid."""
+        """Return the error for a part that is invalid.
+
+        Args:
+            part: part of the study.
+            reason: what is wrong, and what to do.
+        """
         name = f" '{part.name}'" if part.name else ""
         return DocumentError(f"{_get_tag(part)}{name}: {reason}", **self._locate_part(part))
 
@@ -136,7 +164,11 @@ class StudyContext:
                     )
 
     def compile_pattern(self, part: Object, text: str) -> Callable[[str], Any]:
-        """Return the function that matches names against a pattern.
+        """Return the function that matches names against a pattern of the study.
+
+        Args:
+            part: part of the study with the pattern, for messages.
+            text: pattern.
 
         Raises:
             UnsupportedError: the pattern uses syntax that is not supported here.
@@ -153,7 +185,12 @@ class StudyContext:
 
 
 def _describe_invalid_value(spec: FieldSpec, word: Any) -> str:
-    """Return the end of the message on an invalid value of a property; empty if the value is valid."""
+    """Return the end of the message on an invalid value of a property; empty if the value is valid.
+
+    Args:
+        spec: property.
+        word: its value, or one of its values.
+    """
     kind = spec.kind
     if not isinstance(kind, Value) or word is None:
         return ""

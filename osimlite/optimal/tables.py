@@ -39,12 +39,15 @@ TIME_TOLERANCE_S = 1e-6
 
 
 def read_reference(problem: Problem, part: Object, processor: TableProcessor) -> StoTable:
-    """Read the reference table of a goal, in rad.
+    """Read the reference table of a goal, with angles in rad.
 
     Args:
         problem: problem of the study.
         part: goal with the processor, for messages; a table of `problem.tables` replaces the file.
         processor: processor that names the file.
+
+    Returns:
+        Table after the operators of the processor.
 
     Raises:
         UnsupportedError: an operator of the processor is not supported here.
@@ -74,6 +77,9 @@ def process_table(
         states: paths of the model's states.
         mechanism: mechanism of the model.
 
+    Returns:
+        Table with angles in rad.
+
     Raises:
         UnsupportedError: an operator of the processor is not supported here.
         OsimliteError: the file cannot be read.
@@ -99,7 +105,14 @@ def process_table(
 
 
 def read_table(path: Path) -> StoTable:
-    """Read a table; a marker file gives three columns for each marker, as OpenSim flattens them, m."""
+    """Read a table, which may be a marker file.
+
+    Args:
+        path: path of the file.
+
+    Returns:
+        Table; a marker file gives three columns for each marker, in m, as OpenSim flattens them.
+    """
     if path.suffix.lower() != ".trc":
         return read_sto(path)
     markers = MarkerData.from_source(path)
@@ -110,7 +123,12 @@ def read_table(path: Path) -> StoTable:
 
 
 def _filter_lowpass(table: StoTable, operator: TabOpLowPassFilter) -> StoTable:
-    """Return the table after OpenSim's low-pass filter, resampled at equal steps first if need be."""
+    """Return the table after OpenSim's low-pass filter, resampled at equal steps first if necessary.
+
+    Args:
+        table: table.
+        operator: operator with the cutoff frequency, Hz; the table is unchanged if it is negative.
+    """
     if operator.cutoff_frequency < 0.0:
         return table
     times = table.times
@@ -137,7 +155,14 @@ def _append_coupled_values(
     table: StoTable,
     mechanism: Mechanism,
 ) -> StoTable:
-    """Return the table with the values of coordinates that couplers determine."""
+    """Return the table with the values of coordinates that couplers determine.
+
+    Args:
+        problem: study, for messages.
+        operator: operator with the setting that overwrites columns.
+        table: table in rad and m.
+        mechanism: mechanism with the couplers.
+    """
     paths = [f"{info.path}/value" for info in mechanism.coordinates]
     for item in mechanism.constraints:
         if not isinstance(item, Coupler):
@@ -158,7 +183,12 @@ def _append_coupled_values(
 
 
 def _resolve_state_path(label: str, states: Sequence[str]) -> str:
-    """Return the path of the state that an old label means; the label itself if it means none."""
+    """Return the path of the state that an old label means; the label itself if it means none.
+
+    Args:
+        label: label such as ``knee_angle``, ``knee_angle_u`` or ``soleus.activation``.
+        states: paths of the model's states.
+    """
     ending = f"{label[:-2]}/speed" if label.endswith("_u") else label.replace(".", "/")
     for end in (label, ending, f"{ending}/value", re.sub(r"^.*/(?=[^/]+/[^/]+$)", "", label)):
         matches = [state for state in states if state == end or state.endswith(f"/{end}")]
@@ -168,7 +198,7 @@ def _resolve_state_path(label: str, states: Sequence[str]) -> str:
 
 
 def _convert_to_radians(table: StoTable, mechanism: Mechanism) -> StoTable:
-    """Return the table with angles in rad."""
+    """Return the table with angles and angular speeds in rad and rad/s."""
     if not table.in_degrees:
         return table
     angles = {info.path for info in mechanism.coordinates if info.unit == "rad"}
@@ -184,12 +214,16 @@ def fit_splines(problem: Problem, table: StoTable, columns: list[str]) -> list[T
         table: table with the columns.
         columns: names of the columns.
 
+    Returns:
+        Function of time for each column.
+
     Raises:
         DocumentError: a column is missing, has gaps, or does not cover the motion.
     """
     check_columns(table, columns)
     first = float(table.times[0])
     last = float(table.times[-1])
+    # The latest start and the earliest end: a motion with free times may stay within the data.
     start = problem.times[0][1]
     end = problem.times[1][0]
     if start < first - TIME_TOLERANCE_S or end > last + TIME_TOLERANCE_S:
@@ -205,13 +239,25 @@ def fit_splines(problem: Problem, table: StoTable, columns: list[str]) -> list[T
 
 
 def sample_function(function: Function, times: Array) -> Array:
-    """Return value, first and second derivative (3, n) of a function of time at times (n,)."""
+    """Evaluate a function of time.
+
+    Args:
+        function: function of one argument.
+        times: times (n,), s.
+
+    Returns:
+        Value, first and second derivative (3, n).
+    """
     results = (function.evaluate((t,)) for t in times.tolist())
     return np.array([(value, slope[0], curve[0][0]) for value, slope, curve in results]).T
 
 
 def check_columns(table: StoTable, columns: Sequence[str]) -> None:
     """Check that splines can be fitted through columns of a table.
+
+    Args:
+        table: table.
+        columns: names of the columns.
 
     Raises:
         DocumentError: a column is missing or has gaps, or the times are too few or do not rise.
@@ -234,7 +280,15 @@ def _sample_column(curves: SplineCurves, number: int, times: Array) -> Array:
 
 
 class SplineCurves:
-    """Splines through columns, evaluated together; the values of the last times are cached."""
+    """Splines through columns, evaluated together.
+
+    The values at the last times are cached, as each column is a function of time of its own and all
+    are evaluated at the same times.
+
+    Args:
+        times: times (n,), s.
+        rows: values of m columns (n, m).
+    """
 
     def __init__(self, times: Array, rows: Array) -> None:
         self._curves = SampledCurves(times, rows)

@@ -32,14 +32,16 @@ EXPLICIT = "explicit"
 
 
 class TendonEquations:
-    """Equations of the DeGrooteFregly2016Muscles with elastic tendons of one ``tendon_compliance_dynamics_mode``.
+    """Equations of DeGrooteFregly2016Muscles with elastic tendons.
 
     Args:
         problem: problem with the muscles.
         elements: forces of the model with their paths.
-        mode: mode of the muscles.
+        mode: ``tendon_compliance_dynamics_mode`` of the muscles to include.
 
     Attributes:
+        problem: problem with the muscles.
+        muscles: path of each muscle, with the numbers of its fibers and of its tendon.
         paths: paths of the muscles.
         names: names of the rates of their tendon forces, as in Moco.
     """
@@ -64,8 +66,8 @@ class TendonEquations:
     def compute_residuals(self, point: Point, rates: Formula) -> tuple[list[str], Formula]:
         """Compute the excess of each tendon force over the fiber force, relative to the muscle's strength.
 
-        The tendon lengthens as the rate of its force says, and the fibers by the rest of the path's
-        lengthening speed.
+        The rate of its force determines how fast the tendon lengthens; the fibers take the rest of
+        the path's lengthening speed.
 
         Args:
             point: point of the grid.
@@ -86,6 +88,8 @@ class TendonEquations:
             activation = (
                 point.state(f"{path}/activation") if muscle.follows else point.control(path)
             )
+            # Derivative of the tendon's length, the inverse of its exponential force curve, times
+            # the rate of the force.
             stretch = muscle.slack * rates[number] / (tendon.growth * (force + BELOW))
             given = (
                 lengths[place],
@@ -104,6 +108,12 @@ class TendonEquations:
 
         The fibers are springs here: neither the activation nor the force-velocity factor changes
         (M. Millard et al., Journal of Biomechanical Engineering 135, 2013, A6).
+
+        Args:
+            point: point of the grid.
+
+        Returns:
+            Errors (m, 1).
         """
         functions = self.problem.functions
         rows = [casadi.SX(0, 1)]
@@ -117,6 +127,7 @@ class TendonEquations:
                 point.state(f"{path}/activation") if muscle.follows else point.control(path)
             )
             along = casadi.SX.sym("along")
+            # Pennate fibers keep their height normal to the tendon.
             length = casadi.sqrt(along**2 + muscle.height**2)
             fiber = speeds[place] - muscle.slack * rate / (tendon.growth * (force + BELOW))
             velocity = casadi.SX.sym("velocity")
@@ -128,6 +139,8 @@ class TendonEquations:
             )
             springs = passive * muscle.passive + muscle.damping * velocity
             borne = active * make_symbolic(degroote_factor)(velocity) + springs
+            # Differentiated for symbols that the present length and speed replace afterwards: the
+            # speed counts as constant.
             stiffness = casadi.jacobian(borne * along / length, along)
             now = lengths[place] - muscle.slack * make_symbolic(smooth_tendon_length)(
                 force, tendon.growth

@@ -74,6 +74,7 @@ def set_time_range(
         raise context.invalid_error(tool, message)
     study.solver.num_mesh_intervals = math.ceil((end - start) / tool.mesh_interval)
     if tool.clip_time_range:
+        # Moco's margin, s, for finite differences about the ends of the motion.
         start = start + 1e-3
         end = end - 1e-3
     phase = study.problem.phases

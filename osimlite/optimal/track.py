@@ -40,7 +40,7 @@ def build_track_problem(
 
     Args:
         tool: settings.
-        file: setup file of the settings; None if there is none.
+        file: setup file of the settings; None for settings that were not read from a file.
         folder: folder of the files that settings without a file name.
         more: function that changes the study before the problem is built: goals, bounds, solver.
         scaled: as for :func:`osimlite.moco.solve`.
@@ -55,6 +55,7 @@ def build_track_problem(
     place = file.parent if file is not None else folder or Path(".")
     solver = MocoCasADiSolver(
         name="solver",
+        # These settings are MocoTrack's own.
         optim_convergence_tolerance=1e-2,
         optim_constraint_tolerance=1e-2,
         optim_finite_difference_scheme="forward",
@@ -137,6 +138,9 @@ def solve_track(
         refine: as for :func:`osimlite.moco.solve`.
         scaled: as for :func:`osimlite.moco.solve`.
 
+    Returns:
+        Solution with the motion and the controls.
+
     Raises:
         OsimliteError: as for :func:`build_track_problem`.
     """
@@ -164,7 +168,7 @@ def _make_marker_goal(tool: MocoTrack) -> MocoMarkerTrackingGoal:
 
 
 def _append_speeds(table: StoTable) -> StoTable:
-    """Return the table with the derivatives of those coordinate values that have no speed column."""
+    """Return the table with derivatives of those coordinate values that have no speed column."""
     pairs = [
         (name, f"{name.removesuffix('/value')}/speed")
         for name in table.columns
@@ -180,10 +184,21 @@ def _append_speeds(table: StoTable) -> StoTable:
 
 
 def _find_state_weights(problem: Problem, tool: MocoTrack, table: StoTable) -> list[MocoWeight]:
-    """Return the weights of the tool, and weight 0 for states that the model's constraints determine."""
+    """Find the weights of tracked states.
+
+    Args:
+        problem: problem with the names of the states.
+        tool: settings with the weights.
+        table: reference table.
+
+    Returns:
+        Weights of the tool, and weight 0 for states that the model's constraints determine.
+    """
     weight_by_name = {weight.name: weight.weight for weight in tool.states_weight_set.objects}
     result = {}
     for path in problem.functions.coordinates:
+        # A constraint determines its dependent coordinate, whose tracking would fight with that of
+        # the others.
         is_dependent = any(
             str(getattr(part, "dependent_coordinate_name", "")) == path.rpartition("/")[2]
             for part in problem.model.constraint_set.objects

@@ -33,7 +33,7 @@ class MocoTrajectory:
 
     Attributes:
         times: times (n,), s.
-        columns: values of each variable by name (n,); m, rad, s, N.
+        columns: values (n,) of each variable by name; m, rad, s, N.
         names: names of the columns by kind, such as ``states`` and ``controls``.
         parameters: values of parameters by name.
         header: further entries of the file's header, such as ``objective``.
@@ -51,8 +51,8 @@ class MocoTrajectory:
     ) -> MocoTrajectory:
         """Return the trajectory of the variables of a nonlinear program.
 
-        Variables of points between nodes only (velocity corrections) are interpolated at all times,
-        as in Moco.
+        Variables at some points only (velocity corrections, projection slacks) are interpolated at
+        all times, as in Moco.
 
         Args:
             layout: layout of the variables.
@@ -93,6 +93,9 @@ class MocoTrajectory:
     def read(cls, path: str | Path) -> MocoTrajectory:
         """Read a file of Moco, or any table of states and controls over time.
 
+        Args:
+            path: path of the file.
+
         Raises:
             OsimliteError: the file cannot be read.
             DocumentError: the file has no times, or its header counts other columns.
@@ -107,6 +110,8 @@ class MocoTrajectory:
                     f"the header says {name}={word}, which is not a count", file=str(path)
                 )
         counts = [*map(int, counted.values())]
+        # A table that no Moco wrote has no counts; its columns are states for the guess, whatever
+        # they are.
         if not any(counts):
             counts[0] = len(table.columns)
         if sum(counts) != len(table.columns):
@@ -122,7 +127,11 @@ class MocoTrajectory:
         return cls(table.times, column_by_name, names, parameters, table.header)
 
     def table(self, kind: str = "") -> StoTable:
-        """Return the table of the columns of one kind, or of all columns."""
+        """Return the table of the columns of one kind, or of all columns and the parameters.
+
+        Args:
+            kind: one of `COLUMN_KINDS`; empty for all columns.
+        """
         kinds: Iterable[str] = [kind] if kind else COLUMN_KINDS[:-1]
         names = [name for each in kinds for name in self.names.get(each, ())]
         rows = (
@@ -146,6 +155,9 @@ class MocoTrajectory:
 
     def write(self, path: str | Path) -> None:
         """Write a file that OpenSim's MocoTrajectory reads.
+
+        Args:
+            path: path of the file, whose folder is made if it does not exist.
 
         Raises:
             OsimliteError: the file cannot be written.

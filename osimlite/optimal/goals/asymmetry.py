@@ -29,6 +29,13 @@ def build_step_time_asymmetry_goal(goal: MocoStepTimeAsymmetryGoal, problem: Pro
     Each moment counts to a step of the foot that is on the ground; if both feet are, to a step of
     the foot in front. Moments of right steps count -1, of left steps +1, so that their mean over
     time is the asymmetry.
+
+    Args:
+        goal: goal of the study.
+        problem: problem with the contacts.
+
+    Raises:
+        DocumentError: a contact does not exist, or a group lacks the contact of its position.
     """
     groups = goal.right_contact_group, goal.left_contact_group
     feet = [_find_foot(goal, problem, group) for group in groups]
@@ -50,7 +57,12 @@ def build_step_time_asymmetry_goal(goal: MocoStepTimeAsymmetryGoal, problem: Pro
         right, left = contacts
         front = smooth_step(positions[0] - positions[1], 0.0, 1.0, FRONT_FOOT_SHARPNESS_PER_M)
         return smooth_step(
-            left - right - 2.0 * left * right * front, 0.0, 1.0, goal.asymmetry_smoothing
+            # With one foot on the ground `left - right` is 1 or -1; with both it is 0, and the
+            # product gives -front.
+            left - right - 2.0 * left * right * front,
+            0.0,
+            1.0,
+            goal.asymmetry_smoothing,
         )
 
     result = make_integral_terms(integrand)
@@ -63,7 +75,15 @@ def build_step_time_asymmetry_goal(goal: MocoStepTimeAsymmetryGoal, problem: Pro
 def build_step_length_asymmetry_goal(
     goal: MocoStepLengthAsymmetryGoal, problem: Problem
 ) -> GoalTerms:
-    """Return 100 times the time in which the feet are further apart than their target step lengths, as OpenSim."""
+    """Return 100 times the time, s, in which the feet are further apart than their step lengths, as OpenSim.
+
+    Args:
+        goal: goal of the study.
+        problem: problem with the frames.
+
+    Raises:
+        DocumentError: a frame does not exist, or the stride length is not positive.
+    """
     feet = str(goal.right_foot_frame), str(goal.left_foot_frame)
     for foot in feet:
         problem.check_name(goal, foot, problem.functions.mechanism.frames, "frame")
@@ -88,7 +108,12 @@ def build_step_length_asymmetry_goal(
 
 
 def get_component(direction: str, vector: Sequence[Formula] | Formula) -> Formula:
-    """Return the component of a vector in ground along a direction such as ``negative-x``."""
+    """Return the component of a vector in ground along a direction.
+
+    Args:
+        direction: "positive-" or "negative-" and the axis, such as "negative-x".
+        vector: components along x, y and z.
+    """
     sign, _, axis = direction.partition("-")
     return vector["xyz".index(axis)] * (1.0 if sign == "positive" else -1.0)
 
@@ -109,6 +134,11 @@ def _find_foot(
     goal: MocoStepTimeAsymmetryGoal, problem: Problem, group: MocoStepTimeAsymmetryGoalGroup
 ) -> tuple[list[str], str]:
     """Find the contacts of a foot.
+
+    Args:
+        goal: goal, for messages.
+        problem: problem with the contacts.
+        group: contacts of the foot.
 
     Returns:
         Paths of the contact forces of the foot, and path of the body whose origin is its position.

@@ -34,18 +34,28 @@ ContactGoal = MocoContactTrackingGoal | MocoContactImpulseTrackingGoal
 
 
 class ContactGroup(NamedTuple):
-    """Contact forces of the model whose sum tracks one measured force."""
+    """Contact forces of the model whose sum tracks one measured force.
+
+    Attributes:
+        paths: paths of the contact forces.
+        measured: measured force along x, y and z of ground, N.
+        largest: largest absolute value of the measured force along x, y and z (3,), N.
+    """
 
     paths: list[str]
-    """Paths of the contact forces."""
     measured: list[TimeFunction]
-    """Measured force along x, y and z of ground, N."""
     largest: Array
-    """Largest absolute value of the measured force along x, y and z (3,), N."""
 
 
 def build_contact_tracking_goal(goal: MocoContactTrackingGoal, problem: Problem) -> GoalTerms:
-    """Return the integral of the squared force error of each contact group over the model's weight."""
+    """Return the integral of the squared force error of each contact group over the model's weight, N s.
+
+    With `normalize_tracking_error` each component counts relative to its largest measured value.
+
+    Args:
+        goal: goal of the study.
+        problem: problem with the contacts.
+    """
     project = make_projection(goal, problem)
     groups = read_contact_groups(goal, problem)
 
@@ -69,7 +79,15 @@ def build_contact_tracking_goal(goal: MocoContactTrackingGoal, problem: Problem)
 def build_contact_impulse_tracking_goal(
     goal: MocoContactImpulseTrackingGoal, problem: Problem
 ) -> GoalTerms:
-    """Return the squared error of the impulse, N s, along an axis of ground over the model's weight."""
+    """Return the squared error of the impulse along an axis of ground over the model's weight, N s².
+
+    Args:
+        goal: goal of the study.
+        problem: problem with the contacts.
+
+    Raises:
+        DocumentError: there is no such axis, or the goal has several groups.
+    """
     axis = goal.impulse_axis
     if axis not in range(3):
         raise problem.invalid_error(goal, f"impulse_axis is {axis}; expected 0, 1 or 2")
@@ -91,6 +109,13 @@ def build_contact_impulse_tracking_goal(
 
 def read_contact_groups(goal: ContactGoal, problem: Problem) -> list[ContactGroup]:
     """Read the measured forces of a goal and match them with the contact forces of the model.
+
+    Args:
+        goal: goal with the loads.
+        problem: problem with the contacts.
+
+    Returns:
+        Contact groups in the order of the goal.
 
     Raises:
         DocumentError: the goal names no loads, or a force or a contact that does not exist.
@@ -168,13 +193,25 @@ def find_contact(goal: MocoGoal, problem: Problem, name: str) -> tuple[str, Cont
 def _find_contact_path(
     goal: ContactGoal, problem: Problem, name: str, force: Any, group: Any
 ) -> str:
-    """Return the path of a contact, whose sphere must be on the body that the measured force acts on."""
+    """Return the path of a contact, whose sphere must be on the body that the measured force acts on.
+
+    Args:
+        goal: goal, for messages.
+        problem: problem with the contacts.
+        name: path of the contact.
+        force: measured force.
+        group: contact group, which may name other bodies.
+
+    Raises:
+        UnsupportedError: the sphere is on another body.
+    """
     path, sphere = find_contact(goal, problem, name)
     frames = str(sphere.socket_frame).split("/")
     targets = [
         force.applied_to_body,
         *(str(frame).rpartition("/")[2] for frame in group.alternative_frame_paths),
     ]
+    # OpenSim negates the force for the body of the half space; here only the sphere's side is done.
     if not any(each.rpartition("/")[2] in frames for each in targets):
         message = f"the sphere of '{path}' is on {'/'.join(frames)}, and '{force.name}' acts on {force.applied_to_body}"
         raise problem.unsupported_error(

@@ -19,7 +19,12 @@ if TYPE_CHECKING:
 
 
 def build_control_goal(goal: MocoControlGoal, problem: Problem) -> GoalTerms:
-    """Return the integral over time of the weighted sum of ``abs(control) ** exponent``."""
+    """Return the integral over time of the weighted sum of ``abs(control) ** exponent``, s.
+
+    Args:
+        goal: goal of the study.
+        problem: problem with the controls.
+    """
     controls = [*problem.controls]
     weights = problem.find_weights(
         goal, goal.control_weights, goal.control_weights_pattern, controls, "control"
@@ -36,7 +41,12 @@ def build_control_goal(goal: MocoControlGoal, problem: Problem) -> GoalTerms:
 
 
 def build_sum_squared_state_goal(goal: MocoSumSquaredStateGoal, problem: Problem) -> GoalTerms:
-    """Return the integral over time of the weighted sum of squares of the states that match the pattern."""
+    """Return the integral over time of the weighted sum of squares of the states that match the pattern.
+
+    Args:
+        goal: goal of the study.
+        problem: problem with the states.
+    """
     states = problem.functions.states
     weights = problem.find_weights(goal, goal.state_weights, None, states, "state")
     if goal.pattern is not None:
@@ -48,10 +58,17 @@ def build_sum_squared_state_goal(goal: MocoSumSquaredStateGoal, problem: Problem
 
 
 def build_joint_reaction_goal(goal: MocoJointReactionGoal, problem: Problem) -> GoalTerms:
-    """Return the integral of the weighted squares of a joint's reaction force and moment over the model's weight.
+    """Return the integral of the weighted squares of a joint's reaction load over the model's weight.
 
     Forces are in N, moments in N m, along the axes of ``expressed_in_frame_path`` (by default the
     joint's frame on the side of ``loads_frame``).
+
+    Args:
+        goal: goal of the study.
+        problem: problem with the joint.
+
+    Raises:
+        DocumentError: the joint or the frame does not exist.
     """
     path = str(goal.joint_path)
     side = goal.loads_frame

@@ -37,6 +37,10 @@ def build_average_speed_goal(goal: MocoAverageSpeedGoal, problem: Problem) -> Go
 
     The average speed is the distance between the mass centre's first and last position over the
     duration.
+
+    Args:
+        goal: goal of the study.
+        problem: problem of the study.
     """
 
     def value(ends: Endpoints) -> Formula:
@@ -47,7 +51,12 @@ def build_average_speed_goal(goal: MocoAverageSpeedGoal, problem: Problem) -> Go
 
 
 def build_initial_activation_goal(goal: MocoInitialActivationGoal, problem: Problem) -> GoalTerms:
-    """Return excitation less activation at the start, for each muscle that has an activation."""
+    """Return excitation less activation at the start, for each actuator that has an activation.
+
+    Args:
+        goal: goal of the study.
+        problem: problem with the actuators.
+    """
     muscles = [
         name for name in problem.controls if f"{name}/activation" in problem.functions.states
     ]
@@ -66,9 +75,14 @@ def build_initial_force_equilibrium_goal(
     """Return tendon force less fiber force at the start for muscles with explicit tendon dynamics.
 
     The rate of the tendon force is zero there. The force is relative to the muscle's strength.
+
+    Args:
+        goal: goal of the study.
+        problem: problem with the muscles.
     """
 
     def value(ends: Endpoints) -> Formula:
+        # The equilibrium of muscles with implicit dynamics is an equation at all points anyway.
         tendons = TendonEquations(problem, problem.dynamics.list_forces(), EXPLICIT)
         return tendons.compute_residuals(ends.start, casadi.SX.zeros(len(tendons.paths)))[1]
 
@@ -78,7 +92,12 @@ def build_initial_force_equilibrium_goal(
 def build_initial_velocity_equilibrium_goal(
     goal: MocoInitialVelocityEquilibriumDGFGoal, problem: Problem
 ) -> GoalTerms:
-    """Return the rate of the fiber force less that of the tendon force at the start, N/s, for each muscle."""
+    """Return the rate of the fiber force less that of the tendon force at the start, N/s, for each muscle.
+
+    Args:
+        goal: goal of the study.
+        problem: problem with the muscles.
+    """
     both = [
         TendonEquations(problem, problem.dynamics.list_forces(), mode)
         for mode in (IMPLICIT, EXPLICIT)
@@ -91,7 +110,15 @@ def build_initial_velocity_equilibrium_goal(
 
 
 def build_periodicity_goal(goal: MocoPeriodicityGoal, problem: Problem) -> GoalTerms:
-    """Return the initial value less the final value of each pair of variables; their sum for negated pairs."""
+    """Return the initial value less the final value of each pair of variables; for negated pairs minus their sum.
+
+    Args:
+        goal: goal of the study.
+        problem: problem with the states and controls.
+
+    Raises:
+        DocumentError: a variable does not exist.
+    """
     functions = problem.functions
     pairs = []
     for goal_pairs, known, what in (
@@ -116,7 +143,15 @@ def build_periodicity_goal(goal: MocoPeriodicityGoal, problem: Problem) -> GoalT
 
 
 def build_marker_final_goal(goal: MocoMarkerFinalGoal, problem: Problem) -> GoalTerms:
-    """Return the squared distance, m², of a marker or station from a fixed position in ground at the end."""
+    """Return the squared distance, m², of a marker or station from a fixed position in ground at the end.
+
+    Args:
+        goal: goal of the study.
+        problem: problem with the markers.
+
+    Raises:
+        DocumentError: the marker or station does not exist.
+    """
     name = str(goal.point_name)
     problem.check_name(goal, name, problem.functions.mechanism.stations, "marker or station")
 
@@ -134,6 +169,13 @@ def build_expression_based_parameter_goal(
     """Return the value of an expression of parameters.
 
     A property that is no parameter of the study enters with the model's number.
+
+    Args:
+        goal: goal of the study.
+        problem: problem with the parameters.
+
+    Raises:
+        DocumentError: the expression or its variables are invalid.
     """
     if not goal.expression.strip():
         raise problem.invalid_error(goal, "expression is required")
@@ -164,7 +206,16 @@ def build_expression_based_parameter_goal(
 
 
 def _read_number(goal: MocoExpressionBasedParameterGoal, problem: Problem, path: str) -> float:
-    """Return the number that the model has at the path of a property."""
+    """Return the number that the model has at the path of a property.
+
+    Args:
+        goal: goal, for messages.
+        problem: problem with the model.
+        path: path of the property.
+
+    Raises:
+        DocumentError: the model has no such number.
+    """
     matches = find_properties(problem.model, path)
     try:
         return matches[0].make_setter(problem.model).get_value()

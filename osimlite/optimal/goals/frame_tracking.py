@@ -36,7 +36,12 @@ SMALL_SQUARED_SINE = 1e-8
 def build_translation_tracking_goal(
     goal: MocoTranslationTrackingGoal, problem: Problem
 ) -> GoalTerms:
-    """Return the integral of the weighted squared distances of frame origins from reference positions, m² s."""
+    """Return the integral of the weighted squared distances of frame origins from their references, m² s.
+
+    Args:
+        goal: goal of the study.
+        problem: problem with the frames.
+    """
     reference = FrameReference(
         goal,
         goal.translation_reference_file,
@@ -54,7 +59,12 @@ def build_translation_tracking_goal(
 def build_orientation_tracking_goal(
     goal: MocoOrientationTrackingGoal, problem: Problem
 ) -> GoalTerms:
-    """Return the integral of the weighted squared angles of frames from reference orientations, rad² s."""
+    """Return the integral of the weighted squared angles of frames from reference orientations, rad² s.
+
+    Args:
+        goal: goal of the study.
+        problem: problem with the frames.
+    """
     reference = FrameReference(
         goal,
         goal.rotation_reference_file,
@@ -70,7 +80,12 @@ def build_orientation_tracking_goal(
 def build_angular_velocity_tracking_goal(
     goal: MocoAngularVelocityTrackingGoal, problem: Problem
 ) -> GoalTerms:
-    """Return the integral of the weighted squared errors of angular velocities of frames, rad²/s."""
+    """Return the integral of the weighted squared errors of angular velocities of frames, rad²/s.
+
+    Args:
+        goal: goal of the study.
+        problem: problem with the frames.
+    """
     reference = FrameReference(
         goal,
         goal.angular_velocity_reference_file,
@@ -91,6 +106,10 @@ def build_acceleration_tracking_goal(
     """Return the integral of the weighted squared errors of accelerations of frame origins, m²/s³.
 
     With `gravity_offset` the acceleration is the specific force that an accelerometer measures.
+
+    Args:
+        goal: goal of the study.
+        problem: problem with the frames.
     """
     gravity = casadi.DM(problem.functions.mechanism.gravity)
 
@@ -147,13 +166,13 @@ def compute_squared_angle(point: Point, frame: Frame, quaternion: Formula) -> Fo
 
 @dataclass(frozen=True, eq=False)
 class FrameReference:
-    """Reference that frames of the model track: a file of values, or a motion to compute them from.
+    """What frames of the model track: a file of values, or a motion to compute the values from.
 
     Attributes:
         goal: goal with the reference.
-        file: file with a column for each frame; empty if there is none.
-        states: motion of the model from which the values are computed if there is no file; None
-            where OpenSim's goal has no such property.
+        file: file with a column for each frame; empty to use `states`.
+        states: motion of the model from which the values are computed without a file; None where
+            OpenSim's goal has no such property.
         paths: paths of the frames.
         weights: weights by path; 1 by default.
         kind: type of the values as the header of the file names it.
@@ -206,7 +225,12 @@ class FrameReference:
         return make_integral_terms(integrand)
 
     def _read_table(self, problem: Problem, paths: Sequence[str]) -> StoTable:
-        """Return the table of reference values, from the file or from the motion."""
+        """Return the table of reference values, from the file or from the motion.
+
+        Args:
+            problem: problem with the frames.
+            paths: paths of the frames.
+        """
         goal = self.goal
         endings = list_suffixes(self.kind)
         if self.file.strip():
@@ -235,9 +259,15 @@ class FrameReference:
         return StoTable("", motion.times, labels, values, file=motion.file)
 
     def _compute_values(self, problem: Problem, motion: StoTable, paths: Sequence[str]) -> Array:
-        """Return the reference values (n, values) in a motion.
+        """Compute the reference values in a motion.
 
-        States that the motion leaves out have the model's default values.
+        Args:
+            problem: problem with the functions of the model.
+            motion: table of states; those that it leaves out have the model's default values.
+            paths: paths of the frames.
+
+        Returns:
+            Values (times, frames * components).
         """
         functions = problem.functions
         for column in motion.columns:
@@ -253,6 +283,7 @@ class FrameReference:
             x[indices] = row
             values = np.array(frames(t=time, x=x, p=functions.p)[self.part]).T
             if self.kind == "Quaternion":
+                # The functions give rotation matrices column by column.
                 values = quaternion_of(values.reshape(len(paths), 3, 3).transpose(0, 2, 1))
             rows.append(values.ravel())
         return np.array(rows)

@@ -36,24 +36,44 @@ OPERATIONS: dict[str, Callable[[Formula, Formula], Formula]] = {
 
 
 def build_output_goal(goal: MocoOutputGoal, problem: Problem) -> GoalTerms:
-    """Return the integral over time of an output."""
+    """Return the integral over time of an output, in its unit times s.
+
+    Args:
+        goal: goal of the study.
+        problem: problem with the components.
+    """
     return make_integral_terms(build_output_formula(goal, problem), COST_FIRST)
 
 
 def build_initial_output_goal(goal: MocoInitialOutputGoal, problem: Problem) -> GoalTerms:
-    """Return the value of an output at the start."""
+    """Return the value of an output at the start.
+
+    Args:
+        goal: goal of the study.
+        problem: problem with the components.
+    """
     value = build_output_formula(goal, problem)
     return GoalTerms(lambda ends: value(ends.start), modes=COST_FIRST)
 
 
 def build_final_output_goal(goal: MocoFinalOutputGoal, problem: Problem) -> GoalTerms:
-    """Return the value of an output at the end."""
+    """Return the value of an output at the end.
+
+    Args:
+        goal: goal of the study.
+        problem: problem with the components.
+    """
     value = build_output_formula(goal, problem)
     return GoalTerms(lambda ends: value(ends.end), modes=COST_FIRST)
 
 
 def _differentiate(point: Point, column: Formula) -> Formula:
-    """Return the time derivative of a formula that depends on the state alone."""
+    """Return the time derivative of a formula that depends on the state alone.
+
+    Args:
+        point: point of the grid.
+        column: formula (k, 1).
+    """
     return casadi.jtimes(column, point.x, point.rates)
 
 
@@ -69,7 +89,7 @@ def _stack_mass_center_velocity(point: Point, path: str) -> Formula:
 
 
 def _get_acceleration(point: Point, path: str) -> Formula:
-    """Return the acceleration of a coordinate."""
+    """Return the acceleration of a coordinate, m/s² or rad/s²."""
     return point.accelerations[point.problem.functions.coordinates.index(path)]
 
 
@@ -151,6 +171,7 @@ def build_output_formula(
         result = OPERATIONS[part.operation](*values) if part.operation else values[0]
         if result.numel() > 1:
             square = casadi.sumsqr(result)
+            # The square of the length needs no root, which has no slope at zero.
             if exponent == 2:
                 return square
             return casadi.sqrt(casadi.fmax(square, MIN_SQUARED_LENGTH)) ** exponent
@@ -167,8 +188,17 @@ def _find_output(
 ) -> tuple[int, tuple[Callable[[Point, str], Formula], str]]:
     """Find the formula of an output by its path.
 
+    Args:
+        part: goal or constraint, for messages.
+        problem: problem with the components.
+        text: path of the component, "|" and the name of the output.
+
     Returns:
         Size of the output, and its formula with the path of the component.
+
+    Raises:
+        DocumentError: the model has no such component.
+        UnsupportedError: the output has no formula.
     """
     path, _, name = text.strip().rpartition("|")
     path = f"/{path.strip('/')}"

@@ -26,7 +26,15 @@ if TYPE_CHECKING:
 
 
 def build_state_tracking_goal(goal: MocoStateTrackingGoal, problem: Problem) -> GoalTerms:
-    """Return the integral of the weighted squared errors of states from splines through a table."""
+    """Return the integral of the weighted squared errors of states from splines through a table.
+
+    Args:
+        goal: goal of the study.
+        problem: problem with the states.
+
+    Raises:
+        DocumentError: the goal or its table is invalid.
+    """
     states = problem.functions.states
     table = read_reference(problem, goal, goal.reference)
     state_weights = problem.find_weights(goal, goal.state_weights, None, states, "state")
@@ -40,6 +48,7 @@ def build_state_tracking_goal(goal: MocoStateTrackingGoal, problem: Problem) -> 
                 goal, f"the column '{name}' does not match the pattern; set allow_unused_references"
             )
     if goal.scale_weights_with_range:
+        # As in Moco, the weight is divided by the range once, although the error is squared.
         weights |= {name: weights[name] / float(np.ptp(table[name])) for name in tracked}
     pairs = [*zip(tracked, fit_splines(problem, table, tracked), strict=True)]
 
@@ -53,7 +62,15 @@ def build_state_tracking_goal(goal: MocoStateTrackingGoal, problem: Problem) -> 
 
 
 def build_control_tracking_goal(goal: MocoControlTrackingGoal, problem: Problem) -> GoalTerms:
-    """Return the integral of the weighted squared errors of controls from splines through a table."""
+    """Return the integral of the weighted squared errors of controls from splines through a table.
+
+    Args:
+        goal: goal of the study.
+        problem: problem with the controls.
+
+    Raises:
+        DocumentError: the goal or its table is invalid.
+    """
     controls = [*problem.controls]
     table = read_reference(problem, goal, goal.reference)
     columns = {item.name: item.reference for item in goal.reference_labels}
@@ -83,7 +100,15 @@ def build_control_tracking_goal(goal: MocoControlTrackingGoal, problem: Problem)
 
 
 def build_marker_tracking_goal(goal: MocoMarkerTrackingGoal, problem: Problem) -> GoalTerms:
-    """Return the integral of the weighted squared distances, m² s, of markers from measured ones."""
+    """Return the integral of the weighted squared distances, m² s, of markers from measured ones.
+
+    Args:
+        goal: goal of the study.
+        problem: problem with the markers.
+
+    Raises:
+        DocumentError: the goal or its table is invalid.
+    """
     reference = goal.markers_reference
     table = problem.tables.get(goal.name)
     if table is None:
@@ -122,6 +147,13 @@ def build_generalized_force_tracking_goal(
 
     The generalized forces (N, N m) are those that the motion needs beyond gravity and the forces of
     `force_paths`.
+
+    Args:
+        goal: goal of the study.
+        problem: problem with the coordinates.
+
+    Raises:
+        DocumentError: the goal or its table is invalid.
     """
     applied_forces = _match_forces(goal, problem)
     coordinates: dict[str, Any] = {**find_variables(problem.model.tree(), "generalized force")}
@@ -170,7 +202,12 @@ def build_generalized_force_tracking_goal(
 
 
 def _match_forces(goal: MocoGeneralizedForceTrackingGoal, problem: Problem) -> list[str]:
-    """Return the paths of forces that the patterns match; OpenSim refuses to match one twice."""
+    """Return the paths of forces that the patterns match; OpenSim refuses to match one twice.
+
+    Args:
+        goal: goal with the patterns.
+        problem: problem with the forces.
+    """
     forces = [path for path, part in problem.components.items() if isinstance(part, Force)]
     result: list[str] = []
     for pattern in map(str, goal.force_paths):
@@ -184,7 +221,12 @@ def _match_forces(goal: MocoGeneralizedForceTrackingGoal, problem: Problem) -> l
 
 
 def _is_constrained(problem: Problem, coordinate: Coordinate) -> bool:
-    """Return whether a coordinate's motion is prescribed or depends on other coordinates."""
+    """Return whether a coordinate's motion is prescribed or depends on other coordinates.
+
+    Args:
+        problem: problem with the couplers.
+        coordinate: coordinate of the model.
+    """
     couplers = (
         part
         for part in problem.components.values()
