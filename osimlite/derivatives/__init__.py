@@ -1,1 +1,1 @@
-"""Exact derivatives of models: CasADi functions, tangents, linearization, sensitivities."""
+"""Exact derivatives of models: CasADi functions, tangents, linearization and sensitivities."""

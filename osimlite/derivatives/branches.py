@@ -1,7 +1,7 @@
 """Execution of code that branches on symbols, so that the result holds on both sides.
 
 A branch whose sides only assign is run for both sides, and the assigned values are merged
-(`Branch`). Where a side returns or leaves a loop, the whole function is run once for each
+(`Branch`). Where a side returns or leaves a loop, the complete function is run once for each
 combination of sides (`run_all_branches`). Values that cannot be merged, such as the number of
 points of a path, become unmergeable; when one is used, a wider part of the code is run for both
 sides.
@@ -14,9 +14,9 @@ from typing import Any
 
 from osimlite.derivatives.symbols import (
     UNSET,
+    BranchWideningSignal,
     NoFormula,
     Vector,
-    WiderBranchNeeded,
     casadi,
     combine_condition,
     is_symbol,
@@ -29,7 +29,7 @@ MAX_BRANCH_COMBINATIONS = 64
 """Maximum number of combinations of branches through one function."""
 
 Writes = dict[tuple[int, int], tuple[list[Any], int, Any]]
-"""Cells with the values written into them."""
+"""Written cells by (identity of the list, index): the list, the index and the value."""
 
 
 class _EvaluationState:
@@ -49,10 +49,18 @@ class _EvaluationState:
 
 
 run = _EvaluationState()
+"""State of the present evaluation; there is one at a time."""
 
 
 class _FunctionFrame:
-    """One combination of branches through a function: the sides taken, and their tests."""
+    """One combination of branches through a function.
+
+    Attributes:
+        sides: side of each branch that was taken, in the order of execution.
+        tests: condition of each of these branches.
+        at: index of the next branch of the present run.
+        count: number of runs so far.
+    """
 
     def __init__(self) -> None:
         self.sides: list[bool] = []
@@ -64,6 +72,12 @@ class _FunctionFrame:
 def run_until_mergeable(function: Callable[[], Any]) -> Any:
     """Return the result of a function, rerun with wider branches until all used values can be merged.
 
+    Args:
+        function: function without arguments.
+
+    Returns:
+        Its result.
+
     Raises:
         NoFormula: a part depends on the state in a way that has no formula.
     """
@@ -74,11 +88,14 @@ def run_until_mergeable(function: Callable[[], Any]) -> Any:
         Vector.journals.clear()
         try:
             return function()
-        except WiderBranchNeeded as wider:
+        except BranchWideningSignal as wider:
+            # Widening the same part twice does not help, so this ends the loop.
             if wider.part in run.widened:
                 raise NoFormula(
                     f"{wider.part} depends on the state in a way that has no formula"
                 ) from None
+            # The run is repeated from its beginning, since earlier code may have used the narrower
+            # branch.
             run.widened.add(wider.part)
         finally:
             Vector.journals.clear()
@@ -86,9 +103,14 @@ def run_until_mergeable(function: Callable[[], Any]) -> Any:
 
 
 def _undo_writes() -> Writes:
-    """Undo what was written since the last journal began, and return it."""
+    """Undo the writes since the last journal began.
+
+    Returns:
+        The undone writes, which `_apply_writes` can repeat.
+    """
     written: Writes = {}
     for key, (cells, place, before) in Vector.journals.pop().items():
+        # Both sides of a branch must begin with the same vectors; the merge needs what this side wrote.
         written[key] = cells, place, cells[place]
         cells[place] = before
     return written
@@ -101,10 +123,18 @@ def _apply_writes(written: Writes) -> None:
 
 
 def _merge_writes(test: Any, one: Writes, other: Writes, part: Any) -> Writes:
-    """Return the writes of two sides, merged by a test."""
+    """Return the writes of two sides, merged by a test.
+
+    Args:
+        test: condition of the branch.
+        one: writes of the side on which the condition holds.
+        other: writes of the other side.
+        part: part of the code, for messages and identity.
+    """
     result: Writes = {}
     for key in one | other:
         cells, place, _ = one.get(key) or other[key]
+        # A cell that one side did not write keeps its value on that side.
         a = one[key][2] if key in one else cells[place]
         b = other[key][2] if key in other else cells[place]
         result[key] = cells, place, merge_values(test, a, b, part)
@@ -117,18 +147,25 @@ class Branch:
     Args:
         part: part of the code, for messages and identity.
         test: condition.
+
+    Attributes:
+        ends: values of the variables at the end of each side that was run.
     """
 
     def __init__(self, part: str, test: Any) -> None:
         self.part = part
         test = simplify_number(test)
         if is_symbol(test) and part in run.widened:
+            # A widened branch is decided by its caller, which runs both combinations.
             test = decide(part, test)
         self.test = test
         self.ends: list[tuple[Any, ...]] = []
 
     def sides(self) -> Iterator[bool]:
-        """Yield the sides to run."""
+        """Yield the sides to run: one for a known condition, both for a symbol.
+
+        After each side its writes are undone, and the writes of both are merged at the end.
+        """
         if not is_symbol(self.test):
             yield bool(self.test)
             return
@@ -145,7 +182,11 @@ class Branch:
 
     @property
     def end(self) -> tuple[Any, ...]:
-        """Values of the variables after the branch."""
+        """Values of the variables after the branch.
+
+        Returns:
+            Merged values in the order of the variables.
+        """
         if len(self.ends) == 1:
             return self.ends[0]
         one, other = self.ends
@@ -156,6 +197,10 @@ class Branch:
 
 def decide(part: str, test: Any) -> bool:
     """Return the side of a branch in the combination that is being run.
+
+    Args:
+        part: part of the code, for messages.
+        test: condition of the branch.
 
     Raises:
         NoFormula: the branch is outside of functions that can be rerun.
@@ -168,6 +213,8 @@ def decide(part: str, test: Any) -> bool:
         raise NoFormula(f"{part} branches by the state")
     number = frame.at
     frame.at += 1
+    # A new branch is taken on its true side first; `run_all_branches` repeats the function for the
+    # other.
     if number == len(frame.sides):
         frame.sides.append(True)
         frame.tests.append(test)
@@ -177,7 +224,14 @@ def decide(part: str, test: Any) -> bool:
 
 
 def record_failure(test: Any) -> bool:
-    """Return whether there is certainly no result; record a test on symbols, where results become NaN."""
+    """Record the condition of an error return.
+
+    Args:
+        test: condition; a symbol is recorded, and the results become NaN where it holds.
+
+    Returns:
+        Whether there is certainly no result.
+    """
     test = simplify_number(test)
     if not is_symbol(test):
         return bool(test)
@@ -186,23 +240,33 @@ def record_failure(test: Any) -> bool:
 
 
 def run_all_branches(part: str, function: Callable[..., Any], *given: Any) -> Any:
-    """Return what a function returns, merged over all combinations of its branches; writes are merged too.
+    """Return what a function returns, merged over all combinations of its branches.
+
+    Writes into vectors are merged in the same way. The combinations are the leaves of a binary
+    tree: the first run takes the true side of every branch, and each false side is explored from
+    the last branch to the first.
 
     Args:
         part: part of the code, for messages and identity.
         function: function.
         *given: arguments of the function.
 
+    Returns:
+        The merged result.
+
     Raises:
         NoFormula: there are more than `MAX_BRANCH_COMBINATIONS` combinations.
     """
     outer = run.frame
     condition = where.condition
+    # The caller runs the combinations of a widened part, as if its branches were the caller's own.
     if part in run.widened and outer is not None:
         return function(*given)
     frame = run.frame = _FunctionFrame()
     Vector.journals.append({})
     result = function(*given)
+    # A function without branches on symbols has one combination; its writes belong to the outer
+    # journal.
     if not frame.sides:
         writes = Vector.journals.pop()
         if Vector.journals:
@@ -214,10 +278,20 @@ def run_all_branches(part: str, function: Callable[..., Any], *given: Any) -> An
         return result
 
     def run_others(first: int, result: Any) -> tuple[Any, Writes]:
-        """Return result and writes, merged with those of the combinations that differ after `first` branches."""
+        """Merge a run with those of the combinations that agree in the first branches.
+
+        Args:
+            first: number of branches that all combinations share.
+            result: result of the present run.
+
+        Returns:
+            Merged result and merged writes.
+        """
         written = _undo_writes()
         sides = frame.sides
         tests = frame.tests
+        # The first sides are fixed by outer calls; the rest of the tree below side k is explored by
+        # recursion.
         for k in range(len(sides) - 1, first - 1, -1):
             frame.sides = [*sides[:k], False]
             frame.tests = tests[: k + 1]

@@ -1,4 +1,8 @@
-"""Formulas of accelerations under constraints; redundant equations are removed when the functions are made."""
+"""Formulas of accelerations under constraints.
+
+Formulas cannot choose pivots by size, so redundant equations are removed once, when the functions
+are made.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +33,14 @@ TESTED_POSES = 3
 
 
 def list_position_equations(structure: Sequence[int]) -> list[int]:
-    """Return the indices of the position equations, in the order of their errors."""
+    """Return the indices of the position equations, in the order of their errors.
+
+    Args:
+        structure: integers of the packed model.
+
+    Returns:
+        Indices among all equations.
+    """
     h = structure[structure[MODEL.CONSTRAINED] :]
     records = structure[h[CONSTRAINED.CONSTRAINT_AT] :][: h[CONSTRAINED.CONSTRAINTS]]
     ranges = (
@@ -42,31 +53,42 @@ def list_position_equations(structure: Sequence[int]) -> list[int]:
 def find_independent_equations(
     mechanism: Mechanism, packed: PackedModel, state: StateLayout
 ) -> list[int]:
-    """Find the largest set of independent constraint equations, in poses that fulfil the constraints.
+    """Find the largest set of independent constraint equations.
+
+    It is searched in poses that fulfil the constraints.
 
     Args:
         mechanism: mechanism of the model.
         packed: packed model.
         state: layout of the state.
 
+    Returns:
+        Increasing indices of the equations.
+
     Raises:
         SimulationError: no pose fulfils the constraints.
     """
     ints = Program(packed, PYTHON_CODE).ints
     size = len(packed.order)
+    # Controllers may be Python functions, which this does not need.
     ints[MODEL.CONTROLS] = 0
     count = int(ints[ints[MODEL.CONSTRAINED] + CONSTRAINED.EQUATIONS])
     at_rows = int(ints[ints[MODEL.CONSTRAINED] + CONSTRAINED.WORK_ROWS])
     best: list[int] = []
+    # A fixed seed makes the functions reproducible.
     rng = np.random.default_rng(0)
     infos = mechanism.coordinates
     start = np.array([info.default_value for info in infos])
     for number in range(TESTED_POSES):
+        # In the default pose equations may be dependent by chance, for example in a stretched
+        # chain. Random poses near it show the generic rank.
+        # A step of 0.05 (rad, m) leaves such a pose but stays in the range of usual joints.
         q = start + (0.05 * rng.normal(size=len(start)) if number else 0.0)
         values, speeds = find_consistent_state(mechanism, q.tolist(), [0.0] * len(infos), (), ())
         y = np.array(state.pack(values.tolist(), speeds.tolist()))
         w = np.zeros(int(ints[MODEL.WORK_SIZE]))
         f = np.zeros(len(y))
+        # The equations need poses and velocities of the links, but no forces.
         evaluate(ints, packed.numbers, w, y, f, STAGE.VELOCITY)
         evaluate_constraints(ints, packed.numbers, w, y, f)
         rows = _select_independent_rows(w[at_rows : at_rows + count * size].reshape(count, size))
@@ -75,7 +97,17 @@ def find_independent_equations(
 
 
 def _select_independent_rows(rows: Array) -> list[int]:
-    """Select independent rows of normalized equations by pivoting: the row with the largest remainder first."""
+    """Select independent rows of normalized equations by pivoting.
+
+    The row with the largest remainder comes first (Gram-Schmidt with pivoting, Golub and Van Loan,
+    ch. 5.4).
+
+    Args:
+        rows: equations (c, n).
+
+    Returns:
+        Indices of the selected rows, in the order of the selection.
+    """
     lengths = np.linalg.norm(rows, axis=1)
     rest = (
         rows
@@ -91,6 +123,7 @@ def _select_independent_rows(rows: Array) -> list[int]:
             break
         chosen.append(k)
         direction = rest[k] / left[k]
+        # Gram-Schmidt with pivots: what is left of each row is normal to all chosen rows.
         rest = rest - np.outer(rest @ direction, direction)
     return chosen
 
@@ -109,6 +142,7 @@ def make_constrained_dynamics(equations: Sequence[int]) -> Law:
         freedoms = model.rest(model[MODEL.DOF_AT])
         make_symbolic(evaluate_constraints)(model, reals, data, y, f)
         make_symbolic(solve_accelerations)(model, data, right)
+        # M = Lᵀ D L; the diagonal of D stands first in each row of the stored factors.
         inverse = [1.0 / data[freedoms[DOF.SIZE * k + DOF.ROW]] for k in range(size)]
         rows = []
         missing = []
@@ -119,6 +153,8 @@ def make_constrained_dynamics(equations: Sequence[int]) -> Law:
                 - sum(a * right[k] for k, a in enumerate(row))
             )
             turned = Vector(row)
+            # G M⁻¹ Gᵀ = (G L⁻¹) D⁻¹ (G L⁻¹)ᵀ: half of a solution per row suffices, and the product
+            # is symmetric by its form.
             make_symbolic(solve_transposed_factor)(model, data, turned)
             rows.append(casadi.horzcat(*turned.cells))
         g = casadi.sparsify(casadi.SX(casadi.vertcat(*rows)))

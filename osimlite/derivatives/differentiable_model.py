@@ -37,6 +37,7 @@ class DifferentiableModel:
         states: names of the entries of x as in ``states.sto``: values, speeds, auxiliary states,
             each in the order of the model. Locked coordinates have none.
         system_states: the same names in the order of Simbody's system.
+        state_indices: index of each of `states` in the order of the kernels.
         controls: names of the entries of u: paths of the actuators.
         parameters: names of the entries of p.
         p: values of the parameters in the model (p,).
@@ -51,8 +52,8 @@ class DifferentiableModel:
     ) -> None:
         self._folder = folder
         self._model = model
-        # Numbers of merged bodies are no linear functions of masses and positions, those of separate
-        # ones are.
+        # The inertia of merged bodies is not a linear function of masses and positions, those of
+        # separate bodies are.
         self._apart = apart or bool(parameters)
         self.name = model.name or "model"
         self.parameters = tuple(parameters)
@@ -77,6 +78,7 @@ class DifferentiableModel:
         self.states = (*values, *speeds, *sort_by_component(model, paths))
         self.system_states = (*own, *paths)
         names = {name: place for place, name in enumerate(self.system_states)}
+        # From the order of the model, which users see, to that of the engine.
         self.state_indices = [names[name] for name in self.states]
         self.controls = self.forces.controls.names
         self.u = np.zeros(len(self.controls))
@@ -101,18 +103,30 @@ class DifferentiableModel:
 
     @property
     def constraints_kept(self) -> int:
-        """Deprecated name of `constraint_count`."""
+        """Number of constraint equations, under the deprecated name of `constraint_count`."""
         warnings.warn("use constraint_count", DeprecatedWarning, stacklevel=2)
         return self.constraint_count
 
     @property
     def in_system(self) -> tuple[str, ...]:
-        """Deprecated name of `system_states`."""
+        """Names of the states, under the deprecated name of `system_states`.
+
+        Returns:
+            Names in the order of Simbody's system.
+        """
         warnings.warn("use system_states", DeprecatedWarning, stacklevel=2)
         return self.system_states
 
     def _collect_forces(self, model: Model, mechanism: Mechanism) -> Forces:
-        """Return the forces of a model; probes give their values without their operation over time."""
+        """Return the forces and probes of a model.
+
+        Args:
+            model: the model.
+            mechanism: its mechanism.
+
+        Returns:
+            Forces; probes give their values without their operation over time.
+        """
         forces = force_elements(model, mechanism, folder=self._folder)
         # Probes are outputs without their operation over time. Probes that Python measures after the
         # kernels have no formula.
@@ -127,11 +141,20 @@ class DifferentiableModel:
         return replace(forces, elements=tuple(elements))
 
     def _pack_numbers(self, changed: Model) -> Array:
-        """Return the numbers that may depend on parameters; none if the structure of the model changes."""
+        """Return the numbers that may depend on parameters.
+
+        Args:
+            changed: the model with other values of the parameters.
+
+        Returns:
+            Numbers (k,); none if the structure of the model changes.
+        """
         mechanism = build_mechanism(changed)
         packed = pack(mechanism, self._collect_forces(changed, mechanism), apart=self._apart)
         return (
             packed.numbers
+            # A change of the structure, such as of a number of points, is not a change of numbers:
+            # an empty result reports it.
             if np.array_equal(packed.structure, self._packed.structure)
             else np.zeros(0)
         )

@@ -46,6 +46,9 @@ def casadi(
             stand for several numbers that are equal.
         folder: folder of the model's file, for the files that it names; the current folder if None.
 
+    Returns:
+        The functions, each made when it is first used.
+
     Raises:
         MissingDependency: casadi is not installed, or cannot be loaded beside another library.
         ModelError: the model is not a mechanism.
@@ -100,6 +103,8 @@ class CasadiModel(DifferentiableModel):
             "u": library.SX.sym("u", len(self.controls)),
             "p": library.SX.sym("p", len(self.parameters)),
             "multipliers": library.SX.sym("multipliers", self.constraint_count),
+            # Paths around surfaces are found by a search, which has no formula: their lengths and
+            # derivatives are arguments of the inner functions.
             "paths": library.SX.sym("paths", self._wrapped_paths.size),
         }
         self._wrapped_paths.set_symbols(self._list_symbols("paths"))
@@ -114,7 +119,12 @@ class CasadiModel(DifferentiableModel):
         return self._wrapped_paths.forces
 
     def _find_wrapped_paths(self, model: Model, mechanism: Mechanism) -> WrappedPaths:
-        """Return the forces of a model, with symbols for paths around surfaces."""
+        """Return the forces of a model, with symbols for paths around surfaces.
+
+        Args:
+            model: the model.
+            mechanism: its mechanism.
+        """
         from osimlite.derivatives.wrapped_paths import WrappedPaths
 
         infos = mechanism.coordinates
@@ -127,17 +137,31 @@ class CasadiModel(DifferentiableModel):
 
     @property
     def searched(self) -> tuple[str, ...]:
-        """Paths of the forces along paths around surfaces, which have no formula."""
+        """Paths of the forces along paths around surfaces, which have no formula.
+
+        Returns:
+            Component paths.
+        """
         return self._wrapped_paths.names
 
     def _pack_numbers(self, changed: Model) -> Array:
-        """Return all numbers that may depend on parameters; none if the structure of the model changes."""
+        """Return all numbers that may depend on parameters.
+
+        Args:
+            changed: the model with other values of the parameters.
+
+        Returns:
+            Numbers of the kernels, points and frames, and lengths of paths around surfaces; none if
+            the
+                structure of the model changes.
+        """
         mechanism = build_mechanism(changed)
         searched = self._find_wrapped_paths(changed, mechanism)
         packed = pack(mechanism, searched.forces, apart=self._apart)
         if not np.array_equal(packed.structure, self._packed.structure):
             return np.zeros(0)
-        # Courses around surfaces must not depend on a parameter: lengths are not linear in it.
+        # Paths around surfaces must not depend on a parameter, because their lengths are not linear in
+        # it. Two poses suffice to notice a dependence.
         ways = (
             [searched.measure_paths(self.x[: len(self.coordinates)] + by) for by in (0.0, 0.1)]
             if searched.size
@@ -182,12 +206,20 @@ class CasadiModel(DifferentiableModel):
         )
 
     def _list_symbols(self, name: str) -> list[Any]:
-        """Return the entries of a column of symbols."""
+        """Return the entries of a column of symbols.
+
+        Args:
+            name: name of the column, such as "x".
+        """
         symbol = self._symbols[name]
         return [symbol[k] for k in range(symbol.numel())]
 
     def _sort_by_engine(self, name: str) -> list[Any]:
-        """Return the entries of a state in the order of the kernels."""
+        """Return the entries of a state in the order of the kernels.
+
+        Args:
+            name: name of the column of symbols, "x" or "xdot".
+        """
         result: list[Any] = [0.0] * len(self.states)
         for place, entry in zip(self.state_indices, self._list_symbols(name), strict=True):
             result[place] = entry
@@ -206,10 +238,16 @@ class CasadiModel(DifferentiableModel):
         """Return a CasADi function of named symbols and results.
 
         Paths around surfaces enter as the results of a callback, which an outer function inserts.
+
+        Args:
+            name: name of the function.
+            given: names of its arguments.
+            results: formulas by name.
         """
         symbols = [self._symbols[item] for item in given]
         if self._path_function is None or "x" not in given:
             return self._library.Function(name, symbols, [*results.values()], [*given], [*results])
+        # The formulas are SX; the paths are a function that CasADi calls, which takes MX.
         inner = self._library.Function(
             f"{name}_of_paths", [*symbols, self._symbols["paths"]], [*results.values()]
         )
@@ -237,7 +275,10 @@ class CasadiModel(DifferentiableModel):
 
     @cached_property
     def linear(self) -> Any:
-        """``linear(t, x, u, p) -> xdot, A, B``: derivative of the state, with its exact derivatives by state and controls."""
+        """``linear(t, x, u, p) -> xdot, A, B``: derivative of the state, with its exact derivatives.
+
+        A is the derivative by the state (x, x), B that by the controls (x, u).
+        """
         given = "t", "x", "u", "p"
         symbols = self._make_arguments(given)
         xdot = self.dynamics(*symbols)
@@ -250,15 +291,17 @@ class CasadiModel(DifferentiableModel):
     def residual(self) -> Any:
         """``residual(t, x, xdot, u, p, multipliers) -> residual``: zero for motions of the model.
 
-        The rows are in the order of the state: rates of values less those that follow from the
-        speeds (rad/s, m/s); generalized forces ``M udot + c - f + Gᵀ multipliers`` (N, N m); rates
-        of auxiliary states less those of the force laws. The multipliers (N, N m) belong to the
-        rows of G in `constraints`; there are none without constraints.
+        The rows are in the order of the state. Rows of values are given rates less the rates by the
+        speeds (rad/s, m/s). Rows of speeds are generalized forces ``M udot + c - f + Gᵀ
+        multipliers`` (N, N m). Rows of auxiliary states are given rates less the rates by the force
+        laws. The multipliers (N, N m) belong to the rows of G in `constraints`; without constraints there are no multipliers.
         """
         size = len(self.coordinates)
         xdot = self._sort_by_engine("xdot")
         found = self._evaluator.compute_missing_forces(xdot[size : 2 * size])
         f = found.f.cells
+        # Rows of values and auxiliary states: given rate less computed rate. Those of speeds are
+        # forces, which replace them below.
         rows = [given - own for given, own in zip(xdot, f, strict=True)]
         rows[size : 2 * size] = f[size : 2 * size]
         if self.constraint_count:
@@ -279,7 +322,7 @@ class CasadiModel(DifferentiableModel):
         """Return ``generalized_forces(t, x, xdot, u, p) -> missing``: ``M udot + c`` less gravity and given forces.
 
         Args:
-            pushing: paths of the forces.
+            pushing: paths of the given forces.
 
         Returns:
             ``casadi.Function`` whose result (k, 1), N and N m, is in the order of `coordinates`;
@@ -296,14 +339,14 @@ class CasadiModel(DifferentiableModel):
         )
 
     def joint_load(self, path: str, side: str) -> Any:
-        """Return ``joint_load(t, x, xdot, u, p, multipliers) -> force, moment``: load of a joint on one of its bodies.
+        """Return ``joint_load(t, x, xdot, u, p, multipliers) -> force, moment``: load of a joint on a body.
 
         It is the wrench that the bodies which the joint carries need for their accelerations beyond
         all other forces. The multipliers are those of `residual`.
 
         Args:
             path: path of the joint.
-            side: ``child`` or ``parent``.
+            side: ``child`` or ``parent``, the body on which the load acts.
 
         Returns:
             ``casadi.Function`` of the force (3,), N, and the moment (3,), N m, about the origin of
@@ -316,6 +359,8 @@ class CasadiModel(DifferentiableModel):
         body = next(body for body in bodies if body.mobilizer.joint == path)
         link = placements[bodies.index(body)].link
         if link == (GROUND if body.parent == GROUND else placements[body.parent].link):
+            # A joint without motion is merged away, so a model with separate links computes its
+            # load.
             own = CasadiModel(
                 self._model, self.parameters, self._folder, apart=True, loads_given=bool(self.loads)
             )
@@ -359,7 +404,11 @@ class CasadiModel(DifferentiableModel):
 
     @cached_property
     def _constraint_errors(self) -> dict[str, Any]:
-        """Results of `constraints` by name."""
+        """Results of `constraints` by name.
+
+        Returns:
+            Position, velocity and acceleration errors, and the Jacobian.
+        """
         from osimlite.derivatives.constraints import list_position_equations
 
         size = len(self.coordinates)
@@ -424,12 +473,20 @@ class CasadiModel(DifferentiableModel):
 
     @cached_property
     def output_names(self) -> dict[str, tuple[str, ...]]:
-        """Names of the entries of each result of `outputs`."""
+        """Names of the entries of each result of `outputs`.
+
+        Returns:
+            Names by the name of the result.
+        """
         return {name: tuple(labels) for name, (labels, _) in self._outputs.items()}
 
     @cached_property
     def _outputs(self) -> dict[str, tuple[list[str], Any]]:
-        """Labels and column of each result of `outputs`."""
+        """Labels and column of each result of `outputs`.
+
+        Returns:
+            Labels and column by the name of the result.
+        """
         from osimlite.derivatives.outputs import compute_output_columns
 
         found = self._evaluation
@@ -441,7 +498,11 @@ class CasadiModel(DifferentiableModel):
 
     @cached_property
     def _fixed_numbers(self) -> tuple[list[Any], list[Any]]:
-        """Points of stations, and axes and origins of frames, in their links; some may be symbols."""
+        """Points of stations, and axes and origins of frames, in their links; some may be symbols.
+
+        Returns:
+            Points (3 k,), and axes and origins (12 m,).
+        """
         stations, frames = (
             part.tolist() for part in _list_fixed_numbers(self.mechanism, self._packed)
         )
@@ -497,6 +558,7 @@ class CasadiModel(DifferentiableModel):
         """
         _, lengths, speeds = self._paths
         size = len(self.coordinates)
+        # The speed is linear in the generalized speeds, with minus the moment arms as factors.
         arms = -self._library.jacobian(speeds, self._symbols["x"])[:, size : 2 * size]
         return self._make_function(
             "paths", ("t", "x", "p"), {"lengths": lengths, "speeds": speeds, "moment_arms": arms}
@@ -504,12 +566,20 @@ class CasadiModel(DifferentiableModel):
 
     @cached_property
     def path_names(self) -> tuple[str, ...]:
-        """Paths of the forces that act along paths."""
+        """Paths of the forces that act along paths.
+
+        Returns:
+            Component paths in the order of `paths`.
+        """
         return tuple(self._paths[0])
 
     @cached_property
     def _paths(self) -> tuple[list[str], Any, Any]:
-        """Names, lengths and lengthening speeds of the paths."""
+        """Names, lengths and lengthening speeds of the paths.
+
+        Returns:
+            Component paths, column of lengths (m), and column of speeds (m/s).
+        """
         from osimlite.derivatives.outputs import compute_path_columns
 
         return compute_path_columns(self._packed, self.forces, self._evaluation)

@@ -1,4 +1,8 @@
-"""Linearization of a model: xdot - f = A (x - x0) + B (u - u0), y - y0 = C (x - x0) + D (u - u0)."""
+"""Linearization of the motion of a model about a state.
+
+With the rates f and the outputs y0 at (x0, u0): xdot - f = A (x - x0) + B (u - u0) and
+y - y0 = C (x - x0) + D (u - u0).
+"""
 
 from __future__ import annotations
 
@@ -72,7 +76,7 @@ def linearize(
 ) -> Linearization:
     """Linearize the motion of a model with respect to its state and the controls of its actuators.
 
-    Controllers of the model are ignored: A contains no feedback of theirs. Under constraints the
+    Controllers of the model are ignored: A does not contain their feedback. Under constraints the
     accelerations fulfil them.
 
     Args:
@@ -85,6 +89,9 @@ def linearize(
             or entries of groups (``mass_center:y``, ``forces:/forceset/soleus_r|tension``).
         time: time, s.
         folder: folder of the model's file, for the files that it names; the current folder if None.
+
+    Returns:
+        The matrices with the names of their rows and columns.
 
     Raises:
         SettingError: a state, control or output does not exist.
@@ -124,7 +131,15 @@ def linearize(
 def _describe_invalid_entry(
     states: Sequence[str], controls: Sequence[str], xdot: Array, a: Array, b: Array
 ) -> str:
-    """Return the message for the first derivative that is NaN or infinite."""
+    """Return the message for the first derivative that is NaN or infinite.
+
+    Args:
+        states: names of the states.
+        controls: names of the controls.
+        xdot: rates (x,).
+        a: derivatives by the state (x, x).
+        b: derivatives by the controls (x, u).
+    """
     columns = [("", xdot.reshape(-1, 1), [""]), (" by ", a, states), (" by ", b, controls)]
     for words, matrix, names in columns:
         odd = np.argwhere(~np.isfinite(matrix))
@@ -138,7 +153,15 @@ def _describe_invalid_entry(
 def _find_outputs(
     output_names: Mapping[str, Sequence[str]], names: Sequence[str]
 ) -> list[tuple[str, int]]:
-    """Return group and index of each named output."""
+    """Return group and index of each named output.
+
+    Args:
+        output_names: names of the entries by group.
+        names: names of groups, or entries as ``GROUP:ENTRY``.
+
+    Raises:
+        SettingError: an output does not exist.
+    """
     groups = {
         group: [(group, k) for k in range(len(labels))] for group, labels in output_names.items()
     }
@@ -157,7 +180,17 @@ def _find_outputs(
 
 
 def _fill_vector(what: str, names: Sequence[str], default: Array, given: Any) -> Array:
-    """Return the default values with those that are given by name or in order."""
+    """Return the default values with some of them replaced.
+
+    Args:
+        what: "state" or "control", for messages.
+        names: names of the entries.
+        default: default values.
+        given: values by name, or all values in their order; None for the defaults.
+
+    Raises:
+        SettingError: a name does not exist, or there are more or fewer values.
+    """
     result = default.copy()
     if isinstance(given, Mapping):
         for name, value in given.items():

@@ -43,7 +43,15 @@ AXES = "xyz"
 def locate_stations(
     mechanism: Mechanism, packed: PackedModel
 ) -> list[tuple[str, int, tuple[float, ...]]]:
-    """Return path, link and point in the link (3,) of each station."""
+    """Return where all stations of a model are.
+
+    Args:
+        mechanism: mechanism of the model.
+        packed: packed model.
+
+    Returns:
+        Path, link and point in the link (3,), m, of each station.
+    """
     places = Places(mechanism, {}, packed.placements)
     return [
         (path, *places.station(body, point.tolist()))
@@ -52,7 +60,15 @@ def locate_stations(
 
 
 def locate_frames(mechanism: Mechanism, packed: PackedModel) -> dict[str, tuple[int, list[float]]]:
-    """Return link, and axes and origin in the link (12,), of each frame by its path."""
+    """Return where all frames of a model are.
+
+    Args:
+        mechanism: mechanism of the model.
+        packed: packed model.
+
+    Returns:
+        Link, and axes and origin in the link (12,), of each frame by its path.
+    """
     places = Places(mechanism, {}, packed.placements)
     return {
         path: places.frame(placed.body, placed.transform)
@@ -61,7 +77,15 @@ def locate_frames(mechanism: Mechanism, packed: PackedModel) -> dict[str, tuple[
 
 
 def list_probe_items(packed: PackedModel, elements: Sequence[Any]) -> list[int]:
-    """Return the items of all probes."""
+    """Return the items of all probes.
+
+    Args:
+        packed: packed model.
+        elements: force elements of the model.
+
+    Returns:
+        Offsets in the structure.
+    """
     return [
         place
         for place, owner in packed.owners.items()
@@ -172,8 +196,13 @@ def _compute_mass_center(
 ) -> tuple[list[Any], list[Any]]:
     """Compute position and velocity of the mass centre of all bodies.
 
+    Args:
+        mechanism: mechanism of the model.
+        packed: packed model.
+        workspace: workspace of the evaluation.
+
     Returns:
-        Position (3,), m, and velocity (3,), m/s.
+        Position (3,), m, and velocity (3,), m/s; NaN for a model without mass.
     """
     parts = []
     for link in range(int(packed.structure[MODEL.LINKS])):
@@ -185,6 +214,7 @@ def _compute_mass_center(
                 tuple(workspace.reals[first + INERTIA.CENTER : first + INERTIA.MOMENTS]),
             )
         )
+    # Bodies that are fixed to ground have no link, but mass.
     for placement, body in zip(packed.placements, mechanism.bodies, strict=True):
         if placement.link == GROUND:
             own = body.mass_properties
@@ -210,7 +240,16 @@ def _compute_mass_center(
 def _list_contact_values(
     packed: PackedModel, forces: Forces, workspace: Workspace
 ) -> list[tuple[str, Any]]:
-    """Return labels and values of force and point of each contact, the first entries of its record."""
+    """Return force and point of each contact, the first entries of its record.
+
+    Args:
+        packed: packed model.
+        forces: forces of the model.
+        workspace: workspace of the evaluation.
+
+    Returns:
+        Labels and values.
+    """
     pairs: list[tuple[str, int]] = []
     for element, items in zip(forces.elements, packed.items, strict=True):
         if isinstance(element, PairContact):
@@ -238,8 +277,13 @@ def compute_path_columns(
 ) -> tuple[list[str], Any, Any]:
     """Compute the geometry of all paths with a force.
 
+    Args:
+        packed: packed model.
+        forces: forces of the model.
+        workspace: workspace of the evaluation.
+
     Returns:
-        Names, lengths and lengthening speeds.
+        Component paths of the forces, lengths (m), and lengthening speeds (m/s).
     """
     names = list[str]()
     lengths = list[Any]()
@@ -279,6 +323,7 @@ def compute_joint_load_columns(
     """
     from osimlite.derivatives.symbols import casadi
 
+    # The wrench of a link includes all links that it carries, so constraints on any of them count.
     beyond = {link}
     for later in range(link + 1, workspace.model[MODEL.LINKS]):
         if workspace.wrap(link_ints)(workspace.model, later)[LINK.PARENT] in beyond:
@@ -294,6 +339,7 @@ def compute_joint_load_columns(
     place = workspace.wrap(station)(workspace.model, workspace.data, origin[0], tuple(origin[1]))
     start = workspace.data[first + LINK_WORK.ORIGIN : first + LINK_WORK.ORIGIN + 3]
     arm = casadi.vertcat(*place) - casadi.vertcat(*start)
+    # Spatial forces are about the link's ORIGIN; the load is about the origin of the joint's frame.
     moment = wrench[:3] - casadi.cross(arm, wrench[3:])
     return {
         "force": workspace.mask_failures([wrench[3:]]),

@@ -1,4 +1,4 @@
-"""Numbers of a model that stay symbols, and the numbers of the kernels as functions of them."""
+"""Parameters: numbers of a model that stay symbols, and the numbers of the kernels as functions of them."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Parameters:
     """Numbers of a model by path, and the numbers of the kernels as linear functions of them.
 
     Most parameters enter the kernels unchanged: masses, stiffnesses, strengths, positions. The
-    linear function of each is found by changing it, and tested by changing all at once; any other
+    linear function of each is found by changing it, and tested by changing all at once. Any other
     dependence is an error.
 
     Args:
@@ -72,6 +72,7 @@ class Parameters:
 
         columns = np.zeros((len(base), len(given)))
         for k, name in enumerate(names):
+            # The first change gives the slope, the second one tests it.
             one, two = (self._change_values(number, [k]) for number in range(2))
             columns[:, k] = _subtract_base(numbers_at(one, f"'{name}'"), base) / (one[k] - given[k])
             _check_linear(
@@ -87,6 +88,7 @@ class Parameters:
                 if len(names) < 4
                 else "these parameters"
             )
+            # Products of parameters are linear in each but not in all together.
             for number in range(2):
                 values = self._change_values(number, range(len(given)))
                 what = f"{every} together"
@@ -98,7 +100,15 @@ class Parameters:
             )
 
     def _change_values(self, number: int, which: Sequence[int] | range) -> Array:
-        """Return the values with some of them changed, each by another factor, which quotients would hide otherwise."""
+        """Return the values with some of them changed.
+
+        Args:
+            number: 0 or 1, which of two changes.
+            which: indices of the parameters to change.
+
+        Returns:
+            Values (p,). Each is changed by another factor.
+        """
         values = self.values.copy()
         for k in which:
             # Different factors, as the same factor would cancel in quotients of parameters.
@@ -119,6 +129,13 @@ class Parameters:
 def read_parameter(model: Model, name: str) -> float:
     """Return the value of a parameter in a model.
 
+    Args:
+        model: model.
+        name: path of the parameter.
+
+    Returns:
+        Value in the unit of the file.
+
     Raises:
         SettingError: the parameter does not exist, or stands for numbers that differ.
     """
@@ -126,7 +143,15 @@ def read_parameter(model: Model, name: str) -> float:
 
 
 def _find_setters(model: Model, name: str) -> list[PropertySetter]:
-    """Return the setters of all numbers that a path stands for."""
+    """Return the setters of all numbers to which a path leads.
+
+    Args:
+        model: model with the numbers.
+        name: path of a property, which may contain patterns.
+
+    Raises:
+        SettingError: the path leads to no number.
+    """
     setters = [place.make_setter(model) for place in find_properties(model, name)]
     if not setters:
         raise SettingError(
@@ -144,13 +169,29 @@ def _read_value(name: str, setters: Sequence[PropertySetter]) -> float:
 
 
 def _subtract_base(found: Array, base: Array) -> Array:
-    """Return the changes of numbers; an unchanged infinite number has not changed."""
+    """Return the changes of numbers; an unchanged infinite number has not changed.
+
+    Args:
+        found: numbers after a change (k,).
+        base: numbers before it (k,).
+    """
     same = found == base
     return np.where(same, 0.0, found - np.where(same, 0.0, base))
 
 
 def _check_linear(found: Array, base: Array, columns: Array, change: Array, what: str) -> None:
-    """Check that changes of numbers lie on the linear functions."""
+    """Check that changes of numbers lie on the linear functions.
+
+    Args:
+        found: numbers after a change (k,).
+        base: numbers before it (k,).
+        columns: slopes by each changed parameter (k, m).
+        change: changes of the parameters (m,).
+        what: the parameters, for messages.
+
+    Raises:
+        UnsupportedError: a number deviates.
+    """
     parts = columns * change
     size = np.abs(base) + np.abs(parts).sum(axis=1)
     if not np.all(
@@ -171,6 +212,9 @@ def insert_parameters(
         numbers: numbers for zero parameters.
         slopes: see `Parameters.slopes`.
         p: symbols of the parameters.
+
+    Returns:
+        Numbers, some of them expressions.
     """
     result: list[Any] = list(numbers)
     for place, parts in slopes.items():

@@ -4,7 +4,7 @@ The equation is integrated by Merson's formula over the same steps that `simulat
 same states: the result is the exact derivative of these steps with their lengths fixed (H. G. Bock,
 "Numerical treatment of inverse problems in chemical reaction kinetics", Springer 1981). Where the
 laws have a kink (Thelen's muscles have several), a derivative is wrong by the length of a step
-although the motion is accurate; such steps are halved until the derivative is accurate too.
+although the motion is accurate. Such steps are halved until the derivative is accurate too.
 """
 
 from __future__ import annotations
@@ -75,7 +75,14 @@ class Sensitivity(Tabular):
     derivatives: Array
 
     def of(self, state: str, number: str) -> Array:
-        """Return the derivative (n,) of a state by a number.
+        """Return the derivative of a state by a number along the motion.
+
+        Args:
+            state: name of the state.
+            number: name of the number.
+
+        Returns:
+            Derivative (n,) at the times of the rows.
 
         Raises:
             SettingError: the state or the number does not exist.
@@ -89,7 +96,11 @@ class Sensitivity(Tabular):
 
     @property
     def table(self) -> tuple[Mapping[str, Any], Mapping[str, Any]]:
-        """Columns ``STATE|NUMBER`` (n,) over ``time`` (s)."""
+        """Derivatives as a table.
+
+        Returns:
+            The key column ``time`` (s), and columns ``STATE|NUMBER`` (n,), by name.
+        """
         columns = {
             f"{state}|{number}": self.of(state, number)
             for state in self.states
@@ -106,7 +117,7 @@ def sensitivity(
     states: Iterable[str] = (),
     **choices: Any,
 ) -> Sensitivity:
-    """Compute the derivatives of all states along a simulated motion by numbers of the model and initial states.
+    """Compute the derivatives of all states along a simulated motion by numbers and initial states.
 
     The motion is that of :func:`osimlite.simulate` with Merson's steps. Initial states are fixed:
     parts of them that follow from parameters, such as muscles in equilibrium (`equilibrate`), do
@@ -125,6 +136,9 @@ def sensitivity(
             `controls`, `progress` and `folder` of :class:`osimlite.simulation.Options`. The default
             accuracy of 1e-6 gives derivatives of a second of muscles with tendons to 1e-3 of the
             largest, and of smooth motions to 1e-5.
+
+    Returns:
+        The motion and its derivatives.
 
     Raises:
         SettingError: a number or state does not exist, an option is not possible here, or the
@@ -224,23 +238,44 @@ class _SensitivityRun:
         )
 
     def sort_states(self, trajectory: Trajectory) -> Array:
-        """Return the motion (n, x) in the order of the tangents."""
+        """Return the states of a motion in the order of the tangents.
+
+        Args:
+            trajectory: the motion.
+
+        Returns:
+            States (n, x).
+        """
         return self._pack_rows(trajectory)[:, self._places]
 
     def _pack_rows(self, trajectory: Trajectory) -> Array:
-        """Return the motion (n, x) in the order of the simulation."""
+        """Return the states of a motion in the order of the simulation (n, x)."""
         auxiliary = trajectory.auxiliary
         return self._simulation.state.pack_rows(trajectory.values, trajectory.speeds, auxiliary)
 
     def compute_rows(self, trajectory: Trajectory, accuracy: float) -> Array:
-        """Compute the derivatives (n, x, k) at the times of the motion."""
+        """Compute the derivatives at the times of a motion.
+
+        Args:
+            trajectory: the motion.
+            accuracy: accuracy of the motion.
+
+        Returns:
+            Derivatives (n, x, k).
+
+        Raises:
+            SimulationError: a derivative is not finite.
+        """
         start = self._pack_rows(trajectory)[0].tolist()
         wanted = trajectory.times.tolist()
+        # The trajectory has rows, but the derivative needs the steps; repeating the motion is
+        # cheaper than storing all steps of every simulation.
         times, states, ended = self._simulation.record_every_step(
             0.0, start, wanted[-1], Settings(accuracy=accuracy)
         )
         if ended is not None:
             raise ended
+        # Three states suffice to notice tangents of another model.
         for place in (0, len(times) // 2, -1):
             self._check_same_rates(times[place], states[place])
         count = len(self._tangent_model.parameters)
@@ -255,14 +290,19 @@ class _SensitivityRun:
         )
 
     def _project_start(self, x: Array, slopes: Array) -> None:
-        """Project the derivatives (x, m) of the initial state (x,) onto the constraints, in place.
+        """Project the derivatives of the initial state onto the constraints, in place.
 
         The projection repeats that of the initial state: of free values, yielding coordinates
         change first, then all as little as possible; speeds above 1 change relative to their size.
+
+        Args:
+            x: initial state (x,).
+            slopes: its derivatives (x, m), which are changed.
         """
         tangent_model = self._tangent_model
         size = len(self._tangent_model.coordinates)
         infos = {info.path: info for info in tangent_model.mechanism.coordinates}
+        # As the simulation projects its start: values weigh equally, speeds by their size.
         eases = np.ones(size), np.maximum(np.abs(x[size : 2 * size]), 1.0)
         eases[0][[infos[path].yielding for path in tangent_model.coordinates]] = YIELDING_FACTOR
         by_numbers = np.eye(len(tangent_model.parameters), slopes.shape[1])
@@ -276,6 +316,7 @@ class _SensitivityRun:
         ):
             places = slice(part * size, (part + 1) * size)
             paths = [tangent_model.mechanism.coordinates[place].path for place in held]
+            # A scale of 0 keeps coordinates that the caller has set.
             scales = np.where(np.isin(tangent_model.coordinates, paths), 0.0, ease)
             missing = equations @ np.vstack((slopes, by_numbers))
             change = np.linalg.lstsq(equations[:, places] * scales, missing, rcond=RANK_TOLERANCE)[
@@ -285,6 +326,10 @@ class _SensitivityRun:
 
     def _check_same_rates(self, t: float, y: Sequence[float]) -> None:
         """Check that the tangents have the same rates as the simulation.
+
+        Args:
+            t: time, s.
+            y: state in the order of the simulation.
 
         Raises:
             SettingError: they differ.
@@ -314,7 +359,7 @@ def integrate_sensitivities(
     accuracy: float,
     names: Sequence[str],
 ) -> Array:
-    """Integrate the derivatives (n, x, m) of a motion along m directions, and return them at some of its times.
+    """Integrate the derivatives of a motion along m directions.
 
     Args:
         steps: steps of the model with its numbers and directions.
@@ -325,12 +370,24 @@ def integrate_sensitivities(
         accuracy: accuracy of the motion.
         names: names of the states, for messages.
 
+    Returns:
+        Derivatives (n, x, m).
+
     Raises:
         SimulationError: a derivative is not finite.
     """
 
     def integrate_step(t0: float, t1: float, y0: Array) -> Array:
-        """Return the blocks at the end of a step, which is halved until the derivatives are accurate."""
+        """Take one step, and halve it until the derivatives are accurate.
+
+        Args:
+            t0: start of the step, s.
+            t1: end of the step, s.
+            y0: blocks at the start.
+
+        Returns:
+            Blocks at the end.
+        """
         h = t1 - t0
         y, error = steps.step(t0, t1, y0)
         size = np.abs(y)
@@ -345,6 +402,7 @@ def integrate_sensitivities(
         sizes = (np.maximum(before, size) * weights).max(axis=1)
         errors = (np.abs(error) * weights).max(axis=1)
         if h > MIN_STEP_S and (errors > DERIVATIVE_ERROR_FACTOR * accuracy * sizes)[:, 1:].any():
+            # The motion keeps its steps; only the derivatives are integrated with half of them.
             middle = t0 + h / 2.0
             return integrate_step(middle, t1, integrate_step(t0, middle, y0))
         return y
@@ -369,6 +427,11 @@ def integrate_sensitivities(
 
 def _check_not_initial(model: Model, tangent_model: TangentModel, name: str) -> None:
     """Check that a parameter is not an initial value of a state.
+
+    Args:
+        model: the model.
+        tangent_model: its tangents.
+        name: path of the parameter.
 
     Raises:
         SettingError: it is one.
@@ -396,6 +459,11 @@ def _select_coordinate_values(
 
 def _find_index(what: str, names: Sequence[str], name: str) -> int:
     """Return the index of a name.
+
+    Args:
+        what: what is named, for messages.
+        names: all names.
+        name: the name.
 
     Raises:
         SettingError: the name does not exist.

@@ -1,4 +1,8 @@
-"""Kernels as Python functions that run on symbols: the same code with its branches rewritten."""
+"""Conversion of kernels to Python functions that run on symbols.
+
+The code stays the same; its operators, branches and calls are rewritten into calls of helpers,
+which build CasADi expressions.
+"""
 
 from __future__ import annotations
 
@@ -60,18 +64,30 @@ OPERATOR_HELPERS: dict[type, str] = {
 
 
 def _slice_vector(vector: Any, place: int) -> Any:
-    """Return the vector from an index on."""
+    """Return the part of a vector that begins at an index."""
     return vector.rest(place) if isinstance(vector, Vector) else vector[place:]
 
 
 def _call_law(address: int, *given: Any) -> int:
-    """Run the law at an address on symbols; errors collect the items of the calls."""
+    """Run the law at an address on symbols.
+
+    Args:
+        address: number of the law.
+        given: its arguments; the last one is the offset of the item.
+
+    Returns:
+        Outcome of the law.
+
+    Raises:
+        NoFormula: the law has no formula; the error collects the items of the calls.
+    """
     law = pointers.laws[address]
     try:
         result: int = branches.run_all_branches(
             f"the law {name_of(law)}", make_symbolic(law), *given
         )
     except NoFormula as error:
+        # The last argument is the item of the force, from which the message finds its name.
         error.items.append(given[-1])
         raise
     return result
@@ -92,6 +108,9 @@ _counterparts: dict[Any, Any] = {
 def make_symbolic(function: Any) -> Any:
     """Return a kernel or law as a function that takes symbols too.
 
+    Args:
+        function: function in the restricted Python of kernels.
+
     Raises:
         NotImplementedError: the code contains something that has no meaning for symbols.
     """
@@ -104,7 +123,12 @@ def make_symbolic(function: Any) -> Any:
 
 @contextmanager
 def replace_kernel(function: Any, twin: Any) -> Iterator[None]:
-    """Call another function instead of a kernel on symbols within a block."""
+    """Call another function instead of a kernel on symbols within a block.
+
+    Args:
+        function: the kernel.
+        twin: the function that replaces it.
+    """
     before = make_symbolic(function)
     _counterparts[function] = twin
     try:
@@ -150,7 +174,13 @@ def _is_own_function(value: Any) -> bool:
 
 
 class _KernelRewriter(Kernel, ast.NodeTransformer):
-    """Rewriter of one function."""
+    """Rewriter of one function.
+
+    Attributes:
+        number: number of parts of the code so far, which name them in messages.
+        returns_early: whether a branch returns or leaves a loop, so that all combinations are run.
+        branch_variables: variables that are assigned in branches, and unset before.
+    """
 
     def __init__(self, function: Function, language: str) -> None:
         super().__init__(function, language)
@@ -162,9 +192,10 @@ class _KernelRewriter(Kernel, ast.NodeTransformer):
         return copy_tree(super().parse(function))
 
     def compile_function(self) -> Any:
-        """Return the rewritten function."""
+        """Return the rewritten function, compiled."""
         tree = self.tree
         body = [part for item in self.body for part in self._wrap_list(self.visit(item))]
+        # A variable that only one side assigns must exist on the other side, too.
         clear = [
             ast.Assign([_store_name(name)], _load_name("unset_"))
             for name in sorted(self.branch_variables - set(self.given))
@@ -214,6 +245,7 @@ class _KernelRewriter(Kernel, ast.NodeTransformer):
 
     def visit_Compare(self, node: ast.Compare) -> ast.expr:
         self.generic_visit(node)
+        # `a < b < c` becomes `a < b and b < c`, since the first test may be a symbol.
         if len(node.ops) == 1:
             return node
         sides = [node.left, *node.comparators]
@@ -250,6 +282,7 @@ class _KernelRewriter(Kernel, ast.NodeTransformer):
         self.returns_early = True
         part = self._number_part(node)
         self.generic_visit(node)
+        # A loop on symbols has no end that is known beforehand: each pass is a branch.
         node.test = _make_call("decide_", part, node.test)
         return node
 
@@ -260,6 +293,7 @@ class _KernelRewriter(Kernel, ast.NodeTransformer):
         names = list_assigned_names(*node.body, *node.orelse)
         self.generic_visit(node)
         if is_failure:
+            # A failure needs no other side: results where it is true become NaN.
             node.test = _make_call("fails_", node.test)
             return node
         if leaves:
@@ -293,7 +327,14 @@ class _KernelRewriter(Kernel, ast.NodeTransformer):
         ]
 
     def _is_failure(self, node: ast.If) -> bool:
-        """Return whether a branch only returns an error code: anything but OK from a function that returns an outcome."""
+        """Return whether a branch only returns an error code.
+
+        Kernels that return an outcome return anything but OK in this case. Such a branch is no
+        alternative: the results are NaN where it is taken.
+
+        Args:
+            node: the branch.
+        """
         match node:
             case ast.If(body=[ast.Return(value=ast.expr() as value)], orelse=[]):
                 returns = self.tree.returns

@@ -1,4 +1,4 @@
-"""Evaluation of a packed model on symbols: the kernels themselves, run on numbers some of which are symbols."""
+"""Evaluation of a packed model on symbols: the kernels run on numbers and symbols."""
 
 from __future__ import annotations
 
@@ -46,12 +46,12 @@ UNSUPPORTED_KERNELS = {
 
 
 class SymbolicEvaluator:
-    """Evaluator of the kernels for a state of symbols.
+    """Evaluator that runs the kernels on symbols instead of the numbers of a state.
 
     Args:
         packed: packed model.
         forces: forces of the model.
-        numbers: numbers of the packed model, some of which may be symbols.
+        numbers: numbers of the packed model, which may include symbols.
         t: time, s.
         y: state in the order of the packed model.
         controls: controls of the actuators.
@@ -111,7 +111,11 @@ class SymbolicEvaluator:
         return self._elements[self._packed.owners[item]].path
 
     def evaluate(self, stage: int) -> SymbolicWorkspace:
-        """Evaluate the model up to a stage."""
+        """Evaluate the model up to a stage.
+
+        Args:
+            stage: one of `STAGE`.
+        """
         return self.run(
             lambda model, reals, data, y, f: make_symbolic(evaluate)(
                 model, reals, data, y, f, stage
@@ -132,13 +136,17 @@ class SymbolicEvaluator:
     def compute_missing_forces(
         self, udot: Sequence[Any], pushing: Container[str] | None = None
     ) -> SymbolicWorkspace:
-        """Compute by inverse dynamics the generalized forces that accelerations need beyond the model's forces.
+        """Compute by inverse dynamics the forces that accelerations need beyond the model's forces.
 
         Args:
             udot: accelerations (n,).
             pushing: paths of the forces that act; all if None.
+
+        Returns:
+            Workspace with generalized forces in place of the derivatives of the speeds.
         """
         size = self.structure[MODEL.DOFS]
+        # A copy, as the items that act are rewritten for this call only.
         structure = [*self.structure]
         if pushing is not None:
             first = structure[MODEL.ITEM_AT]
@@ -148,6 +156,7 @@ class SymbolicEvaluator:
             ]
             structure[MODEL.ITEMS] = len(items)
             structure[first : first + len(items)] = items
+            # One run without a batched kernel covers the items that are left.
             run = structure[MODEL.RUN_AT]
             structure[MODEL.RUNS], structure[run + RUN.LAW] = 1, 0
             structure[run + RUN.FIRST] = 0
@@ -161,7 +170,13 @@ class SymbolicEvaluator:
         return self.run(law, structure)
 
     def evaluate_constraints(self) -> SymbolicWorkspace:
-        """Evaluate the constraint equations; the result has the wrench of a unit multiplier of each on each link."""
+        """Evaluate the constraint equations.
+
+        Returns:
+            Workspace whose result has the wrench of a unit multiplier, by the index of the equation
+            and the
+                link on which it acts.
+        """
         first = self.structure[self.structure[MODEL.CONSTRAINED] + CONSTRAINED.WORK_ROWS]
         size = self.structure[MODEL.DOFS]
 
@@ -171,9 +186,10 @@ class SymbolicEvaluator:
             wrenches: dict[tuple[int, int], list[Any]] = {}
             kernel = make_symbolic(add_wrench_row)
 
-            def add(
+            def record_wrench(
                 model: Vector, data: Vector, link: int, torque: Any, force: Any, row: Vector
             ) -> None:
+                # The place of the row in the work vector tells the equation.
                 key = (row.first - first) // size, link
                 before = wrenches.get(key, [0.0] * 6)
                 wrenches[key] = [
@@ -182,7 +198,8 @@ class SymbolicEvaluator:
                 kernel(model, data, link, torque, force, row)
 
             make_symbolic(evaluate)(model, reals, data, y, f, STAGE.VELOCITY)
-            with replace_kernel(add_wrench_row, add):
+            # The kernel that adds a wrench to a row of the equations also reveals the wrench.
+            with replace_kernel(add_wrench_row, record_wrench):
                 make_symbolic(evaluate_constraints)(model, reals, data, y, f)
             return wrenches
 
@@ -203,7 +220,8 @@ class SymbolicEvaluator:
             UnsupportedError: a force has no formula.
         """
 
-        def run() -> SymbolicWorkspace:
+        def run_once() -> SymbolicWorkspace:
+            # New vectors for each attempt: a rerun must not see values of the one before.
             model = Vector(self.structure if structure is None else structure)
             reals = Vector(list(self.numbers))
             data = Vector([0.0] * self.structure[MODEL.WORK_SIZE])
@@ -217,7 +235,7 @@ class SymbolicEvaluator:
             return SymbolicWorkspace(model, reals, data, f, result, branches.run.failures)
 
         try:
-            return branches.run_until_mergeable(run)
+            return branches.run_until_mergeable(run_once)
         except branches.NoFormula as error:
             named = next(
                 (self._path(item) for item in error.items if item in self._packed.owners), ""
@@ -228,7 +246,15 @@ class SymbolicEvaluator:
             ) from error
 
     def _find_load(self, g: Vector, gp: Vector, room: Vector, t: Any) -> None:
-        """Write the values of loads into the work vector, instead of the kernel :func:`evaluate_load`."""
+        """Write the values of loads into the work vector, instead of the kernel :func:`evaluate_load`.
+
+        Args:
+            g: integers of the load.
+            gp: its numbers.
+            room: receives force, point and torque (9,).
+            t: time, s.
+        """
+        # The load's record is the last one that begins before its own integers.
         owner = self._packed.owners[max(item for item in self._packed.owners if item <= g.first)]
         element: Any = self._elements[owner]
         first = len(list_load_functions(self._elements[:owner]))
@@ -239,7 +265,14 @@ class SymbolicEvaluator:
 
 
 def list_load_functions(elements: Sequence[Any]) -> list[Function]:
-    """Return the functions of time of all measured and prescribed forces, points and torques."""
+    """Return the functions of time of all measured and prescribed forces, points and torques.
+
+    Args:
+        elements: force elements of the model.
+
+    Returns:
+        Functions in the order of the elements.
+    """
     loads = (
         element.location
         for element in elements
@@ -249,7 +282,7 @@ def list_load_functions(elements: Sequence[Any]) -> list[Function]:
 
 
 class SymbolicWorkspace:
-    """Vectors after an evaluation.
+    """Vectors of the kernels after an evaluation on symbols.
 
     Args:
         model: structure.
@@ -258,6 +291,9 @@ class SymbolicWorkspace:
         f: derivative of the state, or generalized forces instead of it.
         result: value that the function returned.
         failures: conditions under which there is no result.
+
+    Attributes:
+        wrap: function that makes kernels run on symbols.
     """
 
     def __init__(
@@ -278,7 +314,11 @@ class SymbolicWorkspace:
         self._failure = reduce(casadi.logic_or, failures) if failures else None
 
     def mask_failures(self, numbers: Sequence[Any]) -> Any:
-        """Return numbers as one column that is NaN where the evaluation fails."""
+        """Return numbers as one column that is NaN where the evaluation fails.
+
+        Args:
+            numbers: numbers or symbols.
+        """
         column = casadi.SX(casadi.vertcat(*numbers))
         return (
             column

@@ -48,8 +48,10 @@ class NoFormula(Exception):
         self.items: list[int] = []
 
 
-class WiderBranchNeeded(Exception):
-    """Signal that a merged value is used which cannot be merged: a wider part must be run for both sides.
+class BranchWideningSignal(Exception):
+    """Signal that a merged value is used which cannot be merged.
+
+    A wider part of the code must then be run for both sides.
 
     Attributes:
         part: part of the code that merged the value.
@@ -61,13 +63,19 @@ class WiderBranchNeeded(Exception):
 
 
 class UnmergeableValue:
-    """Integer, or similar value, that differs between the sides of a branch; any use of it raises `WiderBranchNeeded`."""
+    """Integer, or similar value, that differs between the sides of a branch.
+
+    Any use of it raises `BranchWideningSignal`.
+
+    Args:
+        part: part of the code that merged the value.
+    """
 
     def __init__(self, part: Any) -> None:
         self.part = part
 
     def _require_wider(self, *_: Any) -> Any:
-        raise WiderBranchNeeded(self.part)
+        raise BranchWideningSignal(self.part)
 
     __add__ = __radd__ = __sub__ = __rsub__ = __mul__ = __rmul__ = __truediv__ = __rtruediv__ = (
         __neg__
@@ -127,6 +135,7 @@ class _ActiveCondition:
 
 
 where = _ActiveCondition()
+"""The only active condition."""
 
 
 def is_symbol(value: Any) -> bool:
@@ -151,7 +160,11 @@ def restrict_condition(test: Any) -> Iterator[None]:
 
 
 def combine_condition(test: Any) -> Any:
-    """Return the conjunction of the active condition and a test."""
+    """Return the conjunction of the active condition and a test.
+
+    Args:
+        test: the test, a symbol.
+    """
     return test if where.condition is None else casadi.logic_and(where.condition, test)
 
 
@@ -173,6 +186,9 @@ def merge_values(test: Any, a: Any, b: Any, part: Any) -> Any:
         a: number, tuple of numbers, or a value that is equal in both.
         b: value of the same kind.
         part: part of the code, which is run for both sides if an unmergeable value is used.
+
+    Returns:
+        A selection of CasADi; the value itself if both are equal, or one is unset.
     """
     if a is b or isinstance(b, UnsetVariable):
         return a
@@ -188,6 +204,7 @@ def merge_values(test: Any, a: Any, b: Any, part: Any) -> Any:
     if isinstance(a, UnmergeableValue) or isinstance(b, UnmergeableValue):
         return UnmergeableValue(part)
     if isinstance(a, SX) or isinstance(b, SX):
+        # Equal expressions need no selection, which keeps the formulas small.
         if isinstance(a, SX) and isinstance(b, SX) and casadi.is_equal(a, b, 1):
             return a
         return casadi.if_else(test, a, b)
@@ -202,7 +219,14 @@ def merge_values(test: Any, a: Any, b: Any, part: Any) -> Any:
 def _make_binary_operation(
     operation: Callable[[Any, Any], Any], number: int
 ) -> Callable[[Any, Any], Any]:
-    """Return an operation on two numbers; CasADi's operators need eight times as long to check their types."""
+    """Return an operation on two numbers.
+
+    CasADi's own operators take eight times as long, since they check the types of their operands.
+
+    Args:
+        operation: operation on floats.
+        number: CasADi's number of the operation.
+    """
     binary = SX.binary
 
     def apply_operation(a: Any, b: Any) -> Any:
@@ -212,12 +236,20 @@ def _make_binary_operation(
 
 
 plus = _make_binary_operation(operator.add, casadi.OP_ADD)
+"""Sum of two numbers or symbols."""
 minus = _make_binary_operation(operator.sub, casadi.OP_SUB)
+"""Difference of two numbers or symbols."""
 times = _make_binary_operation(operator.mul, casadi.OP_MUL)
+"""Product of two numbers or symbols."""
 
 
 def divide(a: Any, b: Any) -> Any:
-    """Return a / b with the rules of IEEE arithmetic for division by zero."""
+    """Return a / b with the rules of IEEE arithmetic for division by zero.
+
+    Args:
+        a: dividend.
+        b: divisor.
+    """
     if is_symbol(b):
         return a / guard_value(b)
     a = simplify_number(a)
@@ -232,7 +264,12 @@ def divide(a: Any, b: Any) -> Any:
 
 
 def power(a: Any, b: Any) -> Any:
-    """Return a to the power of b."""
+    """Return a to the power of b.
+
+    Args:
+        a: base.
+        b: exponent; a whole number gives a product, which is defined for negative bases.
+    """
     a = simplify_number(a)
     b = simplify_number(b)
     if not (isinstance(a, SX) or isinstance(b, SX)):
@@ -253,7 +290,15 @@ def logical_or(*parts: Callable[[], Any]) -> Any:
 
 
 def _evaluate_logical(parts: Iterable[Callable[[], Any]], *, stop: bool) -> Any:
-    """Evaluate parts in turn, each under the condition that the ones before did not decide."""
+    """Evaluate parts in turn, each under the condition that the ones before did not decide.
+
+    Args:
+        parts: functions that return tests.
+        stop: value that decides: False for a conjunction, True for a disjunction.
+
+    Returns:
+        The combined test.
+    """
     known: Any = None
     before = where.condition
     try:
@@ -338,9 +383,14 @@ def truncate_number(value: Any) -> int:
 
 
 def square_root(value: Any) -> Any:
-    """Return the square root; its derivative at 0, and at a square clamped at zero, is 0."""
+    """Return the square root of a number.
+
+    Args:
+        value: number; the derivative at 0, and at a square clamped at zero, is 0.
+    """
     if not is_symbol(value):
         return math.sqrt(simplify_number(value))
+    # max(x, 0) has the derivative 0 below 0, where sqrt would still divide by it.
     test = value > 0.0 if value.op() == casadi.OP_FMAX else value != 0.0
     with restrict_condition(test):
         return casadi.if_else(test, casadi.sqrt(guard_value(value)), 0.0)
@@ -377,7 +427,14 @@ def _make_counterpart(name: str, instead: float | None = None) -> Callable[..., 
 
 
 def sine_cosine(angle: Any) -> tuple[Any, Any]:
-    """Return sine and cosine of an angle, instead of the polynomials of `laws/rotations.py`."""
+    """Return sine and cosine of an angle as functions, instead of the polynomials of `laws/rotations.py`.
+
+    Args:
+        angle: angle, rad.
+
+    Returns:
+        Sine, and cosine.
+    """
     return COUNTERPARTS[math.sin](angle), COUNTERPARTS[math.cos](angle)
 
 
@@ -395,7 +452,9 @@ COUNTERPARTS: dict[Any, Any] = {
         True if is_symbol(value) else math.isfinite(simplify_number(value))
     ),
 }
-"""What stands in the place of Python's own functions."""
+"""Functions that replace Python's built-in and mathematical functions on symbols."""
+# Functions that are defined everywhere need no guard; the others get a harmless argument on the
+# inactive side of a branch.
 for _name in ("sin", "cos", "tan", "atan", "tanh", "floor", "ceil", "erf", "copysign"):
     COUNTERPARTS[getattr(math, _name)] = _make_counterpart(_name)
 for _name in ("exp", "expm1", "sinh", "cosh", "asin", "acos"):
@@ -405,4 +464,3 @@ for _name in ("log", "log1p", "atan2"):
 COUNTERPARTS[math.erfc] = lambda value: (
     1.0 - COUNTERPARTS[math.erf](value) if is_symbol(value) else math.erfc(value)
 )
-"""Functions that replace Python's built-in and mathematical functions."""

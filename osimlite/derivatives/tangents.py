@@ -1,4 +1,8 @@
-"""Rates of a model with their exact derivatives along directions, in machine code."""
+"""Rates of a model with their exact derivatives along directions, in machine code.
+
+The kernels are compiled for dual numbers: each float is a row of its value and `DIRECTIONS`
+derivatives (forward mode of automatic differentiation).
+"""
 
 from __future__ import annotations
 
@@ -45,6 +49,9 @@ def tangents(
         parameters: paths of numbers of the model that the rates are functions of, as for
             :func:`osimlite.casadi`.
         folder: folder of the model's file, for the files that it names; the current folder if None.
+
+    Returns:
+        The model with its rates and derivatives.
 
     Raises:
         ModelError: the model is not a mechanism.
@@ -95,13 +102,17 @@ class DualMachine:
 
         Args:
             name: name of the kernel.
-            y: state.
-            f: derivative of the state.
+            y: state (x, 1 + DIRECTIONS).
+            f: derivative of the state (x, 1 + DIRECTIONS).
         """
         return self.program.code.bind_entry(name, self.program.ints, self.x, self.w, y, f)
 
     def begin(self, t: float) -> None:
-        """Set the time, and clear the derivatives of an earlier evaluation."""
+        """Set the time, and clear the derivatives of an earlier evaluation.
+
+        Args:
+            t: time, s.
+        """
         self.w[:, 1:] = 0.0
         self.w[WORK.TIME, 0] = t
 
@@ -136,19 +147,32 @@ class TangentModel(DifferentiableModel):
         self._evaluate = machine.bind_kernel("evaluate", self._y, self._f)
 
     def take(self, p: Array) -> None:
-        """Set the parameters (p,)."""
+        """Set the values of the parameters.
+
+        Args:
+            p: values (p,), in the units of the file.
+        """
         self.p = p
         self.fill_numbers(self._machine.x[:, 0])
 
     def fill_numbers(self, numbers: Array) -> None:
-        """Write the numbers (k,) of the model that depend on the parameters."""
+        """Write the numbers of the model that depend on the parameters.
+
+        Args:
+            numbers: numbers of the kernels (k,), which are changed.
+        """
         if self._parameters:
             numbers[self._parameter_rows] = (
                 self._parameters.base[self._parameter_rows] + self._slopes @ self.p
             )
 
     def fill_derivatives(self, dp: Array, numbers: Array) -> None:
-        """Write the derivatives (k, m) of these numbers along directions (p, m) of the parameters."""
+        """Write the derivatives of the model's numbers along directions of the parameters.
+
+        Args:
+            dp: directions of the parameters (p, m).
+            numbers: derivatives of the numbers (k, m), which are changed.
+        """
         numbers[self._parameter_rows] = self._slopes @ dp
 
     def along(
@@ -174,7 +198,7 @@ class TangentModel(DifferentiableModel):
                 and their columns in a row of dual numbers.
 
         Returns:
-            Rates (x,), and their derivatives (x, m).
+            Rates (x,), and their derivatives (x, m); NaN where the rates do not exist.
         """
         machine = self._machine
         y = self._y
@@ -183,6 +207,8 @@ class TangentModel(DifferentiableModel):
         self._control_rows[:, 0] = u
         rates = np.full(len(x), np.nan)
         result = np.full(dx.shape, np.nan)
+        # Machine code computes DIRECTIONS derivatives at once; more directions take more
+        # evaluations.
         for part, own in split_directions(dx.shape[1]):
             machine.begin(t)
             y[self.state_indices, own] = dx[:, part]
@@ -196,12 +222,18 @@ class TangentModel(DifferentiableModel):
                 if look is not None:
                     look(part, own)
         if dp is not None:
+            # The derivatives of the numbers must not remain for calls without directions of
+            # parameters.
             machine.x[:, 1:] = 0.0
         return rates, result
 
     @cached_property
     def output_names(self) -> dict[str, tuple[str, ...]]:
-        """Names of the entries of each group of outputs; see `CasadiModel.outputs`."""
+        """Names of the entries of each group of outputs; see `CasadiModel.outputs`.
+
+        Returns:
+            Names by group.
+        """
         return {group: tuple(labels) for group, (labels, _) in self._compute_outputs().items()}
 
     def compute_outputs(
@@ -238,7 +270,11 @@ class TangentModel(DifferentiableModel):
         return y, slopes[:, :size], slopes[:, size:]
 
     def _compute_outputs(self) -> dict[str, tuple[list[str], list[Any]]]:
-        """Compute labels and values of all groups of outputs in the state of the last evaluation."""
+        """Compute all groups of outputs in the state of the last evaluation.
+
+        Returns:
+            Labels and values by group.
+        """
         points = [
             axis for _, _, point in locate_stations(self.mechanism, self._packed) for axis in point
         ]
@@ -290,10 +326,12 @@ class TangentModel(DifferentiableModel):
             rows = rows.reshape(count, freedoms, -1)
             u = y[freedoms : 2 * freedoms]
             positions[:, part] = errors[:, own]
+            # The errors of the speeds are G u - rates: the product rule gives dG u + G du.
             moved = np.einsum("ijk,j->ik", rows[:, :, own], u[:, 0]) + rows[:, :, 0] @ u[:, own]
             speeds[:, part] = moved - rates[:, own]
 
         self.along(t, x, self.u, both[:size], None, both[size:], look=look)
+        # Only some equations restrict positions; the others restrict speeds alone.
         of_places = [
             row
             for at in s[h[CONSTRAINED.CONSTRAINT_AT] :][: h[CONSTRAINED.CONSTRAINTS]]
@@ -323,11 +361,14 @@ class TangentModel(DifferentiableModel):
         return rates, found[:, :size], found[:, size:]
 
     def steps(self, controls: Controls, dp: Array) -> TangentSteps:
-        """Return integration steps of a controlled motion with derivatives along directions of the parameters and the start.
+        """Return integration steps of a controlled motion, with their derivatives.
 
         Args:
             controls: controls of the motion.
             dp: directions of the parameters (p, m).
+
+        Returns:
+            Steps with derivatives along these directions and those of the start.
         """
         packed = pack(self.mechanism, replace(self.forces, controls=controls), apart=self._apart)
         result = TangentSteps(packed, self.forces, self.state_indices)
@@ -356,7 +397,11 @@ class DualWorkspace:
         self.data = DualVector(data)
 
     def mask_failures(self, numbers: Sequence[Any]) -> list[Any]:
-        """Return numbers unchanged: after a failed evaluation they are not read."""
+        """Return numbers unchanged: after a failed evaluation they are not read.
+
+        Args:
+            numbers: dual numbers or floats.
+        """
         return [*numbers]
 
 
@@ -391,7 +436,12 @@ class TangentSteps:
         )
 
     def take(self, numbers: Array, changes: Array) -> None:
-        """Set the numbers of the model (k,) and their derivatives along all directions (k, m)."""
+        """Set the numbers of the model and their derivatives.
+
+        Args:
+            numbers: numbers (k,).
+            changes: their derivatives along all directions (k, m).
+        """
         self._count = changes.shape[1]
         self._number = -1
         self._numbers = [np.zeros(self._machine.x.shape) for _ in split_directions(self._count)]
@@ -400,7 +450,15 @@ class TangentSteps:
             block[:, own] = changes[:, part]
 
     def blocks(self, y: Array, slopes: Array) -> Array:
-        """Return the blocks of a state (x,) with its derivatives (x, m), in the order of the model."""
+        """Return the blocks of a state with its derivatives.
+
+        Args:
+            y: state (x,) in the order of the model.
+            slopes: its derivatives (x, m).
+
+        Returns:
+            Blocks (b, x, 1 + DIRECTIONS).
+        """
         result = np.zeros((len(self._numbers), len(y), 1 + DIRECTIONS))
         result[:, self.state_indices, 0] = y
         for block, (part, own) in zip(result, split_directions(slopes.shape[1]), strict=True):
@@ -408,7 +466,14 @@ class TangentSteps:
         return result
 
     def slopes(self, blocks: Array) -> Array:
-        """Return the derivatives (x, m) in blocks."""
+        """Return the derivatives in blocks.
+
+        Args:
+            blocks: blocks (b, x, 1 + DIRECTIONS).
+
+        Returns:
+            Derivatives (x, m) in the order of the model.
+        """
         parts = [
             block[self.state_indices, own]
             for block, (_, own) in zip(blocks, split_directions(self._count), strict=True)
@@ -431,6 +496,7 @@ class TangentSteps:
         machine = self._machine
         size = start.shape[1]
         for number, block in enumerate(start):
+            # Copying the numbers is costly, and a model with few directions has one block only.
             if self._number != number:
                 self._number = number
                 machine.x[:] = self._numbers[number]
@@ -441,6 +507,7 @@ class TangentSteps:
             h[NEXT_STEP] = t1 - t0
             h[ACCEPTED] = self._accepted
             self._start[:size] = block
+            # A step that fails leaves NaN, since the kernel then does not write its end.
             self._end[0] = np.nan
             if self._evaluate(STAGE.ACCELERATION) == OUTCOME.OK:
                 self._step()
@@ -452,7 +519,16 @@ class TangentSteps:
 
 
 def split_directions(count: int) -> Iterator[tuple[slice, slice]]:
-    """Yield the directions that are computed together, and their columns in a row of dual numbers."""
+    """Yield the directions that are computed together.
+
+    Args:
+        count: number of directions.
+
+    Yields:
+        Slice of the directions, and slice of their columns in a row of dual numbers. Without
+        directions
+            there is one empty slice, so that the values are computed.
+    """
     for first in range(0, max(count, 1), DIRECTIONS):
         size = min(DIRECTIONS, max(count - first, 0))
         yield slice(first, first + size), slice(1, 1 + size)

@@ -1,6 +1,6 @@
-"""Paths around surfaces, which have no formula: CasADi callbacks with their derivatives.
+"""Paths around surfaces, which have no formula, as CasADi callbacks with derivatives.
 
-The kernels search for the course of a path, so that its length and moment arms come from machine
+The kernels find a path around surfaces by a search, so its length and moment arms come from machine
 code (`casadi.Callback`). The rest of the model sees a path whose length and moment arms are known
 functions of the coordinates. Their derivatives are extrapolated differences (L. F. Richardson,
 Phil. Trans. R. Soc. A 226, 1927), accurate to about 1e-9 where a path does not touch or leave a
@@ -31,7 +31,7 @@ from osimlite.simulation.elements.geometries.path import PATH
 from osimlite.simulation.path_system import MeasuredPath, PathSystem
 
 DIFFERENCE_STEP = 1e-4
-"""Step of the differences, rad or m. The search leaves an error of about 1e-13, and paths jump at once."""
+"""Step of the differences, rad or m: large against the error of the search of about 1e-13."""
 SAMPLED_POSES = 60
 """Number of poses in which the coordinates with a moment arm are identified."""
 
@@ -56,22 +56,29 @@ class SymbolicPath:
 
     @property
     def size(self) -> int:
-        """Number of symbols."""
+        """Number of symbols: the length, and moment arm and speed for each coordinate."""
         return 1 + 2 * len(self.coordinates)
 
     def make_records(self, places: Places) -> list[ForceRecord]:
-        """Return the items of a path that is a function of coordinates; see :mod:`osimlite.mechanics.kernels.function_paths`."""
+        """Return the records of a path that is a function of coordinates.
+
+        See :mod:`osimlite.mechanics.kernels.function_paths`.
+
+        Args:
+            places: placement of the bodies in the links of the tree.
+        """
         freedoms = [places.freedom(coordinate) for coordinate in self.coordinates]
         count = len(freedoms)
 
-        def law(s: Any, x: Any, w: Any, y: Any, f: Any, item: int) -> int:
+        def write_length(s: Any, x: Any, w: Any, y: Any, f: Any, item: int) -> int:
             record = w.rest(s[item + ITEM.RECORD])
             record[LENGTH] = self.symbols[0]
             for k in range(count):
+                # The moment arm is minus the derivative of the length.
                 record[DERIVATIVES + k] = -self.symbols[1 + k]
             return OUTCOME.OK
 
-        def speed_law(s: Any, x: Any, w: Any, y: Any, f: Any, item: int) -> int:
+        def write_speed(s: Any, x: Any, w: Any, y: Any, f: Any, item: int) -> int:
             rates = zip(self.symbols[1 + count :], freedoms, strict=True)
             first = s[MODEL.DOFS]
             w.rest(s[item + ITEM.RECORD])[0] = sum(
@@ -79,11 +86,14 @@ class SymbolicPath:
             )
             return OUTCOME.OK
 
-        law.takes_symbols = speed_law.takes_symbols = True  # type: ignore[attr-defined]
+        write_length.takes_symbols = write_speed.takes_symbols = True  # type: ignore[attr-defined]
         given = ForceRecord(
-            "", record_size=DERIVATIVES + count, is_part=True, python=register_symbolic(law)
+            "",
+            record_size=DERIVATIVES + count,
+            is_part=True,
+            python=register_symbolic(write_length),
         )
-        speed = ForceRecord("", record_size=1, is_part=True, python=register_symbolic(speed_law))
+        speed = ForceRecord("", record_size=1, is_part=True, python=register_symbolic(write_speed))
         before = [ForceRecord("pull_coordinates", is_part=True), given, speed]
         backs = [sum(ITEM.OWN + len(item.ints) for item in before[first:]) for first in range(3)]
         ints = backs[0], count, backs[1], backs[2], *freedoms, *[0] * count
@@ -134,7 +144,14 @@ class WrappedPaths:
         self.forces = replace(forces, elements=tuple(elements))
 
     def _measure_speeds(self, pose: Array) -> list[Array]:
-        """Return for each path its speed for a unit speed of each of its coordinates."""
+        """Return the speeds of the paths for unit speeds of their coordinates.
+
+        Args:
+            pose: values of all coordinates of the mechanism.
+
+        Returns:
+            For each path its speed (m/s) for a unit speed of each of its coordinates.
+        """
         result = np.zeros((len(self.symbolic_paths), len(pose)))
         for group in self._groups:
             moving = np.zeros(len(pose))
@@ -146,9 +163,18 @@ class WrappedPaths:
         ]
 
     def _sample_poses(self, mechanism: Mechanism) -> Array:
-        """Return random poses within the ranges of the coordinates."""
+        """Return random poses within the ranges of the coordinates.
+
+        Args:
+            mechanism: mechanism of the model.
+
+        Returns:
+            Values of all coordinates (k, n).
+        """
         rng = np.random.default_rng(0)
         bounds = np.array([info.range for info in mechanism.coordinates]).reshape(-1, 2)
+        # Ranges without meaning, such as -99999 to 99999, are replaced by one unit around the
+        # default.
         wide = bounds[:, 1] - bounds[:, 0] > 2.0 * np.pi
         bounds[wide] = self._default[wide, None] + np.array([-1.0, 1.0])
         return bounds[:, 0] + rng.random((SAMPLED_POSES, len(bounds))) * (
@@ -156,14 +182,25 @@ class WrappedPaths:
         )
 
     def set_symbols(self, symbols: Sequence[Any]) -> None:
-        """Set the symbols (size,) of the paths."""
+        """Set the symbols of the paths.
+
+        Args:
+            symbols: symbols (size,).
+        """
         first = 0
         for item in self.symbolic_paths:
             item.symbols = [symbols[first + k] for k in range(item.size)]
             first += len(item.symbols)
 
     def measure_paths(self, q: Array) -> Array:
-        """Return lengths, moment arms and speeds (size,) at values (n,) of the coordinates."""
+        """Return lengths, moment arms and speeds of the paths.
+
+        Args:
+            q: values (n,) of the coordinates.
+
+        Returns:
+            Numbers (size,): for each path its length (m), moment arms, and speeds for unit speeds.
+        """
         pose = self._default.copy()
         pose[self._order] = q
         lengths = self._system.measure_paths(pose, self._still, LENGTH)
@@ -178,7 +215,14 @@ class WrappedPaths:
         )
 
     def compute_slopes(self, q: Array) -> Array:
-        """Return the derivatives (size, n) of `measure_paths`."""
+        """Return the derivatives of `measure_paths`.
+
+        Args:
+            q: values (n,) of the coordinates.
+
+        Returns:
+            Derivatives (size, n).
+        """
         result = np.zeros((self.size, len(q)))
         owners = np.repeat(
             np.arange(len(self.symbolic_paths)), [item.size for item in self.symbolic_paths]
@@ -189,6 +233,8 @@ class WrappedPaths:
                 [self.measure_paths(_shift_coordinates(q, columns, sign * h)) for sign in (1, -1)]
                 for h in (DIFFERENCE_STEP, 2.0 * DIFFERENCE_STEP)
             )
+            # Central differences with steps h and 2 h, extrapolated: the error is of fourth order
+            # in h.
             slope = (8.0 * (one[0] - one[1]) - (two[0] - two[1])) / (12.0 * DIFFERENCE_STEP)
             for place, column in zip(group, columns, strict=True):
                 own = np.array([place in item.coordinates for item in self.symbolic_paths])[owners]
@@ -197,7 +243,7 @@ class WrappedPaths:
 
     @property
     def pattern(self) -> Any:
-        """Sparsity pattern of `compute_slopes`."""
+        """Sparsity pattern of the derivatives that `compute_slopes` returns."""
         places = {place: k for k, place in enumerate(self._order)}
         rows = list[int]()
         columns = list[int]()
@@ -211,7 +257,10 @@ class WrappedPaths:
         return casadi.Sparsity.triplet(self.size, len(self._order), rows, columns)
 
     def make_function(self) -> Any:
-        """Return ``paths(q)`` as a CasADi function with its derivative; keep a reference while it is used."""
+        """Return ``paths(q)`` as a CasADi function with its derivative.
+
+        CasADi does not keep callbacks alive, so the caller must keep a reference while it is used.
+        """
         slopes = _NumericCallback(
             "path_slopes",
             [len(self._order), self.size],
@@ -225,14 +274,30 @@ class WrappedPaths:
 
 
 def _shift_coordinates(q: Array, places: Sequence[int], by: float) -> Array:
-    """Return values with some of them changed by the same amount."""
+    """Return values with some of them changed by the same amount.
+
+    Args:
+        q: values (n,).
+        places: indices of the values to change.
+        by: the amount.
+    """
     result = q.copy()
     result[places] += by
     return result
 
 
 def _group_coordinates(paths: Sequence[Sequence[int]]) -> list[list[int]]:
-    """Return groups of coordinates of which no path has two, so that a group can be moved at once."""
+    """Return groups of coordinates that can be moved together.
+
+    No path depends on two coordinates of a group, so one evaluation serves all of them (the
+    coloring of Curtis, Powell and Reid 1974).
+
+    Args:
+        paths: coordinates of each path.
+
+    Returns:
+        Groups of coordinates.
+    """
     groups: list[list[int]] = []
     for place in dict.fromkeys(place for own in paths for place in own):
         beside = {other for own in paths if place in own for other in own}
@@ -245,7 +310,11 @@ def _group_coordinates(paths: Sequence[Sequence[int]]) -> list[list[int]]:
 
 
 def _is_wrapped(element: Any) -> bool:
-    """Return whether a force acts along a path around surfaces."""
+    """Return whether a force acts along a path around surfaces.
+
+    Args:
+        element: force element.
+    """
     if (
         not (isinstance(element, DeclaredForce) and element.force_type.geometry is PATH)
         or element.location is None
