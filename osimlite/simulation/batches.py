@@ -54,16 +54,26 @@ the allowed number of attempted steps.
 
 @dataclass(frozen=True, kw_only=True)
 class BatchOptions(IntegrationOptions):
-    """Options of a batch, besides those of its integration."""
+    """Options of a batch, besides those of its integration.
 
-    to: float = 2.0  # end of the runs unless a watch stops them, s
-    report_times: Sequence[float] = ()  # increasing times at which states are recorded, s
-    watches: Sequence[Watch] = ()  # events besides the begin and end of contacts
-    most_events: int = 0  # largest number of recorded events of a run; later ones are dropped
-    event_states: bool = False  # whether states at events are recorded
-    most_tries: int = UNLIMITED_TRIES  # largest number of attempted steps of a run
-    threads: int | None = None  # number of threads; by default one for each core
-    # controllers of the runs; the last function of each of their controls is a constant
+    Attributes:
+        to: end of the runs unless a watch stops them, s.
+        report_times: increasing times at which states are recorded, s.
+        watches: events besides the begin and end of contacts.
+        most_events: largest number of recorded events of a run; later ones are dropped.
+        event_states: whether states at events are recorded.
+        most_tries: largest number of attempted steps of a run.
+        threads: number of threads; by default one for each core.
+        held: controllers of the runs; the last function of each of their controls is a constant.
+    """
+
+    to: float = 2.0
+    report_times: Sequence[float] = ()
+    watches: Sequence[Watch] = ()
+    most_events: int = 0
+    event_states: bool = False
+    most_tries: int = UNLIMITED_TRIES
+    threads: int | None = None
     held: Sequence[KernelController] = ()
 
     def check(self) -> None:
@@ -74,7 +84,7 @@ class BatchOptions(IntegrationOptions):
         """
         self.check_integration()
         if not self.to >= 0.0:
-            raise SettingError(f"the runs end at a time that is not negative, not at {self.to} s")
+            raise SettingError(f"the runs must end at 0 s or later, not at {self.to} s")
         if not all(one <= other for one, other in pairwise([0.0, *self.report_times])):
             raise SettingError("the report times do not increase from 0 on; sort them")
         for number, least, what in (
@@ -87,13 +97,19 @@ class BatchOptions(IntegrationOptions):
 
 
 class BatchEngine(Engine, Protocol):
-    """An engine that computes many motions in one call."""
+    """Engine that computes many motions in one call.
 
-    mechanism: Mechanism  # mechanism of the model
-    forces: Forces  # forces of the model
-    # integers that describe topology; equal for models that differ in numbers only
+    Attributes:
+        mechanism: mechanism of the model.
+        forces: forces of the model.
+        structure: integers that describe topology; equal for models that differ in numbers only.
+        numbers: all numbers of the model (m,).
+    """
+
+    mechanism: Mechanism
+    forces: Forces
     structure: Ints
-    numbers: Floats  # all numbers of the model (m,)
+    numbers: Floats
 
     def run_many(
         self, states: ArrayLike, options: BatchOptions, numbers: ArrayLike | None = None
@@ -103,16 +119,26 @@ class BatchEngine(Engine, Protocol):
     def locate_contacts(
         self, states: ArrayLike, numbers: ArrayLike | None = None, rows: ArrayLike | None = None
     ) -> Floats:
-        """Return the surfaces of all contacts: centre and normal of surface 1, and centre of surface 2, in ground (k, P, 9), m.
+        """Return the surfaces of all contacts.
 
         Args:
             states: states (k, y).
             numbers: numbers of models of the same structure (v, m); by default the engine's.
             rows: row of `numbers` for each state (k,); by default the first.
+
+        Returns:
+            Centre and normal of surface 1 and centre of surface 2, in ground (k, P, 9), m.
         """
 
     def get_contact_radii(self, numbers: ArrayLike | None = None) -> Floats:
-        """Return the radius of surface 2 of each contact for each row of numbers (v, P), m."""
+        """Return the radius of surface 2 of each contact.
+
+        Args:
+            numbers: numbers of models of the same structure (v, m); by default the engine's.
+
+        Returns:
+            Radii (v, P), m.
+        """
 
     def make_updater(self, model: Model, folder: Path, wrapping: str = OPENSIM) -> ModelUpdater:
         """Return an object that updates the engine after numbers of its model have changed.
@@ -126,12 +152,19 @@ class BatchEngine(Engine, Protocol):
 
 @dataclass(frozen=True)
 class UpdatedModel:
-    """A model of which only numbers have changed."""
+    """Model that differs from another one in numbers only.
 
-    mechanism: Mechanism  # mechanism of the model
-    forces: Forces  # forces of the model
-    numbers: Floats  # numbers of the model, see `BatchEngine.numbers` (m,)
-    given: Any  # engine of the model before the change
+    Attributes:
+        mechanism: mechanism of the model.
+        forces: forces of the model.
+        numbers: numbers of the model, see `BatchEngine.numbers` (m,).
+        given: engine of the model before the change.
+    """
+
+    mechanism: Mechanism
+    forces: Forces
+    numbers: Floats
+    given: Any
 
     def make_engine(self) -> Any:
         """Return an engine with these numbers."""
@@ -142,11 +175,14 @@ class ModelUpdater(Protocol):
     """Updater of the parts of a model that forces, masses and gravity affect."""
 
     def update(self, owners: Sequence[Component]) -> UpdatedModel | None:
-        """Return the model with the present properties of its forces and bodies; None if more than numbers changed.
+        """Return the model with the present properties of its forces and bodies.
 
         Args:
             owners: forces, controllers, bodies and the model itself, if one of their properties has
                 changed.
+
+        Returns:
+            The changed model; None if more than numbers changed, so that it must be prepared anew.
         """
 
 
@@ -168,6 +204,9 @@ def run_many(
             the engine's.
         choices: attributes of :class:`BatchOptions`.
 
+    Returns:
+        The results of all runs, in the order of the states.
+
     Raises:
         SettingError: a value has no meaning.
         OsimliteError: shapes do not fit, or a watch names nothing or a locked coordinate.
@@ -181,36 +220,54 @@ Ints = NDArray[np.int64]
 
 
 class Watch(NamedTuple):
-    """Event at which a coordinate, a point of a body or a contact passes a level."""
+    """Event at which a coordinate, a point of a body or a contact passes a level.
 
-    name: str  # name of the event
-    # Exactly one of coordinate, body and contact is set.
-    coordinate: str = ""  # name or path of a coordinate
-    body: str = ""  # name or path of a body or frame with a point
-    station: tuple[float, float, float] = (0.0, 0.0, 0.0)  # the point in the frame, m
-    # direction in ground along which the position of the point is measured
+    Exactly one of `coordinate`, `body` and `contact` is set.
+
+    Attributes:
+        name: name of the event.
+        coordinate: name or path of a coordinate.
+        body: name or path of a body or frame with a point.
+        station: the point in the frame, m.
+        direction: direction in ground along which the position of the point is measured.
+        level: level, rad or m.
+        stops: -1 if falling below ends the run, 1 if rising above does, 0 if neither.
+        contact: name of a contact, one of the engine's `contacts`; it is above its level while it
+            touches.
+    """
+
+    name: str
+    coordinate: str = ""
+    body: str = ""
+    station: tuple[float, float, float] = (0.0, 0.0, 0.0)
     direction: tuple[float, float, float] = (0.0, 1.0, 0.0)
-    level: float = 0.0  # level, rad or m
-    stops: int = 0  # -1 if falling below ends the run, 1 if rising above does, 0 if neither
-    # name of a contact, one of the engine's `contacts`; it is above its level while it touches
+    level: float = 0.0
+    stops: int = 0
     contact: str = ""
 
 
 @dataclass(frozen=True)
 class Runs:
-    """Results of W runs whose states have y entries."""
+    """Results of W runs whose states have y entries.
 
-    times: Floats  # times at which the runs ended (W,), s
-    states: Floats  # states at the end (W, y), in the engine's order
-    endings: Ints  # how each run ended, see `ENDINGS` (W,)
-    counts: Ints  # accepted steps, attempted steps, evaluations (W, 3)
-    reports: Floats  # states at the report times (W, r, y); NaN after the end of a run
-    # events of each run in order of time: time (s), name, whether it begins or rises
+    Attributes:
+        times: times at which the runs ended (W,), s.
+        states: states at the end (W, y), in the engine's order.
+        endings: how each run ended, see `ENDINGS` (W,).
+        counts: accepted steps, attempted steps, evaluations (W, 3).
+        reports: states at the report times (W, r, y); NaN after the end of a run.
+        events: events of each run in order of time: time (s), name, whether it begins or rises.
+        peaks: largest force (N) of each contact at the end of a step, and its time (s) (W, P, 2).
+        event_states: states at the events of each run (as many as events, y), if recorded.
+    """
+
+    times: Floats
+    states: Floats
+    endings: Ints
+    counts: Ints
+    reports: Floats
     events: list[list[tuple[float, str, bool]]]
-    peaks: (
-        Floats  # largest force (N) of each contact at the end of a step, and its time (s) (W, P, 2)
-    )
-    # states at the events of each run (as many as events, y), if recorded
+    peaks: Floats
     event_states: list[Floats] = field(default_factory=list)
 
     def select(self, places: Sequence[int] | Ints) -> Runs:

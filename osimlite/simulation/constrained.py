@@ -18,6 +18,12 @@ def find_free_coordinates(mechanism: Mechanism) -> list[int]:
     Locked coordinates do not. Exception: a locked angle of a ball joint whose other angles are
     free. The speeds of that joint are not the rates of its angles, so that a constraint has to hold
     the angle.
+
+    Args:
+        mechanism: the mechanism.
+
+    Returns:
+        Indices in the order of the mechanism's coordinates.
     """
     turning = [
         set(motion_places)
@@ -50,6 +56,8 @@ def select_constraints(mechanism: Mechanism, order: Sequence[int]) -> tuple[list
         if not isinstance(item, Lock):
             kept.append(item)
         elif item.coordinate in order:
+            # A locked coordinate that stays in the state is held at its default value by a
+            # constraint.
             value = mechanism.coordinates[item.coordinate].default_value
             kept.append(PrescribedCoordinate(item.coordinate, Constant(value), item.name))
         else:
@@ -79,5 +87,6 @@ def find_consistent_state(
     Raises:
         SimulationError: no such state exists.
     """
+    # Positions come first, as in Simbody: the equations of the speeds depend on the pose.
     values = mechanism.assemble(np.array(q), kept=set_values)
     return values, mechanism.project_speeds(values, np.array(u), kept=set_speeds)

@@ -35,7 +35,14 @@ TIME_TOLERANCE = 1e-9
 
 
 class Gain(NamedTuple):
-    """A number of a controller that sweeps and searches can vary."""
+    """Number of a controller that sweeps and searches can vary.
+
+    Attributes:
+        name: name of the gain.
+        value: its present value.
+        low: lower bound.
+        high: upper bound.
+    """
 
     name: str
     value: float
@@ -59,13 +66,22 @@ class Controller(Protocol):
         """Return the gains that can be varied, for a model and its engine."""
 
     def with_values(self, values: Mapping[str, float]) -> Self:
-        """Return the controller with other values of some gains."""
+        """Return the controller with other values of some gains.
+
+        Args:
+            values: new values by the names of the gains.
+        """
 
     def par(self) -> str:
         """Return the values of the gains as the text of a .par file."""
 
     def compile_for(self, model: Model, engine: Any) -> KernelController:
-        """Return the controller in the form of the kernels, for a model and its engine."""
+        """Return the controller in the form of the kernels.
+
+        Args:
+            model: the model.
+            engine: compiled engine of the model.
+        """
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,10 +99,14 @@ class KernelController:
 
     @property
     def header(self) -> dict[str, str]:
-        """Header of the record: gains, and a checksum of everything else.
+        """Header of the record, by which a continued run recognizes its controller.
 
-        A continued run recognizes its controller by it.
+        It has the gains and a checksum of everything else, as text by key.
+
+        Returns:
+            Texts by key: "gains" as JSON, "reflexes" as a checksum.
         """
+        # A checksum tells whether a resumed run has the same reflexes, without writing them out.
         others = crc32(self.plan.tobytes() + self.numbers.tobytes())
         return {
             "gains": json.dumps({**self.gains, "fixed_control_step_size": self.step}),
@@ -95,7 +115,11 @@ class KernelController:
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """Labels of the record: sensors, states of the legs, controls, next step of the integrator."""
+        """Labels of the record: sensors, states of the legs, controls, next step of the integrator.
+
+        Returns:
+            Labels in the order of the record.
+        """
         legs = "leg_l.state", "leg_r.state"
         return (*self.sensors, *legs, *self.paths, "next_step")
 
@@ -104,12 +128,25 @@ class KernelController:
         return floor(time / self.step + TIME_TOLERANCE)
 
     def snap_to_step(self, time: float) -> float:
-        """Return the exact time of a control step if a time (s) is within the tolerance of it, else the time itself."""
+        """Return the exact time of a control step near a time.
+
+        Args:
+            time: time, s.
+
+        Returns:
+            The time of the control step if it is within the tolerance, else the time itself.
+        """
+        # 2 s given as 199.99999999 steps of 0.01 s must run 200 steps.
         nearest = round(time / self.step) * self.step
         return nearest if abs(nearest - time) < TIME_TOLERANCE * self.step else time
 
     def add_constants(self, controls: Controls) -> Controls:
-        """Return controls with one constant more for each control of the controller, which the kernels overwrite.
+        """Return controls with one constant more for each control of the controller.
+
+        The kernels overwrite the constants at each control step.
+
+        Args:
+            controls: controls of the model and of the run.
 
         Raises:
             SettingError: a control is a Python function, to which machine code cannot add.
@@ -117,7 +154,7 @@ class KernelController:
         result = controls.add_functions({path: Constant(0.0) for path in self.paths})
         if not isinstance(result.make_record()[2], str):
             raise SettingError(
-                "beside a controller, controls are numbers or tables, not functions of Python"
+                "a controller cannot be combined with controls that are Python functions; use numbers or tables"
             )
         return result
 
@@ -133,11 +170,11 @@ class KernelController:
         """
         if before is None:
             raise SettingError(
-                "the run that this one goes on from has left no controller.sto, and so had no controller"
+                "the earlier run has no controller.sto, so it had no controller; resume it without one"
             )
         if before.columns != self.columns:
             raise SettingError(
-                "the run that this one goes on from had a controller with other sensors or actuators"
+                "the controller of the earlier run had other sensors or actuators; resume it with the same controller"
             )
         theirs, ours = (
             json.loads(header.get("gains", "{}")) for header in (before.header, self.header)
@@ -148,15 +185,17 @@ class KernelController:
                     f"{each[name]:g}" if name in each else "none" for each in (theirs, ours)
                 )
                 raise SettingError(
-                    f"the run that this one goes on from had '{name}' {one}, and this has {other}; go on with the same"
+                    f"the earlier run had '{name}' {one}, this one has {other}; resume it with the same value"
                 )
         if before.header.get("reflexes") != self.header["reflexes"]:
             raise SettingError(
-                "the run that this one goes on from had other reflexes, states of legs or noise"
+                "the earlier run had other reflexes, states of legs or noise; resume it with the same controller"
             )
+        # The controller acts at multiples of its step, so that its last row is less than one step
+        # before the last state.
         if not 0.0 <= end - before.times[-1] < self.step * (1.0 + TIME_TOLERANCE):
             raise SettingError(
-                f"what is known of the controller ends at {before.times[-1]:g} s, the states at {end:g} s"
+                f"the record of the controller ends at {before.times[-1]:g} s, the states at {end:g} s; use files of one run"
             )
 
     def make_runs(
@@ -167,7 +206,15 @@ class KernelController:
         before: StoTable | None = None,
         others: Sequence[KernelController] = (),
     ) -> ControllerRuns:
-        """Return the workspace of a run of this model, and of further models; see :class:`ControllerRuns`."""
+        """Return the workspace of a run of this model, and of further models.
+
+        Args:
+            engine: engine of one of the models, driven by `controls`.
+            controls: controls with the constants of :meth:`add_constants`.
+            to: end of a single run, s; 0 for runs that are not recorded.
+            before: record of the earlier run that a single run continues.
+            others: controllers of the models of further runs.
+        """
         return ControllerRuns((self, *others), engine, controls, to, before)
 
 
@@ -204,10 +251,9 @@ class ControllerRuns:
         driven = find_constant_offsets(engine, controls)[
             [controls.names.index(path) for path in held.paths]
         ]
-        self._room, rows = (
-            np.zeros((count, plan[REFLEXES.ROOM])),
-            np.zeros((count, senses[SENSES.SIZE])),
-        )
+        self._room = np.zeros((count, plan[REFLEXES.ROOM]))
+        rows = np.zeros((count, senses[SENSES.SIZE]))
+        # UNKNOWN lets the first sensors decide the state of a leg; legs without states keep 0.
         self._room[:, :LEGS] = UNKNOWN if plan[REFLEXES.HAS_STATES] else EARLY_STANCE
         self._excitations = np.zeros((count, len(held.paths)))
         self._progress: Ints = np.zeros((count, COUNTS), dtype=np.int64)
@@ -215,22 +261,29 @@ class ControllerRuns:
             self._resume(plan, before)
         if to > 0.0:
             plan[REFLEXES.ROWS] = held.count_steps(to) + 2 - plan[REFLEXES.FIRST]
-        self._record, self._plan = np.empty((plan[REFLEXES.ROWS], len(held.columns))), plan
-        known, numbers = (
-            np.stack([each.known for each in helds]),
-            np.concatenate([each.numbers for each in helds]),
-        )
+        self._record = np.empty((plan[REFLEXES.ROWS], len(held.columns)))
+        self._plan = plan
+        known = np.stack([each.known for each in helds])
+        numbers = np.concatenate([each.numbers for each in helds])
         self.parts = (
             *(senses, known, driven, plan, numbers),
             *(self._room, rows, self._excitations, self._record, self._progress),
         )
 
     def _resume(self, plan: Ints, before: StoTable) -> None:
-        """Restore the memory of the controller from the record of an earlier run."""
+        """Restore the memory of the controller from the record of an earlier run.
+
+        Args:
+            plan: integers of the controller, which get the first step of this run.
+            before: record of the earlier run.
+        """
         frames = self.controller.count_steps(before.times[-1]) + 1
-        kept, sensors = int(plan[REFLEXES.KEPT]), len(self.controller.sensors)
+        kept = int(plan[REFLEXES.KEPT])
+        sensors = len(self.controller.sensors)
         history = self._room[0, LEGS : LEGS + kept * sensors].reshape(kept, sensors)
         for back, row in enumerate(before.rows[: -1 - kept : -1]):
+            # The history of the sensors is a ring buffer of `kept` frames, indexed by the number of
+            # the frame.
             history[(frames - 1 - back) % kept] = row[:sensors]
         last = before.rows[-1, sensors:]
         self._room[0, :LEGS], self._excitations[0], self.next_step = (
@@ -241,10 +294,16 @@ class ControllerRuns:
         self._progress[0, [STEPS, FRAMES]] = plan[REFLEXES.FIRST] = frames
 
     def table(self, end: float = inf) -> StoTable:
-        """Return the record of a single run, after the last rows of the earlier run that a later continuation needs.
+        """Return the record of a single run.
+
+        It begins with the last rows of the earlier run, which a later continuation needs for its
+        delays.
 
         Args:
             end: end of the motion, s; an interrupted motion may end before the last control steps.
+
+        Returns:
+            One row for each control step, with the columns of the controller.
         """
         new = int(self._progress[0, STEPS] - self._plan[REFLEXES.FIRST])
         times = self.controller.step * np.arange(
@@ -267,7 +326,11 @@ class ControllerRuns:
         )
 
     def add_record(self, controls: Controls) -> Controls:
-        """Return controls with those of the controller in a single run added, as functions of time."""
+        """Return controls with the recorded controls of a single run added, as functions of time.
+
+        Args:
+            controls: controls of the model and of the run.
+        """
         table = self.table()
         times = tuple(table.times.tolist())
         added: Mapping[str, Function] = {

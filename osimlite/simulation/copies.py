@@ -53,6 +53,7 @@ class Copies:
         self.engine = engine
         own = simulation.forces.controls
         self.controls = own.names
+        # Constants are numbers of the model, which the caller replaces at each step.
         driven = own.add_functions({name: Constant(0.0) for name in own.names})
         self.engine.set_controls(driven)
         self.start = np.array(simulation.initial_state({}, {}, equilibrate=True))
@@ -78,12 +79,26 @@ class Copies:
         return self.batch.states
 
     def set_states(self, which: Any, states: Array) -> None:
-        """Set the states of some copies."""
+        """Set the states of some copies, and restart their step size.
+
+        Args:
+            which: indices or slice of the copies.
+            states: their states (k, y).
+        """
         self.batch.states[which] = states
+        # The step size of the old motion says nothing about the new one, and the result must not
+        # depend on what a copy did before.
         self.batch.clocks[which, 1] = self._first_step
 
     def step_all(self, controls: Array) -> NDArray[np.bool_]:
-        """Hold controls (w, c) for one step; return which copies (w,) reached its end."""
+        """Advance all copies by one control step.
+
+        Args:
+            controls: controls (w, c) that are held constant during the step.
+
+        Returns:
+            Whether each copy (w,) reached the end of the step; False where integration failed.
+        """
         going = np.zeros(len(self.states), dtype=np.int64)
         self._run_on_all_cores(
             "hold_several",
@@ -96,12 +111,31 @@ class Copies:
         return going > 0
 
     def walk_some(self, which: Sequence[int], *parts: Any) -> int:
-        """Let some copies walk by :func:`osimlite.mechanics.kernels.walks.walk_several`, and return its largest result."""
+        """Advance some copies by :func:`osimlite.mechanics.kernels.walks.walk_several`.
+
+        Args:
+            which: indices of the copies.
+            parts: further arguments of the kernel.
+
+        Returns:
+            The largest outcome, one of `OUTCOME`; 0 if all went well.
+        """
         return self._run_on_all_cores("walk_several", [(k, k + 1) for k in which], *parts)
 
     def _run_on_all_cores(self, law: str, parts: Sequence[tuple[int, int]], *given: Any) -> int:
-        """Run a law for parts of the copies, given as (first, end), on all cores; return its largest result."""
+        """Run a kernel for parts of the copies on all cores.
+
+        Args:
+            law: name of the kernel.
+            parts: first and last copy (exclusive) of each call.
+            given: arguments of the kernel before these two.
+
+        Returns:
+            Its largest result.
+        """
         self.engine.program.code.make_ready((law,))
+        # One iterator for all threads: each takes the next part when it is ready, so that slow
+        # copies do not hold up the others. The lock of the interpreter makes `next` safe.
         left, said = iter(parts), [0]
 
         def share(room: Floats, numbers: Floats) -> None:
@@ -122,7 +156,7 @@ class Copies:
         return max(said)
 
     def close(self) -> None:
-        """Free threads and engine."""
+        """Shut down the threads and close the engine."""
         if self._pool is not None:
             self._pool.shutdown()
         self.simulation.close()

@@ -22,18 +22,24 @@ FIXED_STEP_TOLERANCE = 1e-9
 
 
 def make_divergence_error(t: float, h: float) -> IntegrationError:
-    """Return the error for fixed steps of length h (s) that diverge at time t (s)."""
+    """Return the error for fixed steps that diverge.
+
+    Args:
+        t: time at the end of the step that is not finite, s.
+        h: length of the steps, s.
+    """
     return IntegrationError(
-        f"the motion bursts at t = {t:.9g} s; take a shorter fixed step than {h:g} s, "
+        f"the motion diverges at t = {t:.9g} s; take a shorter fixed step than {h:g} s, "
         "or control the error (--accuracy)",
         t,
     )
 
 
 class SemiImplicitEuler(Stepper):
-    """Fixed steps u1 = u0 + h udot(t0, y0), q1 = q0 + h qdot(q0, u1), z1 = z0 + h zdot(t0, y0), with y = (q, u, z).
+    """Stepper with fixed steps of the semi-implicit Euler method.
 
-    The method is of first order; PyBullet uses it too.
+    With y = (q, u, z), a step is u1 = u0 + h udot(t0, y0), q1 = q0 + h qdot(q0, u1), z1 = z0 + h
+    zdot(t0, y0). The method is of first order; PyBullet uses it too.
 
     Args:
         f: derivative of the state; its part qdot is not used.
@@ -75,12 +81,22 @@ class SemiImplicitEuler(Stepper):
         self._origin, self._since = t, 0
 
     def step(self, limit: float = inf) -> None:
-        """Take one step of the fixed length, or up to the limit if that comes first."""
+        """Take one step of the fixed length, or up to the limit if that comes first.
+
+        Args:
+            limit: latest end of the step, s.
+
+        Raises:
+            IntegrationError: the state is not finite, a derivative cannot be computed, or no state
+            near the end of the step fulfils the constraints.
+        """
         self._require_later(limit)
         h = self._h
         # Steps are counted from an origin, so that rounding errors of the time do not accumulate.
         self._since += 1
         t = self._origin + h * self._since
+        # A step that ends within rounding of the limit ends at the limit, so that no tiny step
+        # follows.
         if t > limit - 1e-9 * h:
             if t > limit + 1e-9 * h:
                 h = limit - self.time
@@ -91,11 +107,12 @@ class SemiImplicitEuler(Stepper):
             result = self._projected(t, y, FIXED_STEP_TOLERANCE)
             if result is None:
                 raise IntegrationError(
-                    f"the constraints cannot be kept up at t = {t:.9g} s; take a shorter fixed step than {h:g} s, "
+                    f"the constraints cannot be enforced at t = {t:.9g} s; take a shorter fixed step than {h:g} s, "
                     "or control the error (--accuracy)",
                     t,
                 )
             y = result
+        # One sum instead of a test of each entry: a NaN or an infinity survives addition.
         if not isfinite(sum(y)):
             raise make_divergence_error(t, self._h)
         try:
@@ -115,6 +132,8 @@ class SemiImplicitEuler(Stepper):
             x + h * a
             for x, a in zip(self.state[self._nq :], self.derivative[self._nq :], strict=True)
         ]
+        # The new speeds move the coordinates. That makes the method semi-implicit: it keeps the
+        # energy of oscillators bounded, which explicit Euler steps do not.
         u = rest[: self._nq]
         rates = u if self._rates is None else self._rates(q, u)
         return [x + h * v for x, v in zip(q, rates, strict=True)] + rest

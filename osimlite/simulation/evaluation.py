@@ -79,11 +79,9 @@ class StateEvaluator:
         apart: bool = False,
     ) -> None:
         packed = pack(mechanism, forces, chain, apart=apart)
-        self.structure, self.placements, self.order = (
-            packed.structure,
-            packed.placements,
-            packed.order,
-        )
+        self.structure = packed.structure
+        self.placements = packed.placements
+        self.order = packed.order
         contacts = [element for element in forces.elements if isinstance(element, PairContact)]
         self.contacts = tuple(
             item.pair_name(place) for item in contacts for place in range(len(item.pairs))
@@ -103,7 +101,13 @@ class StateEvaluator:
         self._set_model(mechanism, forces, packed.numbers)
 
     def _set_model(self, mechanism: Mechanism, forces: Forces, numbers: Floats) -> None:
-        """Set the model, its numbers, and what is derived from them."""
+        """Set the model, its numbers, and what is derived from them.
+
+        Args:
+            mechanism: the mechanism.
+            forces: its forces.
+            numbers: its numbers in the layout of the kernels.
+        """
         self.mechanism, self.forces, self.numbers = mechanism, forces, numbers
         self.state = StateLayout(mechanism, self.order, forces.elements)
         self.probes = tuple(item for item in forces.elements if isinstance(item, DeclaredProbe))
@@ -112,7 +116,15 @@ class StateEvaluator:
         self._bind_kernels()
 
     def copy_with_numbers(self, mechanism: Mechanism, forces: Forces, numbers: Floats) -> Self:
-        """Return the system of a model with the same structure and other numbers; both share their arrays."""
+        """Return the system of a model with the same structure and other numbers.
+
+        Both share their work vector, so they must not be used at the same time by two threads.
+
+        Args:
+            mechanism: mechanism of the other model.
+            forces: its forces.
+            numbers: its numbers.
+        """
         # The ordinary copy would construct a new engine.
         other = object.__new__(type(self))
         other.__dict__ |= self.__dict__
@@ -123,7 +135,7 @@ class StateEvaluator:
         return other
 
     def _bind_kernels(self) -> None:
-        """Bind the kernels to the arrays of the system."""
+        """Bind the kernels to the arrays of the system, so that a call passes only integers."""
         self._equilibrate: Callable[[int], int] | None = None
         self._evaluate = self.program.code.bind_entry(
             "evaluate", self.program.ints, self.numbers, self._w, self._y, self._f
@@ -160,7 +172,13 @@ class StateEvaluator:
         return self._controls
 
     def _view_rows(self, start: int, count: int, size: int) -> Floats:
-        """Return a view of rows in the work vector; `start` and `count` are fields of the structure."""
+        """Return a view of rows in the work vector.
+
+        Args:
+            start: field of the structure with the offset of the first row.
+            count: field of the structure with the number of rows.
+            size: length of a row.
+        """
         first, rows = self.structure[start], self.structure[count]
         return self._w[first : first + size * rows].reshape(rows, size)
 
@@ -201,7 +219,7 @@ class StateEvaluator:
         return self._f.tolist()
 
     def compute_applied_forces(self, t: float, y: Sequence[float]) -> list[float]:
-        """Return the derivative (y,) at a state with the applied generalized forces (n,) in place of udot.
+        """Return the derivative at a state with the applied generalized forces in place of udot.
 
         The forces belong to the generalized speeds. Gravity is not included.
 
@@ -209,8 +227,12 @@ class StateEvaluator:
             t: time, s.
             y: state (y,).
 
+        Returns:
+            The derivative (y,); entries n to 2 n are generalized forces, N or N m.
+
         Raises:
-            SimulationError: the rates of coordinates are not defined at this state.
+            SimulationError: the rates of coordinates are not defined at this state, or a force
+                cannot be computed.
         """
         status = self.realize(t, y, STAGE.FORCE)
         if status != OUTCOME.OK:
@@ -219,17 +241,21 @@ class StateEvaluator:
         return self.get_derivative()
 
     def compute_required_forces(self, moments: Floats, udot: Floats) -> Floats:
-        """Compute inverse dynamics.
-
-        The result are the generalized forces (k, n) that accelerations need beyond gravity and the
-        forces of the model.
+        """Compute inverse dynamics for many states.
 
         Constraints are ignored. Errors are those of :meth:`evaluate_moments`.
 
         Args:
             moments: times (s) and states (k, 1 + y).
             udot: accelerations (k, n) in the order of the state.
+
+        Returns:
+            Generalized forces (k, n) that the accelerations need beyond gravity and the forces of
+            the
+                model.
         """
+        # The kernel of inverse dynamics writes its result in place of the derivatives of the
+        # speeds.
         first = self.work_size + len(self.order)
         return self.evaluate_moments(moments, range(first, first + len(self.order)), udot=udot)
 
@@ -251,12 +277,15 @@ class StateEvaluator:
     def equilibrate_muscles(
         self, t: float, y: Sequence[float], numbers: Floats | None = None
     ) -> list[float]:
-        """Return the state (y,) with auxiliary states in equilibrium, as OpenSim's Model::equilibrateMuscles does.
+        """Return a state with auxiliary states in equilibrium, as OpenSim's Model::equilibrateMuscles does.
 
         Args:
             t: time, s.
             y: state (y,).
             numbers: numbers of a model of the same structure; by default those of this system.
+
+        Returns:
+            The state (y,) with new auxiliary states.
 
         Raises:
             SimulationError: a force has no equilibrium, or the rates of coordinates are not defined
@@ -268,7 +297,7 @@ class StateEvaluator:
                 self.structure[self._equilibrium_at(failed) + layout.EQUILIBRIUM.ITEM]
             )
             raise SimulationError(
-                f"no equilibrium was found of {muscle}; start elsewhere, or without an equilibrium"
+                f"no equilibrium was found for {muscle}; start in another pose, or without equilibrate"
             )
         return result
 
@@ -320,8 +349,14 @@ class StateEvaluator:
     ) -> tuple[list[float], int | None]:
         """Equilibrate all muscles.
 
+        Args:
+            t: time, s.
+            y: state (y,).
+            numbers: numbers of a model of the same structure; by default those of this system.
+
         Returns:
-            The state, and the index of the first muscle without equilibrium; None without one.
+            The state (y,), and the index of the first muscle without equilibrium, None if all have
+            one.
 
         Raises:
             SimulationError: the rates of coordinates are not defined at this state.
@@ -330,6 +365,7 @@ class StateEvaluator:
             return list(y), None
         code, ints, room = self.program.code, self.program.ints, (self._w, self._y, self._f)
         if self._equilibrate is None:
+            # Most models never need these kernels, so they are linked at their first use.
             self.program.link_equilibria()
             self._equilibrate = code.bind_entry("equilibrate", ints, self.numbers, *room)
         self._set_state(t, y)
@@ -352,7 +388,11 @@ class StateEvaluator:
         return self._y.tolist(), None
 
     def _describe_item(self, item: int) -> str:
-        """Return the subject of a message about an item whose equations have no solution."""
+        """Return the subject of a message about an item whose equations have no solution.
+
+        Args:
+            item: offset of the item in the structure.
+        """
         from osimlite.mechanics.kernels.paths import LENGTH
         from osimlite.simulation.elements.force_type import DeclaredForce
         from osimlite.simulation.elements.geometries.path import PATH
@@ -360,6 +400,8 @@ class StateEvaluator:
         owner = self._owners[item]
         element: Any = self.forces.elements[owner]
         *parts, (place, room) = self._items[owner]
+        # A path that cannot be wrapped has the length NaN, and then the muscle has no solution
+        # either.
         on_path = isinstance(element, DeclaredForce) and element.force_type.geometry is PATH
         if on_path and isnan(self._w[parts[-1][0] + LENGTH]):
             return f"'{element.path}', whose path has no length in this pose"
@@ -375,13 +417,13 @@ class StateEvaluator:
         """
         if not np.isfinite(np.array(y)).all():
             return SimulationError(
-                "the state of the motion is not finite any more; ask for more accuracy"
+                "the state of the motion is no longer finite; use a smaller accuracy value"
             )
         if status == OUTCOME.UNSOLVED:
             item = self.structure[self.structure[MODEL.ITEM_AT] + int(self._f[0])]
-            return NoSolution(
-                f"there is no solution of the equations of {self._describe_item(item)}"
-            )
+            return NoSolution(f"there is no solution for {self._describe_item(item)}")
+        # The kernels report singular matrices by a number. The mechanism in Python finds the joint
+        # and explains it.
         if status == OUTCOME.SINGULAR_RATES:
             try:
                 self.mechanism.rate_matrix(self.state.values(y))
@@ -396,7 +438,9 @@ class StateEvaluator:
             return describe_massless_motion(
                 self.mechanism.coordinates[self.order[int(self._f[0])]].name
             )
-        return SimulationError("the motion cannot be computed any further; ask for more accuracy")
+        return SimulationError(
+            "the motion cannot be computed any further; use a smaller accuracy value"
+        )
 
     def read_record(self, path: str, place: int) -> float:
         """Return a number of an element's record, or of the controls', after an evaluation.
@@ -414,6 +458,12 @@ class StateEvaluator:
         Args:
             path: path of the force.
             names: names in the declaration of its force type.
+
+        Returns:
+            One offset for each name.
+
+        Raises:
+            KeyError: the force records no such quantity.
         """
         known = self.get_force_type(path).record_names
         return [self._records_at[path] + known[name] for name in names]
@@ -463,13 +513,12 @@ class StateEvaluator:
         """
         if moments.shape[1] != 1 + len(self._y):
             raise self.state.make_length_error(moments.shape[1] - 1)
-        law, code = "evaluate" if udot is None else "inverse", self.program.code
+        law = "evaluate" if udot is None else "inverse"
+        code = self.program.code
         code.make_ready(("look", law))
         moving = np.empty((len(moments), 0)) if udot is None else udot
-        given, result = (
-            np.ascontiguousarray(np.hstack([moments, moving])),
-            np.empty((len(moments), len(places))),
-        )
+        given = np.ascontiguousarray(np.hstack([moments, moving]))
+        result = np.empty((len(moments), len(places)))
         order = np.array(
             [len(given), moving.shape[1], code.get_address(law), len(places), *places],
             dtype=np.int64,
@@ -493,7 +542,7 @@ class StateEvaluator:
     def compute_unit_forces(
         self, moments: Floats, udot: Floats, names: Sequence[str]
     ) -> tuple[Floats, Floats, Floats]:
-        """Compute what accelerations require without actuators, and what each actuator contributes at a control of 1.
+        """Compute required generalized forces, and the contribution of each actuator at a control of 1.
 
         The force of each actuator must be proportional to its control, and all controls must be 0.
         Constraints are ignored. Errors are those of :meth:`evaluate_moments`.
@@ -504,8 +553,9 @@ class StateEvaluator:
             names: paths of the a actuators.
 
         Returns:
-            Generalized forces that are missing (k, n), generalized forces of each actuator (k, a,
-                n), and the forces (N) of muscles (k, a), which are 1 for other actuators.
+            Generalized forces that are missing without actuators (k, n), generalized forces of each
+                actuator (k, a, n), and the forces (N) of muscles (k, a), which are 1 for other
+                actuators.
         """
         code, size = self.program.code, len(self.order)
         code.make_ready(("push_each", "inverse"))
@@ -514,16 +564,16 @@ class StateEvaluator:
         order = [len(moments), len(names)]
         for name in names:
             item, path, strength = items[name], -1, -1
+            # A muscle pulls along its path with its strength; the other actuators apply their
+            # optimal force.
             if self.has_quantity(name, STRENGTH):
                 path = item - int(
                     self.structure[item + ITEM.OWN + self.get_force_type(name).text.int_count]
                 )
                 (strength,) = self.find_offsets(name, (STRENGTH,))
             order += item, controls[name], path, strength
-        given, result = (
-            np.hstack([moments, udot]),
-            np.empty((len(moments), size + len(names) * (size + 1))),
-        )
+        given = np.hstack([moments, udot])
+        result = np.empty((len(moments), size + len(names) * (size + 1)))
         parts = (
             self.program.ints,
             self.numbers,
@@ -556,7 +606,11 @@ class StateEvaluator:
         return self._w[self.control_offsets].tolist()
 
     def store_contact_loads(self, forces: Floats) -> None:
-        """Set `loads` from the forces (P, 3) of the contacts."""
+        """Set `loads` from the forces of the contacts.
+
+        Args:
+            forces: contact forces in ground (P, 3), N; zero for contacts that do not touch.
+        """
         bits = 0
         for number, force in enumerate(forces.tolist()):
             if any(force):

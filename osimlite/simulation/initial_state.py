@@ -20,12 +20,15 @@ if TYPE_CHECKING:
 
 
 def convert_value(mechanism: Mechanism, name: str, given: float | str) -> float:
-    """Convert a value or speed of a coordinate to rad or m (per second).
+    """Convert a value or speed of a coordinate to SI units.
 
     Args:
         mechanism: the mechanism.
         name: name or path of the coordinate.
         given: a number in rad or m, or a text such as ``"30deg"`` with or without a unit.
+
+    Returns:
+        The number in rad or m (per second for a speed).
 
     Raises:
         ModelError: there is no such coordinate.
@@ -39,6 +42,7 @@ def convert_value(mechanism: Mechanism, name: str, given: float | str) -> float:
         raise SettingError(
             f"coordinate '{name}' takes a number such as 0.5 or 30deg, not '{given}'"
         )
+    # A coupled coordinate of a CustomJoint may be an angle or a length; both units are accepted.
     if read.unit is not None and kind != "coupled" and read.is_angle != (kind == "rotational"):
         wanted = "deg or rad" if kind == "rotational" else "m, cm or mm"
         raise SettingError(f"coordinate '{name}' is {kind}: give '{given}' in {wanted}")
@@ -86,8 +90,11 @@ def resolve_initial_values(
         SimulationError: a coordinate is locked or prescribed.
     """
     infos = mechanism.coordinates
-    q, u = [info.default_value for info in infos], [info.default_speed for info in infos]
+    q = [info.default_value for info in infos]
+    u = [info.default_speed for info in infos]
     named = dict(initial)
+    # Paths of states come from files. They may name locked coordinates, and constraints may change
+    # them, so they are only a guess.
     for place, info in enumerate(infos):
         for row, what in ((q, "value"), (u, "speed")):
             given = named.pop(f"{info.path}/{what}", None)
@@ -104,7 +111,7 @@ def resolve_initial_values(
                 )
             if infos[place].locked:
                 raise SimulationError(
-                    f"coordinate '{name}' is locked at {infos[place].default_value:g}, so that its {what} cannot "
+                    f"coordinate '{name}' is locked at {infos[place].default_value:g}, so its {what} cannot "
                     "be set; unlock it in the model"
                 )
             if infos[place].prescribed is not None:
@@ -144,8 +151,11 @@ def match_state_columns(labels: Sequence[str], paths: Iterable[str]) -> dict[str
     for path in paths:
         parts = path.strip("/").split("/")
         owner, what = parts[-2], parts[-1]
+        # Names of states before OpenSim 4: knee_angle, knee_angle_u, soleus.activation.
         old = {"value": owner, "speed": f"{owner}_u"}.get(what, f"{owner}.{what}")
         ends = ("/".join(parts[k:]) for k in range(len(parts)))
+        # The longest name wins: a path before its ends, and all of them before names of old
+        # versions.
         column = next((places[label] for label in (path, *ends, old) if label in places), None)
         if column is not None:
             result[path] = column
@@ -155,13 +165,16 @@ def match_state_columns(labels: Sequence[str], paths: Iterable[str]) -> dict[str
 def read_state(
     path: str | Path, mechanism: Mechanism, names: Collection[str], time: float | None = None
 ) -> dict[str, float]:
-    """Return one state of a file by the paths of the states; columns that are not states are ignored.
+    """Return one state of a file by the paths of the states.
 
     Args:
-        path: file with a table of states.
+        path: file with a table of states; columns that are not states are ignored.
         mechanism: the mechanism to which the states belong.
         names: paths of all states, see :func:`match_state_columns`.
         time: time of the state, s; the nearest row is used. The last row if None.
+
+    Returns:
+        Values in SI units (rad, m) by path.
 
     Raises:
         DocumentError: the file is not a table, has no states of the mechanism, or no rows.
@@ -194,6 +207,7 @@ def extract_state(
             else "row"
         )
         raise DocumentError(f"no {what}; give a file of its states", file=table.file)
+    # The nearest row, not an interpolated one, whose states would fulfil no equilibrium.
     row = table.rows[-1 if time is None else int(np.argmin(np.abs(table.times - time)))].tolist()
     turning = {info.path for info in mechanism.coordinates if info.motion_type == "rotational"}
     return {
@@ -205,7 +219,10 @@ def extract_state(
 
 
 def read_earlier_run(given: str | Path | Trajectory) -> tuple[StoTable, StoTable | None]:
-    """Return the states of an earlier run and the record of its controller, from its folder or its trajectory.
+    """Return the states of an earlier run and the record of its controller.
+
+    Args:
+        given: the trajectory of the run, or the folder with its results.
 
     Returns:
         The table of states, and the table of the controller (None without one).

@@ -1,4 +1,4 @@
-"""Interruptions by the keyboard that have to wait."""
+"""Postponement of interruptions by the keyboard."""
 
 from __future__ import annotations
 
@@ -10,15 +10,25 @@ from contextlib import contextmanager
 
 @contextmanager
 def defer_sigint() -> Iterator[None]:
-    """Put off an interruption by the keyboard until what is within is done."""
+    """Postpone an interruption by the keyboard until the block ends.
+
+    Code that must not stop half-way, such as a call of machine code that writes into shared arrays,
+    runs in ``with defer_sigint():``. In other threads than the main one it does nothing, since
+    Python delivers signals to the main thread only.
+
+    Raises:
+        KeyboardInterrupt: Ctrl-C was pressed within the block; raised at its end.
+    """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
+    # Several presses of Ctrl-C raise one exception.
     interruptions: list[object] = []
     before = signal.signal(signal.SIGINT, lambda *told: interruptions.append(told))
     try:
         yield
     finally:
+        # A handler that was not installed by Python is reported as None and cannot be restored.
         signal.signal(signal.SIGINT, signal.SIG_DFL if before is None else before)
     if interruptions:
         raise KeyboardInterrupt

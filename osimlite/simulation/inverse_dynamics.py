@@ -30,7 +30,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class GeneralizedForces(StoTable):
-    """Generalized forces: a column (N or N·m) for each coordinate, and the motion that requires them."""
+    """Generalized forces of a motion: a column (N or N·m) for each coordinate.
+
+    Attributes:
+        motion: the motion that requires them.
+    """
 
     motion: RecordedMotion | None = field(default=None, repr=False)
 
@@ -84,7 +88,10 @@ def inverse_dynamics(
     opensim_derivatives: bool = False,
     folder: str | Path | None = None,
 ) -> GeneralizedForces:
-    """Return the generalized forces (N, N·m) that a motion requires beyond gravity, measured loads and the forces of the model.
+    """Return the generalized forces that a motion requires beyond those that act on the model.
+
+    With the mass matrix M, the bias c (Coriolis and centrifugal forces), gravity g and the applied
+    forces f, the result is M udot + c - g - f (Featherstone 2008, ch. 5).
 
     Args:
         model: the model.
@@ -106,8 +113,9 @@ def inverse_dynamics(
             None.
 
     Returns:
-        A column for each coordinate; those of ball and free joints are moments about axes of the
-            parent frame.
+        A column (N or N·m) for each coordinate; those of ball and free joints are moments about
+        axes
+            of the parent frame.
 
     Raises:
         OsimliteError: the source is not a motion of the model, or loads cannot be read.
@@ -118,6 +126,7 @@ def inverse_dynamics(
     external_loads = resolve_loads(external_loads, applied_to)
     excluded, pushed = [*exclude], model
     if find_excluded_forces(model, excluded):
+        # The caller's model stays as it is; a copy is needed only if forces are switched off.
         pushed = model.copy_deep()
         exclude_forces(pushed, excluded)
     mechanism = build_mechanism(pushed, opensim_derivatives=opensim_derivatives)
@@ -133,10 +142,14 @@ def resolve_loads(
     external_loads: str | Path | ExternalLoads | None,
     applied_to: Mapping[str, Sequence[Sequence[str]]] | None,
 ) -> str | Path | ExternalLoads | None:
-    """Return the external loads, made of a table if `applied_to` assigns its columns; see :func:`inverse_dynamics`.
+    """Return the external loads, made of a table if `applied_to` assigns its columns.
+
+    Args:
+        external_loads: loads, their file, or a table; see :func:`inverse_dynamics`.
+        applied_to: assignment of the table's columns, if any.
 
     Raises:
-        SettingError: `applied_to` is given without a table.
+        SettingError: `applied_to` is set without a table.
     """
     if not applied_to:
         return external_loads
@@ -144,7 +157,7 @@ def resolve_loads(
 
     if not isinstance(external_loads, str | Path):
         raise SettingError(
-            "applied_to says what the columns of a table push; name the table as external_loads"
+            "`applied_to` assigns the columns of a table to bodies; pass the table as `external_loads`"
         )
     return build_external_loads(external_loads, applied_to)
 
@@ -169,6 +182,7 @@ def add_forces(
         model.force_set.objects.clear()
     for each in forces:
         if isinstance(each, Force):
+            # A copy, as an object has one owner and the caller keeps theirs.
             model.force_set.objects.append(each.copy_deep())
             continue
         more = read_document(Source.from_file(each), of=ForceSet).top
@@ -186,8 +200,25 @@ def prepare_motion(
     start: float,
     end: float,
 ) -> RecordedMotion:
-    """Return the selected part of a motion, filtered and assembled as requested; see :func:`kinematics`."""
+    """Return the selected part of a motion, filtered and assembled as requested.
+
+    Args:
+        mechanism: the mechanism.
+        motion: the motion, see :func:`kinematics`.
+        times: times of arrays (t,), s.
+        assemble: whether each pose is moved to the nearest one that fulfils the constraints.
+        lowpass: frequency of the filter, Hz; None for no filter.
+        start: first time, s.
+        end: last time, s.
+
+    Returns:
+        The part of the motion, which remembers the rest for its derivatives.
+
+    Raises:
+        SettingError: no time lies between the first and the last.
+    """
     recorded = RecordedMotion.from_source(mechanism, motion, times)
+    # As in OpenSim, the complete record is filtered before a part is selected.
     if lowpass is not None:
         recorded = recorded.lowpassed(lowpass)
     if not (start <= recorded.times[-1] and end >= recorded.times[0]):

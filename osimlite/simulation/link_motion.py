@@ -1,6 +1,8 @@
 """Motion of points and frames of bodies at many states.
 
-It follows from the link records of the kernels, because each body is fixed to a link.
+It follows from the link records of the kernels, because each body is fixed to a link. A link record
+has the rotation and position of the link in ground, and its spatial velocity and acceleration about
+the point `ORIGIN`, along the axes of ground (Featherstone 2008, ch. 2).
 """
 
 from __future__ import annotations
@@ -26,22 +28,25 @@ Moments = Sequence[tuple[float, Sequence[float]]]
 
 
 def locate_points(links: Floats, points: Floats) -> Floats:
-    """Return positions (m) and velocities (m/s) in ground (..., 6) of points of links.
+    """Return positions and velocities in ground of points of links.
 
     Args:
         links: link records of the kernels (..., n).
         points: points in the frames of the links (..., 3), m.
+
+    Returns:
+        Position (m) and velocity (m/s) of each point (..., 6).
     """
-    origin, turning = (
-        links[..., LINK_WORK.ORIGIN : LINK_WORK.ORIGIN + 3],
-        links[..., LINK_WORK.VELOCITY : LINK_WORK.VELOCITY + 3],
-    )
+    origin = links[..., LINK_WORK.ORIGIN : LINK_WORK.ORIGIN + 3]
+    turning = links[..., LINK_WORK.VELOCITY : LINK_WORK.VELOCITY + 3]
     rotations = links[..., :9].reshape(*links.shape[:-1], 3, 3)
     arms = (
         links[..., LINK_WORK.POSITION : LINK_WORK.POSITION + 3]
         - origin
         + (rotations @ points[..., None])[..., 0]
     )
+    # The linear part of a spatial velocity is that of the point of the link at ORIGIN, hence v =
+    # v_origin + ω × arm.
     velocities = links[..., LINK_WORK.VELOCITY + 3 : LINK_WORK.VELOCITY + 6] + np.cross(
         turning, arms
     )
@@ -49,21 +54,33 @@ def locate_points(links: Floats, points: Floats) -> Floats:
 
 
 def locate_mass_centers(system: System, moments: Moments) -> Floats:
-    """Return position (m) and velocity (m/s) in ground of the mass centre of all bodies (k, 6)."""
+    """Return position and velocity in ground of the mass centre of all bodies.
+
+    Args:
+        system: the evaluated system.
+        moments: times (s) with states.
+
+    Returns:
+        Position (m) and velocity (m/s) at each time (k, 6). A model without mass has zeros.
+    """
     inertia, fixed = system.inertia, system.masses_in_ground
+    # Bodies that are fixed to ground have mass but no link.
     total = inertia[:, 0] @ locate_points(system.evaluate_all_links(moments), inertia[:, 1:4])
     total[:, :3] += sum((mass * center for mass, center in fixed), np.zeros(3))
     return total / (inertia[:, 0].sum() + sum(mass for mass, _ in fixed) or 1.0)
 
 
 def locate_station(system: System, moments: Moments, body: int, location: Floats) -> Floats:
-    """Return position (m) and velocity (m/s) in ground of a station (k, 6).
+    """Return position and velocity in ground of a station.
 
     Args:
         system: the evaluated system.
-        moments: times with states.
+        moments: times (s) with states.
         body: index of the body, -1 for ground.
         location: the station in the body's frame (3,), m.
+
+    Returns:
+        Position (m) and velocity (m/s) at each time (k, 6).
     """
     link, frame = system.placements[body] if body != GROUND else (GROUND, np.eye(4))
     point = frame[:3, :3] @ location + frame[:3, 3]
@@ -86,7 +103,10 @@ class LinkMotion:
         Args:
             system: the system.
             moments: times (s) and states (t, 1 + y).
-            accelerations: derivatives of the generalized speeds (t, n).
+            accelerations: derivatives of the generalized speeds (t, n), in the order of the state.
+
+        Returns:
+            The motion of all links at these times.
 
         Raises:
             SimulationError: the rates of coordinates are not defined at a state, or a force cannot
@@ -117,8 +137,12 @@ class LinkMotion:
     def get_angular_motion(self, body: int) -> tuple[Floats, Floats]:
         """Return the angular motion of a body.
 
+        Args:
+            body: index of the body, -1 for ground.
+
         Returns:
-            Angular velocities (rad/s) and accelerations (rad/s²), (t, 3) each.
+            Angular velocities (rad/s) and accelerations (rad/s²) along the axes of ground, (t, 3)
+            each.
         """
         link, _ = self._get_link(body)
         if link is None:
@@ -154,6 +178,15 @@ class LinkMotion:
         return place, velocity, free + np.cross(alpha, arm) + np.cross(w, velocity)
 
     def _get_link(self, body: int) -> tuple[Floats | None, Floats]:
-        """Return the link record (t, n) of a body, None for ground, and the body's frame in the link."""
+        """Return the link of a body and the body's place in it.
+
+        Args:
+            body: index of the body, -1 for ground.
+
+        Returns:
+            Link records (t, n), None for a body that is fixed to ground, and the body's frame in
+            the link
+                (4, 4).
+        """
         link, frame = self.system.placements[body] if body != GROUND else (GROUND, np.eye(4))
         return None if link == GROUND else self.links[:, link], frame

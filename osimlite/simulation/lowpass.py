@@ -1,7 +1,9 @@
-"""OpenSim's low-pass filters of recorded motions: a Butterworth filter run forward and backward, and a windowed sinc.
+"""Low-pass filters of OpenSim for recorded motions.
 
-The Butterworth filter has third order. A record is first extended at both ends by half its length,
-by point reflection about its first and last row, and resampled evenly if necessary.
+OpenSim has two: a Butterworth filter of third order that runs forward and backward, so that the
+motion is not delayed, and a windowed sinc in the tools RRA and CMC. Records are resampled evenly if
+necessary. For the Butterworth filter a record is first extended at both ends by half its length, by
+point reflection about its first and last row.
 """
 
 from __future__ import annotations
@@ -40,8 +42,12 @@ def filter_lowpass(
         raise SettingError(f"a low-pass frequency is a positive number of Hz, not {cutoff:g}")
     if len(times) < 2:
         raise SettingError("a low-pass filter needs a motion of two rows or more")
+    # OpenSim extends by half the rows (Storage::pad), which hides the filter's start-up at the
+    # ends.
     count = len(times) // 2
     times, values, step = _resample_evenly(extend_ends(times, count), extend_ends(values, count))
+    # Half the sampling frequency (Nyquist) is the limit. OpenSim's tools take 0.49 of it with a
+    # warning.
     if limited and cutoff * step >= 0.5:
         cutoff = 0.49 / step
     if cutoff * step >= 0.5:
@@ -70,17 +76,29 @@ def filter_lowpass_by_sinc(
     times, values, step = _resample_evenly(times, values)
     if len(times) < 2 * order:
         return times, values
+    # The ideal low-pass filter is an infinite sinc; Hamming's window cuts it off smoothly.
     k = np.arange(-order, order + 1)
     weights = np.sinc(2.0 * cutoff * step * k) * (0.54 + 0.46 * np.cos(np.pi * k / order))
+    # A constant signal stays as it is.
     weights /= weights.sum()
     padded = extend_ends(values, order)
     return times, np.column_stack([np.convolve(column, weights, "valid") for column in padded.T])
 
 
 def _resample_evenly(times: Array, values: Array) -> tuple[Array, Array, float]:
-    """Return a record at evenly spaced times, and the step between them."""
+    """Return a record at evenly spaced times, by a spline of fifth degree as in OpenSim.
+
+    Args:
+        times: increasing times (t,), s.
+        values: values (t, n).
+
+    Returns:
+        Times (s,), s, values (s, n), and the step between the times, s. An even record is returned
+            unchanged.
+    """
     step = float(np.diff(times).min())
     span = float(times[-1] - times[0])
+    # OpenSim's test of even spacing: the mean step exceeds the smallest one by more than rounding.
     if span / (len(times) - 1) - step > np.finfo(float).eps:
         step = max(step, span / MAX_SAMPLES)
         # OpenSim adds the steps one by one; their rounding decides whether there is a last sample.
@@ -92,27 +110,38 @@ def _resample_evenly(times: Array, values: Array) -> tuple[Array, Array, float]:
 
 
 def extend_ends(values: Array, count: int) -> Array:
-    """Extend values by `count` rows at both ends by point reflection about the first and last row.
-
-    Short records are reflected repeatedly.
+    """Extend values at both ends by point reflection about the first and last row.
 
     Args:
-        values: the rows.
-        count: number of rows to add at each end.
+        values: values (t,) or (t, n), at least two rows.
+        count: number of rows to add at each end. Short records are reflected repeatedly.
+
+    Returns:
+        The extended values (t + 2 count, ...).
     """
     while count > 0:
         more = min(count, len(values) - 1)
-        before, after = values[more:0:-1], values[-2 : -2 - more : -1]
+        # Reflected about the end point, so that the extended curve has no kink.
+        before = values[more:0:-1]
+        after = values[-2 : -2 - more : -1]
         values = np.concatenate([2.0 * values[0] - before, values, 2.0 * values[-1] - after])
         count -= more
     return values
 
 
 def _run_filter(values: Array, cutoff: float) -> Array:
-    """Return values (t, n) after one run of the filter; `cutoff` is a fraction of the sampling frequency.
+    """Return values after one forward run of the Butterworth filter of third order.
 
-    The first three rows are not changed. The filter's bilinear transform uses w = tan(π cutoff).
+    With w = tan(π cutoff), the bilinear transform of 1 / ((s + 1) (s² + s + 1)) gives the recursion
+    y_i = w³ / d (x_i + 3 x_{i-1} + 3 x_{i-2} + x_{i-3}) - a_1 y_{i-1} - a_2 y_{i-2} - a_3 y_{i-3}
+    with d = (w + 1) (w² + w + 1). The first three rows are not changed, as in OpenSim.
+
+    Args:
+        values: values (t, n).
+        cutoff: frequency of half power, as a fraction of the sampling frequency.
     """
+    # The bilinear transform of a Butterworth filter of third order, as OpenSim's
+    # Signal::LowpassIIR.
     w = math.tan(math.pi * cutoff)
     scale = (w + 1.0) * (w * w + w + 1.0)
     sums = [
@@ -122,6 +151,7 @@ def _run_filter(values: Array, cutoff: float) -> Array:
     ]
     one, two, three = (total / scale for total in sums)
     taken = values[3:] + 3.0 * (values[2:-1] + values[1:-2]) + values[:-3]
+    # OpenSim leaves the first three rows as they are; the padding hides them.
     result = np.concatenate([values[:3], w**3 / scale * taken])
     # Each row is computed by itself: coefficients of slow filters nearly cancel, and blocks of rows
     # would lose seven digits.

@@ -46,7 +46,7 @@ QUANTITIES = {
 
 @dataclass(frozen=True, eq=False)
 class MuscleCurves(Tabular):
-    """Muscles in p poses at rest.
+    """Lengths, moment arms and forces of muscles in p poses at rest.
 
     Attributes:
         muscles: paths of the m muscles, in the order of the model.
@@ -76,7 +76,11 @@ class MuscleCurves(Tabular):
 
     @property
     def coordinates(self) -> tuple[str, ...]:
-        """Names of the swept coordinates."""
+        """Names of the swept coordinates.
+
+        Returns:
+            Names as the caller wrote them.
+        """
         return tuple(self.values)
 
     @property
@@ -91,12 +95,16 @@ class MuscleCurves(Tabular):
         return MuscleCurves(tuple(self.muscles[k] for k in places), self.values, columns)
 
     def of(self, indices: Sequence[int]) -> MuscleCurves:
-        """Return the same as :meth:`select_muscles`, under the name that is deprecated."""
+        """Return the same as :meth:`select_muscles`, under its deprecated name."""
         return self.select_muscles(indices)
 
     @property
     def table(self) -> tuple[Mapping[str, Array], Mapping[str, Array]]:
-        """The `columns` over ``muscle`` and the coordinates: a row for each muscle in each pose."""
+        """Curves as a table with a row for each muscle in each pose.
+
+        Returns:
+            Key columns ``muscle`` and the coordinates, and the other columns, by name.
+        """
         poses, count = self.poses, len(self.muscles)
         rows = {"muscle": np.tile(np.array(self.muscles, dtype=object), len(poses))}
         rows |= {name: poses[:, index].repeat(count) for index, name in enumerate(self.values)}
@@ -120,8 +128,11 @@ class MuscleCurves(Tabular):
     def get_bounds(self, name: str) -> tuple[Array, Array]:
         """Return the bounds of a column for each muscle, ignoring NaN.
 
+        Args:
+            name: name of the column.
+
         Returns:
-            Smallest and largest values (m,).
+            Smallest and largest values (m,); NaN for a muscle that has only NaN.
         """
         return np.fmin.reduce(self.columns[name]), np.fmax.reduce(self.columns[name])
 
@@ -196,6 +207,7 @@ def muscle_curves(
     controls = Controls(
         forces.controls.names, ((Constant(activation),),) * len(forces.controls.names)
     )
+    # Poses are assembled first, so single muscles need no constraints.
     free = mechanism.without_constraints()
     alone = [
         _Muscle(
@@ -215,6 +227,8 @@ def muscle_curves(
     for number, pose in enumerate(poses):
         q = start.copy()
         q[places] = pose
+        # Each pose starts from the default one. The result does not depend on the order of the
+        # poses.
         q = mechanism.assemble(q, kept=places)
         arms = paths.moment_arms(q)
         for index, (path, muscle) in enumerate(zip(named, alone, strict=True)):
@@ -239,7 +253,14 @@ def _select_muscles(paths: list[str], names: Sequence[str]) -> list[str]:
 
 
 class _Muscle(NamedTuple):
-    """A muscle in a system of its own, so that one without an equilibrium does not affect others."""
+    """Muscle in a system of its own, so that one without an equilibrium does not affect others.
+
+    Attributes:
+        element: force element of the muscle.
+        system: system with this muscle only.
+        activation: activation, 0 to 1.
+        optimal: optimal fiber length, m.
+    """
 
     element: DeclaredForce
     system: System
@@ -247,7 +268,14 @@ class _Muscle(NamedTuple):
     optimal: float
 
     def evaluate(self, q: Array) -> dict[str, float]:
-        """Return the :data:`QUANTITIES` that exist at values q (n,) of the coordinates."""
+        """Return the quantities of the muscle in a pose at rest.
+
+        Args:
+            q: values (n,) of all coordinates.
+
+        Returns:
+            Numbers by the names of :data:`QUANTITIES`; the length alone if there is no equilibrium.
+        """
         element, system = self.element, self.system
         y = system.state.pack(q.tolist(), [0.0] * len(q))
         for place, path in enumerate(system.state.paths, 2 * len(system.order)):
@@ -262,12 +290,14 @@ class _Muscle(NamedTuple):
             name: system.read_record(element.path, place)
             for name, place in element.force_type.record_offsets.items()
         }
+        # The path has a length also where the muscle has no equilibrium; other columns stay NaN.
         result = {"length": known["length"]}
         if is_settled:
             cos, fibers = known["cos_pennation"], known["fiber_length"]
             result |= {
                 "fiber_length": fibers,
                 "normalized_fiber_length": fibers / self.optimal,
+                # The fiber is inclined to the tendon by the pennation angle.
                 "tendon_length": known["length"] - fibers * cos,
                 "tendon_force": known["tension"],
                 "active_fiber_force": known["active_fiber_force"] * cos,

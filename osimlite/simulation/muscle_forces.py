@@ -32,7 +32,10 @@ _HALF_SPLINE_ORDER = 3
 
 @dataclass(frozen=True, eq=False)
 class MuscleForces(StoTable):
-    """Activations of all actuators: one column each, equal to its control; NaN at times without a solution.
+    """Activations of all actuators over time.
+
+    As a table it has one column for each actuator, equal to its control; NaN at times without a
+    solution.
 
     Attributes:
         forces: forces of the model and of the loads (N, N m), labelled as by OpenSim's
@@ -52,16 +55,23 @@ class MuscleForces(StoTable):
         return self.shared.solved
 
     def describe_unsolved(self) -> str:
-        """Describe the times without a solution and the coordinates that lack force; empty if there are none."""
+        """Describe the times without a solution and the coordinates that lack force.
+
+        Returns:
+            A phrase for a message; empty if every time has a solution.
+        """
         assert self.shared is not None
         return self.shared.describe_unsolved()
 
     def unsolved(self) -> str:
-        """Return the same as :meth:`describe_unsolved`, under the name that is deprecated."""
+        """Return the same as :meth:`describe_unsolved`, under its deprecated name."""
         return self.describe_unsolved()
 
     def write(self, folder: str | Path) -> list[Path]:
-        """Write activations, forces and controls into a folder, with the file names of OpenSim's analysis.
+        """Write activations, forces and controls, with the file names of OpenSim's analysis.
+
+        Args:
+            folder: output folder; it is made if it does not exist.
 
         Returns:
             Paths of the files.
@@ -108,11 +118,12 @@ def static_optimization(
     opensim_derivatives: bool = False,
     folder: str | Path | None = None,
 ) -> MuscleForces:
-    """Distribute what a motion requires over muscles and other actuators: the activations with the least sum of |x|ᵖ.
+    """Distribute the generalized forces of a motion over muscles and other actuators.
 
-    Each time is solved by itself, exactly: it has one solution or none. As in OpenSim, the speeds
-    are rates of the coordinates by splines of fifth degree, and the accelerations are rates of such
-    splines through the speeds.
+    Of all activations x that cause the motion, the result has the least sum of |x|ᵖ. Each time is
+    solved by itself, exactly: it has one solution or none. As in OpenSim, the speeds are rates of
+    the coordinates by splines of fifth degree, and the accelerations are rates of such splines
+    through the speeds.
 
     Args:
         model: the model; its actuators act within their min_control and max_control.
@@ -176,12 +187,20 @@ def _compute_states(
 ) -> tuple[Array, Array, Array]:
     """Compute the states of a motion that fulfil the constraints.
 
+    Args:
+        model: the model.
+        mechanism: its mechanism.
+        recorded: the motion.
+
     Returns:
-        Values, speeds and accelerations (t, n).
+        Values (rad, m), generalized speeds and accelerations of all coordinates, (t, n) each.
     """
+    # A part of a record is differentiated with the rows around it, so that its ends are not
+    # special.
     times, values = recorded.around or (recorded.times, recorded.values)
     around = RecordedMotion(mechanism, times, values)
     all_speeds = around.rates[0].copy()
+    # Speeds of ball joints and the like are not the rates of their coordinates.
     if mechanism.turning:
         for q, u in zip(values, all_speeds, strict=True):
             u[:] = mechanism.speeds_from_rates(q, u)

@@ -52,6 +52,8 @@ INITIAL_STEP_S = 0.01
 """First step that an integrator tries, s: a tenth of Simbody's default time scale."""
 UNBOUNDED_STEPS = 0.0, inf
 """Shortest and longest step (s) where the options set none."""
+BOUNDED_INTEGRATORS = (MERSON, "euler2")
+"""Integrators that observe `step_bounds`; the others choose their steps without limits."""
 
 
 def check_integrator(name: str) -> None:
@@ -90,11 +92,16 @@ class IntegrationOptions:
     )
     step_bounds: tuple[float, float] = define_option(
         UNBOUNDED_STEPS,
-        more="shortest and longest step, s. A step of the shortest length is accepted whatever its error.",
+        more="shortest and longest step of 'merson' and 'euler2', s. A step of the shortest length is accepted "
+        "whatever its error.",
     )
 
     def integration_choices(self) -> dict[str, Any]:
-        """Return the values of the integration options by name, as keyword arguments for another record."""
+        """Return the values of the integration options, as keyword arguments for another record.
+
+        Returns:
+            Values by the names of the options.
+        """
         return {name: getattr(self, name) for name in INTEGRATION_OPTIONS}
 
     def summarize_choices(self) -> dict[str, Any]:
@@ -118,6 +125,11 @@ class IntegrationOptions:
         if not 0.0 < self.accuracy < 1.0:
             raise SettingError(f"the accuracy must lie between 0 and 1; {self.accuracy} does not")
         check_integrator(self.integrator)
+        if self.step_bounds != UNBOUNDED_STEPS and self.integrator not in BOUNDED_INTEGRATORS:
+            raise SettingError(
+                f"`step_bounds` has no effect on the steps of '{self.integrator}'; leave it out, or select the integrator "
+                f"{' or '.join(BOUNDED_INTEGRATORS)}"
+            )
         shortest, longest = self.step_bounds
         if not (0.0 <= shortest <= longest and longest > 0.0):
             raise SettingError(
@@ -260,9 +272,9 @@ class Options(IntegrationOptions):
         Raises:
             SettingError: a keyword is not an option.
         """
-        return cls().changed(choices)
+        return cls().change_options(choices)
 
-    def changed(self, choices: Mapping[str, Any]) -> Options:
+    def change_options(self, choices: Mapping[str, Any]) -> Options:
         """Return a copy in which keyword arguments replace some options.
 
         None stands for the default of an integration option.
@@ -281,6 +293,7 @@ class Options(IntegrationOptions):
         integration = {
             name: choices[name] for name in INTEGRATION_OPTIONS if choices.get(name) is not None
         }
+        # None stands for the default.
         defaults = {
             name: INTEGRATION_OPTIONS[name].default
             for name in choices
@@ -288,7 +301,7 @@ class Options(IntegrationOptions):
         }
         changed = replace(self, **{**choices, **defaults, **integration})
         if changed.fixed_step is not None:
-            # Only here is it known whether somebody asked for a value that equals the default.
+            # Only these keywords tell a requested value from an equal default.
             for name, declared in INTEGRATION_OPTIONS.items():
                 if name in integration or getattr(changed, name) != declared.default:
                     raise SettingError(
@@ -303,11 +316,11 @@ class Options(IntegrationOptions):
         Raises:
             SettingError: a keyword is not an option, or it belongs to the prepared model.
         """
-        made = self.changed(choices)
+        made = self.change_options(choices)
         for name in choices:
             if name not in RUN_OPTIONS:
                 raise SettingError(
-                    f"'{name}' is chosen when a model is made ready: Simulation(model, engine, {name}=...)"
+                    f"'{name}' belongs to the prepared model; pass it to Simulation(model, engine, {name}=...)"
                 )
         return made
 
@@ -342,22 +355,25 @@ def check_fixed_step(h: float, to: float) -> None:
         raise SettingError(f"the fixed step is a positive and finite number of seconds, not {h!r}")
     if h > MAX_FIXED_STEP_S:
         raise SettingError(
-            f"a fixed step of {h:g} s is too long for any motion of bodies; take at most {MAX_FIXED_STEP_S:g} s, with "
+            f"a fixed step of {h:g} s is too long for the motion of bodies; use at most {MAX_FIXED_STEP_S:g} s, with "
             "contacts about 0.001 s"
         )
     if h * MAX_FIXED_STEPS < to:
         raise SettingError(
-            f"{to:g} s in fixed steps of {h:g} s are more than a thousand million; take longer steps"
+            f"{to:g} s in fixed steps of {h:g} s are more than a billion steps; use longer ones"
         )
 
 
 def compute_report_times(to: float, interval: float, start: float = 0.0) -> list[float]:
-    """Return the times of the rows of the results, s: the start, the multiples of the interval after it, and the end.
+    """Return the times of the rows of the results.
 
     Args:
         to: end of the motion, s.
         interval: time between rows, s.
         start: start of the motion, s.
+
+    Returns:
+        The start, the multiples of the interval after it, and the end, s.
 
     Raises:
         SettingError: a time is not a number, the motion does not end after its start, or there are
@@ -367,14 +383,15 @@ def compute_report_times(to: float, interval: float, start: float = 0.0) -> list
         if not _is_number(number):
             raise SettingError(f"a time is a number of seconds, not {number!r}")
     if not (isfinite(to) and to > start):
-        told = "for a positive time, not" if start == 0.0 else f"from {start:g} s on, and not to"
-        raise SettingError(f"a simulation goes on {told} {to:g} s")
+        expected = "a positive time" if start == 0.0 else f"after its start at {start:g} s"
+        raise SettingError(f"the end of a simulation is {expected}, not {to:g} s")
     if not (isfinite(interval) and interval > 0.0):
         raise SettingError(f"the report interval is a positive time, not {interval:g} s")
     if to / interval > 1e7:
         raise SettingError(
-            f"a report every {interval:g} s makes more than ten million rows; take a longer interval"
+            f"a report every {interval:g} s makes more than ten million rows; use a longer interval"
         )
+    # Multiples instead of sums, so that rounding errors do not accumulate.
     times = [number * interval for number in range(floor(to / interval) + 1)]
     # A last time that differs from `to` by rounding only is `to`.
     if to - times[-1] <= 1e-9 * interval:

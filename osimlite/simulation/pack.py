@@ -28,7 +28,7 @@ MIN_BATCHED_ITEMS = 8
 
 @dataclass
 class PackedModel:
-    """A mechanism with its forces as vectors, without addresses."""
+    """Mechanism with its forces as vectors of the kernels, without addresses."""
 
     structure: Ints  # integers without addresses
     numbers: Floats  # numbers of the model
@@ -52,13 +52,16 @@ class PackedModel:
 def pack(
     mechanism: Mechanism, forces: Forces, chain: Chain | None = None, *, apart: bool = False
 ) -> PackedModel:
-    """Pack a mechanism and its forces.
+    """Pack a mechanism and its forces into vectors.
 
     Args:
         mechanism: the mechanism.
         forces: forces on it besides gravity.
         chain: joints whose mass matrix another program computes; None if the kernels compute it.
         apart: whether a body that never moves in its parent is a link of its own.
+
+    Returns:
+        The packed model.
 
     Raises:
         UnsupportedError: the kernels do not support a joint, function, constraint or force.
@@ -70,7 +73,14 @@ def pack(
 
 
 class Packer(LinkPacker):
-    """Writer of the kernel vectors of one model."""
+    """Writer of the kernel vectors of one model.
+
+    Args:
+        tree: tree of the mechanism's links.
+        forces: forces on the mechanism.
+        state: layout of the state.
+        chain: joints whose mass matrix another program computes, if any.
+    """
 
     def __init__(self, tree: Tree, forces: Forces, state: StateLayout, chain: Chain | None) -> None:
         super().__init__(tree)
@@ -92,16 +102,17 @@ class Packer(LinkPacker):
             from osimlite.simulation.pack_chain import pack_chain
 
             pack_chain(self, self.chain)
+        # Items refer to the controls by offset, so these have to be reserved first.
         ints[MODEL.WORK_CONTROL] = self.reserve_work(len(self.controls.names))
+        # Controls are written last, because `System.set_controls` may replace their record by a
+        # longer one.
         result = self.write_items()
         self.write_controls()
         ints[MODEL.STATE_SIZE] = self.state.size
         ints[MODEL.WORK_STATE] = self.reserve_work(ints[MODEL.STATE_SIZE] * STATES)
         ints[MODEL.WORK_SIZE] = self.work
-        structure, numbers = (
-            np.array(ints, dtype=np.int64),
-            np.array(self.numbers, dtype=np.float64),
-        )
+        structure = np.array(ints, dtype=np.int64)
+        numbers = np.array(self.numbers, dtype=np.float64)
         laws = tuple(dict.fromkeys(self.laws))
         asked = self.kernels, self.equilibria, self.responses, self.runs, self.owners
         return PackedModel(
@@ -109,7 +120,10 @@ class Packer(LinkPacker):
         )
 
     def write_items(self) -> list[list[tuple[int, int]]]:
-        """Write the items of all force elements; the records of contacts come first, in their order.
+        """Write the items of all force elements.
+
+        The records of contacts come first in the work vector, in the order of the elements, so that
+        one view covers all contact forces.
 
         Returns:
             For each element the records of its items in the work vector, as (offset, length).
@@ -139,6 +153,8 @@ class Packer(LinkPacker):
                 result[-1].append((place, size))
                 if item.is_contact:
                     pairs.append(len(self.ints))
+                # Parts of a path are evaluated by the path itself. Consecutive items of one batched
+                # kernel form a run.
                 if not item.is_part:
                     if not runs or runs[-1][0] != item.batched:
                         runs.append((item.batched, len(records)))
@@ -152,6 +168,7 @@ class Packer(LinkPacker):
                     settling[len(self.ints)] = item.equilibrium
                 if item.response is not None:
                     responding[len(self.ints)] = item.response
+                # Offsets of states and of records of other elements are known only here.
                 own = list(item.ints)
                 for number, at_state in enumerate(item.states):
                     own[at_state] = self.state.find_first_state(element) + number
@@ -179,18 +196,25 @@ class Packer(LinkPacker):
                 STATES=response.states,
                 SENSE=response.sense,
             )
+        # All runs share one workspace, since they are evaluated one after the other.
         room = self.reserve_work(LANES * ROWS) if any(kernel for kernel, _ in runs) else 0
         self.ints[MODEL.RUNS], self.ints[MODEL.RUN_AT] = len(runs), len(self.ints)
         for (kernel, first), end in zip(
             runs, [*(run[1] for run in runs[1:]), len(records)], strict=False
         ):
+            # Runs that are too short get no kernel, and their items are evaluated singly.
             if end - first >= MIN_BATCHED_ITEMS and kernel:
                 self.runs[len(self.ints)] = kernel
             self.ints += RUN.record(LAW=0, FIRST=first, END=end, ROOM=room)
         return result
 
     def make_item_head(self, place: int, first_contact: int) -> list[int]:
-        """Return the head of an item's record, without the address of its law."""
+        """Return the head of an item's record, without the address of its law.
+
+        Args:
+            place: offset of its record in the work vector.
+            first_contact: index of the first contact of its force.
+        """
         return ITEM.record(
             LAW=0, NUMBERS=len(self.numbers), RECORD=place, FIRST_CONTACT=first_contact
         )

@@ -1,4 +1,9 @@
-"""Packing of a robot chain whose mass matrix another program computes."""
+"""Packing of a robot chain whose mass matrix another program computes.
+
+PyBullet computes with joints of one axis. The kernels map the m degrees of freedom of the mechanism
+to the joints: the rates of the joints are v = P u, hence M = Pᵀ M_joints P. A *share* is a nonzero
+entry of P.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +24,7 @@ from osimlite.mechanics.kernels.layout import (
 )
 from osimlite.mechanics.multibody.motions import AccelerationErrorAngle, EllipsoidPoint
 from osimlite.mechanics.multibody.parts import GROUND
-from osimlite.simulation.robot.couplings import as_line
+from osimlite.simulation.robot.couplings import find_line
 from osimlite.simulation.robot.robot import RobotJoint
 
 if TYPE_CHECKING:
@@ -27,7 +32,7 @@ if TYPE_CHECKING:
 
 
 class Chain(NamedTuple):
-    """A robot whose mass matrix and bias another program computes."""
+    """Robot whose mass matrix and bias another program computes."""
 
     joints: Sequence[RobotJoint]  # moving joints, in the order of that program
     # bodies, and what is added to their principal moments of inertia there (kg·m²)
@@ -39,7 +44,12 @@ class Chain(NamedTuple):
 
 
 def pack_chain(packer: Packer, chain: Chain) -> None:
-    """Write the records of a chain, if it has any joints."""
+    """Write the records of a chain, if it has any joints.
+
+    Args:
+        packer: writer of the kernel vectors, in which the mechanism is written already.
+        chain: the chain.
+    """
     ints, count = packer.ints, len(chain.joints)
     if not count:
         return
@@ -59,6 +69,8 @@ def pack_chain(packer: Packer, chain: Chain) -> None:
         ("PRODUCTS", "PRODUCT_AT"): (PRODUCT.SIZE, _list_products(packer, shares, count)),
         ("EXCESSES", "EXCESS_AT"): (EXCESS.SIZE, list_excesses(packer, chain.excess)),
     }
+    # The four lists follow the head. Each pair of names is a field for its length and one for its
+    # offset.
     places: dict[str, int] = {}
     for (length, place), (each, numbers) in lists.items():
         places |= {length: len(numbers) // each, place: len(ints)}
@@ -76,12 +88,24 @@ def pack_chain(packer: Packer, chain: Chain) -> None:
 
 
 def _encode_joint(packer: Packer, joint: RobotJoint) -> tuple[int, int, int, list[int]]:
-    """Return kind, source and part of a joint, and the degrees of freedom that move it."""
+    """Return the description of a joint for the kernels.
+
+    Args:
+        packer: writer of the kernel vectors.
+        joint: a moving joint.
+
+    Returns:
+        Kind of the joint (`JOINT_KIND`), source (index of an operation or of a degree of freedom),
+        part
+            (a component, or the index of a number), and the degrees of freedom that move it.
+    """
     function, places = joint.function, list(joint.coordinates)
     freedoms = [packer.places.freedom(place) for place in places]
     for number, operation in enumerate(packer.operations):
         if operation.joint != joint.source:
             continue
+        # The order of the cases matters: a ball joint or an ellipsoid joint has three joints of one
+        # axis, all with the same source.
         is_ball = operation.kind in (MOTION.BALL, MOTION.BALL_BACK)
         if operation.kind == MOTION.ACCELERATION_ERROR and isinstance(
             function, AccelerationErrorAngle
@@ -94,16 +118,28 @@ def _encode_joint(packer: Packer, joint: RobotJoint) -> tuple[int, int, int, lis
             return JOINT_KIND.ANGLE, number, operation.arguments.index(places[0]), angles
         if operation.function is function and operation.arguments == places:
             return JOINT_KIND.AMOUNT_OF, number, 0, freedoms
-    line = as_line(function)
+    # What remains are joints that are the coordinate itself or a multiple of it, as the couplings
+    # of `build_robot` make them.
+    line = find_line(function)
     assert line is not None and line.start == 0.0, f"nothing moves '{joint.name}'"
     packer.numbers.append(line.slope)
     return JOINT_KIND.LINE, freedoms[0], len(packer.numbers) - 1, freedoms
 
 
 def _list_products(packer: Packer, shares: Sequence[tuple[int, int]], count: int) -> list[int]:
-    """Return the records of products for each entry of the mass matrix.
+    """Return the records of the products that make the mass matrix of the mechanism.
 
-    A record has pairs of shares, the entry of the other program's matrix, and the offset of the sum.
+    Entry (i, j) of Pᵀ M_joints P is a sum over pairs of shares. Only the entries of a degree of
+    freedom and those above it in the tree are nonzero, so each row is followed up to the root.
+
+    Args:
+        packer: writer of the kernel vectors.
+        shares: index of the joint and of the degree of freedom for each share.
+        count: number of joints, the size of the other program's matrix.
+
+    Returns:
+        Records with both shares, the entry of the other program's matrix, and the offset of the
+        sum.
     """
     of_freedom: dict[int, list[tuple[int, int]]] = defaultdict(list)
     for number, (joint, freedom) in enumerate(shares):
@@ -111,20 +147,37 @@ def _list_products(packer: Packer, shares: Sequence[tuple[int, int]], count: int
     result: list[int] = []
     freedoms = packer.ints[packer.ints[MODEL.DOF_AT] :]
     for freedom in range(packer.ints[MODEL.DOFS]):
-        place, other = freedoms[DOF.SIZE * freedom + DOF.ROW], freedom
+        place = freedoms[DOF.SIZE * freedom + DOF.ROW]
+        other = freedom
+        # Up to the root, whose freedoms have none above: -1.
         while other >= 0:
             for one, i in of_freedom[freedom]:
                 for two, j in of_freedom[other]:
                     result += PRODUCT.record(ONE=one, TWO=two, ENTRY=count * i + j, PLACE=place)
-            place, other = place + 1, freedoms[DOF.SIZE * other + DOF.ABOVE]
+            place = place + 1
+            other = freedoms[DOF.SIZE * other + DOF.ABOVE]
     return result
 
 
 def list_excesses(packer: Packer, excess: Sequence[tuple[int, float]]) -> list[int]:
-    """Return records of added inertia: link, last degree of freedom on the path to it, and offset of the added moment."""
+    """Return the records of added inertia.
+
+    Another program may round small moments of inertia up. The kernels then subtract the excess
+    again.
+
+    Args:
+        packer: writer of the kernel vectors.
+        excess: bodies, and what is added to each of their principal moments of inertia (kg·m²).
+
+    Returns:
+        Records with the link, the last degree of freedom on the path to it, and the offset of the
+        added
+            moment in the numbers. Bodies that cannot move have none.
+    """
     result: list[int] = []
     for body, moment in excess:
         link = carrier = packer.places.placements[body].link
+        # Links without a degree of freedom of their own move with their parents.
         while carrier != GROUND and packer.ends[carrier] == packer.ends[carrier + 1]:
             carrier = packer.links[carrier].parent
         if carrier != GROUND:

@@ -28,7 +28,13 @@ ALL_PATHS = -1
 
 @dataclass(frozen=True)
 class MeasuredPath(Silent):
-    """A path as a force element that is measured and exerts no force."""
+    """Path as a force element that is measured and exerts no force.
+
+    Attributes:
+        path: component path of the owner.
+        along: the path itself.
+        states: no states.
+    """
 
     path: str  # path of the owner
     along: Along  # the path itself
@@ -36,7 +42,7 @@ class MeasuredPath(Silent):
 
     @property
     def name(self) -> str:
-        """Path of the owner."""
+        """Name in reports: the component path of the owner."""
         return self.path
 
     def describe_failure(self, record: Sequence[float]) -> str:
@@ -44,7 +50,14 @@ class MeasuredPath(Silent):
         return f"'{self.path}': the path has no length in this pose"
 
     def make_records(self, places: Places) -> list[ForceRecord]:
-        """Return the items of the path, the last of which is evaluated by itself."""
+        """Return the force records of the path.
+
+        Args:
+            places: links and offsets of the packed mechanism.
+
+        Returns:
+            The records; the last one, the path, is evaluated although no force uses it.
+        """
         *parts, last = self.along.make_records(places)
         return [*parts, replace(last, is_part=False)]
 
@@ -67,25 +80,36 @@ class PathSystem(System):
     entries = ("evaluate", "watch")
 
     def measure_paths(self, q: Array, u: Array, what: int) -> Array:
-        """Return the length (m) or speed (m/s) of each path (p,).
+        """Return the length or speed of each path.
 
         Args:
             q: coordinate values (n,).
             u: generalized speeds (n,).
             what: `LENGTH` or `SPEED`.
+
+        Returns:
+            Lengths (m) or speeds (m/s) (p,).
         """
         self._evaluate_state(q, u)
         return self._w[[items[-1][0] + what for items in self._items]]
 
     def compute_pulls(self, poses: Array) -> Array:
-        """Return the generalized forces (k, p, n) of a tension of 1 N in each path, in poses (k, n)."""
+        """Return the generalized forces of a tension of 1 N in each path.
+
+        Args:
+            poses: values of all coordinates (k, n).
+
+        Returns:
+            Generalized forces (k, p, n), N or N m.
+
+        Raises:
+            SimulationError: a path cannot be computed in a pose.
+        """
         states = np.zeros((len(poses), len(self._y)))
         states[:, : len(self.order)] = poses[:, self.order]
         forces = np.zeros((len(poses), len(self._items), len(self.order)))
-        pull, parts = (
-            self.program.code.get_entry("pull_each"),
-            (self.numbers, self._w, self._y, self._f),
-        )
+        pull = self.program.code.get_entry("pull_each")
+        parts = (self.numbers, self._w, self._y, self._f)
         with self._convert_errors():
             status = self._run_kernel(pull, self.program.ints, *parts, len(poses), states, forces)
         if status != OUTCOME.OK:
@@ -143,10 +167,17 @@ class PathSystem(System):
     def measure_all_on_surfaces(
         self, poses: Array, routes: Mapping[str, Along]
     ) -> Iterator[tuple[str, str, Array]]:
-        """Yield owner, surface, and the lengths (k,) of the path on the surface in poses (k, n), m.
+        """Yield the lengths of paths on their surfaces in many poses.
 
-        NaN has the meaning of :meth:`Paths.lengths_on_surfaces`; 0 stands for a pose in which paths
-        cannot be computed.
+        Args:
+            poses: values of all coordinates (k, n).
+            routes: the paths by the names of their owners.
+
+        Yields:
+            Owner, surface, and the lengths (k,) of the path on the surface, m. NaN has the meaning
+            of
+                :meth:`Paths.lengths_on_surfaces`; 0 stands for a pose in which paths cannot be
+                computed.
         """
         parts = [*self._iterate_surfaces(routes)]
         wanted = sorted(
@@ -170,7 +201,8 @@ class PathSystem(System):
         for (name, route), items in zip(routes.items(), self._items, strict=True):
             if isinstance(route, ThroughPoints):
                 *_, (path, _) = items
-                laws, points = iter([place for place, _ in items[1:-1]]), len(route.points)
+                laws = iter([place for place, _ in items[1:-1]])
+                points = len(route.points)
                 size = points + 2 * len(route.surfaces)
                 order = path + COUNT, *range(path + ORDER, path + ORDER + size)
                 for second, surface in zip(range(points + 1, size, 2), route.surfaces, strict=True):
@@ -181,6 +213,7 @@ class PathSystem(System):
     @staticmethod
     def _length_on(part: _OnSurface, columns: Callable[[Sequence[int]], Array]) -> Array:
         count, order = np.split(columns(part.order), [1], axis=1)
+        # A path touches a surface if the second tangent point is among its present nodes.
         is_on = ((order == part.node) & (np.arange(order.shape[1]) < count)).any(axis=1)
         length, said = part.length
         # For a segment that passes straight, the length is 0 or NaN.
@@ -188,15 +221,25 @@ class PathSystem(System):
         return np.where(is_on, columns([length])[:, 0], passed)
 
     def measure_poses(self, poses: Array) -> Array:
-        """Return the lengths (k, p) of all paths in poses (k, n), m; NaN in a pose in which they cannot be computed."""
+        """Return the lengths of all paths in many poses.
+
+        Args:
+            poses: values of all coordinates (k, n).
+
+        Returns:
+            Lengths (k, p), m; NaN in a pose in which they cannot be computed.
+        """
         return self.read_work_vector(poses, [items[-1][0] + LENGTH for items in self._items])
 
     def measure_one_path(self, paths: Sequence[int], poses: Array) -> Array:
-        """Return the length (k,) of one path in each of the poses (k, n), m; NaN where it cannot be computed.
+        """Return the length of one path in each of many poses.
 
         Args:
-            paths: index of the path for each pose.
+            paths: index of the path for each pose (k,).
             poses: values of all coordinates (k, n).
+
+        Returns:
+            Lengths (k,), m; NaN where the path cannot be computed.
         """
         column = {path: k for k, path in enumerate(dict.fromkeys(paths))}
         result = self.read_work_vector(
@@ -223,7 +266,8 @@ class PathSystem(System):
         Returns:
             Numbers (k, m); NaN in a pose in which the paths cannot be computed.
         """
-        states, result = np.zeros((len(poses), len(self._y))), np.empty((len(poses), len(places)))
+        states = np.zeros((len(poses), len(self._y)))
+        result = np.empty((len(poses), len(places)))
         states[:, : len(self.order)] = poses[:, self.order]
         asked = np.full(len(poses), ALL_PATHS) if paths is None else paths
         head = np.array([len(places), len(cleared), *places, *cleared], dtype=np.int64)
@@ -260,7 +304,10 @@ class PathSystem(System):
     @staticmethod
     @contextmanager
     def _convert_errors() -> Iterator[None]:
-        """Raise a SimulationError where kernels in Python raise an arithmetic error; machine code gives NaN there."""
+        """Raise a SimulationError where kernels in Python raise an arithmetic error.
+
+        Machine code computes NaN there, which the kernels report as an outcome.
+        """
         try:
             yield
         except (ArithmeticError, ValueError) as failure:

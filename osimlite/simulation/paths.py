@@ -35,12 +35,17 @@ ARM_ROUNDING = 1e-12
 
 @any_numbers
 def paths(model: Model, wrapping: str = OPENSIM, mechanism: Mechanism | None = None) -> Paths:
-    """Return the paths of a model: of its muscles, ligaments, springs and actuators, whether they act or not.
+    """Return the paths of a model: of its muscles, ligaments, springs and actuators.
+
+    Paths of forces that are switched off are included.
 
     Args:
         model: the model.
         wrapping: "opensim" or "geodesic", see :class:`osimlite.simulation.Options`.
         mechanism: mechanism of the model; built if None.
+
+    Returns:
+        The paths, ready to be measured in any pose.
 
     Raises:
         SettingError: there is no such wrapping.
@@ -241,24 +246,37 @@ class Paths:
         }
 
     def compute_moment_arms(self, poses: Array, couplings: Iterable[Array] | None = None) -> Array:
-        """Return the moment arms (k, p, n) of all paths about all coordinates in many poses.
+        """Return the moment arms of all paths about all coordinates in many poses.
 
         Args:
             poses: values of all coordinates (k, n).
             couplings: result of :meth:`compute_coupling` (n, n) for each pose, if known.
+
+        Returns:
+            Moment arms (k, p, n), m, or 1 for a coordinate in m; NaN at a coordinate that cannot
+            move.
         """
         arms = self.system.compute_pulls(poses)
         if not all(isinstance(item, Lock) for item in self.mechanism.constraints):
             each = map(self.compute_coupling, poses) if couplings is None else couplings
             for row, coupling in zip(arms, each, strict=True):
+                # OpenSim's moment arm includes what a coupled coordinate contributes, except for
+                # paths that are functions.
                 row[self._coupled] = row[self._coupled] @ coupling
+        # Rounding would make a path cross coordinates that it does not cross.
         arms[np.abs(arms) <= ARM_ROUNDING] = 0.0
         return arms
 
     def compute_coupling(self, q: Values) -> Array:
-        """Return the generalized speeds (n, n) that go with a speed of 1 of each coordinate, in its column.
+        """Return the generalized speeds that the constraints couple to each coordinate.
 
-        Columns of coordinates that cannot move are NaN.
+        Args:
+            q: values of coordinates.
+
+        Returns:
+            Matrix (n, n), whose column i has the speeds that go with a speed of 1 of coordinate i.
+            Columns
+                of coordinates that cannot move are NaN.
         """
         q = self.mechanism.values(q)
         constraints = self.mechanism.constraints
@@ -266,13 +284,22 @@ class Paths:
             return np.eye(len(q))
         state = self.mechanism.at(q)
         coupling = self.compute_free_coupling(state)
+        # OpenSim unlocks a coordinate before it computes its moment arm.
         for place, lock in self._locks.items():
             others = [item for item in constraints if item is not lock]
             coupling[:, [place]] = _compute_coupled_speeds(others, state, [place])[:, [place]]
         return coupling
 
     def compute_free_coupling(self, state: Kinematics) -> Array:
-        """Return the coupling (n, n) in a pose at rest; columns of locked coordinates have a single 1."""
+        """Return the coupling of the coordinates that are not locked.
+
+        Args:
+            state: a pose at rest.
+
+        Returns:
+            Matrix (n, n) as in :meth:`compute_coupling`; columns of locked coordinates have a
+            single 1.
+        """
         constraints = self.mechanism.constraints
         free = [index for index in range(len(state.q)) if index not in self._locks]
         return _compute_coupled_speeds(
@@ -289,9 +316,20 @@ class Paths:
 def _compute_coupled_speeds(
     constraints: Sequence[Constraint], state: Kinematics, places: Sequence[int]
 ) -> Array:
-    """Return the admissible speeds nearest to 1 for one coordinate and 0 for all others.
+    """Return the admissible speeds that go with a speed of 1 of some coordinates.
 
-    They are in the columns of `places`, divided by the speed of the coordinate itself.
+    For each such coordinate, of all admissible speeds those nearest to 1 for it and 0 for the
+    others are taken, and divided by its own speed.
+
+    Args:
+        constraints: the constraints.
+        state: a pose.
+        places: indices of the coordinates.
+
+    Returns:
+        Matrix (n, n) with the speeds in the columns of `places`; the others have a single 1. NaN
+        where
+            the coordinate cannot move.
     """
     coupling = np.eye(len(state.q))
     if constraints and places:

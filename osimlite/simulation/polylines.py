@@ -28,15 +28,19 @@ CONSTRAINT_LAWS = "prescribe", "bind_bodies", "factorise_law", "minimum_norm_law
 
 @runtime_checkable
 class TraceablePath(Protocol):
-    """A path that can be traced."""
+    """Path whose polyline around its surfaces the kernels can compute."""
 
     @property
     def trace(self) -> str:
-        """Name of the law that traces the path."""
+        """Name of the kernel that traces the path."""
 
     @property
     def curves(self) -> tuple[str, ...]:
-        """Names of the laws that the tracing law calls; their addresses follow the item of the path."""
+        """Names of the kernels that the tracing kernel calls; their addresses follow the item of the path.
+
+        Returns:
+            Names in the order of the surfaces.
+        """
 
     @property
     def corners(self) -> int:
@@ -44,10 +48,21 @@ class TraceablePath(Protocol):
 
     @property
     def start(self) -> tuple[int, Array]:
-        """Body in which the path starts, and the position there (3,), m."""
+        """Index of the body in which the path starts, and the position of its first point there (3,), m.
+
+        Returns:
+            Index of the body (-1 for ground), and the position (3,), m.
+        """
 
     def make_records(self, places: Places) -> list[ForceRecord]:
-        """Return the items of the path, the last of which is the path itself."""
+        """Return the force records of the path.
+
+        Args:
+            places: links and offsets of the packed mechanism.
+
+        Returns:
+            The records; the last one is the path, those before it are its points and surfaces.
+        """
 
 
 class Polylines:
@@ -71,16 +86,18 @@ class Polylines:
 
     def __init__(self, mechanism: Mechanism, routes: Sequence[TraceablePath]) -> None:
         program = self.program = mechanism.program
-        self.laws, self.items, self.traces = [""], list[int](), list[int]()
-        ints, numbers, self.work, self.room = (
-            [*program.model],
-            [*program.reals],
-            program.model[MODEL.WORK_SIZE],
-            0,
-        )
+        self.laws = [""]
+        self.items = list[int]()
+        self.traces = list[int]()
+        ints = [*program.model]
+        numbers = [*program.reals]
+        self.work = program.model[MODEL.WORK_SIZE]
+        self.room = 0
         self.bound = bool(routes) and not all(
             isinstance(item, Lock) for item in mechanism.constraints
         )
+        # Paths need only positions. Leaving out the other kernels keeps the JavaScript of the
+        # viewer small.
         unused = {
             *MOTION_LAWS,
             *(() if routes else SPEED_LAWS),
@@ -107,18 +124,22 @@ class Polylines:
             for curve in route.curves:
                 ints.append(self._number_law(curve, len(ints)))
             self.room = max(self.room, route.corners)
-        self.structure, self.numbers = np.array(ints, dtype=np.int64), np.array(numbers)
-        self._w, self._y, self._f = (
-            np.zeros(self.work),
-            np.zeros(2 * len(program.order)),
-            np.zeros(3 * self.room),
-        )
+        self.structure = np.array(ints, dtype=np.int64)
+        self.numbers = np.array(numbers)
+        self._w = np.zeros(self.work)
+        self._y = np.zeros(2 * len(program.order))
+        self._f = np.zeros(3 * self.room)
         # The first body of each link.
         links, bodies = np.unique(program.links[:-1], return_index=True)
         self._bodies = bodies[links >= 0]
 
     def _number_law(self, name: str, place: int | None = None) -> int:
-        """Return the index of a law, and note the place in the structure that needs its address."""
+        """Return the index of a kernel in `laws`, and append it if it is new.
+
+        Args:
+            name: name of the kernel, "" for none.
+            place: offset in the structure that needs the address of the kernel.
+        """
         if name not in self.laws:
             self.laws.append(name)
         if name and place is not None:
@@ -137,7 +158,7 @@ class Polylines:
         return code, ints
 
     def trace(self, q: Array, rotations: Array, origins: Array) -> list[Array]:
-        """Return the corners (k, 3) of each path in ground, from end to end, m.
+        """Return the corners of each path in ground, for given poses of the bodies.
 
         On a surface, corners are 0.15 rad apart.
 
@@ -145,9 +166,14 @@ class Polylines:
             q: coordinate values (n,).
             rotations: rotations of the bodies in ground (b, 3, 3).
             origins: origins of the bodies in ground (b, 3), m.
+
+        Returns:
+            Corners (k, 3) of each path from end to end, m.
         """
         code, ints = self._linked
         s, (bodies, order) = self.structure, (self._bodies, self.program.order)
+        # The kernels take positions of links. They follow from one body of each link, so that the
+        # poses can come from anywhere, for example from a viewer.
         links = self._w[s[MODEL.WORK_LINK] :][: LINK_WORK.SIZE * len(bodies)].reshape(
             -1, LINK_WORK.SIZE
         )

@@ -24,7 +24,9 @@ MAX_PYTHON_POSES = 20
 def assemble_motion(
     mechanism: Mechanism, times: Array, values: Array, code: Code | None = None
 ) -> Array:
-    """Return the poses nearest to those of a motion that fulfil the constraints, as `Mechanism.assemble` does.
+    """Move every pose of a motion to the nearest one that fulfils the constraints.
+
+    The result equals that of `Mechanism.assemble` for each pose.
 
     Args:
         mechanism: the mechanism.
@@ -39,6 +41,7 @@ def assemble_motion(
     Raises:
         SimulationError: no pose near one of these fulfils the constraints.
     """
+    # Locked coordinates keep the recorded values, so that nothing is left to assemble.
     if all(isinstance(item, Lock) for item in mechanism.constraints):
         return values.copy()
     if code is None:
@@ -47,13 +50,15 @@ def assemble_motion(
     order = program.order
     size = len(order)
     functions = (ASSEMBLY_KERNEL, *program.laws)
+    # Python replaces machine code where these kernels cannot be compiled.
     code = code.select_for(functions)
     code.make_ready(functions)
     ints = np.array(program.model, dtype=np.int64)
     for name in program.laws:
         ints[MODEL.LAWS + LAW_NUMBERS[name]] = code.get_address(name)
     equations = int(ints[ints[MODEL.CONSTRAINED] + CONSTRAINED.POSITIONS])
-    frames, found = np.column_stack([times, values[:, order]]), np.empty((len(times), size + 1))
+    frames = np.column_stack([times, values[:, order]])
+    found = np.empty((len(times), size + 1))
     code.get_entry(ASSEMBLY_KERNEL)(
         ints,
         np.array(program.reals, dtype=np.float64),
@@ -76,10 +81,23 @@ def assemble_motion(
 
 
 def _list_integers(mechanism: Mechanism, order: Sequence[int]) -> list[int]:
-    """Return the integers of the assembly, see `kernels.assembly`."""
-    program, infos = mechanism.program, [mechanism.coordinates[place] for place in order]
+    """Return the integers of the assembly, see :mod:`osimlite.mechanics.kernels.assembly`.
+
+    Args:
+        mechanism: the mechanism.
+        order: indices of the coordinates in the order of the kernels.
+
+    Returns:
+        Whether links must be evaluated, the number of couplers, four flags for each coordinate, and
+        the
+            dependent coordinate and equation of each coupler.
+    """
+    program = mechanism.program
+    infos = [mechanism.coordinates[place] for place in order]
     turning = any(not program.bound.isdisjoint(item.coordinates) for item in mechanism.turning)
     couplers = [item for item in mechanism.constraints if isinstance(item, Coupler)]
+    # Without constraints on bodies the positions of the links need not be computed, which is much
+    # faster.
     result = [int(program.on_bodies or turning), len(couplers)]
     result += [assembly.HELD_BY_USER if info.locked else assembly.FREED for info in infos]
     result += [int(not info.yielding) for info in infos]
@@ -91,7 +109,16 @@ def _list_integers(mechanism: Mechanism, order: Sequence[int]) -> list[int]:
 
 
 def _list_numbers(mechanism: Mechanism, order: Sequence[int]) -> list[float]:
-    """Return the numbers of the assembly, see `kernels.assembly`."""
+    """Return the numbers of the assembly, see :mod:`osimlite.mechanics.kernels.assembly`.
+
+    Args:
+        mechanism: the mechanism.
+        order: indices of the coordinates in the order of the kernels.
+
+    Returns:
+        The tolerance of the constraints, and the lower and upper end of the range of each
+        coordinate.
+    """
     result = [tolerance_of(mechanism)]
     for place in order:
         result += mechanism.coordinates[place].range

@@ -16,15 +16,15 @@ from osimlite.schema.model import Model
 
 
 class NamedItem(Protocol):
-    """An object with a name and a path."""
+    """Object with a name and a path."""
 
     @property
     def name(self) -> str:
-        """Name without the parent."""
+        """Name of the component, without its parents."""
 
     @property
     def path(self) -> str:
-        """Path from the model."""
+        """Path of the component in the model."""
 
 
 NamedItemType = TypeVar("NamedItemType", bound=NamedItem)
@@ -35,7 +35,13 @@ Step = str | int
 
 @dataclass(frozen=True)
 class PropertyPath:
-    """The way to one number of a component."""
+    """Path to one number of a component.
+
+    Attributes:
+        component: path of the component.
+        steps: names of properties and indices of lists from the component to the number.
+        unit: unit in the schema's notation, or "".
+    """
 
     component: str  # path of the component
     steps: tuple[Step, ...]  # steps from the component to the number
@@ -65,19 +71,29 @@ class PropertyPath:
 
 @dataclass(frozen=True)
 class PropertySetter:
-    """Setter of one property, or of one entry of it; values are multiplied by `factor`."""
+    """Setter of one property, or of one entry of it.
+
+    Attributes:
+        holder: object with the property.
+        name: name of the property.
+        entry: index in the property if it is a vector.
+        factor: factor by which values are multiplied before they are set.
+    """
 
     holder: Object
     name: str
     entry: int | None
     factor: float = 1.0
 
-    def as_factor(self) -> PropertySetter:
-        """Return a setter whose factor is the present value."""
+    def make_factor_setter(self) -> PropertySetter:
+        """Return a setter of multiples of the present value."""
         return replace(self, factor=self.get_value())
 
     def set_value(self, value: float) -> None:
-        """Set the number.
+        """Set the number to a value times `factor`.
+
+        Args:
+            value: the value.
 
         Raises:
             ModelError: the property does not accept it.
@@ -86,12 +102,13 @@ class PropertySetter:
         if self.entry is None:
             setattr(self.holder, self.name, value)
         else:
+            # Vectors of the schema are tuples, so the complete one is replaced.
             numbers = list(getattr(self.holder, self.name))
             numbers[self.entry] = value
             setattr(self.holder, self.name, tuple(numbers))
 
     def get_value(self) -> float:
-        """Return the present number."""
+        """Return the present value of the number."""
         result = getattr(self.holder, self.name)
         return float(result if self.entry is None else result[self.entry])
 
@@ -119,9 +136,18 @@ def match_components(pattern: str, components: Iterable[NamedItemType]) -> list[
 
 
 def expand_braces(name: str, model: Model) -> list[str]:
-    """Return one name for each different text that the pattern in braces stands for, in the names or paths of the components.
+    """Return the names that result from a pattern in braces.
 
-    ``{*}_?/control`` becomes ``soleus_?/control``, ``vasti_?/control`` and so on.
+    The pattern is compared with the names or paths of the components, and each different text that
+    it stands for gives one name: ``{*}_?/control`` becomes ``soleus_?/control``,
+    ``vasti_?/control`` and so on.
+
+    Args:
+        name: a name, path or pattern, with at most one pair of braces.
+        model: the model.
+
+    Returns:
+        Names in the order of the model; the name itself without braces.
     """
     head, brace, rest = name.partition("{")
     if not brace:
@@ -154,7 +180,7 @@ def _matches(pattern: str, name: str) -> bool:
 
 
 def find_properties(model: Model, path: str) -> tuple[PropertyPath, ...]:
-    """Return the numbers that a path selects; none if there are no such numbers.
+    """Return the numbers that a path selects.
 
     A path consists of the path or name of a component (see :func:`match_components`), and the names
     of properties, separated by ``/``. Entries of lists are counted from 0
@@ -163,10 +189,15 @@ def find_properties(model: Model, path: str) -> tuple[PropertyPath, ...]:
     Args:
         model: the model.
         path: the path.
+
+    Returns:
+        One path for each selected component that has the number; none if there are no such numbers.
     """
     words = path.split("/")
+    # Components may have components, so the longest front that is a component wins.
     for count in range(len(words) - 1, 0, -1):
-        pattern, route = "/".join(words[:count]) or "/", "/".join(words[count:])
+        pattern = "/".join(words[:count]) or "/"
+        route = "/".join(words[count:])
         matching = match_components(pattern, model.components())
         if matching:
             every = [(item, dict(_iterate_numbers(item)).get(route)) for item in matching]
@@ -183,7 +214,14 @@ def list_property_paths(model: Model) -> list[str]:
 
 
 def _iterate_numbers(holder: Object) -> Iterator[tuple[str, tuple[tuple[Step, ...], str]]]:
-    """Yield the name, the steps and the unit of every number below an object, except those of other components."""
+    """Yield every number below an object, except those of other components.
+
+    Args:
+        holder: the object.
+
+    Yields:
+        Name of the number, its steps, and its unit with the schema's notation.
+    """
     for spec in type(holder).field_specs().values():
         kind = spec.kind
         if isinstance(kind, Value) and kind.scalar == "double":

@@ -46,7 +46,15 @@ FORCE_KEYWORDS = {"all": "Force", "actuators": "Actuator", "muscles": "Muscle"}
 
 
 def exclude_forces(model: Model, names: Iterable[str]) -> None:
-    """Switch forces of a model off, as OpenSim's tools do with `forces_to_exclude`; see :func:`find_excluded_forces`."""
+    """Switch forces of a model off, as OpenSim's tools do with `forces_to_exclude`.
+
+    Args:
+        model: the model, which is changed.
+        names: names of forces or of groups, or keywords; see :func:`find_excluded_forces`.
+
+    Raises:
+        SettingError: there is no such force or group.
+    """
     for force in find_excluded_forces(model, names):
         force.appliesForce = False
 
@@ -57,6 +65,10 @@ def find_excluded_forces(model: Model, names: Iterable[str]) -> list[Force]:
     Args:
         model: the model.
         names: names of forces or of groups, or "All", "Actuators" or "Muscles".
+
+    Returns:
+        The forces in the order of the names; a force that several names select occurs several
+        times.
 
     Raises:
         SettingError: there is no such force or group.
@@ -108,13 +120,17 @@ class RecordedMotion(Movement):
     def from_source(
         cls, mechanism: Mechanism, source: MotionSource, times: ArrayLike | None = None
     ) -> RecordedMotion:
-        """Return a motion from a file, from arrays, or from another motion, which may be of another model.
+        """Return a motion from a file, from arrays, or from another motion.
 
         Args:
             mechanism: the mechanism.
-            source: a .mot or .sto file; a motion, such as a fitted one or a trajectory; or arrays
-                (t,) in rad and m by the names or paths of coordinates.
+            source: a .mot or .sto file; a motion, such as a fitted one or a trajectory, which may
+                be of another model; or arrays (t,) in rad and m by the names or paths of
+                coordinates.
             times: times of arrays (t,), s.
+
+        Returns:
+            The motion of this mechanism.
 
         Raises:
             SettingError: times of arrays are missing, or the lengths differ.
@@ -124,7 +140,7 @@ class RecordedMotion(Movement):
             return cls.read(mechanism, source)
         if isinstance(source, Mapping):
             if times is None:
-                raise SettingError("arrays of coordinates have no times of their own; give times")
+                raise SettingError("arrays of coordinates need `times`, one for each row")
             moments = np.asarray(times, dtype=float).reshape(-1)
             columns = [np.asarray(column, dtype=float) for column in source.values()]
             for name, column in zip(source, columns, strict=True):
@@ -146,8 +162,15 @@ class RecordedMotion(Movement):
         """Read a motion from a .mot or .sto file.
 
         A column is named like the coordinate, or like its value in a file of states of any version
-        (``/jointset/knee/ knee_angle/value``, ``knee/knee_angle/value``). If the file is in
+        (``/jointset/knee/knee_angle/value``, ``knee/knee_angle/value``). If the file is in
         degrees, rotational coordinates are converted and coupled ones are not, as in OpenSim.
+
+        Args:
+            mechanism: the mechanism.
+            path: the file.
+
+        Returns:
+            The motion.
 
         Raises:
             DocumentError: the file is not a table, has no rows, its times do not increase, a
@@ -158,10 +181,16 @@ class RecordedMotion(Movement):
 
     @classmethod
     def from_table(cls, mechanism: Mechanism, table: StoTable) -> RecordedMotion:
-        """Return the motion in a table; see :meth:`read`."""
+        """Return the motion in a table; see :meth:`read`.
+
+        Args:
+            mechanism: the mechanism.
+            table: table of coordinates or states.
+        """
         if not len(table.times):
             raise DocumentError("the motion has no rows", file=table.file)
         values = np.tile(mechanism.values({}), (len(table.times), 1))
+        # Of columns with one label, the first counts.
         places = {label: place for place, label in reversed([*enumerate(table.columns)])}
         states = match_state_columns(
             table.columns,
@@ -179,7 +208,9 @@ class RecordedMotion(Movement):
                 states.get(f"{info.path}/value"),
             )
             column = next(
-                (one for one in columns if one is not None and one not in result.values()), None
+                # A column belongs to one coordinate only, even if two coordinates share a name.
+                (one for one in columns if one is not None and one not in result.values()),
+                None,
             )
             if column is not None:
                 result[place] = column
@@ -205,6 +236,7 @@ class RecordedMotion(Movement):
                 f"{join_words(mechanism.coordinate_names)}",
                 file=table.file,
             )
+        # Only then are times compared: a repeated time is an error if the poses differ.
         close = (np.abs(np.diff(values, axis=0)) < SAME_VALUE_TOLERANCE).all(axis=1)
         if len(again := np.flatnonzero((np.diff(table.times) == 0.0) & close)):
             # OpenSim's tools write the last time twice, with values that differ by rounding.
@@ -221,7 +253,9 @@ class RecordedMotion(Movement):
             name = mechanism.coordinates[place].name
             told = f"'{name}' is {values[row, place]} at {table.times[row]:g} s; "
             told += (
-                "fill the gaps" if not np.isfinite(values[row, place]) else "no body goes so far"
+                "fill the gaps"
+                if not np.isfinite(values[row, place])
+                else "no body can be that far away"
             )
             raise DocumentError(told, file=table.file)
         missing = tuple(
@@ -234,7 +268,10 @@ class RecordedMotion(Movement):
 
     @cached_property
     def rates(self) -> tuple[Array, Array]:
-        """First and second derivatives (t, n) of the values, by natural splines of fifth degree through them.
+        """First and second derivatives of the values, by natural splines of fifth degree through them.
+
+        Returns:
+            First derivatives (t, n) per s, and second derivatives (t, n) per s².
 
         Raises:
             SettingError: there are fewer than six times.
@@ -254,6 +291,9 @@ class RecordedMotion(Movement):
                 half the length of the motion each, and a frequency that is too high is reduced, as
                 in OpenSim's tools.
 
+        Returns:
+            The filtered motion.
+
         Raises:
             SettingError: the frequency is not positive, or too high for the times, or there are
                 fewer than six times.
@@ -268,14 +308,21 @@ class RecordedMotion(Movement):
         return replace(self, times=times[own], values=values[own], around=(times, values))
 
     def between(self, first: float, last: float) -> RecordedMotion:
-        """Return the motion from the row at or before `first` (s) to the row at or before `last` (s), at least one row.
+        """Return a part of the motion, at least one row.
+
+        Args:
+            first: the part begins with the row at or before this time, s.
+            last: it ends with the row at or before this time, s.
+
+        Returns:
+            The part, which remembers the rest for its derivatives.
 
         Raises:
             SettingError: `last` is before `first`.
         """
         if not first <= last:
             raise SettingError(
-                f"the times from {first:g} s to {last:g} s are none; give the first time first"
+                f"the first time, {first:g} s, is after the last, {last:g} s; exchange them"
             )
         start, end = (
             max(0, int(np.searchsorted(self.times, time, side="right")) - 1)
@@ -309,10 +356,11 @@ class RecordedMotion(Movement):
         return RecordedMotion(self.mechanism, self.times, poses, self.missing, self.ignored)
 
     def bodies(self) -> StoTable:
-        """Return positions of bodies over time in ground.
+        """Return the positions of all mass centres and the orientations of all bodies.
 
-        These are position (m) and body-fixed X-Y-Z angles (degrees) of each body's mass centre, then
-        the position of the model's mass centre.
+        The columns are those of OpenSim's BodyKinematics analysis in ground: for each body the
+        position (m) of its mass centre and its body-fixed X-Y-Z angles (degrees), then the mass
+        centre of the model (m).
         """
         mechanism = self.mechanism
         columns = [
@@ -331,7 +379,10 @@ class RecordedMotion(Movement):
         return StoTable("Positions", self.times, labels, rows, in_degrees=True)
 
     def markers(self) -> StoTable:
-        """Return the position (m) in ground of every marker."""
+        """Return the positions of all markers.
+
+        The columns are X, Y and Z of each marker in ground, m.
+        """
         mechanism = self.mechanism
         places = {
             path: place
@@ -346,7 +397,7 @@ class RecordedMotion(Movement):
         return StoTable("MarkerPositions", self.times, tuple(columns), rows)
 
     def inverse_dynamics(self, forces: Forces | None = None) -> StoTable:
-        """Return the generalized forces (N, N·m) that the motion requires beyond gravity and the given forces.
+        """Return the generalized forces that the motion requires beyond gravity and the given forces.
 
         Locks and other constraints are ignored, as in OpenSim. The forces belong to the generalized
         speeds: for ball and free joints they are moments about axes of the joint's parent frame.
@@ -356,6 +407,9 @@ class RecordedMotion(Movement):
         Args:
             forces: forces on the mechanism, such as springs, contacts and measured loads; their
                 states have initial values.
+
+        Returns:
+            A column (N or N·m) for each coordinate, in the order of OpenSim's tool.
 
         Raises:
             SimulationError: a force cannot be computed at one of the states, or a result is NaN or
@@ -368,12 +422,15 @@ class RecordedMotion(Movement):
         if mechanism.turning:
             for q, u, udot in zip(self.values, speeds, accelerations, strict=True):
                 u[:] = mechanism.speeds_from_rates(q, u)
+                # With qdot = N(q) u, the derivative is qddot = N udot + Ndot u, and the bias is
+                # Ndot u.
                 udot[:] = mechanism.speeds_from_rates(q, udot - mechanism.rate_bias(q, u))
         states = system.state.pack_rows(self.values, speeds)
         rows = np.empty_like(self.values)
         rows[:, order] = system.compute_required_forces(
             np.column_stack([self.times, states]), accelerations[:, order]
         )
+        # OpenSim's tool lists coordinates in the order of the multibody tree, not of the model.
         order = [place for body in mechanism.bodies for place in body.mobilizer.coordinates]
         infos = [mechanism.coordinates[place] for place in order]
         labels = [

@@ -122,11 +122,13 @@ def _borrow_simulation(
     key = (engine_name(engine), *(getattr(chosen, name) for name in SUMMARY_OPTIONS), chosen.route)
     is_plain = chosen.external_loads is None and not chosen.show
     simulation = tree.cached.pop(key, None) if is_plain else None
+    # A simulation in use is not in the cache, so a second thread prepares its own.
     if simulation is None:
         simulation = Simulation(
             model, engine, **{name: choices[name] for name in choices if name not in RUN_OPTIONS}
         )
     elif chosen.initial or chosen.initial_speeds:
+        # Another start may allow a motion without inertia where the first one did not.
         simulation.reset_inertia_check()
     try:
         yield simulation
@@ -141,6 +143,7 @@ def _borrow_simulation(
     _RECENT_TREES[:] = [known for known in _RECENT_TREES if known() not in (None, tree)] + [
         weakref.ref(tree)
     ]
+    # The list has weak references: the cache must not keep a model alive that its user has dropped.
     if len(_RECENT_TREES) > CACHED_SIMULATIONS:
         longest_ago = _RECENT_TREES.pop(0)()
         if longest_ago is not None:
@@ -159,7 +162,14 @@ SUMMARY_OPTIONS = (
 
 
 def list_constraints(mechanism: Mechanism) -> list[str]:
-    """Return the names of the constraints besides joints and locks, which not every engine supports."""
+    """Return the names of the constraints that not every engine supports.
+
+    Args:
+        mechanism: the mechanism.
+
+    Returns:
+        Names of all constraints except locks, in the order of the mechanism.
+    """
     return [item.name for item in mechanism.constraints if not isinstance(item, Lock)]
 
 
@@ -193,6 +203,7 @@ class Simulation:
         self._snapshot = Snapshot(model.tree())
         self._lock = RLock()
         _require_finite_start(self.mechanism)
+        # Forces need the mechanism; the engine then packs both for the kernels.
         self.forces = force_elements(
             model,
             self.mechanism,
@@ -255,7 +266,7 @@ class Simulation:
         if chosen.resume is not None:
             if initial or chosen.initial_speeds or chosen.equilibrate:
                 raise SettingError(
-                    "a simulation that goes on starts where the other one ended; say no other start"
+                    "a resumed simulation starts where the earlier one ended; leave out initial values, speeds and equilibrate"
                 )
             earlier, before = read_earlier_run(chosen.resume)
             start = float(earlier.times[-1]) if len(earlier.times) else 0.0
@@ -274,11 +285,13 @@ class Simulation:
             if chosen.resume is not None:
                 held.require_same_controller(before, start)
         elif before is not None:
-            raise SettingError("the run that this one goes on from had a controller; give it, too")
+            raise SettingError("the earlier run had a controller; pass the same one to resume it")
+        # A controller has moved `to` onto a control step before the rows are chosen.
         times = report_times(to, chosen.report_interval, start)
         if fixed_step is not None:
             check_fixed_step(fixed_step, to)
         chosen.check_integration()
+        # A warning instead of an error: OpenSim accepts any accuracy below 1.
         if fixed_step is None and chosen.accuracy > LOOSEST_SOUND_ACCURACY:
             warn_caller(
                 f"an accuracy of {chosen.accuracy:g} is so loose that a motion may end far from the model's own; "
@@ -313,6 +326,8 @@ class Simulation:
             given["controller"] = str(chosen.controller)
         if chosen.resume is not None:
             given["resume"] = str(chosen.resume)
+        # The engine sees one constant per control of the controller, which the kernels overwrite at
+        # each control step. The trajectory gets the recorded values instead.
         opened = controls if held is None else held.add_constants(controls)
         self.engine.set_controls(opened)
         y = self.initial_state(initial, initial_speeds, equilibrate=chosen.equilibrate)
@@ -333,8 +348,9 @@ class Simulation:
             # The last time that was reached, so that another run can continue there.
             times, states = [*times, stepper.time], [*states, stepper.state]
         table = None if runs is None else runs.table(times[-1])
+        # One sum instead of a test of each entry: a NaN or an infinity survives addition.
         if not isfinite(sum(states[-1])):
-            raise SimulationError("the motion is not finite any more; ask for more accuracy")
+            raise SimulationError("the motion is no longer finite; use a smaller accuracy value")
         wall = time.perf_counter() - started
         wanted = {
             "to": to,
@@ -354,6 +370,7 @@ class Simulation:
         trajectory = self._make_trajectory(
             times, states, stepper, recorder, wanted, wall, controls, table
         )
+        # An error without a single step has no motion to show.
         if isinstance(stepper.ended, SimulationError):
             stepper.ended.trajectory = trajectory if stepper.taken else None
             raise stepper.ended
@@ -422,7 +439,17 @@ class Simulation:
     def _integrate(
         self, y: list[float], settings: Settings, times: Sequence[float], progress: Progress | None
     ) -> tuple[Recorder, Stepper, Sequence[Any]]:
-        """Integrate from a state; return the recorder, the stepper, and the states at the times (s)."""
+        """Integrate from a state.
+
+        Args:
+            y: initial state (y,).
+            settings: how to step.
+            times: times of the rows, s; the first one is the start.
+            progress: called during the motion.
+
+        Returns:
+            The recorder and the stepper after the motion, and the states (y,) at the times.
+        """
         recorder = Recorder(self.engine)
         stepper = self._make_stepper(times[0], y, settings, recorder.observe_step)
         recorder.start(stepper)
@@ -436,8 +463,19 @@ class Simulation:
 
     @any_numbers
     def _require_inertia(self, y: Sequence[float]) -> None:
-        """Raise SimulationError if the first initial state allows a motion without inertia; all engines give the same error."""
+        """Check that the first initial state allows no motion without inertia.
+
+        All engines give the same error thereby, although Bullet would compute a motion.
+
+        Args:
+            y: initial state (y,).
+
+        Raises:
+            SimulationError: an admissible motion moves no mass.
+        """
         if not self._has_inertia:
+            # The mechanism in Python explains singular mass matrices. It is slow, so it runs for
+            # one state.
             self.mechanism.acceleration(self.state.values(y), self.state.speeds(y))
             self._has_inertia = True
 
@@ -449,7 +487,7 @@ class Simulation:
         *,
         equilibrate: bool = False,
     ) -> list[float]:
-        """Return an initial state (y,) in the engine's order: the given values, and default values for the others.
+        """Return an initial state: the requested values, and default values for the others.
 
         Args:
             initial: values (rad, m) of coordinates by name or path, and any states by their paths
@@ -457,10 +495,14 @@ class Simulation:
             speeds: generalized speeds of coordinates by name or path.
             equilibrate: whether muscle states that `initial` does not name start in equilibrium.
 
+        Returns:
+            The state (y,) in the engine's order. It fulfils the constraints.
+
         Raises:
             ModelError: there is no such coordinate.
-            SimulationError: a coordinate is locked or prescribed, a number is not finite, no pose
-                or speeds fulfil the constraints, or a muscle has no equilibrium.
+            SettingError: a coordinate is set twice, or a number is not finite.
+            SimulationError: a coordinate is locked or prescribed, no pose or speeds fulfil the
+                constraints, or a muscle has no equilibrium.
         """
         own = {path: initial[path] for path in self.state.paths if path in initial}
         q, u, places = resolve_initial_values(
@@ -497,11 +539,29 @@ class Simulation:
         return y
 
     def read_state(self, path: str | Path, time: float | None = None) -> dict[str, float]:
-        """Return a state of a file such as ``states.sto`` in the form of `initial`; see :func:`initial_state.read_state`."""
+        """Return a state of a file such as ``states.sto`` in the form of `initial`.
+
+        Args:
+            path: file with a table of states.
+            time: time of the state, s; the nearest row is used. The last row if None.
+
+        Returns:
+            Values in SI units (rad, m) by path.
+
+        Raises:
+            DocumentError: the file is not a table of states of this model.
+        """
         return read_state(path, self.mechanism, self.paths, time)
 
     def get_last_state(self, table: StoTable) -> dict[str, float]:
-        """Return the last state of a table in SI units, in the form of `initial`."""
+        """Return the last state of a table, in the form of `initial`.
+
+        Args:
+            table: table of states.
+
+        Returns:
+            Values in SI units (rad, m) by path.
+        """
         return extract_state(table, self.mechanism, self.paths)
 
     def _make_trajectory(
@@ -515,7 +575,8 @@ class Simulation:
         controls: Controls,
         controller: StoTable | None,
     ) -> Trajectory:
-        def asked(what: Callable[[Engine], Any]) -> Any:
+        # Reports are computed when they are first read, which may be after the next run.
+        def evaluate_with_controls(what: Callable[[Engine], Any]) -> Any:
             """Evaluate a function of the engine with the controls of this run; later runs may have set others."""
             with self._lock:
                 self.engine.set_controls(controls)
@@ -536,9 +597,13 @@ class Simulation:
             }
 
         report = Report(
-            lambda: asked(lambda engine: (engine.columns, engine.force_table(times, states))),
-            lambda: asked(lambda engine: list(map(engine.compute_energies, times, states))),
-            lambda: asked(
+            lambda: evaluate_with_controls(
+                lambda engine: (engine.columns, engine.force_table(times, states))
+            ),
+            lambda: evaluate_with_controls(
+                lambda engine: list(map(engine.compute_energies, times, states))
+            ),
+            lambda: evaluate_with_controls(
                 lambda engine: (
                     list_probe_labels(engine.probes),
                     list(
@@ -548,7 +613,7 @@ class Simulation:
                     ),
                 )
             ),
-            lambda: asked(summary),
+            lambda: evaluate_with_controls(summary),
         )
         values, speeds = self.state.extract_histories(states)
         auxiliary = self.state.extract_auxiliary(states)
@@ -567,7 +632,11 @@ class Simulation:
 
 @any_numbers
 def _require_finite_start(mechanism: Mechanism) -> None:
-    """Raise SimulationError if default values, default speeds or the mass matrix are not finite numbers."""
+    """Check that default values, default speeds and the mass matrix are finite numbers.
+
+    Raises:
+        SimulationError: one of them is not.
+    """
     for what in ("value", "speed"):
         for info in mechanism.coordinates:
             number = getattr(info, f"default_{what}")

@@ -74,10 +74,11 @@ def add_controls(
         what: what is added, for messages.
 
     Returns:
-        The combined controls.
+        The combined controls; as in OpenSim, those of several controllers of an actuator are
+        summed.
 
     Raises:
-        OsimliteError: an actuator does not exist or is given twice, or a file cannot be read.
+        OsimliteError: an actuator does not exist or is set twice, or a file cannot be read.
         SettingError: a control is not a number, or times do not increase.
         SimulationError: a TableSource of the model ends before the motion.
     """
@@ -115,7 +116,14 @@ def add_controls(
 
 
 def describe_controls(given: Mapping[str, Any] | StoTable | str | Path) -> Any:
-    """Return controls for a summary: the name of a file, or numbers and descriptions by actuator."""
+    """Return controls in the form of a summary.
+
+    Args:
+        given: controls as in :func:`add_controls`.
+
+    Returns:
+        The name of a file, "a table", or numbers and descriptions by actuator.
+    """
     if not isinstance(given, Mapping):
         return "a table" if isinstance(given, StoTable) else str(given)
     kinds = {
@@ -166,7 +174,7 @@ def require_table_span(controls: Controls, start: float, to: float) -> None:
         if isinstance(column, TableColumn) and not column.x[0] <= start < to <= column.x[-1]:
             raise SimulationError(
                 f"the table of '{column.source}' goes from {column.x[0]:g} to {column.x[-1]:g} s, and the motion from "
-                f"{start:g} to {to:g} s; outside of it OpenSim stops"
+                f"{start:g} to {to:g} s; OpenSim stops outside of the table, so extend it"
             )
 
 
@@ -187,7 +195,15 @@ def _map_by_name(given: Mapping[str, Any] | StoTable | str | Path) -> Mapping[st
 
 
 def _make_function(name: str, value: Any) -> Function:
-    """Return the control of an actuator as a function of time."""
+    """Return the control of an actuator as a function of time.
+
+    Args:
+        name: name of the actuator, for messages.
+        value: a number, a function of osimlite or OpenSim, or a Python function.
+
+    Raises:
+        SettingError: the value is of another type, or not finite.
+    """
     if isinstance(value, Function):
         return value
     if isinstance(value, Object):
@@ -206,22 +222,46 @@ def _make_function(name: str, value: Any) -> Function:
 
 
 def _interpolate(name: str, times: Any, values: Any) -> tuple[Function, float, float]:
-    """Return the linear interpolation of values at times, and the first and last time."""
-    x, y = np.asarray(times, dtype=float), np.asarray(values, dtype=float)
+    """Return the linear interpolation of values at times.
+
+    Args:
+        name: name of the actuator, for messages.
+        times: increasing times (k,), s.
+        values: controls (k,).
+
+    Returns:
+        The function of time, and the first and last time (s).
+
+    Raises:
+        SettingError: the lengths differ, a number is not finite, or times do not increase.
+    """
+    x = np.asarray(times, dtype=float)
+    y = np.asarray(values, dtype=float)
     if x.ndim != 1 or x.shape != y.shape or not len(x):
         raise SettingError(
             f"the control of '{name}' has {x.size} times and {y.size} values; give as many of both"
         )
     if not (np.isfinite(x).all() and np.isfinite(y).all() and (np.diff(x) > 0.0).all()):
         raise SettingError(
-            f"the control of '{name}' has times that do not increase, or what is no number; mend it"
+            f"the control of '{name}' has times that do not increase, or a value that is not a finite number; correct it"
         )
+    # A smoothing spline of degree 1 without smoothing is the polyline through the values.
     line = Constant(float(y[0])) if len(x) == 1 else smoothing_spline(x, y, 1, 0.0)
     return line, float(x[0]), float(x[-1])
 
 
 def find_constant_offsets(engine: Any, driven: Controls) -> Ints:
-    """Return the offsets of the last function of each control, a constant, in the numbers of a model."""
+    """Return where the last function of each control is in the numbers of a model.
+
+    That function must be a constant, whose only number is its value.
+
+    Args:
+        engine: engine whose controls are `driven`.
+        driven: controls of the model.
+
+    Returns:
+        Offset of each constant in `engine.numbers` (c,).
+    """
     own, numbers, _ = driven.make_record()
     tables = [*own[1 + len(driven.names) :], len(numbers)]
     last = [own[1 + k] for k in range(len(driven.names))]

@@ -20,7 +20,13 @@ EVENT_TIME_TOLERANCE_S = 1e-9
 
 
 class ContactEvent(NamedTuple):
-    """Begin or end of a contact at a time (s)."""
+    """Begin or end of a contact.
+
+    Attributes:
+        time: time of the event, s.
+        contact: name of the contact.
+        begins: whether the contact begins; else it ends.
+    """
 
     time: float
     contact: str
@@ -28,7 +34,15 @@ class ContactEvent(NamedTuple):
 
 
 class _Change(NamedTuple):
-    """A step within which contacts began or ended."""
+    """Step within which contacts began or ended.
+
+    Attributes:
+        start: start of the step, s.
+        end: end of the step, s.
+        state: interpolation of the state within the step.
+        before: one bit for each contact that touched at the start.
+        after: one bit for each contact that touches at the end.
+    """
 
     start: float
     end: float
@@ -43,6 +57,9 @@ class Recorder:
     A contact touches while it exerts a force. Contacts that begin and end within one step are
     missed. The largest force of a contact is taken from the ends of the steps and the start of the
     motion.
+
+    Args:
+        engine: engine that computes the motion; its `loads` belong to the step that is observed.
     """
 
     def __init__(self, engine: Engine) -> None:
@@ -67,10 +84,16 @@ class Recorder:
         self._note_forces(stepper.time)
 
     def observe_step(self, t: float, y: list[float]) -> None:
-        """Record an accepted step."""
+        """Record an accepted step.
+
+        Args:
+            t: time at its end, s.
+            y: state at its end.
+        """
         touching = self._loads[-1]
         if touching != self._touching:
             assert self._stepper is not None
+            # The interpolant is stored; events are located when the summary is read.
             change = _Change(
                 self._last, t, self._stepper.make_interpolant(), self._touching, touching
             )
@@ -116,6 +139,7 @@ class Recorder:
         for number in self._get_set_bits(change.before ^ change.after):
             bit = 1 << number
             low, high = change.start, change.end
+            # Bisection, since the force of a contact is not smooth where it begins.
             while high - low > EVENT_TIME_TOLERANCE_S:
                 middle = 0.5 * (low + high)
                 if (
@@ -144,6 +168,7 @@ class Recorder:
 
     def _get_set_bits(self, bits: int) -> tuple[int, ...]:
         """Return the indices of the bits that are set."""
+        # Feet touch in few combinations, so the indices of each are cached.
         known = self._numbers.get(bits)
         if known is None:
             known = tuple(number for number in range(bits.bit_length()) if bits >> number & 1)
@@ -163,7 +188,10 @@ EXTREME_RULES: dict[str, tuple[float, Callable[[float, float], bool]]] = {
 class Extreme:
     """Smallest or largest value so far, with its sign.
 
-    Without integration (a prescribed motion) OpenSim starts at 0.
+    Args:
+        operation: a key of `EXTREME_RULES`.
+        is_known: whether the search starts at 0, as in OpenSim for a prescribed motion, which is
+            not integrated.
     """
 
     def __init__(self, operation: str, *, is_known: bool = False) -> None:
@@ -172,17 +200,37 @@ class Extreme:
             self._extreme = 0.0
 
     def evaluate(self, t: float, value: float) -> float:
-        """Return the extreme at a time (s)."""
+        """Return the extreme at a time.
+
+        Args:
+            t: time, s.
+            value: present value.
+        """
         return value if self._is_new(value, self._extreme) else self._extreme
 
     def accept(self, t: float, value: float) -> None:
-        """Record the value at the end of a step."""
+        """Record the value at the end of a step.
+
+        Args:
+            t: time, s.
+            value: value there.
+        """
         self._extreme = self.evaluate(t, value)
 
 
 @dataclass
 class Rate:
-    """Rate of change since the last step: of first order in the first step, of second order in later ones."""
+    """Rate of change since the last step, as Simbody's Measure::Differentiate computes it.
+
+    The first step gives the slope of a line, of first order. Later steps give the slope at the end
+    of the parabola through both values with the earlier rate at its start, of second order.
+
+    Attributes:
+        time: time of the last accepted value, s; minus infinity before the first.
+        value: the value there.
+        rate: the rate there.
+        is_good: whether `rate` is one of a step.
+    """
 
     time: float = -inf
     value: float = 0.0
@@ -190,15 +238,27 @@ class Rate:
     is_good: bool = False
 
     def evaluate(self, t: float, value: float) -> float:
-        """Return the rate at a time (s)."""
+        """Return the rate at a time.
+
+        Args:
+            t: time, s.
+            value: value there.
+        """
         if t == self.time or self.time == -inf:
             return self.rate
         line = (value - self.value) / (t - self.time)
+        # The mean slope of a parabola is the mean of the slopes at its ends.
         return 2.0 * line - self.rate if self.is_good else line
 
     def accept(self, t: float, value: float) -> None:
-        """Record the value at the end of a step."""
-        rate, self.is_good = self.evaluate(t, value), self.time != -inf
+        """Record the value at the end of a step.
+
+        Args:
+            t: time, s.
+            value: value there.
+        """
+        rate = self.evaluate(t, value)
+        self.is_good = self.time != -inf
         self.time, self.value, self.rate = t, value, rate
 
 
@@ -234,6 +294,7 @@ def compute_probe_rows(
         [memory_of(probe.operation) for _ in probe.reading.labels] if need_steps([probe]) else []
         for probe in engine.probes
     ]
+    # Steps and rows are merged in order of time; `pop` takes the earliest from the end.
     waiting = list(reversed(steps)) if need_steps(engine.probes) else []
     for t, y in moments:
         while waiting and waiting[-1][0] <= t:

@@ -26,7 +26,7 @@ Start = float | Callable[[Sequence[float], Sequence[float]], float]
 
 @dataclass(frozen=True)
 class StateVariable:
-    """An auxiliary state of a force element."""
+    """Auxiliary state of a force element, such as an activation."""
 
     path: str  # path in OpenSim
     start: Start = 0.0  # initial value
@@ -39,12 +39,20 @@ def sort_by_component(model: Model, paths: Sequence[str]) -> list[str]:
     """Sort paths of states by their components, in OpenSim's order.
 
     States of one component keep their order, and so do the coordinates of one joint.
+
+    Args:
+        model: the model.
+        paths: paths of states, such as ``/jointset/knee/flexion/value``.
+
+    Returns:
+        The sorted paths; unknown components come last.
     """
     components = model.tree().by_path
     rank = {path: number for number, path in enumerate(components)}
 
     def place(path: str) -> int:
         owner = path.rpartition("/")[0]
+        # OpenSim lists a joint's coordinates where the joint is.
         if isinstance(components.get(owner), Coordinate):
             owner = owner.rpartition("/")[0]
         return rank.get(owner, len(rank))
@@ -76,6 +84,7 @@ class StateLayout:
         self.mechanism = mechanism
         self.order = tuple(order)
         result = [variable for element in elements for variable in element.states]
+        # sorted() is stable: within both groups the order of the forces stays.
         self.variables = tuple(sorted(result, key=attrgetter("is_simbody")))
         self.size = 2 * len(self.order) + len(self.variables)
         self._still = [info.default_value for info in mechanism.coordinates]
@@ -99,7 +108,14 @@ class StateLayout:
 
     # ------------------------------------------------------------------------------------------ whole states
     def require_length(self, y: Sequence[float]) -> None:
-        """Raise an OsimliteError if a state has another length."""
+        """Check the length of a state.
+
+        Args:
+            y: the state.
+
+        Raises:
+            OsimliteError: the length differs from `size`.
+        """
         if len(y) != self.size:
             raise self.make_length_error(len(y))
 
@@ -111,8 +127,11 @@ class StateLayout:
             f"a state of '{self.mechanism.name}' has {self.size} numbers ({parts}), not {count}"
         )
 
-    def as_table(self, states: ArrayLike) -> Array:
+    def to_table(self, states: ArrayLike) -> Array:
         """Return a copy of states as a contiguous array (k, y).
+
+        Args:
+            states: k states in the order of this layout.
 
         Raises:
             OsimliteError: the states are not rows of this layout.
@@ -140,6 +159,12 @@ class StateLayout:
             q: values (n,) in the order of the mechanism.
             u: generalized speeds (n,) in the order of the mechanism.
             z: auxiliary states; by default their initial values.
+
+        Returns:
+            The state (y,).
+
+        Raises:
+            OsimliteError: there are more or fewer auxiliary states.
         """
         y = [float(row[place]) for row in (q, u) for place in self.order]
         y += self._compute_starts(y) if z is None else map(float, z)
@@ -147,12 +172,20 @@ class StateLayout:
         return y
 
     def restart_auxiliary(self, states: Array) -> Array:
-        """Return states (k, y) with the auxiliary states at their initial values for the values and speeds there."""
+        """Return states in which the auxiliary states have their initial values.
+
+        Args:
+            states: states (k, y); their values and speeds are used.
+
+        Returns:
+            New states (k, y).
+        """
         if not self.variables:
             return states.copy()
         result = np.empty((len(states), self.size))
         first = 2 * len(self.order)
         result[:, :first] = states[:, :first]
+        # Initial values that depend on the pose are rare and are computed row by row.
         if any(callable(item.start) for item in self.variables):
             starts = [self._compute_starts(y) for y in states.tolist()]
             result[:, first:] = np.reshape(starts, (len(states), len(self.variables)))
@@ -170,7 +203,12 @@ class StateLayout:
 
     # ------------------------------------------------------------------------------------------------ parts
     def spread_to_all(self, values: Sequence[float], still: Sequence[float]) -> list[float]:
-        """Return numbers of all coordinates: those of the state's coordinates from `values`, the rest from `still`."""
+        """Return numbers of all coordinates in the mechanism's order.
+
+        Args:
+            values: numbers of the coordinates in the state.
+            still: numbers (n,) of all coordinates, used for those that are not in the state.
+        """
         row = list(still)
         for place, value in zip(self.order, values, strict=True):
             row[place] = value
@@ -186,26 +224,32 @@ class StateLayout:
         return self.spread_to_all(y[count : 2 * count], [0.0] * len(self._still))
 
     def auxiliary(self, y: Sequence[float]) -> Sequence[float]:
-        """Return the auxiliary states."""
+        """Return the auxiliary states, the last part of a state (y,)."""
         return y[2 * len(self.order) :]
 
     def extract_histories(self, states: Sequence[Sequence[float]]) -> tuple[Array, Array]:
-        """Return the coordinates at k states.
+        """Return the values and speeds of all coordinates at k states.
+
+        Args:
+            states: states (k, y).
 
         Returns:
             Values (k, n) and generalized speeds (k, n) of all coordinates.
         """
-        rows, count = np.array(states, dtype=float).reshape(len(states), self.size), len(self.order)
-        values, speeds = (
-            np.empty((len(states), len(self._still))),
-            np.zeros((len(states), len(self._still))),
-        )
+        rows = np.array(states, dtype=float).reshape(len(states), self.size)
+        count = len(self.order)
+        values = np.empty((len(states), len(self._still)))
+        speeds = np.zeros((len(states), len(self._still)))
+        # Locked coordinates rest at their default values, and their speeds at 0.
         values[:] = self._still
         values[:, self.order], speeds[:, self.order] = rows[:, :count], rows[:, count : 2 * count]
         return values, speeds
 
     def extract_auxiliary(self, states: ArrayLike) -> dict[str, Array]:
         """Return the auxiliary states at k states.
+
+        Args:
+            states: states (k, y).
 
         Returns:
             Columns (k,) by the paths of the states.
@@ -215,13 +259,16 @@ class StateLayout:
     def pack_rows(
         self, values: Array, speeds: Array, auxiliary: Mapping[str, Array] | None = None
     ) -> Array:
-        """Pack histories into states (k, y), the inverse of `extract_histories`.
+        """Pack histories into states, the inverse of `extract_histories`.
 
         Args:
             values: values of all coordinates (k, n).
             speeds: generalized speeds (k, n).
             auxiliary: columns (k,) by path; by default the initial values for these values and
                 speeds.
+
+        Returns:
+            States (k, y).
         """
         places = list(self.order)
         moving = np.column_stack([values[:, places], speeds[:, places]])

@@ -57,11 +57,14 @@ FORCES_TITLE = "ModelForces"
 
 
 def make_ideal_actuator(actuator: ScalarActuator, optimal_force: float) -> ScalarActuator | None:
-    """Return an actuator whose force is its control times a constant, in place of another one; None for an unsupported class.
+    """Return an actuator whose force is its control times a constant, in place of another one.
 
     Args:
         actuator: the actuator to replace.
         optimal_force: the constant, N or N m.
+
+    Returns:
+        The replacement; None for an unsupported class.
     """
     if isinstance(actuator, PathActuator):
         path = actuator.geometry_path.copy_deep()
@@ -80,17 +83,26 @@ def make_ideal_actuator(actuator: ScalarActuator, optimal_force: float) -> Scala
 
 @dataclass(frozen=True, eq=False)
 class SharedForces:
-    """Distribution of the generalized forces of a motion over the actuators."""
+    """Distribution of the generalized forces of a motion over the actuators.
 
-    times: Array  # (t,), s
-    names: tuple[str, ...]  # names of the actuators (a,)
-    activations: Array  # activations (t, a); NaN at times without a solution
-    strengths: Array  # force of each actuator at an activation of 1 (t, a), N or N m
-    coordinates: tuple[str, ...]  # names of the coordinates to accelerate (m,)
-    # generalized forces (t, m) that the actuators cannot supply, N or N m; the smallest possible
-    # ones at times without a solution
+    Attributes:
+        times: times (t,), s.
+        names: names of the actuators (a,).
+        activations: activations (t, a); NaN at times without a solution.
+        strengths: force of each actuator at an activation of 1 (t, a), N or N m.
+        coordinates: names of the coordinates to accelerate (m,).
+        lacking: generalized forces (t, m) that the actuators cannot supply, N or N m; the smallest
+            possible ones at times without a solution.
+        solved: whether each time has a solution (t,).
+    """
+
+    times: Array
+    names: tuple[str, ...]
+    activations: Array
+    strengths: Array
+    coordinates: tuple[str, ...]
     lacking: Array
-    solved: NDArray[np.bool_]  # whether each time has a solution (t,)
+    solved: NDArray[np.bool_]
 
     @property
     def forces(self) -> Array:
@@ -102,7 +114,15 @@ class SharedForces:
         return StoTable(TITLE, self.times, self.names, self.activations)
 
     def describe_lack(self, row: int) -> str:
-        """Describe what is missing at a time without a solution, the largest first."""
+        """Describe which coordinates lack force at a time without a solution.
+
+        Args:
+            row: index of the time.
+
+        Returns:
+            Generalized forces by coordinate, the largest first; those below a tenth of it are left
+            out.
+        """
         sizes = np.abs(self.lacking[row])
         worst = [place for place in np.argsort(-sizes) if sizes[place] > 0.1 * sizes.max()]
         return join_words(
@@ -110,7 +130,11 @@ class SharedForces:
         )
 
     def describe_unsolved(self) -> str:
-        """Describe the times without a solution and the coordinates that lack force; empty if there are none."""
+        """Describe the times without a solution and the coordinates that lack force.
+
+        Returns:
+            A phrase for a message; empty if every time has a solution.
+        """
         failed = np.flatnonzero(~self.solved)
         if not len(failed):
             return ""
@@ -155,14 +179,15 @@ class StaticOptimization:
     ) -> None:
         if not 1.0 < exponent < np.inf:
             raise SettingError(
-                f"an exponent of {exponent:g} has not one answer; give a number above 1, such as 2"
+                f"an exponent of {exponent:g} does not determine the activations; set a number above 1, such as 2"
             )
         if muscles not in MUSCLES:
             raise SettingError(
-                f"muscles pull with no '{muscles}' force{suggest_or_list(muscles, MUSCLES)}"
+                f"unknown muscle force '{muscles}'{suggest_or_list(muscles, MUSCLES)}"
             )
         self.mechanism, self._exponent = mechanism, exponent
         model = model.copy_deep()
+        # Controls are what is searched for.
         model.controller_set.objects.clear()
         # Probes are not reported here, and those of muscles would refer to muscles that are
         # replaced below.
@@ -179,6 +204,8 @@ class StaticOptimization:
             folder=folder,
             rigid_tendons=True,
         )
+        # Coordinates that constraints determine need no balance of their own: their forces act on
+        # the free ones by `ways`.
         dependent = {item.dependent for item in mechanism.constraints if isinstance(item, Coupler)}
         self._free = [
             place
@@ -188,6 +215,7 @@ class StaticOptimization:
         ]
         self.names = tuple(item.name for item in self._actuators)
         self.coordinates = tuple(mechanism.coordinates[place].name for place in self._free)
+        # Fewer unknowns than equations have no solution but by chance.
         if len(self.names) < len(self.coordinates):
             raise ModelError(
                 f"'{model.name}' has {len(self.names)} actuators for {len(self.coordinates)} coordinates; append "
@@ -213,7 +241,7 @@ class StaticOptimization:
     def solve_motion(
         self, times: Array, values: Array, speeds: Array, accelerations: Array
     ) -> SharedForces:
-        """Distribute what a motion requires over the actuators.
+        """Distribute the generalized forces of a motion over the actuators.
 
         Args:
             times: times (t,), s.
@@ -221,8 +249,12 @@ class StaticOptimization:
             speeds: generalized speeds (t, n).
             accelerations: their derivatives (t, n); those of constrained coordinates are ignored.
 
+        Returns:
+            The distribution, with what is missing at times without a solution.
+
         Raises:
             SimulationError: the forces cannot be computed at one of the states.
+            UnsupportedError: constrained coordinates can move while all others rest.
         """
         allowed, ways = self._project_accelerations(times, values, speeds, accelerations)
         needed, pushes, strengths = self._compute_requirements(times, values, speeds, allowed, ways)
@@ -241,7 +273,17 @@ class StaticOptimization:
     def _compute_requirements(
         self, times: Array, values: Array, speeds: Array, accelerations: Array, ways: Array
     ) -> tuple[Array, Array, Array]:
-        """Compute the linear equations of the distribution, along the directions `ways` (t, n, m) of the free coordinates.
+        """Compute the linear equations of the distribution.
+
+        Generalized forces f on all coordinates count along the directions D of the free ones, as Dᵀ
+        f: the forces of constraints do not appear, because they do no work along these.
+
+        Args:
+            times: times (t,), s.
+            values: values of all coordinates (t, n).
+            speeds: generalized speeds (t, n).
+            accelerations: their derivatives (t, n), which the constraints allow.
+            ways: motion D of all coordinates with each free one (t, n, m).
 
         Returns:
             Required generalized forces (t, m), contributions of each actuator at a control of 1 (t,
@@ -272,7 +314,16 @@ class StaticOptimization:
         )
 
     def compute_strengths(self, times: Array, values: Array, speeds: Array) -> Array:
-        """Return the force of each actuator at a control of 1 in one pose (a,), N or N m."""
+        """Return the force of each actuator at a control of 1 in one pose.
+
+        Args:
+            times: time (1,), s.
+            values: values of all coordinates (1, n).
+            speeds: generalized speeds (1, n).
+
+        Returns:
+            Forces (a,), N or N m.
+        """
         moments = np.column_stack([times, self._system.state.pack_rows(values, speeds)])
         at_rest = np.zeros((len(times), len(self._system.order)))
         _, _, strengths = self._system.compute_unit_forces(moments, at_rest, self._paths)
@@ -281,9 +332,20 @@ class StaticOptimization:
     def balance_accelerations(
         self, times: Array, values: Array, speeds: Array, accelerations: Array
     ) -> Array:
-        """Return forces (t, a) that give accelerations (t, n) with the least squares of controls, without bounds."""
+        """Return the forces that give accelerations with the least squares of controls, without bounds.
+
+        Args:
+            times: times (t,), s.
+            values: values of all coordinates (t, n).
+            speeds: generalized speeds (t, n).
+            accelerations: their derivatives (t, n).
+
+        Returns:
+            Forces (t, a), N or N m.
+        """
         allowed, ways = self._project_accelerations(times, values, speeds, accelerations)
         needed, pushes, _ = self._compute_requirements(times, values, speeds, allowed, ways)
+        # The pseudoinverse gives the solution with the least sum of squares, without bounds.
         shared = np.linalg.pinv(pushes.transpose(0, 2, 1)) @ needed[:, :, None]
         result: Array = shared[..., 0] * self.optimal_forces
         return result
@@ -291,7 +353,15 @@ class StaticOptimization:
     def compute_balance(
         self, times: Array, values: Array, speeds: Array, accelerations: Array
     ) -> tuple[Array, Array, Array]:
-        """Compute the force balance of a motion for the f coordinates that can move, ignoring whether the constraints allow it.
+        """Compute the force balance of a motion for the f coordinates that can move.
+
+        Whether the constraints allow the accelerations is not checked.
+
+        Args:
+            times: times (t,), s.
+            values: values of all coordinates (t, n).
+            speeds: generalized speeds (t, n).
+            accelerations: their derivatives (t, n).
 
         Returns:
             Required generalized forces (t, f), contributions of each actuator per 1 N (t, f, a),
@@ -323,7 +393,12 @@ class StaticOptimization:
     def compute_path_lengths(
         self, times: Array, values: Array, speeds: Array
     ) -> tuple[Array, Array]:
-        """Compute the paths of the muscles.
+        """Compute the lengths and speeds of the muscles' paths.
+
+        Args:
+            times: times (t,), s.
+            values: values of all coordinates (t, n).
+            speeds: generalized speeds (t, n).
 
         Returns:
             Lengths (m) and lengthening speeds (m/s), (t, a) each; 1 and 0 for other actuators.
@@ -341,6 +416,11 @@ class StaticOptimization:
         self, times: Array, values: Array, speeds: Array
     ) -> tuple[Array, Array, Array]:
         """Compute the accelerations of all coordinates in one pose as a linear function of forces.
+
+        Args:
+            times: time (1,), s.
+            values: values of all coordinates (1, n).
+            speeds: generalized speeds (1, n).
 
         Returns:
             Accelerations without actuators (n,), by a force of 1 of each actuator (n, a), and by a
@@ -369,14 +449,20 @@ class StaticOptimization:
     def _project_accelerations(
         self, times: Array, values: Array, speeds: Array, wanted: Array
     ) -> tuple[Array, Array]:
-        """Return admissible accelerations and the motion of all coordinates with the free ones.
+        """Return the accelerations that the constraints allow, and the directions of motion.
 
-        Where the constraints do not allow the given accelerations of free coordinates, the nearest
-        ones are used.
+        With the constraints G udot = b, the coordinates are split into free ones (f) and held ones
+        (h): udot_h = G_h⁺ (b - G_f udot_f). Where the constraints do not allow the given
+        accelerations of free coordinates, the nearest ones are used.
+
+        Args:
+            times: times (t,), s.
+            values: values of all coordinates (t, n).
+            speeds: generalized speeds (t, n).
+            wanted: requested accelerations (t, n); those of the free coordinates are used.
 
         Returns:
-            The accelerations (t, n) that the constraints allow, and the motion of all coordinates
-            with each free one (t, n, m).
+            Accelerations (t, n), and the motion of all coordinates with each free one (t, n, m).
         """
         size, free = len(self.mechanism.coordinates), self._free
         ways = np.zeros((len(times), size, len(free)))
@@ -391,20 +477,36 @@ class StaticOptimization:
         equations = np.concatenate([bound, unmoved], axis=1)
         targets = np.hstack([drifts, np.zeros((len(times), len(still)))])
         held = [place for place in range(size) if place not in free]
+        # Redundant equations (closed loops) have no inverse.
         inverse = np.linalg.pinv(equations[:, :, held])
+        # From G_held u_held + G_free u_free = 0: how the held coordinates follow each free one.
         ways[:, held] = -inverse @ equations[:, :, free]
         left_over = targets[..., None] - equations[:, :, free] @ wanted[:, free, None]
         udot[:, held] = (inverse @ left_over)[..., 0]
         left = np.abs(equations @ ways).max(axis=(1, 2), initial=0.0) > RATE_TOLERANCE
         is_fixed = np.linalg.matrix_rank(equations[:, :, held]) == len(held)
+        # Frames in which the split does not work are rare (kinematic loops, singular poses) and are
+        # solved singly.
         for row in np.flatnonzero(left | ~is_fixed):
             udot[row], ways[row] = self._project_one(equations[row], targets[row], wanted[row])
         return udot, ways
 
     def _compute_equations(self, times: Array, values: Array, speeds: Array) -> tuple[Array, Array]:
-        """Return the constraint equations: rows G (t, c, n), and the required values of G times the accelerations (t, c)."""
-        system, size = System(self.mechanism, Forces(())), values.shape[1]
-        order, head = list(system.order), int(system.structure[MODEL.CONSTRAINED])
+        """Return the constraint equations at the level of accelerations.
+
+        Args:
+            times: times (t,), s.
+            values: values of all coordinates (t, n).
+            speeds: generalized speeds (t, n).
+
+        Returns:
+            Rows G (t, c, n), and the required values b of G udot (t, c).
+        """
+        # Without forces, which the equations do not need.
+        system = System(self.mechanism, Forces(()))
+        size = values.shape[1]
+        order = list(system.order)
+        head = int(system.structure[MODEL.CONSTRAINED])
         count = self.equation_count
         equations = np.zeros((len(times), count, size))
         if not count:
@@ -420,9 +522,25 @@ class StaticOptimization:
         return equations, looked[:, -count:]
 
     def _project_one(self, equations: Array, targets: Array, wanted: Array) -> tuple[Array, Array]:
-        """Do the same at one time at which the constrained coordinates do not follow from the free ones alone."""
+        """Project the accelerations at one time onto the constraints by a singular value decomposition.
+
+        It is for times at which the constrained coordinates do not follow from the free ones alone.
+
+        Args:
+            equations: rows G (c, n).
+            targets: required values of G udot (c,).
+            wanted: requested accelerations (n,).
+
+        Returns:
+            Accelerations (n,), and the motion of all coordinates with each free one (n, m).
+
+        Raises:
+            UnsupportedError: some coordinates can move while all free ones rest.
+        """
         _, sizes, turned = np.linalg.svd(equations)
+        # Singular values are sorted, the largest first.
         rank = int(np.sum(sizes > RATE_TOLERANCE * sizes[0])) if len(sizes) else 0
+        # The null space of G: all motions that the constraints allow.
         directions = turned[rank:].T
         free = directions[self._free]
         if np.linalg.matrix_rank(free) < directions.shape[1]:
@@ -432,18 +550,29 @@ class StaticOptimization:
                 if index not in self._free
             ]
             raise UnsupportedError(
-                f"{join_words(names)} can move apart from all coordinates that are to be accelerated"
+                f"{join_words(names)} can move while all other coordinates rest; lock or couple them"
             )
+        # A particular solution of G udot = target, to which motions of the null space are added.
         start = np.linalg.pinv(equations) @ targets
         back = np.linalg.pinv(free)
         return start + directions @ (back @ (wanted - start)[self._free]), directions @ back
 
     def report_forces(self, shared: SharedForces, values: Array, speeds: Array) -> StoTable:
-        """Return the force records with these actuator forces: the columns of OpenSim's ForceReporter."""
+        """Return the force records with the distributed actuator forces.
+
+        Args:
+            shared: the distribution.
+            values: values of all coordinates (t, n).
+            speeds: generalized speeds (t, n).
+
+        Returns:
+            The columns of OpenSim's ForceReporter, SI units.
+        """
         elements, system = self._forces.elements, self._system
         labels = [label for item in elements for label in item.columns]
         owners = [item.path for item in elements for _ in item.columns]
         rows = np.zeros((len(shared.times), len(labels)))
+        # Other forces than actuators, such as contacts, are computed from the states.
         if not {*owners} <= {*self._paths}:
             rows[:] = system.force_table(shared.times, system.state.pack_rows(values, speeds))
         places = {path: k for k, path in enumerate(self._paths)}
@@ -453,7 +582,14 @@ class StaticOptimization:
 
 
 def find_column_basis(columns: Array) -> Array:
-    """Return an orthonormal basis (n, r) of the space that columns (n, m) span."""
+    """Return an orthonormal basis of the space that columns span.
+
+    Args:
+        columns: columns (n, m).
+
+    Returns:
+        Basis (n, r), r being the rank.
+    """
     basis, sizes, _ = np.linalg.svd(columns, full_matrices=False)
     result: Array = basis[:, sizes > RATE_TOLERANCE * sizes.max(initial=0.0)]
     return result
@@ -487,7 +623,20 @@ def minimize_effort(
 
 
 def _replace_by_ideal_actuators(model: Model, physiology: bool) -> list[ScalarActuator]:
-    """Replace all actuators but muscles with fibers by ideal ones; return the actuators that act."""
+    """Replace all actuators but muscles with fibers by ideal ones.
+
+    Args:
+        model: the model, which is changed.
+        physiology: whether muscles keep their fibers; else they become ideal actuators, too.
+
+    Returns:
+        The actuators that act, in the order of the model.
+
+    Raises:
+        UnsupportedError: the force of an actuator is not proportional to its control.
+        ModelError: there are no actuators.
+    """
+    # By identity, as forces may share a name.
     places = {id(force): number for number, force in enumerate(model.force_set.objects)}
     result: list[ScalarActuator] = []
     for item in list(model.components(Actuator)):
@@ -505,8 +654,9 @@ def _replace_by_ideal_actuators(model: Model, physiology: bool) -> list[ScalarAc
             )
             other = make_ideal_actuator(item, force)
             if other is None or id(item) not in places:
-                message = f"'{item.name}' ({type(item).__name__}) does not push in proportion to its control"
+                message = f"'{item.name}' ({type(item).__name__}) has a force that is not proportional to its control"
                 raise UnsupportedError(f"{message}; set its appliesForce to false")
+            # The control keeps its bounds, so that a muscle still only pulls.
             other.min_control, other.max_control = item.min_control, item.max_control
             model.force_set.objects[places[id(item)]] = item = other
         result.append(item)

@@ -24,14 +24,14 @@ Progress = Callable[[float, float], object]
 
 
 class NoSolution(SimulationError, ArithmeticError):
-    """Error of a state at which the equations of a force have no solution.
+    """Error of a force whose equations have no solution at a state.
 
     Within a step the integrator then tries a smaller step, as Simbody does.
     """
 
 
 class IntegrationError(SimulationError):
-    """The integrator cannot continue.
+    """Error of an integrator that cannot continue.
 
     Attributes:
         time: time at which it stopped, s.
@@ -80,13 +80,13 @@ class Stepper(ABC):
         self.taken = 0
         if len(self.derivative) != len(self.state):
             raise ValueError(
-                f"f gives {len(self.derivative)} derivatives of {len(self.state)} states"
+                f"f returns {len(self.derivative)} derivatives for {len(self.state)} states"
             )
         self.previous = t, self.state, self.derivative
 
     @property
     def name(self) -> str:
-        """Name of the method."""
+        """Class name of the integration method, as the summary shows it."""
         return type(self).__name__
 
     @property
@@ -95,7 +95,10 @@ class Stepper(ABC):
         return self.taken
 
     def catch_up(self) -> None:  # noqa: B027
-        """Make the outstanding calls of `observe`; a stepper that computes many steps in one call postpones them."""
+        """Make the outstanding calls of `observe`.
+
+        A stepper that computes many steps in one call postpones them.
+        """
 
     @abstractmethod
     def step(self, limit: float = inf) -> None:
@@ -107,25 +110,40 @@ class Stepper(ABC):
 
     @abstractmethod
     def make_interpolant(self) -> Callable[[float], list[float]]:
-        """Return a function of time (s) that gives the state within the last step; it stays valid after later steps."""
+        """Return an interpolation of the state within the last step.
+
+        Returns:
+            Function of time (s) that gives the state (y,). It stays valid after later steps.
+        """
 
     def iterate_steps(self, until: float) -> Iterator[tuple[float, list[float]]]:
-        """Yield time and state after each step; the last step ends at `until` (s), as with OpenSim's Manager."""
+        """Yield time and state after each step.
+
+        Args:
+            until: end of the last step, s. It is shortened to end there, as with OpenSim's Manager.
+        """
         while self.time < until:
             self.step(until)
             yield self.time, self.state
 
     def tabulate(self, times: Sequence[float], progress: Progress | None = None) -> Sequence[Any]:
-        """Return the states at non-decreasing times (s), up to the time that was reached if the motion ended early.
+        """Return the states at given times.
 
         Args:
-            times: times of the rows, s.
+            times: non-decreasing times of the rows, s.
             progress: called after every step, or after several that are fast.
+
+        Returns:
+            One state (y,) for each time, up to the time that was reached if the motion ended early.
+            The
+                exception that ended it is in `ended`.
         """
         rows: list[list[float]] = []
         try:
             for t in times:
                 while self.time < t:
+                    # Steps end at the last time only. Rows between are interpolated, so that the
+                    # number of rows does not change the motion.
                     self.step(times[-1])
                     if progress is not None:
                         progress(self.time, self.time - self.previous[0])
@@ -137,7 +155,14 @@ class Stepper(ABC):
         return rows
 
     def interpolate(self, t: float) -> list[float]:
-        """Return the state at a time within the last step, s."""
+        """Return the state at a time within the last step.
+
+        Args:
+            t: time, s.
+
+        Raises:
+            ValueError: the time is not within the last step.
+        """
         if t == self.time:
             return self.state
         start = self.previous[0]
@@ -166,20 +191,35 @@ class Stepper(ABC):
             )
 
     def _evaluate(self, t: float, y: list[float]) -> Sequence[float]:
-        """Return the derivative at a state of the motion; raise an IntegrationError where it does not exist."""
+        """Return the derivative at a state of the motion.
+
+        Args:
+            t: time, s.
+            y: state.
+
+        Raises:
+            IntegrationError: the derivative cannot be computed or is not finite.
+        """
         try:
             derivative = self._f(t, y)
         except (ArithmeticError, ValueError) as failure:
             raise IntegrationError(
                 f"The derivative cannot be computed at t = {t:.9g} s: {failure}.", t
             ) from failure
+        # x - x is 0 for finite x only, and one sum is faster than a test of each entry. A sum of
+        # finite numbers may overflow, so the entries are then tested.
         total = sum(derivative)
         if total - total != 0.0:
             self._refuse_non_finite(t, derivative)
         return derivative
 
     def _refuse_non_finite(self, t: float, derivative: Sequence[float]) -> None:
-        """Raise an error that names the first entry that is not finite, if there is one."""
+        """Raise an IntegrationError that names the first entry that is not finite, if there is one.
+
+        Args:
+            t: time, s.
+            derivative: derivative of the state.
+        """
         for index, value in enumerate(derivative):
             if not isfinite(value):
                 raise IntegrationError(
@@ -198,6 +238,14 @@ class Stepper(ABC):
 def interpolate_linearly(
     t0: float, y0: list[float], t1: float, y1: list[float], t: float
 ) -> list[float]:
-    """Return the state at time t on the straight line from y0 at t0 to y1 at t1."""
+    """Return the state on the straight line between two states.
+
+    Args:
+        t0: time of `y0`, s.
+        y0: first state.
+        t1: time of `y1`, s.
+        y1: second state.
+        t: time of the result, s.
+    """
     s = (t - t0) / (t1 - t0)
     return [y + s * (z - y) for y, z in zip(y0, y1, strict=True)]

@@ -36,10 +36,20 @@ class System(StateEvaluator):
     """
 
     def evaluate_probes(self, t: float, y: Sequence[float]) -> list[list[float]]:
-        """Return the inputs of each probe at a state, before the probe's operation: one number for each of its labels."""
+        """Return the inputs of each probe at a state, before the probe's operation.
+
+        Args:
+            t: time, s.
+            y: state (y,).
+
+        Returns:
+            One number for each label of each probe.
+        """
         self.compute_applied_forces(t, y)
         result = []
         for probe, place in zip(self.probes, self._probe_places, strict=True):
+            # Some probes, such as of momentum, are computed in Python from the links; the others
+            # have a kernel.
             if probe.probe_type.measure is not None:
                 result.append(list(probe.probe_type.measure(probe, self, t, y)))
                 continue
@@ -51,12 +61,22 @@ class System(StateEvaluator):
         return result
 
     def find_touching_contacts(self, t: float, y: Sequence[float]) -> int:
-        """Return one bit for each contact that touches, and set `loads`."""
+        """Return one bit for each contact that touches, and set `loads`.
+
+        Args:
+            t: time, s.
+            y: state (y,).
+        """
         self.compute_applied_forces(t, y)
         return int(self.loads[-1])
 
     def force_records(self, t: float, y: Sequence[float]) -> list[float]:
-        """Return one number for each of `columns`."""
+        """Return one number for each of `columns`.
+
+        Args:
+            t: time, s.
+            y: state (y,).
+        """
         self.compute_applied_forces(t, y)
         origins = [self._get_origin(body) for body in range(len(self.placements))] + [
             (0.0, 0.0, 0.0)
@@ -96,7 +116,10 @@ class System(StateEvaluator):
                 own.append(slice(len(places), len(places) + room))
                 places += range(place, place + room)
             slices.append(own)
-        links, size = int(self.structure[MODEL.WORK_LINK]), LINK_WORK.SIZE
+        # Reports of torques need the origins of the bodies, hence rotation and position of each
+        # link.
+        links = int(self.structure[MODEL.WORK_LINK])
+        size = LINK_WORK.SIZE
         count = len(places)
         for number in range(len(self._links)):
             first = links + size * number
@@ -119,7 +142,14 @@ class System(StateEvaluator):
         return result
 
     def _compute_origins(self, links: Floats) -> Floats:
-        """Return the origins of all bodies and of ground (k, b + 1, 3) from rotations and positions of the links (k, l, 12)."""
+        """Return the origins of all bodies and of ground.
+
+        Args:
+            links: rotations (9 numbers) and positions (m) of the links (k, l, 12).
+
+        Returns:
+            Origins in ground (k, b + 1, 3), m; the last one is that of ground.
+        """
         result = np.zeros((len(links), len(self.placements) + 1, 3))
         for body, (link, frame) in enumerate(self.placements):
             offset = frame[:3, 3]
@@ -137,6 +167,7 @@ class System(StateEvaluator):
         """
         self.compute_applied_forces(t, y)
         kinetic, gravity = self._compute_link_energies()
+        # Simbody counts the potential energy of bodies that are welded to ground.
         gravity -= sum(
             float(mass * self.mechanism.gravity @ center) for mass, center in self.masses_in_ground
         )
@@ -147,7 +178,16 @@ class System(StateEvaluator):
         )
 
     def compute_stored_energy(self, path: str, t: float, y: Sequence[float]) -> float:
-        """Return the energy stored in one force, J; 0 if the force does not act."""
+        """Return the energy stored in one force.
+
+        Args:
+            path: path of the force.
+            t: time, s.
+            y: state (y,).
+
+        Returns:
+            Energy, J; 0 if the force does not act.
+        """
         self.compute_applied_forces(t, y)
         return float(
             sum(
@@ -158,15 +198,21 @@ class System(StateEvaluator):
         )
 
     def _compute_link_energies(self) -> tuple[float, float]:
-        """Return kinetic and gravitational potential energy of all links (J) after an evaluation."""
+        """Return the energies of all links after an evaluation.
+
+        Returns:
+            Kinetic energy ½ Σ (m v² + ωᵀ I ω) and potential energy -Σ m gᵀ c of gravity, J, with
+            mass
+                centres c and inertias I about them.
+        """
         w, inertia = self._links, self.inertia
         motion = locate_points(w, inertia[:, 1:4])
-        rotations, turning, v = (
-            w[:, :9].reshape(-1, 3, 3),
-            w[:, LINK_WORK.VELOCITY : LINK_WORK.VELOCITY + 3],
-            motion[:, 3:],
-        )
+        rotations = w[:, :9].reshape(-1, 3, 3)
+        turning = w[:, LINK_WORK.VELOCITY : LINK_WORK.VELOCITY + 3]
+        v = motion[:, 3:]
+        # Inertias are along the axes of the links, so the angular velocities are rotated into them.
         own = (turning[:, None, :] @ rotations)[:, 0]
+        # Ixx, Iyy, Izz, Ixy, Ixz, Iyz become a symmetric matrix.
         moments = inertia[:, [4, 7, 8, 7, 5, 9, 8, 9, 6]].reshape(-1, 3, 3)
         spin = np.sum(own * (moments @ own[:, :, None])[:, :, 0])
         kinetic = 0.5 * float(inertia[:, 0] @ np.sum(v * v, axis=1) + spin)
@@ -174,29 +220,39 @@ class System(StateEvaluator):
 
     @property
     def inertia(self) -> Floats:
-        """Mass, mass centre and inertia of all links (l, 10)."""
+        """Mass (kg), mass centre (m) and inertia about it (kg·m²) of all links, in their frames (l, 10)."""
         size = layout.INERTIA.SIZE
         return self.numbers[layout.INERTIA_AT :][: size * len(self._links)].reshape(-1, size)
 
     @cached_property
     def masses_in_ground(self) -> list[tuple[float, Floats]]:
-        """Masses and mass centres of the bodies that are fixed to ground."""
+        """Masses (kg) and mass centres (3,) in ground (m) of the bodies that are fixed to ground."""
         pairs = zip(self.placements, self.mechanism.bodies, strict=True)
         fixed = [(frame, body.mass_properties) for (link, frame), body in pairs if link == GROUND]
         return [(own.mass, frame[:3, :3] @ own.center + frame[:3, 3]) for frame, own in fixed]
 
     def evaluate_all_links(self, moments: Moments) -> Floats:
-        """Return the link records (k, l, n) of the kernels at times with states."""
+        """Return the link records of the kernels at many states.
+
+        Args:
+            moments: times (s) with states.
+
+        Returns:
+            Link records (k, l, n).
+        """
         return self.evaluate_links(
             np.array([(t, *y) for t, y in moments]).reshape(len(moments), 1 + len(self._y))
         )
 
     def evaluate_links(self, moments: Floats, links: Sequence[int] | None = None) -> Floats:
-        """Return the link records (k, l, n) of the kernels.
+        """Return the link records of the kernels at many states.
 
         Args:
             moments: times (s) and states (k, 1 + y).
             links: indices of the l links; all if None.
+
+        Returns:
+            Link records (k, l, n), without accelerations.
         """
         first, (count, size) = int(self.structure[MODEL.WORK_LINK]), self._links.shape
         chosen = range(count) if links is None else links
@@ -212,7 +268,14 @@ class System(StateEvaluator):
             yield element, [work[place : place + room] for place, room in items]
 
     def _get_origin(self, body: int) -> tuple[float, float, float]:
-        """Return the origin of a body in ground (m) after an evaluation."""
+        """Return the origin of a body after an evaluation.
+
+        Args:
+            body: index of the body.
+
+        Returns:
+            Position in ground (3,), m.
+        """
         link, frame = self.placements[body]
         x, y, z = frame[:3, 3].tolist()
         if link == GROUND:

@@ -24,7 +24,7 @@ from osimlite.schema.tree import Snapshot
 
 
 class Trajectory(Tabular):
-    """The motion of a mechanism over time, with its forces, energies and summary.
+    """Motion of a mechanism over time, with its forces, energies and summary.
 
     Forces, energies and events are computed when they are first read.
 
@@ -66,6 +66,7 @@ class Trajectory(Tabular):
             f"{info.path}/{what}" for info in mechanism.coordinates for what in ("value", "speed")
         ]
         self.paths = tuple(paths) or (*own, *auxiliary)
+        # Auxiliary states get the order in which OpenSim writes them.
         rank = {path: number for number, path in enumerate(self.paths)}
         ordered = sorted(auxiliary, key=lambda path: rank.get(path, len(rank)))
         self.auxiliary: dict[str, Array] = {
@@ -166,7 +167,11 @@ class Trajectory(Tabular):
 
     @cached_property
     def summary(self) -> dict[str, Any]:
-        """Counts, settings, energies, contact events and largest forces, as in summary.json."""
+        """Counts, settings, energies, contact events and largest forces, as in summary.json.
+
+        Returns:
+            Data that JSON can hold, by name.
+        """
         assert self._report is not None
         return self._report.summary()
 
@@ -188,7 +193,12 @@ class Trajectory(Tabular):
         write_atomically(path, "".join(format_bvh(motion)))
 
     def to_sto(self, path: str | Path) -> None:
-        """Write the states with OpenSim's column names; the file is complete or not written at all.
+        """Write the states with OpenSim's column names.
+
+        The file is complete or not written at all.
+
+        Args:
+            path: the file.
 
         Raises:
             OsimliteError: the file cannot be written.
@@ -201,6 +211,9 @@ class Trajectory(Tabular):
 
         Names are ``<coordinate>`` and ``<coordinate>/speed``, and those of `auxiliary`, `forces`
         and `probes`.
+
+        Returns:
+            Columns by name.
         """
         columns: dict[str, Array] = {}
         for index, name in enumerate(self.coordinates):
@@ -210,7 +223,11 @@ class Trajectory(Tabular):
 
     @property
     def table(self) -> tuple[Mapping[str, Array], Mapping[str, Array]]:
-        """The `columns` over ``time`` (s)."""
+        """Motion as a table.
+
+        Returns:
+            The key column ``time`` (s), and the `columns`, by name.
+        """
         return {"time": self.times}, self.columns
 
     def to_xarray(self) -> Any:
@@ -274,10 +291,13 @@ class Trajectory(Tabular):
         )
 
     def write(self, folder: str | Path) -> list[Path]:
-        """Write ``states.sto``, ``forces.sto`` and ``summary.json`` into a folder.
+        """Write the motion into a folder.
 
-        Models with probes also have ``probes.sto``, and runs with a controller ``controller.sto``.
-        The folder is made if it does not exist.
+        The files are ``states.sto``, ``forces.sto`` and ``summary.json``, and ``probes.sto`` and
+        ``controller.sto`` if the model has probes or a controller.
+
+        Args:
+            folder: output folder; it is made if it does not exist.
 
         Returns:
             Paths of the written files.
@@ -286,6 +306,8 @@ class Trajectory(Tabular):
             OsimliteError: the folder cannot be made or a file cannot be written.
         """
         base = Path(folder)
+        # All texts are made before the first file is written, so that an error leaves no half of a
+        # result.
         texts = {
             "states.sto": self.states_text(),
             "forces.sto": self.forces_text(),
@@ -309,7 +331,7 @@ def format_table(table: StoTable) -> str:
 
 
 class Interrupted(KeyboardInterrupt):
-    """Ctrl-C ended a simulation.
+    """Interruption of a simulation by Ctrl-C.
 
     Attributes:
         trajectory: the motion up to the last time that was reached.
@@ -321,35 +343,53 @@ class Interrupted(KeyboardInterrupt):
 
 
 class Report(NamedTuple):
-    """Functions with which a trajectory computes its reports when they are first read."""
+    """Functions with which a trajectory computes its reports when they are first read.
 
-    forces: Callable[
-        [], tuple[Sequence[str], Sequence[Sequence[float]]]
-    ]  # labels, and one row for each moment
-    # kinetic energy, potential energy of gravity and stored energy at each moment, J
+    Attributes:
+        forces: returns labels, and one row of numbers for each moment.
+        energies: returns kinetic energy, potential energy of gravity and stored energy at each
+            moment, J.
+        probes: returns labels, and one row of numbers for each moment.
+        summary: returns the content of summary.json.
+    """
+
+    forces: Callable[[], tuple[Sequence[str], Sequence[Sequence[float]]]]
     energies: Callable[[], Sequence[Sequence[float]]]
-    # labels, and one row for each moment
     probes: Callable[[], tuple[Sequence[str], Sequence[Sequence[float]]]]
-    summary: Callable[[], dict[str, Any]]  # content of summary.json
+    summary: Callable[[], dict[str, Any]]
 
 
 class Movement(Tabular):
-    """A motion of a mechanism: values of its coordinates over time, from any source."""
+    """Motion of a mechanism from any source: values of its coordinates over time.
 
-    mechanism: Mechanism  # the mechanism
-    times: Array  # times (t,), s
-    values: Array  # values of all n coordinates (t, n), in the mechanism's order, rad and m
+    Attributes:
+        mechanism: the mechanism.
+        times: times (t,), s.
+        values: values of all n coordinates (t, n), in the mechanism's order, rad and m.
+    """
+
+    mechanism: Mechanism
+    times: Array
+    values: Array
 
     plot = make_plot("plot_movement")
 
     @property
     def coordinates(self) -> tuple[str, ...]:
-        """Names of the coordinates, in the mechanism's order."""
+        """Names of the coordinates, in the mechanism's order.
+
+        Returns:
+            One name for each column of `values`.
+        """
         return self.mechanism.coordinate_names
 
     @property
     def table(self) -> tuple[Mapping[str, Array], Mapping[str, Array]]:
-        """The coordinates over ``time``, rad and m."""
+        """Motion as a table.
+
+        Returns:
+            The key column ``time`` (s), and the coordinates (rad, m), by name.
+        """
         return {"time": self.times}, dict(zip(self.coordinates, self.values.T, strict=True))
 
     @property
@@ -394,6 +434,9 @@ def label_as_opensim(labels: Iterable[str]) -> list[str]:
     Args:
         labels: labels of the force elements, in which the energy of a limit force carries the name
             of that force.
+
+    Returns:
+        The labels; OpenSim gives all limit forces the same label for their energy.
     """
     return [
         LIMIT_ENERGY_LABEL if label.endswith(f".{LIMIT_ENERGY_LABEL}") else label

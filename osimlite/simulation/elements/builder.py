@@ -33,6 +33,15 @@ WRAPPINGS = OPENSIM, GEODESIC = "opensim", "geodesic"
 class ElementBuilder:
     """Maker of the elements of one model.
 
+    Args:
+        model: the model.
+        mechanism: mechanism of the model.
+        folder: folder of the model's file.
+        early_return: see below.
+        own_times: see below.
+        wrapping: "opensim" or "geodesic".
+        rigid_tendons: see below.
+
     Attributes:
         model: the model.
         tree: component tree of the model.
@@ -68,11 +77,9 @@ class ElementBuilder:
         self._folder, self.reads_files = folder, False
         self._of: dict[type, list[Any]] = {}
         self.drives: dict[str, list[Drive]] = {}
-        self.early_return, self.own_times, self.geodesic = (
-            early_return,
-            own_times,
-            wrapping == GEODESIC,
-        )
+        self.early_return = early_return
+        self.own_times = own_times
+        self.geodesic = wrapping == GEODESIC
         self.rigid_tendons = rigid_tendons
 
     @property
@@ -97,7 +104,10 @@ class ElementBuilder:
         return self._of[component_class]
 
     def iterate_forces(self) -> Iterator[Any]:
-        """Yield every component that applies a force or has the states of one, including unknown classes."""
+        """Yield every component that applies a force or has the states of one.
+
+        Components of unknown classes in the ForceSet are included, so that they are reported.
+        """
         for component in self.tree.components:
             unknown = (
                 isinstance(component, Unknown)
@@ -114,6 +124,9 @@ class ElementBuilder:
 
     def make_element(self, force: Any) -> ForceElement:
         """Return the element of a force.
+
+        Args:
+            force: the component.
 
         Raises:
             UnsupportedError: osimlite cannot compute it; the message is its path and class.
@@ -189,7 +202,15 @@ class ElementBuilder:
             ) from None
 
     def check_finite(self, component: Any, numbers: Sequence[float]) -> None:
-        """Raise a ModelError if a number is not finite."""
+        """Check that the parameters of a component are finite.
+
+        Args:
+            component: the component.
+            numbers: the parameters.
+
+        Raises:
+            ModelError: a number is not finite.
+        """
         # A finite sum proves that all numbers are finite; the sum of large ones may overflow.
         if not (isfinite(sum(numbers)) or all(map(isfinite, numbers))):
             raise ModelError(
@@ -217,7 +238,7 @@ def get_class_name(component: Any) -> str:
     return getattr(component, "class_name", "") or type(component).__name__
 
 
-def as_triple(values: Any) -> Triple:
-    """Return three values as floats."""
+def to_triple(values: Any) -> Triple:
+    """Return three values as a tuple of floats."""
     x, y, z = (float(value) for value in values)
     return x, y, z

@@ -23,7 +23,7 @@ from osimlite.schema.contact import (
 from osimlite.schema.forces import HuntCrossleyForce
 from osimlite.schema.frames import PhysicalFrame
 from osimlite.schema.tree import Use
-from osimlite.simulation.elements.builder import ElementBuilder, Triple, as_triple, get_class_name
+from osimlite.simulation.elements.builder import ElementBuilder, Triple, get_class_name, to_triple
 from osimlite.simulation.elements.force_records import ForceRecord, Response
 from osimlite.simulation.elements.registry import register_force_type
 from osimlite.simulation.states import StateVariable
@@ -40,33 +40,47 @@ Material = tuple[float, float, float, float, float]
 
 @dataclass(frozen=True, slots=True)
 class ContactSurface:
-    """Half space, sphere, ellipsoid or mesh that is fixed to a body (index, -1 for ground)."""
+    """Half space, sphere, ellipsoid or mesh that is fixed to a body.
+
+    Attributes:
+        name: name of the contact geometry.
+        body: index of the body, -1 for ground.
+        frame: name of the frame that the model fixes it to.
+        center: center of the sphere, or a point on the plane, in the body frame (m).
+        radius: radius of the sphere, largest half axis of the ellipsoid, or radius of the ball
+            around the mesh (m); infinite for a half space.
+        normal: outward unit normal of the half space, in the body frame.
+        material: the law's K (Pa), c (s/m), us, ud (1), uv (s/m).
+        radii: half axes of an ellipsoid (m); None for other surfaces.
+        axes: directions of the half axes in the body frame, as columns of a matrix.
+        mesh: the triangles of a mesh, in the body frame.
+    """
 
     name: str
     body: int
-    frame: str  # name of the frame that the model fixes it to
-    center: Triple  # center of the sphere, or a point on the plane, in the body frame (m)
-    # radius of the sphere, largest half axis of the ellipsoid, or radius of the ball around the
-    # mesh (m); infinite for a half space
+    frame: str
+    center: Triple
     radius: float
-    normal: Triple  # outward unit normal of the half space, in the body frame
-    material: Material  # the law's K (Pa), c (s/m), us, ud (1), uv (s/m)
-    radii: Triple | None = None  # half axes of an ellipsoid (m); None for other surfaces
-    # directions of the half axes in the body frame, as columns of a matrix
+    normal: Triple
+    material: Material
+    radii: Triple | None = None
     axes: tuple[Triple, Triple, Triple] | None = None
-    mesh: TriangleMesh | None = None  # the triangles of a mesh, in the body frame
+    mesh: TriangleMesh | None = None
 
     @property
     def is_half_space(self) -> bool:
-        """Whether the surface is a half space."""
+        """Flag: the surface is a half space."""
         return self.radius == inf
 
 
 @dataclass(frozen=True, slots=True)
 class ContactPair:
-    """Two surfaces (indices in the element) that may touch; a half space comes before a sphere.
+    """Two surfaces that may touch.
 
-    `effective` has the combined parameters k, a, c, us, ud, uv of the law.
+    Attributes:
+        first: index of surface 1 in the element; a half space comes before a sphere.
+        second: index of surface 2.
+        effective: combined parameters k, a, c, us, ud, uv of the law.
     """
 
     first: int
@@ -98,10 +112,20 @@ class PairContact:
     early_return: bool = False
 
     def make_records(self, places: Places) -> list[ForceRecord]:
-        """Return a record for each pair, and one that computes them in order if they depend on one another."""
+        """Return the records that the kernels compute.
+
+        Args:
+            places: placement of the bodies in the links of the tree.
+
+        Returns:
+            A record for each pair. With Simbody's early return, the forces depend on one another,
+            and one
+                more record computes all pairs in order; else there are records for derivatives.
+        """
         result = []
         for pair in self.pairs:
-            one, two = self.surfaces[pair.first], self.surfaces[pair.second]
+            one = self.surfaces[pair.first]
+            two = self.surfaces[pair.second]
             links, numbers = self.pack_pair(pair, places)
             kernel = "touch_half_space" if one.is_half_space else "touch_spheres"
             if one.radii or two.radii:
@@ -121,10 +145,17 @@ class PairContact:
         return result
 
     def _make_responses(self) -> list[ForceRecord]:
-        """Return records for derivatives of the force of each pair without ellipsoids, along three axes."""
+        """Return records for derivatives of the force of each pair, along three axes.
+
+        Implicit integrators use them. Pairs with ellipsoids have none; the integrators then omit
+        these terms of the Jacobian.
+        """
+        # A response finds the record of its pair by the number of integers between them: those of
+        # the pairs (two links each) and of the responses so far.
         result, back = [], (ITEM.OWN + 2) * len(self.pairs)
         for pair in self.pairs:
-            one, two = self.surfaces[pair.first], self.surfaces[pair.second]
+            one = self.surfaces[pair.first]
+            two = self.surfaces[pair.second]
             if not (one.radii or two.radii):
                 for axis in range(3):
                     ints = back, axis, int(one.is_half_space)
@@ -132,6 +163,7 @@ class PairContact:
                         ForceRecord(ints=ints, is_part=True, response=Response(RESPONSE, 0, 0, 1))
                     )
                     back += ITEM.OWN + len(ints)
+            # The next pair's record begins that much later.
             back -= ITEM.OWN + 2
         return result
 
@@ -147,13 +179,13 @@ class PairContact:
         Returns:
             The links of both surfaces, and the numbers of the kernel.
         """
-        one, two = self.surfaces[pair.first], self.surfaces[pair.second]
+        one = self.surfaces[pair.first]
+        two = self.surfaces[pair.second]
         first, center = places.station(one.body, one.center)
         second, other = places.station(two.body, two.center)
-        normal, radius = (
-            places.direction(one.body, one.normal),
-            0.0 if one.is_half_space else one.radius,
-        )
+        normal = places.direction(one.body, one.normal)
+        # An infinite radius would give NaN in the kernels' products with zero.
+        radius = 0.0 if one.is_half_space else one.radius
         return (first, second), (
             *center,
             *normal,
@@ -165,7 +197,11 @@ class PairContact:
         )
 
     def _make_early_return(self, places: Places) -> ForceRecord:
-        """Return the record that computes the pairs one by one in Simbody's order."""
+        """Return the record that computes the pairs one by one in Simbody's order.
+
+        Args:
+            places: placement of the bodies in the links of the tree.
+        """
         stations = [places.station(surface.body, surface.center) for surface in self.surfaces]
         links = (link for link, _ in stations)
         pairs = (place for pair in self.pairs for place in (pair.first, pair.second))
@@ -178,7 +214,14 @@ class PairContact:
         return ForceRecord("early_return", ints, tuple(numbers), record_size=5 * len(stations))
 
     def pair_name(self, index: int) -> str:
-        """Return the name of a pair: that of the force, with the surfaces if the force has several pairs."""
+        """Return the name of a pair.
+
+        Args:
+            index: index of the pair.
+
+        Returns:
+            The name of the force, with the surfaces if the force has several pairs.
+        """
         if len(self.pairs) == 1:
             return self.name
         pair = self.pairs[index]
@@ -186,7 +229,11 @@ class PairContact:
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """Labels of force and torque on the frame of each surface."""
+        """Labels of force and torque on the frame of each surface, as in OpenSim.
+
+        Returns:
+            Six labels for each surface.
+        """
         labels = [f"{kind}.{axis}" for kind in ("force", "torque") for axis in "XYZ"]
         return tuple(
             f"{self.name}.{surface.frame}.{label}" for surface in self.surfaces for label in labels
@@ -195,12 +242,27 @@ class PairContact:
     def report(
         self, records: Sequence[Sequence[float]], origins: Sequence[Sequence[float]]
     ) -> list[float]:
-        """Return the force on the body of each surface, and its torque about the body's origin, in ground."""
+        """Return one row of the columns.
+
+        The contact force acts on surface 2 and, with the opposite sign, on surface 1.
+
+        Args:
+            records: output records of the pairs after an evaluation.
+            origins: origin of each body in ground, m; ground's origin is the last.
+
+        Returns:
+            For each surface the force (N) on its body and the torque (N m) about the body's origin,
+            in
+                ground. Surfaces on one body have the same load.
+        """
         loads: dict[int, list[float]] = {}
         for pair, record in zip(self.pairs, records, strict=False):
+            # `not >` also leaves out a depth of NaN.
             if not record[CONTACT_WORK.DEPTH] > 0.0:
                 continue
-            force, torque = vector(record, 0), vector(self.find_torque(records, pair), 0)
+            # The record holds the load on the second surface; the first one has the opposite.
+            force = vector(record, 0)
+            torque = vector(self.find_torque(records, pair), 0)
             for surface, sign in (
                 (self.surfaces[pair.first], -1.0),
                 (self.surfaces[pair.second], 1.0),
@@ -215,11 +277,23 @@ class PairContact:
         return row
 
     def find_torque(self, records: Sequence[Sequence[float]], pair: ContactPair) -> Sequence[float]:
-        """Return the torque (N.m) on surface 2 of a contact in addition to that of the force at its point."""
+        """Return the torque on surface 2 of a contact in addition to that of the force at its point.
+
+        Args:
+            records: output records after an evaluation.
+            pair: the contact.
+
+        Returns:
+            Torque (3,) in ground, N m.
+        """
         return 0.0, 0.0, 0.0
 
     def compute_energy(self, records: Sequence[Sequence[float]]) -> float:
-        """Return the potential energy, J."""
+        """Return the potential energy of the Hertz springs, J.
+
+        Args:
+            records: output records of the pairs after an evaluation.
+        """
         return sum(
             contact_energy(
                 record[CONTACT_WORK.DEPTH], record[CONTACT_WORK.RADIUS], pair.effective[0]
@@ -253,8 +327,11 @@ class HuntCrossley(PairContact):
         pairs = []
         for first, second in combinations(range(len(surfaces)), 2):
             a, b = surfaces[first], surfaces[second]
+            # Surfaces on one body never move against each other, and two half spaces always
+            # overlap. Simbody ignores both.
             if a.body == b.body or (a.is_half_space and b.is_half_space):
                 continue
+            # The kernels expect the half space first.
             if b.is_half_space:
                 first, second, a, b = second, first, b, a
             try:
@@ -271,7 +348,15 @@ class HuntCrossley(PairContact):
 
 
 def _pack_shape(surface: ContactSurface, places: Places) -> tuple[float, ...]:
-    """Return the axes in the link, and the half axes, of an ellipsoid or a sphere."""
+    """Return an ellipsoid or a sphere as numbers of a kernel.
+
+    Args:
+        surface: the surface.
+        places: placement of the bodies in the links of the tree.
+
+    Returns:
+        Three axes in the link, and the half axes (m) along them.
+    """
     if surface.radii is None or surface.axes is None:
         return (
             1.0,
@@ -294,7 +379,14 @@ def _pack_shape(surface: ContactSurface, places: Places) -> tuple[float, ...]:
 def read_geometries(
     builder: ElementBuilder, force: Any
 ) -> Iterator[tuple[ContactGeometry, Material]]:
-    """Yield the contact geometries of a force in its order, each with the material that the force gives it.
+    """Yield the contact geometries of a force in its order.
+
+    Args:
+        builder: builder of the model's elements.
+        force: the component.
+
+    Yields:
+        A geometry, and the material that the force gives it.
 
     Raises:
         ModelError: the model has no geometry of a name.
@@ -349,16 +441,19 @@ def read_surface(
             raise ModelError(
                 f"the radii of '{builder.path(geometry)}' are not all positive; make them positive"
             )
-        place, still = as_triple(center), (0.0, 0.0, 0.0)
-        rows = as_triple(axes[0]), as_triple(axes[1]), as_triple(axes[2])
-        longest, radii = max(geometry.radii), as_triple(geometry.radii)
+        place, still = to_triple(center), (0.0, 0.0, 0.0)
+        rows = to_triple(axes[0]), to_triple(axes[1]), to_triple(axes[2])
+        # The longest radius bounds the ellipsoid, as a sphere's radius does, where only a bound is
+        # needed.
+        longest = max(geometry.radii)
+        radii = to_triple(geometry.radii)
         return ContactSurface(
             geometry.name, body, frame, place, longest, still, material, radii, rows
         )
     radius = geometry.radius if isinstance(geometry, ContactSphere) else inf
     builder.check_finite(geometry, (*center, *normal, 0.0 if radius == inf else radius))
     return ContactSurface(
-        geometry.name, body, frame, as_triple(center), radius, as_triple(normal), material
+        geometry.name, body, frame, to_triple(center), radius, to_triple(normal), material
     )
 
 

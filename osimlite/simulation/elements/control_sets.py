@@ -43,7 +43,13 @@ class ControlCurves:
 
     @classmethod
     def read(cls, path: Path) -> ControlCurves:
-        """Read a document, or a table (``.sto``), which is interpolated linearly.
+        """Read a ControlSet, or a table (``.sto``), which is interpolated linearly.
+
+        Args:
+            path: the file.
+
+        Returns:
+            Its controls.
 
         Raises:
             DocumentError: the file is neither.
@@ -68,7 +74,14 @@ class ControlCurves:
         return [name.removesuffix(EXCITATION) for name in self.of_model]
 
     def find_curve(self, actuator: str) -> Function | None:
-        """Return the control named like an actuator, or like it with the suffix ``.excitation``."""
+        """Return the control of an actuator.
+
+        Args:
+            actuator: name of the actuator, which the control has with or without ``.excitation``.
+
+        Returns:
+            The function of time; None if there is no such control.
+        """
         return self.curves.get(actuator) or self.curves.get(actuator + EXCITATION)
 
 
@@ -97,10 +110,14 @@ def make_node_curve(
         nodes: the nodes in the order of time.
         file: file of the control, for messages.
 
+    Returns:
+        The function of time (s).
+
     Raises:
         ModelError: the times go back, or a number is not finite.
     """
-    times, values = [node.t for node in nodes], [node.value for node in nodes]
+    times = [node.t for node in nodes]
+    values = [node.value for node in nodes]
     if not np.isfinite([*times, *values]).all() or (np.diff(times) < 0.0).any():
         raise ModelError(
             f"the x_nodes of the control '{control.name}' go back in time or are not finite; sort and correct them",
@@ -119,7 +136,13 @@ def _connect_points(
 ) -> Function:
     """Return straight lines between points; two points at one time make a jump.
 
-    Outside, the first and last lines are extrapolated, or the end values are constant.
+    Args:
+        times: non-decreasing times, s.
+        values: values at these times.
+        extrapolate: whether the first and last lines continue outside; else the end values do.
+
+    Returns:
+        The function of time.
     """
     if len(times) == 1:
         return Constant(values[0])
@@ -147,6 +170,7 @@ def drive_by_control_set(
     result = ControlCurves.read(path)
     driven = find_actuators(builder, controller)
     actuators = map_actuators(builder)
+    # OpenSim adds the actuators of the file to those that the controller names.
     for name in result.actuators:
         if name not in actuators:
             raise ModelError(

@@ -15,7 +15,12 @@ from osimlite.mechanics.multibody.smoothing_spline import smoothing_spline
 
 
 def read_controls(path: str | Path) -> StoTable:
-    """Return a table of controls; as in OpenSim, the last of several rows at one time counts.
+    """Return a table of controls.
+
+    As in OpenSim, the last of several rows at one time counts.
+
+    Args:
+        path: the file.
 
     Raises:
         DocumentError: the file is not a table.
@@ -27,10 +32,8 @@ def read_controls(path: str | Path) -> StoTable:
         for time, row in stream:
             for number, value in enumerate((time, *row)):
                 if not isfinite(value):
-                    where, column = (
-                        ("time", *stream.columns)[number],
-                        find_word_start(stream.text, number),
-                    )
+                    where = ("time", *stream.columns)[number]
+                    column = find_word_start(stream.text, number)
                     raise ModelError(
                         f"'{where}' is {value}; give a number",
                         file=stream.file,
@@ -70,10 +73,15 @@ def make_column_function(table: StoTable, index: int, degree: int, what: str) ->
         degree: degree of the spline; 0 for steps; an even degree stands for the odd one below it.
         what: name of the setting of the degree, for messages.
 
+    Returns:
+        The function of time (s).
+
     Raises:
         ModelError: the table has too few rows for the degree.
     """
-    times, values, half_order = table.times, table.rows[:, index], (degree + 1) // 2
+    times = table.times
+    values = table.rows[:, index]
+    half_order = (degree + 1) // 2
     if degree == 0:
         return PiecewiseConstant(tuple(times.tolist()), tuple(values.tolist()))
     if not 1 <= half_order <= 4 or len(times) < 2 * half_order:

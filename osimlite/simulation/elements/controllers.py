@@ -1,4 +1,4 @@
-"""Controllers that are functions of time, columns of a file, or reflexes of muscles."""
+"""Controllers of a model that are functions of time, columns of a file, or reflexes of muscles."""
 
 from __future__ import annotations
 
@@ -30,7 +30,8 @@ def drive_as_prescribed(
     Raises:
         ModelError: the number of functions is not that of the actuators, or the file does not fit.
     """
-    path, functions = builder.path(controller), controller.ControlFunctions.objects
+    path = builder.path(controller)
+    functions = controller.ControlFunctions.objects
     actuators = find_actuators(builder, controller)
     if len(functions) != len(actuators):
         raise ModelError(
@@ -43,16 +44,21 @@ def drive_as_prescribed(
             signal = error
         yield Drive(actuator, signal)
     if controller.controls_file:
-        yield from _from_file(builder, controller, actuators)
+        yield from _drive_from_file(builder, controller, actuators)
 
 
-def _from_file(
+def _drive_from_file(
     builder: ElementBuilder, controller: PrescribedController, taken: list[Any]
 ) -> Iterator[Drive]:
     """Yield the columns of the file, whose labels are names or paths of actuators.
 
-    As in OpenSim, a column is ignored if the controller names an actuator by the same text, or if an
-    earlier column has the same label.
+    As in OpenSim, a column is ignored if the controller names an actuator by the same text, or if
+    an earlier column has the same label.
+
+    Args:
+        builder: builder of the model's elements.
+        controller: the controller.
+        taken: actuators that the controller drives already.
     """
     path = builder.path(controller)
     actuators = map_actuators(builder)

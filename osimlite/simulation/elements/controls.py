@@ -31,15 +31,23 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Controls:
-    """All controls of a model: for each of them the functions of time whose sum it is."""
+    """All controls of a model: for each of them the functions of time whose sum it is.
 
-    # paths of the actuators in the order of the model; as in OpenSim's tools, an actuator with
-    # several controls has suffixes `_0`, `_1` ...
+    Attributes:
+        names: paths of the actuators in the order of the model; as in OpenSim's tools, an actuator
+            with several controls has suffixes `_0`, `_1` ...
+        functions: terms of each control's sum.
+    """
+
     names: tuple[str, ...] = ()
-    functions: tuple[tuple[Function, ...], ...] = ()  # terms of each control's sum
+    functions: tuple[tuple[Function, ...], ...] = ()
 
     def add_functions(self, more: Mapping[str, Function]) -> Controls:
-        """Return these controls with a function added to some of them, by name."""
+        """Return these controls with one more term for some of them.
+
+        Args:
+            more: functions of time by the names of the controls.
+        """
         pairs = zip(self.names, self.functions, strict=True)
         return replace(
             self,
@@ -49,11 +57,12 @@ class Controls:
         )
 
     def make_record(self) -> tuple[list[int], list[float], str | Callable[..., None]]:
-        """Return what computes the controls.
+        """Return the kernel of the controls and its data.
 
         Returns:
-            Integers and numbers of the record, and the name of the kernel, or a Python function if one of
-            the functions of time has no table.
+            Integers and numbers of the record, and the name of the kernel, or a Python function if
+            one of
+                the functions of time has no table.
         """
         ends: list[int] = []
         tables: list[int] = []
@@ -80,18 +89,26 @@ NO_CONTROLS = Controls()
 
 
 class Reflex(NamedTuple):
-    """Control in proportion to a muscle's lengthening speed over its maximum contraction velocity."""
+    """Control in proportion to a muscle's lengthening speed.
+
+    Attributes:
+        gain: control at the maximum contraction velocity of the muscle.
+    """
 
     gain: float
 
 
 class Drive(NamedTuple):
-    """Contribution of a controller to one control."""
+    """Contribution of a controller to one control.
 
-    actuator: Any  # the component
-    # term of a control, or the error that says why it cannot be computed
+    Attributes:
+        actuator: the component.
+        signal: term of a control, or the error that says why it cannot be computed.
+        number: index among the controls of the actuator; None for an actuator with one control.
+    """
+
+    actuator: Any
     signal: Function | Reflex | UnsupportedError
-    # index among the controls of the actuator; None for an actuator with one control
     number: int | None = None
 
 
@@ -129,6 +146,8 @@ class ModelControls:
                 why = f" driven by '{builder.path(controller)}', which has one control for its {actuator.control_count}"
                 signal = builder.unsupported_error(actuator, why)
             if isinstance(signal, UnsupportedError):
+                # The error is raised only if the actuator is computed: one that is off needs no
+                # control.
                 self._refused[path] = signal
             elif isinstance(signal, Reflex):
                 self.reflexes[path] = self.reflexes.get(path, 0.0) + signal.gain
@@ -139,6 +158,10 @@ class ModelControls:
     def find_first(self, builder: ElementBuilder, actuator: Any) -> int:
         """Return the index of the first control of an actuator.
 
+        Args:
+            builder: builder of the model's elements.
+            actuator: the component.
+
         Raises:
             UnsupportedError: osimlite cannot compute one of its drives.
         """
@@ -148,7 +171,15 @@ class ModelControls:
         return self._first[path]
 
     def compute_gain(self, builder: ElementBuilder, actuator: Any) -> float:
-        """Return the gain of the stretch reflexes of a muscle: control per lengthening speed, s/m."""
+        """Return the gain of the stretch reflexes of a muscle.
+
+        Args:
+            builder: builder of the model's elements.
+            actuator: the muscle.
+
+        Returns:
+            Control per lengthening speed of the path, s/m.
+        """
         fastest = actuator.optimal_fiber_length * actuator.max_contraction_velocity
         gain = self.reflexes.get(builder.path(actuator), 0.0)
         return gain / fastest if gain else 0.0

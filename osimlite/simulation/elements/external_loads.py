@@ -1,7 +1,8 @@
 """Measured forces: the ExternalLoads of a document and the columns of their data file (.sto, .mot, .c3d).
 
 As in OpenSim, a column is a natural cubic spline through all its values, straight lines if it has
-two or three values, and a constant if it has one. Outside its times a spline is extrapolated linearly.
+two or three values, and a constant if it has one. Outside its times a spline is extrapolated
+linearly.
 """
 
 from __future__ import annotations
@@ -61,22 +62,23 @@ def build_external_loads(
 
     Args:
         table: a .mot, .sto or .c3d file, in the axes of ground.
-        applied_to: by the names of bodies, for each load the starts of the labels of its force, point
-            and moment; the last one or two may be omitted. Without a point the force acts at the
-            origin of the body.
+        applied_to: by the names of bodies, for each load the starts of the labels of its force,
+            point and moment; the last one or two may be omitted. Without a point the force acts at
+            the origin of the body.
+
+    Returns:
+        A document with one ExternalForce for each load.
 
     Raises:
         SettingError: the file has another suffix, or a load has no labels or more than three.
     """
     if Path(table).suffix.lower() not in TABLES:
-        raise SettingError(
-            f"'{table}' is no table of forces ({', '.join(TABLES)}), whose columns could push bodies"
-        )
+        raise SettingError(f"'{table}' is not a table of forces ({', '.join(TABLES)})")
     loads = ExternalLoads(name="loads", datafile=str(table))
     for body, several in applied_to.items():
         for number, names in enumerate(several, start=1):
             if not 1 <= len(names) <= len(PARTS) or not names[0]:
-                message = f"the load on '{body}' is {list(names)}; name what the labels of its force begin with"
+                message = f"the load on '{body}' is {list(names)}; name the beginnings of the labels of its force"
                 raise SettingError(f"{message}, then of its point, then of its moment")
             identifiers: Any = {
                 f"{part}_identifier": text for part, text in zip(PARTS, names, strict=False)
@@ -91,7 +93,7 @@ def read_external_loads(
 ) -> tuple[DeclaredForce, ...]:
     """Return the loads of a document of ExternalLoads whose `appliesForce` is true.
 
-    The data file is found beside the document, or else from the working directory.
+    The data file is searched in the folder of the document, then in the working directory.
 
     Args:
         mechanism: mechanism that the loads act on.
@@ -101,18 +103,18 @@ def read_external_loads(
         The force elements, in the order of the document.
 
     Raises:
-        DocumentError: a file is missing or has other content, the mechanism has no body of a name, or
-            an identifier does not match three columns.
+        DocumentError: a file is missing or has other content, the mechanism has no body of a name,
+            or an identifier does not match three columns.
     """
     if isinstance(source, ExternalLoads):
         loads, folder, file = source, Path(), None
     elif Path(source).suffix.lower() in TABLES:
-        message = "this is a table, which does not say what its forces push: name it in a document of ExternalLoads"
-        raise DocumentError(
-            f"{message}, or say so to inverse-dynamics by --applied-to", file=str(source)
-        )
+        message = "this table does not name the bodies on which its forces act: name it in a document of ExternalLoads"
+        raise DocumentError(f"{message}, or use --applied-to", file=str(source))
     else:
-        loads, folder, file = read_object(source, ExternalLoads), Path(source).parent, str(source)
+        loads = read_object(source, ExternalLoads)
+        folder = Path(source).parent
+        file = str(source)
     members: list[Any] = [*loads.objects]
     for item in members:
         if not isinstance(item, ExternalForce):
@@ -136,8 +138,12 @@ def read_external_loads(
 def read_load_of_model(builder: ElementBuilder, force: ExternalForce) -> Load:
     """Return the load of an ExternalForce in a set of ExternalLoads that is part of the model.
 
+    Args:
+        builder: builder of the model's elements.
+        force: the component.
+
     Raises:
-        UnsupportedError: it is elsewhere, where OpenSim finds no data for it either.
+        UnsupportedError: the force is not in such a set. OpenSim finds no data for it either.
     """
     loads: Any = builder.tree.parent_of(force)
     if not isinstance(loads, ExternalLoads):
@@ -155,6 +161,9 @@ def read_loads_table(loads: ExternalLoads, folder: Path, file: str | None) -> St
         loads: the loads.
         folder: folder in which the data file is searched first.
         file: file of the loads, for messages.
+
+    Returns:
+        The table; a .c3d file is converted to forces, points and torques.
 
     Raises:
         DocumentError: the loads name no data file, or it cannot be read.
@@ -208,7 +217,14 @@ def _read_load(
 
 
 def _list_identifiers(force: ExternalForce) -> dict[str, str]:
-    """Return the starts of the labels of a force's columns, by the parts that the force has."""
+    """Return the starts of the labels of a force's columns.
+
+    Args:
+        force: the component.
+
+    Returns:
+        Identifiers by part ("force", "point", "torque"), for the parts that the force has.
+    """
     identifiers = {what: (getattr(force, f"{what}_identifier") or "").strip() for what in PARTS}
     return {
         what: identifier
@@ -218,7 +234,17 @@ def _list_identifiers(force: ExternalForce) -> dict[str, str]:
 
 
 def _find_frame(mechanism: Mechanism, value: Any, what: str, file: str | None) -> FramePlacement:
-    """Return the placement of a frame, by its path or the name of a body."""
+    """Return the placement of a frame.
+
+    Args:
+        mechanism: the mechanism.
+        value: path of the frame, name of a body, or component.
+        what: name of the property, for messages.
+        file: file of the loads, for messages.
+
+    Raises:
+        DocumentError: there is no such frame.
+    """
     name = value if isinstance(value, str) else value.name
     try:
         return mechanism.placement(f"/{name.lstrip('./')}" if "/" in name else name)
@@ -238,6 +264,7 @@ class _Columns:
     @cached_property
     def _functions(self) -> dict[int, Function]:
         """Functions of all named columns by index; their splines are solved together."""
+        # Only columns of some force are fitted: tables of a laboratory hold many more.
         starts = tuple(
             {
                 identifier
@@ -260,6 +287,9 @@ class _Columns:
             identifier: start of the labels.
             what: name of the property, for messages.
             file: file of the loads, for messages.
+
+        Returns:
+            Functions of time (s) of the x, y and z component.
 
         Raises:
             DocumentError: there are not exactly three columns, or one has a gap.
@@ -285,17 +315,26 @@ class _Columns:
         file, labels = self.table.file, self.table.columns
         if places:
             result = join_words([labels[place] for place in places])
-            return f"exactly three columns must begin so, and '{file}' has {result}"
+            return f"exactly three columns must begin with it, and '{file}' has {result}"
         starts = [label[:-1] for label in labels if label[-1:] in ("x", "X", "1")]
         near = find_nearest(identifier, starts) or find_nearest(identifier, labels)
         hint = f"; did you mean '{near}'?" if near else f"; its columns are {join_words(labels)}"
-        return f"no column of '{file}' begins so{hint}"
+        return f"no column of '{file}' begins with it{hint}"
 
 
 def make_column_functions(times: Array, columns: Array) -> list[Function]:
-    """Return columns (n, k) at increasing times (n,) as functions of time."""
+    """Return columns of a table as functions of time.
+
+    Args:
+        times: increasing times (n,), s.
+        columns: values (n, k).
+
+    Returns:
+        One function for each column.
+    """
     if len(times) == 1:
         return [Constant(float(value)) for value in columns[0]]
+    # A cubic spline needs four points.
     if len(times) < 4:
         return [
             PiecewiseLinear(tuple(times.tolist()), tuple(column)) for column in columns.T.tolist()

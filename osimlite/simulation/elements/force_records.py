@@ -32,28 +32,37 @@ CONTROLS = ""
 
 @dataclass(frozen=True)
 class ForceRecord:
-    """One computation of an element, as the kernels see it."""
+    """One computation of an element, as the kernels see it.
 
-    # name of the kernel, see `find_function`; "" for a record that only has a response
+    Attributes:
+        kernel: name of the kernel, see `find_function`; "" for a record that only has a response.
+        ints: integers behind those that every record has.
+        numbers: parameters.
+        record_size: size of the output record, unless it is a contact.
+        is_contact: whether the output record is that of a contact.
+        is_part: whether the kernel of another record calls its kernel.
+        states: indices among its integers that receive the offsets of the element's states in y, in
+            order.
+        record_references: indices of integers that are offsets in the output record of an earlier
+            element, with the path of that element, or CONTROLS for the record of the controls.
+        equilibrium: name of the kernel that sets its states to equilibrium; "" without one.
+        response: derivatives of a force along one displacement.
+        batched: name of the kernel that computes several consecutive records; "" without one.
+        python: Python function that replaces the kernel, with arguments (model, reals, data, y, f,
+            offset of the record) as arrays.
+    """
+
     kernel: str = ""
-    ints: tuple[int, ...] = ()  # integers behind those that every record has
-    numbers: tuple[float, ...] = ()  # parameters
-    record_size: int = 0  # size of the output record, unless it is a contact
-    is_contact: bool = False  # whether the output record is that of a contact
-    is_part: bool = False  # whether the kernel of another record calls its kernel
-    # indices among its integers that receive the offsets of the element's states in y, in order
+    ints: tuple[int, ...] = ()
+    numbers: tuple[float, ...] = ()
+    record_size: int = 0
+    is_contact: bool = False
+    is_part: bool = False
     states: tuple[int, ...] = ()
-    # indices of integers that are offsets in the output record of an earlier element, with the path
-    # of that element, or CONTROLS for the record of the controls
     record_references: tuple[tuple[int, str], ...] = ()
-    # name of the kernel that sets its states to equilibrium; "" if there is none
     equilibrium: str = ""
-    response: Response | None = None  # derivatives of a force along one displacement
-    batched: str = (
-        ""  # name of the kernel that computes several that follow one another, if there is one
-    )
-    # Python function that replaces the kernel, with arguments (model, reals, data, y, f, offset of
-    # the record) as arrays
+    response: Response | None = None
+    batched: str = ""
     python: Callable[..., None] | None = None
 
 
@@ -66,18 +75,30 @@ class ForceElement(Protocol):
 
     @property
     def name(self) -> str:
-        """Name of the component."""
+        """Name of the component, without its parents."""
 
     @property
     def states(self) -> tuple[StateVariable, ...]:
-        """Auxiliary states, in the order of its offsets."""
+        """Auxiliary states, in the order of its offsets.
+
+        Returns:
+            One state for each offset.
+        """
 
     def make_records(self, places: Places) -> list[ForceRecord]:
-        """Return the records that the kernels compute."""
+        """Return the records that the kernels compute.
+
+        Args:
+            places: placement of the bodies in the links of the tree.
+        """
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """Labels of the values of :meth:`report`, as OpenSim's ForceReporter writes them."""
+        """Labels of the values of :meth:`report`, as OpenSim's ForceReporter writes them.
+
+        Returns:
+            One label for each value.
+        """
 
     def report(
         self, records: Sequence[Sequence[float]], origins: Sequence[Sequence[float]]
@@ -87,10 +108,20 @@ class ForceElement(Protocol):
         Args:
             records: its output records after an evaluation.
             origins: origin of each body in ground, m; ground's origin is the last.
+
+        Returns:
+            One number for each of `columns`, SI units.
         """
 
     def compute_energy(self, records: Sequence[Sequence[float]]) -> float:
-        """Return the potential energy, J."""
+        """Return the potential energy of the force.
+
+        Args:
+            records: its output records after an evaluation.
+
+        Returns:
+            Energy, J.
+        """
 
 
 class Silent:
@@ -101,9 +132,9 @@ class Silent:
     def report(
         self, records: Sequence[Sequence[float]], origins: Sequence[Sequence[float]]
     ) -> list[float]:
-        """Return an empty row."""
+        """Return an empty row, since there are no columns."""
         return []
 
     def compute_energy(self, records: Sequence[Sequence[float]]) -> float:
-        """Return 0 J."""
+        """Return 0 J, since nothing is stored."""
         return 0.0

@@ -50,14 +50,22 @@ ENERGY = "energy"
 
 @dataclass(frozen=True)
 class State:
-    """State of a force type: its value is an argument of the law, its derivative an output."""
+    """State of a force type: its value is an argument of the law, its derivative an output.
 
-    name: str  # OpenSim's name of the state
-    # initial value from the component; by default its property `default_<name>`, or 0 without one
+    Attributes:
+        name: OpenSim's name of the state.
+        start: initial value from the component; by default its property `default_<name>`, or 0
+            without one.
+        is_argument: whether its value is an argument of the law.
+        output: output that is its derivative; by default `<name>_rate`.
+        is_simbody: whether it is a state of Simbody, not of OpenSim.
+    """
+
+    name: str
     start: Callable[[Any], float] | None = None
-    is_argument: bool = True  # whether its value is an argument of the law
-    output: str = ""  # output that is its derivative; by default `<name>_rate`
-    is_simbody: bool = False  # whether it is a state of Simbody, not of OpenSim
+    is_argument: bool = True
+    output: str = ""
+    is_simbody: bool = False
 
     def initial_value(self, component: Any) -> float:
         """Return the value at the start of a simulation."""
@@ -74,48 +82,66 @@ class State:
 
 @dataclass(frozen=True, eq=False)
 class ForceType:
-    """Declaration of how the forces of one class are computed and applied."""
+    """Declaration of how the forces of one class are computed and applied.
 
-    component: type  # class of the forces
-    geometry: Geometry  # where the forces act
-    law: Callable[..., Any] | None = None  # function that computes the outputs
-    # names of the results of the law: loads that the geometry applies, rates of states, recorded
-    # quantities
+    Attributes:
+        component: class of the forces.
+        geometry: where the forces act.
+        law: function that computes the outputs.
+        outputs: names of the results of the law: loads that the geometry applies, rates of states,
+            recorded quantities.
+        parameters: arguments of the law from a component; a name stands for a property that is a
+            number.
+        inputs: inputs of the geometry that are arguments of the law; all if None.
+        recorded_inputs: inputs and rates of states that are recorded too.
+        has_control: whether the controls of the actuator are arguments of the law.
+        states: states of each force.
+        inputs_type: named tuple that combines inputs, excitation and states into one argument;
+            separate arguments if None.
+        equilibrium: function with the arguments of the law that returns whether there is an
+            equilibrium, and the values of `solved_states`.
+        solved_states: names of the states in equilibrium.
+        rigid_law: of muscles: function with the arguments of the law that returns the force (N) of
+            fully active fibers along a rigid tendon.
+        law_from_record: cheaper form of the law for derivatives at the last evaluation; its
+            additional parameters are names of recorded quantities.
+        contact_response: name of the kernel with the derivatives of a contact force along its
+            normal and across it.
+        batched: the law in stages, for several forces together.
+        describe_failure: returns words about a force whose law or equilibrium has no solution, from
+            its `named_values`.
+        labels: labels of the report with their outputs, where {name} is the name of the force; the
+            labels of the geometry if None.
+        compute_energy: returns the energy (J) of a force from its record, if it is not an output of
+            the law.
+        check: raises a ModelError if the parameters have no meaning together.
+        shares_numbers: whether a force may depend on properties of others of its class.
+        states_change_when_off: whether the states change even if `appliesForce` is false; otherwise
+            they are constant.
+        terms: the parameters as objects, the control first.
+    """
+
+    component: type
+    geometry: Geometry
+    law: Callable[..., Any] | None = None
     outputs: tuple[str, ...] = ()
-    # arguments of the law from a component; a name stands for a property that is a number
     parameters: Sequence[str | Parameter] = ()
-    # inputs of the geometry that are arguments of the law; all if None
     inputs: tuple[str, ...] | None = None
-    recorded_inputs: tuple[str, ...] = ()  # inputs and rates of states that are recorded too
-    # whether the controls of the actuator are arguments of the law
+    recorded_inputs: tuple[str, ...] = ()
     has_control: bool = False
-    states: tuple[State, ...] = ()  # states of each force
-    # named tuple that combines inputs, excitation and states into one argument; separate if None
+    states: tuple[State, ...] = ()
     inputs_type: type[Any] | None = None
-    # function with the arguments of the law that returns whether there is an equilibrium, and the
-    # values of `solved_states`
     equilibrium: Callable[..., Any] | None = None
-    solved_states: tuple[str, ...] = ()  # names of the states in equilibrium
-    # of muscles: function with the arguments of the law that returns the force (N) of fully active
-    # fibers along a rigid tendon
+    solved_states: tuple[str, ...] = ()
     rigid_law: Callable[..., float] | None = None
-    # cheaper form of the law for derivatives at the last evaluation; its additional parameters are
-    # names of recorded quantities
     law_from_record: Callable[..., Any] | None = None
-    # name of the kernel with the derivatives of a contact force along its normal and across it
     contact_response: str = ""
-    batched: BatchedLaw | None = None  # the law in stages, for several forces together
-    # returns words about a force whose law or equilibrium has no solution, from its `named_values`
+    batched: BatchedLaw | None = None
     describe_failure: Callable[[Mapping[str, float]], str] | None = None
-    # labels of the report with their outputs, where {name} is the name of the force; the labels of
-    # the geometry if None
     labels: Mapping[str, str] | None = None
-    # returns the energy (J) of a force from its record, if it is not an output of the law
     compute_energy: Callable[[DeclaredForce, Sequence[float]], float] | None = None
-    # raises a ModelError if the parameters have no meaning together
     check: Callable[[ElementBuilder, Any], None] | None = None
-    shares_numbers: bool = False  # whether a force may depend on properties of others of its class
-    # whether the states change even if `appliesForce` is false; otherwise they are constant
+    shares_numbers: bool = False
     states_change_when_off: bool = False
     terms: tuple[Parameter, ...] = field(init=False)
 
@@ -153,6 +179,10 @@ class ForceType:
     def make(self, builder: ElementBuilder, force: Any) -> DeclaredForce:
         """Return the element of a component.
 
+        Args:
+            builder: builder of the model's elements.
+            force: the component.
+
         Raises:
             UnsupportedError: osimlite cannot compute a part of it.
             ModelError: it names something that does not exist, or a parameter has no meaning.
@@ -171,6 +201,8 @@ class ForceType:
         if not (force.appliesForce or self.states_change_when_off):
             return ForceOff(self.component, path, force.name, None, (), states)
         values = tuple(term.read(builder, force) for term in self.terms)
+        # A force that is off may still have states that change, as the activation of a muscle in
+        # OpenSim does.
         made = DeclaredForce if force.appliesForce else ForceOff
         if builder.rigid_tendons and is_a(force, "Muscle"):
             if self.rigid_law is None:
@@ -182,7 +214,11 @@ class ForceType:
 
     @cached_property
     def record_offsets(self) -> dict[str, int]:
-        """Offset in the record of each recorded quantity, by name."""
+        """Offset in the record of each recorded quantity, by name.
+
+        Returns:
+            Offsets by name, in the order of the record.
+        """
         others = {SOLVED, *(state.rate for state in self.states)}
         names = [name for name in self.outputs if name not in others] + list(self.recorded_inputs)
         if self.geometry.speed and issubclass(self.component, Actuator):
@@ -191,7 +227,14 @@ class ForceType:
 
     @cached_property
     def record_names(self) -> dict[str, int]:
-        """The record offsets, with "actuation" and "speed" of an actuator as names in addition to their own."""
+        """Offsets in the record by name, with two names that all actuators share.
+
+        "actuation" stands for the force that OpenSim reports, "speed" for the speed along which it
+        acts.
+
+        Returns:
+            Offsets by name.
+        """
         recorded = self.record_offsets
         others = {"actuation": (self.labels or {}).get("{name}", ""), "speed": self.geometry.speed}
         return recorded | {
@@ -200,7 +243,7 @@ class ForceType:
 
     @cached_property
     def text(self) -> KernelText:
-        """Generator of its kernels."""
+        """Generator of the kernels of this type."""
         return KernelText(self)
 
     def make_records(self, force: DeclaredForce, places: Places) -> list[ForceRecord]:
@@ -215,6 +258,8 @@ class ForceType:
         """
         parts = self.geometry.make_parts(force.location, places)
         ints, numbers = self.geometry.pack(force.location, places)
+        # The geometry's integers begin with the distance back to the record of its last part, a
+        # path.
         if parts:
             ints = (ITEM.OWN + len(parts[-1].ints), *ints)
         size = len(self.record_offsets) + self.geometry.record_size(force.location)
@@ -278,12 +323,16 @@ class DeclaredForce:
 
     @property
     def force_type(self) -> ForceType:
-        """Declaration of its class."""
+        """Declaration of the force's class."""
         return FORCE_TYPES.find(self.component)
 
     @property
     def states(self) -> tuple[StateVariable, ...]:
-        """States that this force has."""
+        """States of this force in the order of its declaration, without those that the component lacks.
+
+        Returns:
+            States of the component.
+        """
         return tuple(state for state in self.optional_states if state is not None)
 
     def make_records(self, places: Places) -> list[ForceRecord]:
@@ -296,7 +345,11 @@ class DeclaredForce:
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """Labels of its report, as OpenSim's ForceReporter writes them."""
+        """Labels of its report, as OpenSim's ForceReporter writes them.
+
+        Returns:
+            One label for each value of `report`.
+        """
         force_type = self.force_type
         if force_type.labels is None:
             return force_type.geometry.list_columns(self)
@@ -305,7 +358,12 @@ class DeclaredForce:
     def report(
         self, records: Sequence[Sequence[float]], origins: Sequence[Sequence[float]]
     ) -> list[float]:
-        """Return one row of the columns; see :class:`osimlite.simulation.elements.force_records.ForceElement`."""
+        """Return one row of the columns; see :class:`osimlite.simulation.elements.force_records.ForceElement`.
+
+        Args:
+            records: its output records after an evaluation.
+            origins: origin of each body in ground, m; ground's origin is the last.
+        """
         force_type = self.force_type
         if force_type.labels is None:
             return force_type.geometry.report(
@@ -335,7 +393,14 @@ class DeclaredForce:
         return numbers | {name: record[place] for name, place in force_type.record_offsets.items()}
 
     def describe_failure(self, record: Sequence[float]) -> str:
-        """Return the words for a message about a law without a solution: the path, and what the type adds."""
+        """Return the words for a message about a law without a solution.
+
+        Args:
+            record: its record after an evaluation.
+
+        Returns:
+            The path of the force, and what its type adds.
+        """
         return f"'{self.path}'" + (
             self.force_type.describe_failure(self.named_values(record))
             if self.force_type.describe_failure

@@ -1,7 +1,8 @@
-"""Contact of meshes by an elastic foundation, in pairs.
+"""Contact of meshes by an elastic foundation, in pairs (Simbody's ElasticFoundationForce).
 
-As in Simbody, meshes touch half spaces, spheres and each other; other surfaces of such a force do
-not touch. Between two meshes both have springs, each with half its area.
+Every triangle of a mesh has a spring at its centroid, with the triangle's area. As in Simbody,
+meshes touch half spaces, spheres and each other; other surfaces of such a force do not touch.
+Between two meshes both have springs, each with half its area.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from osimlite.mechanics.multibody.mechanism import GROUND
 from osimlite.mechanics.multibody.spatial import Array, make_transform
 from osimlite.schema.contact import ContactMesh
 from osimlite.schema.contact_forces import ElasticFoundationForce
-from osimlite.simulation.elements.builder import ElementBuilder, as_triple
+from osimlite.simulation.elements.builder import ElementBuilder, to_triple
 from osimlite.simulation.elements.contact import (
     ContactPair,
     ContactSurface,
@@ -71,10 +72,12 @@ class ElasticFoundation(PairContact):
         )
         pairs = []
         for first, second in combinations(range(len(surfaces)), 2):
+            # The kernels expect the mesh second, as it carries the springs.
             if surfaces[second].mesh is None:
                 first, second = second, first
             a, b = surfaces[first], surfaces[second]
             if a.body != b.body and b.mesh is not None and a.radii is None:
+                # The law takes the material of the mesh alone, so nothing is combined.
                 pairs.append(ContactPair(first, second, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)))
         return cls(
             builder.path(force),
@@ -136,14 +139,14 @@ def _read_mesh(
             f"the force '{builder.path(force)}': a contact stiffness must not be negative"
         )
     mesh = TriangleMesh.read(geometry.filename, builder.mesh_folders).transform(placed)
-    center, still = as_triple(mesh.center), (0.0, 0.0, 0.0)
+    center, still = to_triple(mesh.center), (0.0, 0.0, 0.0)
     return ContactSurface(
         geometry.name, body, frame, center, mesh.radius, still, material, mesh=mesh
     )
 
 
 class Springs:
-    """Springs of two meshes, each with half the area of its triangle.
+    """Springs of two meshes that touch, each with half the area of its triangle.
 
     Args:
         one: surface 1.
@@ -169,6 +172,9 @@ class Springs:
             about: point for the torque, m.
             v: velocity of surface 1 relative to surface 2 at that point, m/s.
             turning: angular velocity of surface 1 relative to surface 2, 1/s.
+
+        Returns:
+            Force (N), torque about the point (N·m), and stored energy (J).
         """
         first, second = self._first, self._second
         springs = _find_springs_inside(self._stiffness[0], first, one, second, two)
@@ -196,20 +202,33 @@ class Springs:
         v: Vector,
         turning: Vector,
     ) -> Load:
-        """Return the load on a mesh of its active springs: stiffness, middle and end of each."""
+        """Return the load on a mesh of its active springs.
+
+        Args:
+            surface: surface of the mesh.
+            acting: stiffness, middle (m) and end (m) of each active spring.
+            about: point for the torque, m.
+            v: velocity of the other surface at that point, m/s.
+            turning: angular velocity of the other surface, 1/s.
+        """
         _, c, us, ud, uv = surface.material
         force = torque = ZERO
         energy = 0.0
         for k, x, y, z, *end in acting:
             push, turn, stored = spring_load(
-                k, c, us, ud, uv, self.vt, (x, y, z), as_triple(end), about, v, turning
+                k, c, us, ud, uv, self.vt, (x, y, z), to_triple(end), about, v, turning
             )
             force, torque, energy = plus(force, push), plus(torque, turn), energy + stored
         return force, torque, energy
 
 
 class Pose(NamedTuple):
-    """Pose of a body in ground: rotation (3, 3) and origin (3,)."""
+    """Pose of a body in ground.
+
+    Attributes:
+        turn: rotation (3, 3).
+        origin: origin (3,), m.
+    """
 
     turn: Array
     origin: Array
@@ -226,9 +245,22 @@ class Pose(NamedTuple):
 def _find_springs_inside(
     stiffness: Array, mesh: TriangleMesh, pose: Pose, other: TriangleMesh, theirs: Pose
 ) -> list[list[float]]:
-    """Return the springs of a mesh that are inside another: stiffness, middle and end of each."""
+    """Return the springs of a mesh that are inside another mesh.
+
+    Args:
+        stiffness: stiffness of each spring (t,).
+        mesh: the mesh of the springs.
+        pose: pose of its body.
+        other: the other mesh.
+        theirs: pose of the other body.
+
+    Returns:
+        Stiffness, middle (m) and end (m, the nearest point of the other mesh) of each spring, in
+        ground.
+    """
     middles = pose.points(mesh.centroids)
     seen = (middles - theirs.origin) @ theirs.turn
+    # The bounding box excludes most springs before the costly search.
     boxed = np.all((seen >= other.points.min(axis=0)) & (seen <= other.points.max(axis=0)), axis=1)
     places = np.flatnonzero(boxed)
     if not len(places):
@@ -242,7 +274,13 @@ def _find_springs_inside(
 
 @dataclass(frozen=True)
 class _Meshes:
-    """Function that computes the contact of two meshes, in Python."""
+    """Function that computes the contact of two meshes, in Python.
+
+    Attributes:
+        springs: springs of both meshes.
+        one: placement of the body of surface 1 in its link.
+        two: placement of the body of surface 2 in its link.
+    """
 
     springs: Springs  # springs of both meshes
     one: Placement  # placement of the body of surface 1 in its link
@@ -258,6 +296,7 @@ class _Meshes:
         about, other = two.points(np.array(second.center)), one.points(np.array(first.center))
         point: Vector = tuple(about.tolist())
         load: Load = ZERO, ZERO, 0.0
+        # Balls around the meshes that do not overlap need no search.
         if np.linalg.norm(about - other) < first.radius + second.radius:
             links = self.one.link, self.two.link
             v = minus(*(velocity(model, data, link, point) for link in links))
@@ -272,5 +311,5 @@ class _Meshes:
         if link < 0:
             return Pose(frame[:3, :3], frame[:3, 3])
         start = model[MODEL.WORK_LINK] + LINK_WORK.SIZE * link
-        origin = np.array(station(model, data, link, as_triple(frame[:3, 3])))
+        origin = np.array(station(model, data, link, to_triple(frame[:3, 3])))
         return Pose(data[start : start + 9].reshape(3, 3) @ frame[:3, :3], origin)

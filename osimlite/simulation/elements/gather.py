@@ -90,6 +90,7 @@ def force_elements(
         try:
             elements.append(builder.make_element(component))
         except UnsupportedError as error:
+            # All unsupported forces are collected, so that one message names them all.
             skipped.append(error.message)
     if skipped and not skip_unsupported:
         raise UnsupportedError(
@@ -102,10 +103,8 @@ def force_elements(
     from osimlite.simulation.elements.probe_type import make_probes
 
     elements += make_probes(builder, elements)
-    controls, reads_files = (
-        builder.controls.controls,
-        builder.reads_files or external_loads is not None,
-    )
+    controls = builder.controls.controls
+    reads_files = builder.reads_files or external_loads is not None
     return Forces(tuple(elements), tuple(skipped), controls, reads_files)
 
 
@@ -118,7 +117,14 @@ FEW = 4
 
 
 def summarize_skipped(skipped: Sequence[str]) -> list[str]:
-    """Return the skipped forces for a message: one by one if they are few, else the count of each class."""
+    """Return the skipped forces for a message.
+
+    Args:
+        skipped: forces as ``path (class)``.
+
+    Returns:
+        The forces one by one if they are few, else the count of each class.
+    """
     if len(skipped) <= FEW:
         return list(skipped)
     groups: dict[str, list[str]] = {}

@@ -15,16 +15,19 @@ def evaluate_function(function: Function, argument: float) -> float:
     return float(value)
 
 
-def integrate(function: Function, start: float, end: float) -> float:
+def integrate_function(function: Function, start: float, end: float) -> float:
     """Return the integral of a function of one argument.
 
-    Gauss-Legendre quadrature with five nodes from knot to knot, or in sixteen intervals for functions
-    without knots. It is exact for piecewise polynomials up to degree nine.
+    Gauss-Legendre quadrature with five nodes from knot to knot, or in sixteen intervals for
+    functions without knots. It is exact for piecewise polynomials up to degree nine.
 
     Args:
         function: the function.
         start: lower limit.
-        end: upper limit.
+        end: upper limit; the sign changes if it is below the lower one.
+
+    Returns:
+        The integral.
     """
     inner = [
         knot for knot in getattr(function, "x", ()) if min(start, end) < knot < max(start, end)

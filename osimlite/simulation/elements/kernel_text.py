@@ -122,11 +122,13 @@ class KernelText:
         :mod:`osimlite.mechanics.kernels.condensation`. The derivatives are those at the last evaluation,
         whose record has its results.
         """
-        force_type, force = self.force_type, self.force_type.geometry.displacement_output[0]
+        force_type = self.force_type
+        force = self.force_type.geometry.displacement_output[0]
         rows, changed = (force, *(state.rate for state in force_type.states)), self.changed_outputs
         arguments = self._arguments
         directions = {column: direction for direction, column in enumerate(changed)}
-        law, count = force_type.law_from_record or force_type.law, len(changed)
+        law = force_type.law_from_record or force_type.law
+        count = len(changed)
         for column, place in changed.items():
             arguments[place] = f"carrying({arguments[place]}, {directions[column]}, {count})"
         # Expressions compute in the record. The stored control already includes the reflex (rate 0).
@@ -175,11 +177,9 @@ class KernelText:
         force_type, made = self.force_type, self.force_type.batched
         if made is None:
             raise TypeError(f"the law of {force_type.name} has no parts")
-        inputs, recorded, arguments = (
-            force_type.geometry.inputs,
-            force_type.record_offsets,
-            self._arguments,
-        )
+        inputs = force_type.geometry.inputs
+        recorded = force_type.record_offsets
+        arguments = self._arguments
         # The record stores the quantities between the stages.
         offsets = (f"record[{place}]" for name, place in recorded.items() if name not in inputs)
         known = dict(zip(made.known._fields, offsets, strict=False))
@@ -264,7 +264,13 @@ class KernelText:
         )
 
     def _write_loop(self, lines: Sequence[str]) -> list[str]:
-        """Return a loop over the records of a run; a record without a solution reports its number in f[0]."""
+        """Return a loop over the records of a run.
+
+        A record without a solution reports its number in f[0].
+
+        Args:
+            lines: body of the loop.
+        """
         refused = "    return OUTCOME.UNSOLVED"
         written_lines = [
             new
@@ -279,7 +285,13 @@ class KernelText:
 
     @property
     def changed_outputs(self) -> dict[int, int]:
-        """Column of the derivatives to index of the law's argument that is varied."""
+        """Index of the law's argument that is varied for each column of the derivatives.
+
+        The first two columns are the displacement and its speed, the others are the states.
+
+        Returns:
+            Index of an argument by column.
+        """
         force_type = self.force_type
         inputs = list(self.input_names)
         result = {
@@ -293,7 +305,7 @@ class KernelText:
 
     @property
     def responds(self) -> bool:
-        """Whether its forces have derivatives along one displacement."""
+        """Flag: the forces of this type have derivatives along one displacement."""
         force_type = self.force_type
         return (
             force_type.law is not None
@@ -323,7 +335,8 @@ class KernelText:
     def _compile(
         self, form: str, place: str, lines: Sequence[str], **scope_of_form: Any
     ) -> Callable[..., int]:
-        force_type, name = self.force_type, self.force_type.name + form
+        force_type = self.force_type
+        name = self.force_type.name + form
         source = "\n    ".join(
             [
                 f'def {name}({PARAMETERS}, {place}: "int") -> "int":',
@@ -357,8 +370,13 @@ class KernelText:
         return lines + self._write_results(force_type.record_offsets)
 
     def _write_results(self, names: Iterable[str]) -> list[str]:
-        """Return lines that record results of the law by name, and write the rates of states."""
-        force_type, lines = self.force_type, self._write_record(names)
+        """Return lines that record results of the law by name, and write the rates of states.
+
+        Args:
+            names: names of the results to record.
+        """
+        force_type = self.force_type
+        lines = self._write_record(names)
         if SOLVED in force_type.outputs:
             lines += [f"if not {SOLVED}:", "    return OUTCOME.UNSOLVED"]
         for place, state in self._state_indices.items():
@@ -371,7 +389,10 @@ class KernelText:
 
     @property
     def _state_indices(self) -> dict[int, State]:
-        """States by the indices of their offsets among the integers of a record; an offset of -1 marks an absent state."""
+        """States by the indices of their offsets among the integers of a record.
+
+        An offset of -1 marks a state that the component lacks.
+        """
         first = ITEM.OWN + sum(term.int_count for term in self.force_type.terms)
         return {first + number: state for number, state in enumerate(self.force_type.states)}
 
@@ -387,7 +408,11 @@ class KernelText:
 
     @property
     def input_names(self) -> tuple[str, ...]:
-        """Names of the geometry's inputs that the law takes."""
+        """Names of the geometry's inputs that the law takes.
+
+        Returns:
+            Names in the order of the arguments.
+        """
         return (
             self.force_type.geometry.inputs
             if self.force_type.inputs is None
@@ -395,7 +420,15 @@ class KernelText:
         )
 
     def _write_call(self, arguments: Sequence[str], law: str = "law") -> str:
-        """Return a call of a law; `inputs_type` combines the arguments that change with time."""
+        """Return a call of a law.
+
+        If the force type has an `inputs_type`, the arguments that change with time are combined
+        into one.
+
+        Args:
+            arguments: arguments as expressions.
+            law: name of the law in the kernel.
+        """
         made = self.force_type.inputs_type
         if made is None:
             return f"{law}({', '.join(arguments)})"
@@ -420,12 +453,15 @@ class KernelText:
 
 
 def write_arguments(terms: Iterable[Parameter], head: int, number: int) -> list[str]:
-    """Return the arguments of a law for terms, as expressions.
+    """Return the arguments of a law for parameters, as expressions.
 
     Args:
         terms: the parameters.
         head: index of their first integer.
         number: index of their first number.
+
+    Returns:
+        One expression for each argument.
     """
     result = []
     for term in terms:

@@ -3,7 +3,8 @@
 The kernel of a force type is generated from its declaration and has the name of the class in snake
 case. A suffix distinguishes its other kernels: EQUILIBRIUM computes equilibrium states, OFF belongs
 to a force that is off, RESPONSE computes derivatives, RIGID belongs to a muscle with a rigid
-tendon, and BATCHED computes several forces together. Kernels of probes are generated in the same way.
+tendon, and BATCHED computes several forces together. Kernels of probes are generated in the same
+way.
 """
 
 from __future__ import annotations
@@ -14,13 +15,11 @@ from typing import Any
 from osimlite.mechanics.kernels.table import LAW_MODULES, load_kernel
 from osimlite.simulation.elements.registry import FORCE_TYPES, PROBE_TYPES
 
-EQUILIBRIUM, OFF, RESPONSE, RIGID, BATCHED = (
-    "_equilibrium",
-    "_off",
-    "_response",
-    "_rigid",
-    "_batched",
-)
+EQUILIBRIUM = "_equilibrium"
+OFF = "_off"
+RESPONSE = "_response"
+RIGID = "_rigid"
+BATCHED = "_batched"
 FORMS = {
     EQUILIBRIUM: "equilibrium_kernel", OFF: "off_kernel", RESPONSE: "response_kernel", RIGID: "rigid_kernel",
     BATCHED: "batched_kernel",
@@ -49,10 +48,13 @@ WITHOUT_DERIVATIVES = frozenset(
 
 
 def list_library_laws(directions: int = 0) -> list[str]:
-    """Return the names of all laws of this package in a fixed order, as the library of kernels has them.
+    """Return the names of all kernels of this package, as the library of kernels has them.
 
     Args:
         directions: number of directions of derivatives; 0 for floats.
+
+    Returns:
+        Names in a fixed order, on which the order of the machine code depends.
     """
     names = list(LAW_MODULES)
     for force_type in FORCE_TYPES:
@@ -71,7 +73,11 @@ def list_library_laws(directions: int = 0) -> list[str]:
 
 
 def get_symbol(name: str) -> str:
-    """Return the symbol of a law in compiled libraries."""
+    """Return the symbol of a kernel in compiled libraries, where ``~`` is not allowed.
+
+    Args:
+        name: name of the kernel.
+    """
     return name.replace(ALONG, "_along_")
 
 

@@ -28,14 +28,28 @@ from osimlite.simulation.elements.registry import register_probe_type
 
 
 class Power(NamedTuple):
-    """Factor of a quantity, and the exponent to which the product is raised."""
+    """Factor of a quantity, and the exponent to which the product is raised.
+
+    Attributes:
+        factor: factor; -1 for the power of a tension.
+        exponent: exponent, a property of the probe.
+    """
 
     factor: float
     exponent: float
 
 
 def raise_to_power(x: float, exponent: float) -> float:
-    """Return x to a power, with the results of C++ for negative and zero bases."""
+    """Return x to a power, with the results of C++ for negative and zero bases.
+
+    Python would return a complex number, or raise an error, where ``std::pow`` returns NaN or
+    infinity.
+
+    Args:
+        x: base.
+        exponent: exponent.
+    """
+    # As C's pow(), which OpenSim calls; Python would raise an error or return a complex number.
     if x < 0.0 and exponent != floor(exponent):
         return nan
     if x == 0.0 and exponent < 0.0:
@@ -44,7 +58,12 @@ def raise_to_power(x: float, exponent: float) -> float:
 
 
 def compute_actuator_force(actuation: float, n: Power) -> float:
-    """Return the force of an actuator (N or N.m), raised to a power."""
+    """Return the force of an actuator, raised to a power.
+
+    Args:
+        actuation: force, N or N.m.
+        n: factor and exponent.
+    """
     return raise_to_power(n.factor * actuation, n.exponent)
 
 
@@ -66,6 +85,9 @@ def define_reading(
         subjects: names of the subjects.
         read: the subjects.
         is_sum: whether the only result is the sum.
+
+    Returns:
+        The reading with OpenSim's labels.
     """
     if is_sum:
         return Reading((f"{name}_Summed",), read)
@@ -78,7 +100,16 @@ register_probe_type(
 
 
 def compute_actuator_power(actuation: float, speed: float, n: Power) -> float:
-    """Return the power of an actuator (W), raised to a power."""
+    """Return the power of an actuator, raised to a power.
+
+    Args:
+        actuation: force, N or N.m.
+        speed: speed along it, m/s or rad/s.
+        n: factor and exponent.
+
+    Returns:
+        Power (W) to the exponent.
+    """
     return raise_to_power(n.factor * actuation * speed, n.exponent)
 
 
@@ -103,15 +134,15 @@ register_probe_type(
 
 
 def _read_joints(builder: ElementBuilder, probe: JointInternalPowerProbe) -> Reading:
-    mechanism, joints = (
-        builder.mechanism,
-        find_members(builder, probe, probe.joint_names, "/jointset", "Joint"),
-    )
+    mechanism = builder.mechanism
+    joints = find_members(builder, probe, probe.joint_names, "/jointset", "Joint")
     infos = [
         (place, info)
         for place, info in enumerate(mechanism.coordinates)
         if info.prescribed is not None
     ]
+    # OpenSim's joint power is that of the forces that prescribe the coordinates of the joint. The
+    # forces of couplers and loops would have to be distributed over joints, which is not unique.
     driven = [
         [place for place, info in infos if info.joint == builder.path(joint)] for joint in joints
     ]
@@ -142,6 +173,8 @@ def _measure_joint_power(
         forces = state.spread_to_all(
             system.compute_applied_forces(t, y)[count : 2 * count], [0.0] * len(q)
         )
+        # With the accelerations known, what inverse dynamics requires beyond the applied forces is
+        # what prescribes the coordinates.
         udot = system.mechanism.acceleration(q, u, forces, time=t)
         powers = (system.mechanism.inverse_dynamics(q, u, udot) - forces) * u
     result = [raise_to_power(float(sum(powers[places])), exponent) for places in driven]
@@ -154,6 +187,7 @@ register_probe_type(ProbeType(JointInternalPowerProbe, _read_joints, measure=_me
 def _read_energies(builder: ElementBuilder, probe: SystemEnergyProbe) -> Reading:
     kinds = (
         probe.compute_kinetic_energy,
+        # Twice: the potential energy of gravity, and that of the springs.
         probe.compute_potential_energy,
         probe.compute_potential_energy,
     )

@@ -33,7 +33,10 @@ def read_metabolic_probe(
     numbers: Callable[[Any, Any, float], Any],
     curve: Function | None = None,
 ) -> Reading:
-    """Return the reading of a metabolic probe: the total power, and if requested the basal one and each muscle's.
+    """Return the reading of a metabolic probe.
+
+    Its results are the total power and, unless only that is requested, the basal power and that of
+    each muscle, W.
 
     Args:
         builder: builder of the elements.
@@ -42,9 +45,12 @@ def read_metabolic_probe(
             muscle, and its mass (kg).
         curve: curve that the law takes.
 
+    Returns:
+        The reading with OpenSim's labels.
+
     Raises:
-        UnsupportedError: OpenSim disables the probe, because a muscle does not exist or a number has no
-            meaning.
+        UnsupportedError: OpenSim disables the probe, because a muscle does not exist or a number
+            has no meaning.
     """
     known: dict[str, Any] = builder.tree.list_members("/forceset", "Muscle")
     parameters = probe.metabolic_muscle_parameter_set.objects
@@ -72,13 +78,18 @@ def read_metabolic_probe(
 
 
 def find_muscle_mass(builder: ElementBuilder, probe: Any, item: Any, muscle: Any) -> float:
-    """Return the mass of a muscle, kg: the provided one, or density times fiber length and cross-section.
+    """Return the mass of a muscle.
+
+    It is the provided one, or m = density F0 / sigma l0 with the specific tension sigma.
 
     Args:
         builder: builder of the elements.
         probe: the probe, for messages.
         item: the probe's parameters of the muscle.
         muscle: the muscle.
+
+    Returns:
+        Mass, kg.
 
     Raises:
         UnsupportedError: a number has no meaning.
@@ -146,7 +157,9 @@ def compute_bhargava(
 
 
 def define_bhargava(probe: Any, item: Any, muscle: Any, mass: float) -> Bhargava2004:
-    """Return the parameters of the law; switches that the probe does not have are on.
+    """Return the parameters of the law.
+
+    Switches that the probe does not have, as in the smooth form, are on.
 
     Args:
         probe: the probe.
@@ -202,6 +215,7 @@ def _read_smoothed(
     builder: ElementBuilder, component: Bhargava2004SmoothedMuscleMetabolics
 ) -> Reading:
     path = builder.path(component)
+    # The law takes the form of the transitions as a number: 0 for sharp ones.
     forms = {"tanh": 1.0, "huber": 2.0}
     form = forms[component.smoothing_type or "tanh"] if component.use_smoothing else 0.0
     sharpness = (getattr(component, name) for name in SmoothTransitions._fields[1:])
@@ -224,7 +238,19 @@ def _read_smoothed(
 def _measure_smoothed(
     probe: DeclaredProbe, system: Any, t: float, y: Sequence[float]
 ) -> list[float]:
-    """Return the sums of the rates of all muscles (the first with the basal rate), and each muscle's total rate."""
+    """Return the metabolic rates of all muscles.
+
+    Args:
+        probe: the probe.
+        system: the system after an evaluation of its forces.
+        t: time, s.
+        y: state (y,).
+
+    Returns:
+        The sums of the rates of all muscles (the first with the basal rate), then each muscle's
+        total
+            rate, W.
+    """
     rates = []
     for places, numbers in zip(probe.places, probe.numbers, strict=True):
         m, by = (

@@ -1,4 +1,4 @@
-"""What muscles have in common: one tension along a path, an excitation, and the recorded quantities."""
+"""Declarations that all muscles share: one tension along a path, an excitation, and the recorded quantities."""
 
 from __future__ import annotations
 
@@ -43,10 +43,16 @@ PENNATION = Number(
 
 
 def compute_height(builder: ElementBuilder, force: Any) -> tuple[float]:
-    """Return the height of the fibers across the tendon, m, as a tuple of one number.
+    """Return the height of the fibers across the tendon, as a tuple of one number.
+
+    The height h = l0 sin(a0) is constant, as in OpenSim's MuscleFixedWidthPennationModel.
+
+    Args:
+        builder: builder of the model's elements.
+        force: the muscle.
 
     Returns:
-        Optimal fiber length times the sine of the pennation angle.
+        Optimal fiber length times the sine of the pennation angle there, m.
     """
     return (
         force.optimal_fiber_length * sin(Number("pennation_angle_at_optimal").read(builder, force)),
@@ -67,6 +73,9 @@ def define_curve(
         make: function that computes the numbers from the curve's properties, in their order; its
             ValueError says why the properties make no curve.
         changed: function that returns the properties of the curve that the muscle changes.
+
+    Returns:
+        Parameter with these numbers.
     """
 
     def read(builder: ElementBuilder, force: Any) -> Sequence[float]:
@@ -85,7 +94,12 @@ def define_curve(
 
 
 def check_muscle(builder: ElementBuilder, force: Any, *numbers: Number) -> None:
-    """Raise an error if OpenSim refuses the activation or pennation of a muscle, or one of the numbers.
+    """Check the properties that all muscles have, as OpenSim does.
+
+    Args:
+        builder: builder of the model's elements.
+        force: the muscle.
+        numbers: further properties of its class.
 
     Raises:
         ModelError: a property has no meaning; the message names it.
@@ -110,6 +124,7 @@ def check_muscle(builder: ElementBuilder, force: Any, *numbers: Number) -> None:
 
 
 def _describe_failure(known: Mapping[str, float]) -> str:
+    # Most failures come from a path whose length does not fit the fibers and the tendon.
     off = known["length"] - known["tendon_slack_length"] - known["optimal_fiber_length"]
     # Not every search is for a fiber length.
     fibers = (
@@ -132,10 +147,14 @@ def define_muscle(
 
     Args:
         component: class of the muscle.
-        law: function of :class:`MuscleInputs` and the parameters, which returns `RECORDED` and `rates`.
+        law: function of :class:`MuscleInputs` and the parameters, which returns `RECORDED` and
+            `rates`.
         rates: outputs after `RECORDED`: rates of states, including "fiber_velocity", and others.
         parameters: parameters of the law.
         more: attributes of the force type.
+
+    Returns:
+        The declaration, which still has to be registered.
     """
     return ForceType(
         component,

@@ -31,13 +31,13 @@ class Tail:
         self.numbers: list[float] = []
         self.record_size = record_size
 
-    def put_ints(self, ints: Sequence[int]) -> int:
-        """Append integers, and return their offset."""
+    def append_ints(self, ints: Sequence[int]) -> int:
+        """Append integers, and return the offset of the first from the start of the record."""
         self.ints += ints
         return self._first[0] + len(self.ints) - len(ints)
 
-    def put_numbers(self, numbers: Sequence[float]) -> int:
-        """Append numbers, and return their offset."""
+    def append_numbers(self, numbers: Sequence[float]) -> int:
+        """Append numbers, and return the offset of the first from the record's numbers."""
         self.numbers += numbers
         return self._first[1] + len(self.numbers) - len(numbers)
 
@@ -48,14 +48,24 @@ class Tail:
 
 
 class Parameter(ABC):
-    """One argument of a law, or several, from a component."""
+    """One or several arguments of a law that come from a component.
 
-    size: int = 0  # number of numbers of fixed position
-    int_count: int = 0  # number of integers, which are offsets of data of variable length
+    Attributes:
+        size: number of numbers of fixed position.
+        int_count: number of integers, which are offsets of data of variable length.
+    """
+
+    size: int = 0
+    int_count: int = 0
 
     @abstractmethod
     def read(self, builder: ElementBuilder, force: Any) -> Any:
-        """Return the value, from a component."""
+        """Return the value of the parameter for a component.
+
+        Args:
+            builder: builder of the model's elements.
+            force: the component.
+        """
 
     @abstractmethod
     def write_arguments(self, head: int, number: int) -> list[str]:
@@ -90,11 +100,17 @@ class Parameter(ABC):
 
 @dataclass(frozen=True)
 class Number(Parameter):
-    """Property that is a number, or a boolean that the law takes as 1 or 0."""
+    """Property that is a number, or a boolean that the law takes as 1 or 0.
 
-    name: str  # name of the property
-    accepts: Callable[[float], bool] = lambda value: True  # whether a number is accepted
-    needs: str = ""  # message about other numbers, after "the <name> of '<path>' "
+    Attributes:
+        name: name of the property.
+        accepts: returns whether a number is accepted.
+        needs: message about other numbers, after "the <name> of '<path>' ".
+    """
+
+    name: str
+    accepts: Callable[[float], bool] = lambda value: True
+    needs: str = ""
     size = 1
 
     def read(self, builder: ElementBuilder, force: Any) -> float:
@@ -110,7 +126,7 @@ class Number(Parameter):
         return value
 
     def write_arguments(self, head: int, number: int) -> list[str]:
-        """Return the number's expression."""
+        """Return the expression that reads the number from the record."""
         return [f"p[{number}]"]
 
     def pack(self, value: float, tail: Tail, where: str) -> tuple[Sequence[int], Sequence[float]]:
@@ -136,11 +152,19 @@ class Numbers(Parameter):
 
     @property
     def size(self) -> int:  # type: ignore[override]
-        """Number of values."""
+        """Number of values that the function returns."""
         return self.count
 
     def read(self, builder: ElementBuilder, force: Any) -> tuple[float, ...]:
-        """Return the values."""
+        """Return the values as floats; a ModelError if one is not finite.
+
+        Args:
+            builder: builder of the model's elements.
+            force: the component.
+
+        Returns:
+            `count` values.
+        """
         values = tuple(map(float, self.of(builder, force)))
         builder.check_finite(force, values)
         return values
@@ -171,19 +195,23 @@ class Fields(Parameter):
 
     @property
     def size(self) -> int:  # type: ignore[override]
-        """Number of fields."""
+        """Number of fields of the tuple."""
         return len(self.type._fields)
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the values: those of the properties, then those of the other fields."""
+        """Names of the values: those of the properties, then those of the other fields.
+
+        Returns:
+            One name for each field of the tuple.
+        """
         return (
             *(item.name for item in self.properties),
             *self.type._fields[len(self.properties) :],
         )
 
     def read(self, builder: ElementBuilder, force: Any) -> Any:
-        """Return the named tuple."""
+        """Return the named tuple; a ModelError if a value is not finite or not accepted."""
         values = [item.read(builder, force) for item in self.properties]
         values += map(float, self.others(builder, force))
         builder.check_finite(force, values)
@@ -217,7 +245,17 @@ class Vector(Numbers):
     """Several numbers that the law takes as a pointer."""
 
     def read(self, builder: ElementBuilder, force: Any) -> tuple[float, ...]:
-        """Return the numbers unchanged: muscles share those of equal curves."""
+        """Return the numbers unchanged, as a tuple.
+
+        The objects are not copied: muscles with equal curves then share one tuple in memory.
+
+        Args:
+            builder: builder of the model's elements.
+            force: the component.
+
+        Returns:
+            The numbers of the function.
+        """
         values = tuple(self.of(builder, force))
         builder.check_finite(force, values)
         return values
@@ -229,13 +267,17 @@ class Vector(Numbers):
 
 @dataclass(frozen=True)
 class Curve(Parameter):
-    """Property that is a function of one argument; the law takes its table, for `value_at`."""
+    """Property that is a function of one argument; the law takes its table, for `value_at`.
+
+    Attributes:
+        name: name of the property.
+    """
 
     name: str
     int_count = 1
 
     def read(self, builder: ElementBuilder, force: Any) -> Function:
-        """Return the function."""
+        """Return the function that the property holds."""
         return builder.read_function(force, getattr(force, self.name), self.name)
 
     def write_arguments(self, head: int, number: int) -> list[str]:
@@ -250,7 +292,7 @@ class Curve(Parameter):
         Returns:
             Integers and numbers of fixed position.
         """
-        return (tail.put_numbers(table_of_one(value, f"the {self.name} of {where}")),), ()
+        return (tail.append_numbers(table_of_one(value, f"the {self.name} of {where}")),), ()
 
 
 @dataclass(frozen=True)
@@ -262,16 +304,16 @@ class Together(Parameter):
 
     @property
     def size(self) -> int:  # type: ignore[override]
-        """Number of numbers."""
+        """Number of numbers of all its parameters."""
         return sum(term.size for term in self.terms)
 
     @property
     def int_count(self) -> int:  # type: ignore[override]
-        """Number of integers."""
+        """Number of integers of all its parameters."""
         return sum(term.int_count for term in self.terms)
 
     def read(self, builder: ElementBuilder, force: Any) -> Any:
-        """Return the named tuple."""
+        """Return the named tuple of the values of its parameters."""
         return self.type(*(term.read(builder, force) for term in self.terms))
 
     def write_arguments(self, head: int, number: int) -> list[str]:
@@ -309,7 +351,7 @@ class Expression(Parameter):
     int_count = 3
 
     def read(self, builder: ElementBuilder, force: Any) -> Formula:
-        """Return the parsed expression."""
+        """Return the parsed expression; an error names the property."""
         where = f"the {self.name} of '{builder.path(force)}'"
         return Formula.parse(getattr(force, self.name), self.variables, where)
 
@@ -327,7 +369,7 @@ class Expression(Parameter):
         count = len(steps) // 3
         # Each register may carry its derivatives with respect to the variables.
         registers = tail.reserve_record((1 + len(self.variables)) * (len(self.variables) + count))
-        return (tail.put_ints((count, *steps)), tail.put_numbers(constants), registers), ()
+        return (tail.append_ints((count, *steps)), tail.append_numbers(constants), registers), ()
 
 
 @dataclass(frozen=True)
@@ -343,7 +385,15 @@ class Expressions(Parameter):
     int_count = 2
 
     def read(self, builder: ElementBuilder, force: Any) -> tuple[Formula, ...]:
-        """Return the parsed expressions."""
+        """Return the parsed expressions, a tuple in the order of `names`.
+
+        Args:
+            builder: builder of the model's elements.
+            force: the component.
+
+        Returns:
+            One formula for each name.
+        """
         return tuple(Expression(name, self.variables).read(builder, force) for name in self.names)
 
     def write_arguments(self, head: int, number: int) -> list[str]:
@@ -362,9 +412,9 @@ class Expressions(Parameter):
         most = 0
         for formula in value:
             steps, constants = program(formula)
-            ints += (len(steps) // 3, tail.put_numbers(constants), *steps)
+            ints += (len(steps) // 3, tail.append_numbers(constants), *steps)
             most = max(most, len(steps) // 3)
-        return (tail.put_ints(ints), tail.reserve_record(len(self.variables) + most)), ()
+        return (tail.append_ints(ints), tail.reserve_record(len(self.variables) + most)), ()
 
 
 @dataclass(frozen=True)
@@ -379,7 +429,7 @@ class Control(Parameter):
         return builder.controls.find_first(builder, force)
 
     def write_arguments(self, head: int, number: int) -> list[str]:
-        """Return one expression for each control."""
+        """Return one expression for each control, which reads it from the work vector."""
         return [f"data[model[MODEL.WORK_CONTROL] + i[{head}] + {k}]" for k in range(self.count)]
 
     def pack(self, value: Any, tail: Tail, where: str) -> tuple[Sequence[int], Sequence[float]]:

@@ -40,41 +40,61 @@ INTEGRATE = "integrate"
 
 
 class Subject(NamedTuple):
-    """One actuator, and the numbers that the law takes for it."""
+    """Actuator for which a law is called.
+
+    Attributes:
+        actuator: the component.
+        numbers: named tuple of the numbers that the law takes for it.
+    """
 
     actuator: Any
     numbers: Any
 
 
 class Reading(NamedTuple):
-    """Inputs of a probe, and the labels of its results."""
+    """Inputs of a probe, and the labels of its results.
 
-    labels: tuple[str, ...]  # labels of its results
-    subjects: tuple[Subject, ...] = ()  # actuators that the law is called for
-    # index of the first subject's result; -1 if the sum is the only result. The sum is the first
-    # result unless this index is 0.
+    Attributes:
+        labels: labels of its results.
+        subjects: actuators that the law is called for.
+        first: index of the first subject's result; -1 if the sum is the only result. The sum is the
+            first result unless this index is 0.
+        constant: first term of the sum, which is also the second result if `first` is 2.
+        curve: curve that the law takes.
+        details: data for `measure`.
+    """
+
+    labels: tuple[str, ...]
+    subjects: tuple[Subject, ...] = ()
     first: int = -1
-    # first term of the sum, which is also the second result if `first` is 2
     constant: float = 0.0
-    curve: Function | None = None  # curve that the law takes
-    details: Any = ()  # data for `measure`
+    curve: Function | None = None
+    details: Any = ()
 
 
 @dataclass(frozen=True, eq=False)
 class ProbeType:
-    """Declaration of how the probes of one class are computed."""
+    """Declaration of how the probes of one class are computed.
 
-    component: type  # class of the probes
-    # returns the inputs of a probe; raises an UnsupportedError if it cannot be computed
+    Attributes:
+        component: class of the probes.
+        read: returns the inputs of a probe; raises an UnsupportedError if it cannot be computed.
+        law: returns the quantity of one subject.
+        reads: inputs of the law from a subject: recorded quantities, or "actuation", "speed" and
+            "control".
+        numbers: type of the last argument of the law, a named tuple.
+        measure: computes the results instead of a law, from the probe, the system after an
+            evaluation of its forces, and the time (s) and state of the evaluation.
+        has_curve: whether the law takes a curve.
+    """
+
+    component: type
     read: Callable[[ElementBuilder, Any], Reading]
-    law: Callable[..., float] | None = None  # returns the quantity of one subject
-    # inputs of the law from a subject: recorded quantities, or "actuation", "speed" and "control"
+    law: Callable[..., float] | None = None
     reads: tuple[str, ...] = ()
-    numbers: Any = tuple  # type of the last argument of the law, a named tuple
-    # computes the results instead of a law, from the probe, the system after an evaluation of its
-    # forces, and the time (s) and state of the evaluation
+    numbers: Any = tuple
     measure: Callable[[DeclaredProbe, Any, float, Sequence[float]], Sequence[float]] | None = None
-    has_curve: bool = False  # whether the law takes a curve
+    has_curve: bool = False
 
     @property
     def name(self) -> str:
@@ -90,6 +110,8 @@ class ProbeType:
     @property
     def source(self) -> str:
         """Source text of the kernel."""
+        # The text is restricted Python, so that the kernel can be translated to C++ like the
+        # others.
         size, count = len(self.numbers._fields), len(self.reads)
         arguments = [f"data[a[{k}]]" for k in range(count)]
         arguments += [f"at(p, i[{HEAD - 1}])"] if self.has_curve else []
@@ -117,22 +139,36 @@ class ProbeType:
 
 @dataclass(frozen=True)
 class DeclaredProbe(Silent):
-    """Probe of a declared type; see :class:`osimlite.simulation.elements.force_records.ForceElement`."""
+    """Probe of a declared type.
 
-    component: type  # class of the component
-    path: str  # path of the component
-    name: str  # name of the component
-    operation: str  # operation on its results: "value", "integrate" and so on
-    gain: float  # factor of the reported results
-    initial: tuple[float, ...]  # initial values of integrals
-    reading: Reading  # inputs
-    # for each subject and each input, the element whose record has it, and the offset there
+    It is a :class:`osimlite.simulation.elements.force_records.ForceElement` without forces.
+
+    Attributes:
+        component: class of the component.
+        path: path of the component.
+        name: name of the component.
+        operation: operation on its results: "value", "integrate" and so on.
+        gain: factor of the reported results.
+        initial: initial values of integrals.
+        reading: inputs.
+        places: for each subject and each input, the element whose record has it, and the offset
+            there.
+        numbers: last argument of the law for each subject.
+    """
+
+    component: type
+    path: str
+    name: str
+    operation: str
+    gain: float
+    initial: tuple[float, ...]
+    reading: Reading
     places: tuple[tuple[tuple[str, int], ...], ...] = ()
-    numbers: tuple[tuple[float, ...], ...] = ()  # last argument of the law for each subject
+    numbers: tuple[tuple[float, ...], ...] = ()
 
     @property
     def probe_type(self) -> ProbeType:
-        """Declaration of its class."""
+        """Declaration of the probe's class."""
         return PROBE_TYPES.find(self.component)
 
     @property
@@ -173,12 +209,15 @@ class DeclaredProbe(Silent):
 def make_probes(builder: ElementBuilder, elements: Sequence[ForceElement]) -> list[DeclaredProbe]:
     """Return the enabled probes of a model, in its order.
 
-    Components whose outputs are reported are included. A probe that cannot be computed is left out, with
-    a notice.
+    Components whose outputs are reported are included. A probe that cannot be computed is left out,
+    with a warning.
 
     Args:
         builder: builder of the elements.
         elements: forces of the model.
+
+    Returns:
+        The probes.
 
     Raises:
         ModelError: a probe names something that does not exist, where OpenSim fails too.
@@ -192,16 +231,18 @@ def make_probes(builder: ElementBuilder, elements: Sequence[ForceElement]) -> li
         try:
             result.append(_make_probe(probe_type, builder, probe, by_path))
         except UnsupportedError as error:
-            warn_caller(f"{error.message} is left out of the probes")
+            warn_caller(f"{error.message} is left out: its probe is not reported")
     return result
 
 
 def _make_probe(
     probe_type: ProbeType, builder: ElementBuilder, probe: Any, elements: Mapping[str, ForceElement]
 ) -> DeclaredProbe:
-    path, reading = builder.path(probe), probe_type.read(builder, probe)
+    path = builder.path(probe)
+    reading = probe_type.read(builder, probe)
     # A component with outputs has no operations: it reports values.
-    operation, gain = getattr(probe, "probe_operation", "value"), float(getattr(probe, "gain", 1.0))
+    operation = getattr(probe, "probe_operation", "value")
+    gain = float(getattr(probe, "gain", 1.0))
     if operation == INTEGRATE and probe_type.law is None:
         raise builder.unsupported_error(probe, ", whose integral osimlite does not compute")
     initial: tuple[float, ...] = tuple(getattr(probe, "initial_conditions_for_integration", ()))
@@ -235,7 +276,23 @@ def _locate_inputs(
     subject: Subject,
     elements: Mapping[str, ForceElement],
 ) -> tuple[tuple[tuple[str, int], ...], tuple[float, ...]]:
-    """Return where the records have the inputs of the law for a subject, and the subject's numbers."""
+    """Return where the inputs of a law are recorded.
+
+    Args:
+        probe_type: declaration of the probe's class.
+        builder: builder of the elements.
+        probe: the probe.
+        subject: one of its actuators.
+        elements: forces of the model by path.
+
+    Returns:
+        For each input the path of the element with the record and the offset there, and the
+        subject's
+            numbers.
+
+    Raises:
+        UnsupportedError: the actuator is not computed, or does not record an input.
+    """
     actuator, numbers = subject
     path = builder.path(actuator)
     control = CONTROLS, builder.controls.find_first(builder, actuator)
@@ -267,7 +324,10 @@ def find_members(
         probe: the probe.
         words: names, or components.
         path: path of the set.
-        probe_type: class of the components.
+        probe_type: class name of the components in the set.
+
+    Returns:
+        The components, in the order of the words.
 
     Raises:
         ModelError: the set has no component of a name.

@@ -1,7 +1,8 @@
-"""Tables of the modules that declare what is computed of each class, and access to the declarations.
+"""Tables of the modules that declare how components are computed, and access to the declarations.
 
-A table names the module of every class. The module is imported when a model first has a component of
-that class, because models rarely need more than a few of them. It then registers its declarations::
+A table names the module of every class. The module is imported when a model first has a component
+of that class, because models rarely need more than a few of them. It then registers its
+declarations::
 
     register_force_type(ForceType(PathSpring, ...))
 
@@ -48,7 +49,14 @@ class Registry:
         return declaration
 
     def find(self, component: type | str) -> Any:
-        """Return the declaration of a class, or of the class of a name, or None."""
+        """Return the declaration of a class.
+
+        Args:
+            component: the class, or its name.
+
+        Returns:
+            The declaration; None if no table names the class.
+        """
         name = component if isinstance(component, str) else component.__name__
         module = self.modules.get(name)
         if module is None:
@@ -150,5 +158,12 @@ def register_path(component: type) -> Callable[[T], T]:
 
 @cache
 def kernel_name(component: str) -> str:
-    """Return the name of the kernel that computes a component of a class: `path_spring` for PathSpring."""
+    """Return the name of the kernel that computes the components of a class.
+
+    Args:
+        component: name of the class.
+
+    Returns:
+        The name in snake case: `path_spring` for PathSpring.
+    """
     return make_module_name(component)

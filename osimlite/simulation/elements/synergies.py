@@ -26,12 +26,15 @@ class TableColumn(PiecewiseLinear):
 
 
 def read_signal(builder: ElementBuilder, controller: Any, text: str) -> Function | None:
-    """Return the output that the text `path|output:channel` names; None if it is not a function of time.
+    """Return the output that an input of a controller names, as a function of time.
 
     Args:
         builder: builder of the elements.
         controller: controller with the input.
-        text: the text of the input.
+        text: the text of the input, `path|output:channel`.
+
+    Returns:
+        The function; None if the output is not a known function of time.
 
     Raises:
         ModelError: there is no such output.

@@ -32,14 +32,23 @@ Flags = NDArray[np.bool_]
 
 @dataclass(frozen=True, eq=False)
 class TriangleMesh:
-    """Closed surface of triangles."""
+    """Closed surface of triangles.
 
-    points: Array  # positions (n, 3), m
-    triangles: Indices  # indices of points (t, 3), counter-clockwise seen from outside
+    Attributes:
+        points: positions (n, 3), m.
+        triangles: indices of points (t, 3), counter-clockwise seen from outside.
+    """
+
+    points: Array
+    triangles: Indices
 
     @classmethod
     def read(cls, name: str, folders: MeshFolders) -> TriangleMesh:
-        """Return the surface in a file (.vtp, .stl, .stla or .obj) in one of the folders of a model.
+        """Return the surface in a file in one of the folders of a model.
+
+        Args:
+            name: name of the file (.vtp, .stl, .stla or .obj).
+            folders: the folders.
 
         Raises:
             ModelError: there is no such file, its format is unknown, or it is not a closed surface.
@@ -66,13 +75,22 @@ class TriangleMesh:
 
     @classmethod
     def from_corners(cls, corners: Array, file: str) -> TriangleMesh:
-        """Return the surface of triangles (t, 3, 3), in which corners at one position become one point."""
+        """Return the surface of triangles whose corners are separate, as in STL files.
+
+        Corners at one position become one point.
+
+        Args:
+            corners: corners of the triangles (t, 3, 3), m.
+            file: the file, for messages.
+        """
         different, which = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
         points: list[Array] = []
         cells: dict[tuple[int, ...], int] = {}
         place_of = np.empty(len(different), dtype=np.int64)
         for number, point in enumerate(different):
             cell = np.floor(point / _SAME_POINT).astype(np.int64)
+            # A grid of cells makes the search for equal points linear; a point near a cell's border
+            # may be in a neighbour.
             around = (cells.get(tuple((cell + step).tolist()), -1) for step in _STEPS)
             same = (k for k in around if k >= 0 and np.abs(points[k] - point).max() <= _SAME_POINT)
             place_of[number] = place = next(same, len(points))
@@ -83,7 +101,14 @@ class TriangleMesh:
 
     @classmethod
     def from_polygons(cls, polygons: Polygons, file: str) -> TriangleMesh:
-        """Return the surface of polygons: a quadrilateral becomes two triangles, a larger one a fan about its mean."""
+        """Return the surface of polygons.
+
+        As in Simbody, a quadrilateral becomes two triangles, a larger polygon a fan about its mean.
+
+        Args:
+            polygons: the polygons.
+            file: the file, for messages.
+        """
         points, triangles = polygons.points.tolist(), []
         for around in np.split(polygons.corners, polygons.ends[:-1]):
             match around.tolist():
@@ -103,6 +128,8 @@ class TriangleMesh:
     @classmethod
     def _make_closed(cls, points: Array, triangles: Indices, file: str) -> TriangleMesh:
         edges = np.concatenate([triangles[:, [a, b]] for a, b in ((0, 1), (1, 2), (2, 0))])
+        # Each edge from a to b has a number, and the edge from b to a another one. On a closed
+        # surface each edge occurs once in either direction.
         codes, back = (edges @ np.array(pair) for pair in ((len(points), 1), (1, len(points))))
         counts = np.unique(codes, return_counts=True)[1]
         open_edges = np.count_nonzero(~np.isin(codes, back)) + np.count_nonzero(counts > 1)
@@ -120,11 +147,16 @@ class TriangleMesh:
                 file=file,
             )
         corners = result.corners
+        # The sign of the volume tells whether the triangles are seen from outside.
         volume = np.einsum("ij,ij->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))
         return result if volume > 0.0 else cls(points, triangles[:, ::-1])
 
     def transform(self, frame: Array) -> TriangleMesh:
-        """Return the surface in another frame, in which its axes and origin are `frame` (4, 4)."""
+        """Return the surface in another frame.
+
+        Args:
+            frame: axes and origin of the present frame in the other one (4, 4).
+        """
         return TriangleMesh(self.points @ frame[:3, :3].T + frame[:3, 3], self.triangles)
 
     @cached_property
@@ -171,7 +203,8 @@ class TriangleMesh:
 
     @cached_property
     def is_one_piece(self) -> bool:
-        """Whether every triangle can be reached from every other across edges."""
+        """Flag: every triangle can be reached from every other across edges."""
+        # Labels spread along triangles until all points of a piece have the least one.
         label = np.arange(len(self.points))
         while True:
             least = label[self.triangles].min(axis=1)
@@ -191,9 +224,11 @@ class TriangleMesh:
             The nearest points (m, 3), and which of the given points are inside the surface (m,).
         """
         apart = np.linalg.norm(places[:, None] - self.centroids, axis=2)
+        # A triangle whose nearest possible point is farther than the farthest of another one is
+        # out.
         least = (apart + self._reaches).min(axis=1)
         which, triangles = np.nonzero(apart - self._reaches <= least[:, None])
-        result = _nearest_on_triangles(self.corners[triangles], places[which])
+        result = _find_nearest_on_triangles(self.corners[triangles], places[which])
         ways = result - places[which]
         squares = np.einsum("ij,ij->i", ways, ways)
         bound = np.full(len(places), np.inf)
@@ -210,8 +245,16 @@ class TriangleMesh:
         return _edges_cross(self, other) or _edges_cross(other, self)
 
 
-def _nearest_on_triangles(corners: Array, places: Array) -> Array:
-    """Return the nearest point (k, 3) of each triangle (k, 3, 3) to a point (k, 3)."""
+def _find_nearest_on_triangles(corners: Array, places: Array) -> Array:
+    """Return the nearest point of a triangle to a point, for many pairs.
+
+    Args:
+        corners: corners of the triangles (k, 3, 3).
+        places: the points (k, 3).
+
+    Returns:
+        Points on the triangles (k, 3).
+    """
     a, b, c = np.moveaxis(corners, 1, 0)
     normal = np.cross(b - a, c - a)
     height = _dot_rows(places - a, normal) / _dot_rows(normal, normal)
@@ -220,6 +263,8 @@ def _nearest_on_triangles(corners: Array, places: Array) -> Array:
     best, least = on_plane.copy(), np.full(len(places), np.inf)
     for start, end in ((a, b), (b, c), (c, a)):
         along = end - start
+        # The projection is inside the triangle if it is on the same side of all edges; else the
+        # nearest point is on an edge.
         inside &= _dot_rows(np.cross(along, on_plane - start), normal) >= 0.0
         part = np.clip(_dot_rows(places - start, along) / _dot_rows(along, along), 0.0, 1.0)
         point = start + part[:, None] * along
@@ -230,8 +275,14 @@ def _nearest_on_triangles(corners: Array, places: Array) -> Array:
 
 
 def _edges_cross(one: TriangleMesh, two: TriangleMesh) -> bool:
-    """Return whether an edge of one surface goes through a triangle of another."""
+    """Return whether an edge of one surface goes through a triangle of another.
+
+    Args:
+        one: surface with the edges.
+        two: surface with the triangles.
+    """
     edges = np.concatenate([one.triangles[:, [a, b]] for a, b in ((0, 1), (1, 2), (2, 0))])
+    # Each edge belongs to two triangles and is tested once.
     edges = edges[edges[:, 0] < edges[:, 1]]
     start, end = one.points[edges[:, 0]], one.points[edges[:, 1]]
     near = np.ones((len(edges), len(two.triangles)), dtype=bool)

@@ -16,7 +16,9 @@ from osimlite.simulation.system import System
 
 
 class KernelEngine(System):
-    """Motion by the kernels; see :class:`osimlite.simulation.engines.protocol.Engine` for its methods.
+    """Engine that computes motions by the kernels.
+
+    Its methods are those of :class:`osimlite.simulation.engines.protocol.Engine`.
 
     Args:
         mechanism: the mechanism.
@@ -33,8 +35,11 @@ class KernelEngine(System):
     def error_counts(self) -> tuple[int, int]:
         """Divisors of the sums of squared errors of values and of speeds, in the norm of the integrator.
 
-        Simbody counts locked coordinates too, and the fourth number of a quaternion for each joint
-        with three angles.
+        Simbody's norm is a root mean square. It counts locked coordinates too, and the fourth
+        number of a quaternion for each joint with three angles.
+
+        Returns:
+            Divisor for the values, and divisor for the speeds.
         """
         count = len(self.mechanism.coordinates)
         return count + sum(
@@ -43,7 +48,16 @@ class KernelEngine(System):
 
     # ---------------------------------------------------------------------------------------- accelerations
     def compute_derivative(self, t: float, y: Sequence[float]) -> list[float]:
-        """Return (qdot, udot, zdot) at a state."""
+        """Return (qdot, udot, zdot) at a state, and set `loads`.
+
+        Args:
+            t: time, s.
+            y: state (y,).
+
+        Raises:
+            SimulationError: an admissible motion moves no mass, or speeds are not defined in the
+                pose.
+        """
         status = self.realize(t, y, STAGE.ACCELERATION)
         if status != OUTCOME.OK:
             raise self.make_evaluation_error(status, t, y)
@@ -53,7 +67,16 @@ class KernelEngine(System):
     def compute_accelerations(
         self, t: float, q: Sequence[float], u: Sequence[float]
     ) -> list[float]:
-        """Return the derivatives of the speeds of all coordinates, in the mechanism's order; 0 if locked."""
+        """Return the derivatives of the speeds of all coordinates.
+
+        Args:
+            t: time, s.
+            q: values (n,) of all coordinates, in the mechanism's order.
+            u: generalized speeds (n,).
+
+        Returns:
+            Accelerations (n,) in the mechanism's order; 0 for locked coordinates.
+        """
         udot = self.compute_derivative(t, self.state.pack(q, u))[
             len(self.order) : 2 * len(self.order)
         ]
@@ -63,8 +86,17 @@ class KernelEngine(System):
     def make_stepper(
         self, t: float, y: Sequence[float], settings: Settings, observe: Observer
     ) -> Stepper:
-        """Return a stepper from a state on: error-controlled steps, or fixed steps of semi-implicit Euler."""
+        """Return a stepper that continues from a state.
+
+        Args:
+            t: time, s.
+            y: state (y,).
+            settings: how to step: with error control, or by fixed steps of semi-implicit Euler.
+            observe: called with time and state after each step.
+        """
         if settings.fixed_step is not None:
+            # Speeds of ball joints are angular velocities, from which the kernels compute the rates
+            # of the angles.
             rates = (
                 None
                 if all(body.mobilizer.speeds_are_rates for body in self.mechanism.bodies)
@@ -84,17 +116,33 @@ class KernelEngine(System):
         return ControlledSteps(self, t, y, settings, observe, held=settings.held)
 
     def project_state(self, t: float, y: Sequence[float], tolerance: float) -> list[float] | None:
-        """Return the nearest state (y,) that fulfils the constraints to a tolerance; None if none is near."""
+        """Return the nearest state that fulfils the constraints.
+
+        Args:
+            t: time, s.
+            y: state (y,).
+            tolerance: largest accepted error of a constraint, in its unit.
+
+        Returns:
+            The state (y,); None if none is near.
+        """
         if not self.structure[MODEL.CONSTRAINED]:
             return list(y)
         self._set_state(t, y)
+        # The kernel reads its tolerance and the largest accepted correction from the scratch
+        # numbers.
         self._w[WORK.SCRATCH : WORK.SCRATCH + 2] = tolerance, inf
         entry = self.program.code.get_entry("project")
         status = entry(self.program.ints, self.numbers, self._w, self._y, self._f, 0)
         return self._y.tolist() if status == OUTCOME.OK else None
 
     def _compute_rates(self, q: list[float], u: list[float]) -> list[float]:
-        """Return the rates of the coordinates for values and speeds."""
+        """Return the rates of the coordinates.
+
+        Args:
+            q: values of the coordinates in the state.
+            u: their generalized speeds.
+        """
         y = q + u + [0.0] * len(self.state.variables)
         status = self.realize(0.0, y, STAGE.VELOCITY)
         if status != OUTCOME.OK:

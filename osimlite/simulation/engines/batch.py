@@ -30,7 +30,7 @@ NO_WATCH_LEVELS = np.zeros((0, 7))
 
 
 class Batch:
-    """Runs that differ in their initial states or in their numbers.
+    """Workspace of runs that differ in their initial states or in their numbers.
 
     Args:
         engine: the engine.
@@ -74,16 +74,24 @@ class Batch:
         start_holds: bool = False,
         held: ControllerRuns | None = None,
     ) -> None:
-        self.states = engine.state.as_table(states)
+        self.states = engine.state.to_table(states)
         (count, size), pairs = self.states.shape, len(engine.contacts)
-        self._engine, self._kinds, self._levels, self._held = engine, kinds, levels, held
+        self._engine = engine
+        self._kinds = kinds
+        self._levels = levels
+        self._held = held
         self._vectors = engine.numbers[None] if vectors is None else vectors
         self._times = np.array(options.report_times, dtype=np.float64)
         self._settings = options.to, options.accuracy, *engine.error_counts, *options.step_bounds
-        s, event, program = engine.structure, 3 + size * options.event_states, engine.program
+        s = engine.structure
+        event = 3 + size * options.event_states
+        program = engine.program
         method = import_module(f"{kernels.__name__}.{LAW_MODULES[options.integrator]}")
+        # After the work vector follow the positions of contacts and watches, then the head and the
+        # stages of the method.
         self._method_at = int(s[MODEL.WORK_SIZE]) + 3 * (pairs + len(kinds))
         self._room = self._method_at + method.HEAD + method.STATES * size
+        # Implicit methods solve with a Jacobian, which needs the derivatives of the forces.
         if method.IS_IMPLICIT:
             program.link_responses(options.integrator)
             self._room += condensation_size(int(s[MODEL.DOFS]), int(s[MODEL.RESPONSES]))
@@ -99,34 +107,46 @@ class Batch:
         self._sizes = np.array((*sizes, start_holds, address, self._method_at), dtype=np.int64)
         self.clocks = np.empty((count, 2))
         self.clocks[:] = start, next_step
-        self.counts, self.endings = (
-            np.zeros((count, record.COUNTED), dtype=np.int64),
-            np.zeros(count, dtype=np.int64),
-        )
+        self.counts = np.zeros((count, record.COUNTED), dtype=np.int64)
+        self.endings = np.zeros(count, dtype=np.int64)
+        # Rows that a run does not reach stay NaN.
         self.reports = np.full((count, len(self._times), size), np.nan)
-        self.events, self.peaks = (
-            np.zeros((count, options.most_events, event)),
-            np.zeros((count, pairs, 2)),
-        )
-        self.log, self.forces = (
-            np.empty((most_logged, 1 + 2 * size)),
-            np.empty((most_logged, pairs, 3)),
-        )
+        self.events = np.zeros((count, options.most_events, event))
+        self.peaks = np.zeros((count, pairs, 2))
+        self.log = np.empty((most_logged, 1 + 2 * size))
+        self.forces = np.empty((most_logged, pairs, 3))
 
     def limit_steps(self, steps: int) -> None:
-        """Let the next call end after a number of steps, or when the log is full."""
+        """Let the next call end after a number of steps, or when the log is full.
+
+        Args:
+            steps: number of steps.
+        """
         self._sizes[record.MOST_LOGGED] = min(steps, len(self.log))
 
     def make_workspace(self) -> Floats:
-        """Return the workspace of `run`; a method continues from what it has left there."""
+        """Return a new workspace of :meth:`run`.
+
+        A method of several steps keeps its history there, so a motion continues with the same
+        workspace.
+        """
         return np.zeros(self._room)
 
     def run(self, room: Floats, first: int = 0, last: int | None = None) -> None:
-        """Compute the runs from `first` to before `last`; other threads compute others in their own workspaces."""
+        """Compute some of the runs.
+
+        Other threads may compute others at the same time, in their own workspaces.
+
+        Args:
+            room: the workspace.
+            first: index of the first run.
+            last: index after the last run; by default all that follow.
+        """
         size = self.states.shape[1]
         first_error = int(self._engine.structure[MODEL.WORK_STATE]) + ERRORS * size
         self.errors = room[first_error : first_error + size]
         vectors = self._vectors
+        # A stride of 0 lets all runs share one row of numbers.
         each = vectors.shape[1] if len(vectors) > 1 else 0
         own = self._sizes, self.clocks, self.counts, self.states
         records = self._times, self.reports, self.log, self.forces, self.events, self.peaks
@@ -146,13 +166,16 @@ class Batch:
         )
 
     def run_walk_law(self, law: str, room: Floats, numbers: Floats, *parts: Any) -> int:
-        """Call a law of :mod:`osimlite.mechanics.kernels.walks`.
+        """Call a kernel of :mod:`osimlite.mechanics.kernels.walks`.
 
         Args:
             law: its name.
             room: workspace, see :meth:`make_workspace`.
-            numbers: numbers of the model (x,), which the law changes.
-            parts: further arguments of the law.
+            numbers: numbers of the model (x,), which the kernel changes.
+            parts: further arguments of the kernel.
+
+        Returns:
+            The result of the kernel.
         """
         return self._call_law(
             law,

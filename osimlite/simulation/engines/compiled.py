@@ -44,7 +44,7 @@ def make_engine(mechanism: Mechanism, forces: Forces, settings: Settings) -> Bat
     """
     if settings.show:
         raise SimulationError(
-            "the compiled engine shows no window; osimlite view plays its motions, or take --engine bullet for --gui"
+            "the compiled engine shows no window; play the motion with osimlite view, or use --engine bullet for --gui"
         )
     if settings.route not in ("auto", CompiledEngine.route):
         raise OsimliteError(
@@ -64,12 +64,20 @@ def run_many(
     options: BatchOptions,
     numbers: ArrayLike | None = None,
 ) -> Runs:
-    """Compute a batch; see :meth:`osimlite.simulation.batches.BatchEngine.run_many`."""
+    """Compute a batch; see :meth:`osimlite.simulation.batches.BatchEngine.run_many`.
+
+    Args:
+        engine: the engine.
+        states: initial states (W, y).
+        options: options of the batch.
+        numbers: numbers of models of the same structure (W, m); by default the engine's.
+    """
     from concurrent.futures import ThreadPoolExecutor
 
-    starts = engine.state.as_table(states)
+    starts = engine.state.to_table(states)
     options.check()
-    vectors, count = _as_number_rows(engine, numbers), len(starts)
+    vectors = _to_number_rows(engine, numbers)
+    count = len(starts)
     if vectors.shape not in ((1, len(engine.numbers)), (count, len(engine.numbers))):
         raise OsimliteError(
             f"the numbers are one row of {len(engine.numbers)} for each of the {count} runs; got {vectors.shape}"
@@ -86,8 +94,10 @@ def run_many(
     batch = Batch(engine, starts, options, vectors=vectors, kinds=kinds, levels=levels, held=held)
 
     def work(first: int) -> None:
+        # Each task has a workspace of its own, as threads run at the same time.
         batch.run(batch.make_workspace(), first, min(first + RUNS_PER_TASK, count))
 
+    # Threads suffice, because ctypes releases Python's global lock during a call.
     with ThreadPoolExecutor(options.threads or count_cores()) as pool:
         list(pool.map(work, range(0, count, RUNS_PER_TASK)))
     names = [*engine.contacts, *(watch.name for watch in options.watches)]
@@ -118,31 +128,65 @@ def locate_contacts(
     numbers: ArrayLike | None = None,
     rows: ArrayLike | None = None,
 ) -> Floats:
-    """Return the surfaces of all contacts (k, P, 9); see :meth:`osimlite.simulation.batches.BatchEngine.locate_contacts`."""
-    vectors, given = _as_number_rows(engine, numbers), engine.state.as_table(states)
+    """Return the surfaces of all contacts (k, P, 9).
+
+    See :meth:`osimlite.simulation.batches.BatchEngine.locate_contacts`.
+
+    Args:
+        engine: the engine.
+        states: states (k, y).
+        numbers: numbers of models of the same structure (v, m); by default the engine's.
+        rows: row of `numbers` for each state (k,); by default the first.
+    """
+    vectors = _to_number_rows(engine, numbers)
+    given = engine.state.to_table(states)
     which = np.zeros(len(given), dtype=np.int64) if rows is None else np.array(rows, dtype=np.int64)
     places = np.zeros((len(given), len(engine.contacts), 9))
-    w, derivative = np.zeros(engine.structure[MODEL.WORK_SIZE]), np.zeros(engine.state.size)
+    w = np.zeros(engine.structure[MODEL.WORK_SIZE])
+    derivative = np.zeros(engine.state.size)
     arrays = vectors, w, vectors.shape[1], which, given, derivative, places
     engine.program.code.get_entry("contact_places")(engine.program.ints, *arrays, len(given))
     return places
 
 
 def get_contact_radii(engine: CompiledEngine, numbers: ArrayLike | None = None) -> Floats:
-    """Return the radii of the second surfaces (v, P), m."""
+    """Return the radii of the second surfaces.
+
+    Args:
+        engine: the engine.
+        numbers: numbers of models of the same structure (v, m); by default the engine's.
+
+    Returns:
+        Radii (v, P), m.
+    """
     s = engine.structure
     records = s[s[MODEL.CONTACT_AT] : s[MODEL.CONTACT_AT] + len(engine.contacts)]
-    return _as_number_rows(engine, numbers)[:, s[records + ITEM.NUMBERS] + RADIUS]
+    # Read from the numbers, as runs may differ in their radii.
+    return _to_number_rows(engine, numbers)[:, s[records + ITEM.NUMBERS] + RADIUS]
 
 
-def _as_number_rows(engine: CompiledEngine, numbers: ArrayLike | None) -> Floats:
+def _to_number_rows(engine: CompiledEngine, numbers: ArrayLike | None) -> Floats:
+    """Return numbers of models as contiguous rows (v, m); the engine's by default."""
     vectors = np.array(engine.numbers if numbers is None else numbers, dtype=np.float64, order="C")
     return vectors.reshape(-1, vectors.shape[-1])
 
 
 def _encode_watches(engine: CompiledEngine, watches: Sequence[Watch]) -> tuple[Ints, Floats]:
-    """Return kinds (k, 3) and levels (k, 7) of watches for the kernels."""
-    kinds, levels = np.zeros((len(watches), 3), dtype=np.int64), np.zeros((len(watches), 7))
+    """Return watches in the form of the kernels.
+
+    Args:
+        engine: the engine.
+        watches: the watches.
+
+    Returns:
+        Kinds (k, 3) and levels (k, 7).
+
+    Raises:
+        OsimliteError: a watch does not name exactly one thing, or names a locked coordinate or no
+            contact of the model.
+    """
+    kinds = np.zeros((len(watches), 3), dtype=np.int64)
+    levels = np.zeros((len(watches), 7))
     mechanism = engine.mechanism
     for row, watch in enumerate(watches):
         if bool(watch.coordinate) + bool(watch.body) + bool(watch.contact) != 1:
@@ -165,6 +209,8 @@ def _encode_watches(engine: CompiledEngine, watches: Sequence[Watch]) -> tuple[I
         else:
             body, frame = mechanism.placement(watch.body)
             link, placed = (-1, np.eye(4)) if body < 0 else engine.placements[body]
+            # The kernels know links, not bodies, so the point is expressed in the frame of the
+            # link.
             station = (placed @ frame @ np.array((*watch.station, 1.0)))[:3]
             kinds[row] = record.HEIGHT, link, watch.stops
             levels[row] = (*station, *watch.direction, watch.level)
@@ -172,7 +218,10 @@ def _encode_watches(engine: CompiledEngine, watches: Sequence[Watch]) -> tuple[I
 
 
 class CompiledEngine(KernelEngine):
-    """Engine that computes accelerations in machine code; see :class:`osimlite.simulation.engines.protocol.Engine`.
+    """Engine that computes accelerations in machine code.
+
+    Its methods are those of :class:`osimlite.simulation.engines.protocol.Engine` and
+    :class:`osimlite.simulation.batches.BatchEngine`.
 
     Args:
         mechanism: the mechanism.
@@ -195,7 +244,13 @@ class CompiledEngine(KernelEngine):
     get_contact_radii = get_contact_radii
 
     def make_updater(self, model: Model, folder: Path, wrapping: str = OPENSIM) -> NumberUpdater:
-        """Return an updater of parts of the model."""
+        """Return an updater of parts of the model.
+
+        Args:
+            model: the engine's model, whose numbers will change.
+            folder: folder of its file.
+            wrapping: how paths wrap.
+        """
         from osimlite.simulation.engines.model_update import NumberUpdater
 
         return NumberUpdater(model, self, folder, wrapping)

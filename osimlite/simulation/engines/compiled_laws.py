@@ -1,8 +1,8 @@
-"""Laws that a C++ compiler compiles one by one: edited laws, and those of a user's own force types.
+"""Kernels that a C++ compiler compiles one by one: edited ones, and those of a user's own force types.
 
 Each becomes a small shared library in a folder that only the user can write to. The file name
-contains the digest of the law's sources. A checksum detects damage; the permissions of the folder
-guarantee who wrote a file.
+contains the digest of the kernel's sources. A checksum detects damage; the permissions of the
+folder guarantee who wrote a file.
 """
 
 from __future__ import annotations
@@ -47,16 +47,20 @@ Function = Callable[..., Any]
 
 
 def load_function(symbol: str, function: Function, directions: int) -> int | None:
-    """Return the address of a function that was compiled earlier; None if no trusted file has it.
+    """Return the address of a function that was compiled earlier.
 
     Args:
         symbol: its name in the library.
         function: the function it was compiled from.
         directions: number of derivatives of its dual numbers; 0 for floats.
+
+    Returns:
+        The address; None if no trusted file has the function.
     """
     file = _file_name(symbol, function, directions)
     for folder in cache_folders():
-        code, checksum = read_private(folder / file), read_private(folder / f"{file}.sha256")
+        code = read_private(folder / file)
+        checksum = read_private(folder / f"{file}.sha256")
         if (
             code is not None
             and checksum is not None
@@ -98,12 +102,15 @@ def compile_laws(names: Sequence[str]) -> dict[str, int]:
 
 
 def compile_function(symbol: str, function: Function, directions: int) -> int:
-    """Compile a function, save it if a folder allows that, and return its address.
+    """Compile a function, and save it if a folder allows that.
 
     Args:
         symbol: its name in the library.
         function: a function in the restricted Python of kernels.
         directions: number of derivatives of its dual numbers; 0 for floats.
+
+    Returns:
+        The address of the function.
 
     Raises:
         CompilationError: there is no compiler, it failed, or the function cannot be translated.
@@ -129,13 +136,21 @@ def compile_function(symbol: str, function: Function, directions: int) -> int:
         # A loaded library can be deleted, except on Windows.
         if os.name != "nt":
             return _load_library(result, symbol)
+        # Windows locks loaded libraries, so this one must outlive the temporary folder.
         lasting = Path(tempfile.mkdtemp()) / result.name
         result.rename(lasting)
         return _load_library(lasting, symbol)
 
 
 def _save_library(library: Path) -> Path | None:
-    """Copy a library into the first folder that only the user can write to, and return its path there; None without one."""
+    """Copy a library into the first folder that only the user can write to.
+
+    Args:
+        library: path of the library.
+
+    Returns:
+        Path of the copy; None if there is no such folder.
+    """
     code = library.read_bytes()
     refusals = []
     for folder in cache_folders():
@@ -148,7 +163,7 @@ def _save_library(library: Path) -> Path | None:
         except OsimliteError as error:
             refusals.append(str(error))
     warn_once(
-        f"machine code is compiled anew in every run, since it can be kept nowhere: {'; '.join(refusals)}"
+        f"machine code is compiled again in every run, because it cannot be saved: {'; '.join(refusals)}"
     )
     return None
 

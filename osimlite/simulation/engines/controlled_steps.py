@@ -1,4 +1,4 @@
-"""Error-controlled steps, the default way to integrate a motion."""
+"""Stepper with error control, the default way to integrate a motion."""
 
 from __future__ import annotations
 
@@ -42,14 +42,14 @@ _steps_per_call: WeakKeyDictionary[KernelEngine, int] = WeakKeyDictionary()
 
 
 class ControlledSteps(Stepper):
-    """Steps of Simbody's RungeKuttaMerson, OpenSim's default integrator, or of another method of `INTEGRATORS`.
+    """Stepper with error control, by one of `INTEGRATORS`.
 
-    Merson's method propagates a fourth-order solution and estimates its error with an embedded
-    third-order one (Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, table 4.1).
-    A step is accepted if the norm of the error is at most `accuracy`, else repeated with a smaller
-    length. With equal derivatives the steps equal OpenSim's to the last bit. The kernels take the
-    steps (:mod:`osimlite.mechanics.kernels.runs`), many in one call where a table of states is
-    requested.
+    The default is Simbody's RungeKuttaMerson, as in OpenSim. Merson's method propagates a
+    fourth-order solution and estimates its error with an embedded third-order one (Hairer, Norsett,
+    Wanner, Solving Ordinary Differential Equations I, table 4.1). A step is accepted if the norm of
+    the error is at most `accuracy`, else repeated with a smaller length. With equal derivatives the
+    steps equal OpenSim's to the last bit. The kernels take the steps
+    (:mod:`osimlite.mechanics.kernels.runs`), many in one call where a table of states is requested.
 
     The methods for stiff motions (:mod:`osimlite.mechanics.kernels.multistep` and `rosenbrock`)
     keep the same norm of their estimated error below `accuracy`.
@@ -59,12 +59,15 @@ class ControlledSteps(Stepper):
         t: initial time, s.
         y: initial state.
         options: accuracy, integrator and other options of the integration.
-        observe: called with time and state for each step; for the steps of a table only when a
-            result needs them.
+        observe: called with time and state after each step. For the steps of a table it is called
+            only when a result needs them.
         held: controller of the run.
 
     Attributes:
-        attempted: attempted steps so far, of which `taken` were accepted.
+        attempted: attempted steps so far; `taken` counts the accepted ones.
+
+    Raises:
+        SettingError: an option has no meaning.
     """
 
     attempted = 0
@@ -87,6 +90,8 @@ class ControlledSteps(Stepper):
         self._held = held
         shortest, longest = options.step_bounds
         self.next_step = (
+            # A resumed controller continues with the step of the earlier run, so that both together
+            # equal one run.
             min(max(INITIAL_STEP_S, shortest), longest) if held is None else held.next_step
         )
         self._room: Floats | None = None
@@ -99,26 +104,43 @@ class ControlledSteps(Stepper):
 
     @property
     def name(self) -> str:
-        """Name of the method."""
+        """Name of the method, as in Simbody."""
         return INTEGRATORS[self._options.integrator]
 
     def step(self, limit: float = inf) -> None:
-        """Take one step of the length that the error allows, and choose the next length."""
+        """Take one step of the length that the error allows, and choose the next length.
+
+        Args:
+            limit: latest end of the step, s.
+
+        Raises:
+            IntegrationError: no step is small enough.
+        """
         self._require_later(limit)
         self._call_kernels(self._make_batch((), limit), 1)
         self.catch_up()
 
     def make_interpolant(self) -> Callable[[float], list[float]]:
-        """Return the cubic Hermite polynomial through the ends of the last step, projected onto the constraints."""
-        ends, size = (*self.previous, self.time, self.state, self.derivative), len(self.state)
+        """Return the interpolation of the last step.
+
+        It is the cubic Hermite polynomial through both ends of the step with their derivatives,
+        projected onto the constraints to a tenth of the accuracy.
+
+        Returns:
+            Function of time (s) that gives the state (y,).
+        """
+        ends = (*self.previous, self.time, self.state, self.derivative)
+        size = len(self.state)
         engine, tolerance = self._engine, self._accuracy / 10.0
 
-        def held(t: float) -> list[float]:
+        def interpolate(t: float) -> list[float]:
             y: Any = [0.0] * size
             interpolate_cubic(size, *ends, t, y)  # type: ignore[arg-type]
+            # Without a near state that fulfils the constraints, the interpolated one is still the
+            # best guess.
             return engine.project_state(t, y, tolerance) or y
 
-        return held
+        return interpolate
 
     def tabulate(self, times: Sequence[float], progress: Progress | None = None) -> Sequence[Any]:
         """Return the states at times as an array; see :meth:`Stepper.tabulate`."""
@@ -154,7 +176,12 @@ class ControlledSteps(Stepper):
 
     # --------------------------------------------------------------------------------------------- helpers
     def _make_batch(self, times: Sequence[float], to: float) -> Batch:
-        """Return a batch of one run that continues from the present state to a time, with reports at times (s)."""
+        """Return a batch of one run that continues from the present state.
+
+        Args:
+            times: times of reports, s.
+            to: end of the run, s.
+        """
         if times and times[0] < self.time:
             raise ValueError(f"t = {times[0]:.9g} s is before the present {self.time:.9g} s")
         batch = Batch(
@@ -172,10 +199,20 @@ class ControlledSteps(Stepper):
         return batch
 
     def _call_repeatedly(self, batch: Batch, steps: int) -> Iterator[float]:
-        """Take steps until the last report, `steps` of them first; yield their mean length in each call, s."""
+        """Take steps until the last report.
+
+        Args:
+            batch: the batch.
+            steps: number of steps in the first call.
+
+        Yields:
+            Mean length of the steps of each call, s.
+        """
         ending = record.FULL
         while ending == record.FULL:
-            started, before, taken = perf_counter(), self.time, self.taken
+            started = perf_counter()
+            before = self.time
+            taken = self.taken
             ending = self._call_kernels(batch, steps)
             # The number of steps follows the allowed time, but grows at most eightfold.
             more = min(8.0 * steps, (self.taken - taken) * MAX_CALL_S / (perf_counter() - started))
@@ -183,8 +220,20 @@ class ControlledSteps(Stepper):
             yield (self.time - before) / max(self.taken - taken, 1)
 
     def _call_kernels(self, batch: Batch, steps: int) -> int:
-        """Take at most `steps` steps; return how the call ended."""
+        """Take some steps in one call of the kernels.
+
+        Args:
+            batch: the batch.
+            steps: largest number of steps.
+
+        Returns:
+            How the call ended, see :mod:`osimlite.mechanics.kernels.record`.
+
+        Raises:
+            IntegrationError: no step is small enough.
+        """
         (count,) = batch.counts
+        # The log of the last call was copied, so it starts anew.
         count[record.LOGGED] = 0
         batch.limit_steps(steps)
         if self._room is None:
@@ -192,13 +241,11 @@ class ControlledSteps(Stepper):
         batch.run(self._room)
         (ending,), logged = batch.endings.tolist(), int(count[record.LOGGED])
         log = batch.log[:logged].copy(), batch.forces[:logged].copy()
-        clock, state, counts = (
-            batch.clocks[0].tolist(),
-            batch.states[0].tolist(),
-            count[: record.REPORTED].tolist(),
-        )
-        # Python handles Ctrl-C between calls of functions. There are none here, so either all of
-        # these are set or none.
+        clock = batch.clocks[0].tolist()
+        state = batch.states[0].tolist()
+        counts = count[: record.REPORTED].tolist()
+        # Python handles Ctrl-C between calls of functions. These lines call none, so an
+        # interruption finds all of them set, or none of them.
         self._put_off += (log,)
         (self.time, self.next_step), self.state = clock, state
         self.taken, self.attempted, self.evaluations = counts
@@ -214,10 +261,14 @@ class ControlledSteps(Stepper):
         """
         t0, y0 = self.time, self.state
         h = max(shortest_step(self.time, self.attempted), self._options.step_bounds[0])
+        # These evaluations raise a clearer error than the one below if the derivative is not
+        # finite.
         f0, size = self._evaluate(t0, y0), len(self._engine.order)
         # The derivative may not exist after this state.
         self._evaluate(t0 + h, [y + h * f for y, f in zip(y0, f0, strict=True)])
         off = [
+            # As in the kernels, errors of values count absolutely, and those of other states
+            # relative to their size.
             abs(e) * (error_weight(y) if k >= size else 1.0)
             for k, (e, y) in enumerate(zip(errors, y0, strict=True))
         ]
@@ -227,16 +278,16 @@ class ControlledSteps(Stepper):
         elif off[index] > self._accuracy:
             what = f"misses the accuracy {off[index] / self._accuracy:.3g} times, most of all in {self._get_state_name(index)}"
         elif self._engine.structure[MODEL.CONSTRAINED]:
-            what = "ends too far from where the constraints hold"
+            what = "ends too far from the constraints"
         else:
-            what = "has no end that can be computed"
+            what = "ends in a state that cannot be computed"
         # With loose accuracy, muscle fibers diverge; with a strict one, stiff forces are the usual
         # cause.
-        other = "more" if self._accuracy > DEFAULT_ACCURACY else "less"
+        other = "smaller" if self._accuracy > DEFAULT_ACCURACY else "larger"
         raise IntegrationError(
-            f"The integrator cannot go on at t = {t0:.9g} s: even its shortest step of {h:.3g} s {what}. "
+            f"The integrator cannot continue at t = {t0:.9g} s: even its shortest step of {h:.3g} s {what}. "
             "Something changes too abruptly there, such as a very stiff contact or a sharp limit: soften it, or "
-            f"ask for {other} accuracy.",
+            f"use a {other} accuracy value.",
             t0,
             index,
         )

@@ -61,7 +61,12 @@ ARITHMETIC_SLOPES: dict[Any, tuple[Callable[..., float], ...]] = {
 
 
 class DualNumber:
-    """A number with its derivatives along several directions."""
+    """Number with its derivatives along several directions.
+
+    Args:
+        value: the number.
+        slopes: its derivatives.
+    """
 
     __array_ufunc__ = None
     # Equality compares values only, so dual numbers cannot be dictionary keys.
@@ -69,7 +74,8 @@ class DualNumber:
     __slots__ = "slopes", "value"
 
     def __init__(self, value: float, slopes: list[float]) -> None:
-        self.value, self.slopes = value, slopes
+        self.value = value
+        self.slopes = slopes
 
     def __float__(self) -> float:
         return self.value
@@ -82,7 +88,7 @@ class DualNumber:
 
 
 class DualVector:
-    """A vector of dual numbers, which are made of the rows of an array when they are read.
+    """Vector of dual numbers, which are made from the rows of an array when they are read.
 
     Args:
         rows: numbers with their derivatives (n, 1 + directions).
@@ -120,9 +126,17 @@ class DualVector:
 def _apply_chain_rule(
     function: Any, slopes: tuple[Callable[..., float], ...]
 ) -> Callable[..., Any]:
-    """Return a function of dual numbers and floats, by the chain rule."""
+    """Return a function of dual numbers and floats.
 
-    def called(*given: Any) -> Any:
+    Args:
+        function: function of floats.
+        slopes: its derivative by each argument, as functions of the arguments and the value.
+
+    Returns:
+        Function that returns a float if all arguments are floats.
+    """
+
+    def differentiate(*given: Any) -> Any:
         values = [float(x) for x in given]
         result = function(*values)
         change: list[float] = []
@@ -133,7 +147,7 @@ def _apply_chain_rule(
                 change = [a + b for a, b in zip(change, more, strict=True)] if change else more
         return DualNumber(result, change) if change else result
 
-    return called
+    return differentiate
 
 
 def _compare_values(comparison: Callable[[float, float], bool]) -> Callable[[Any, Any], bool]:
@@ -150,6 +164,7 @@ for _name in ("neg", "abs"):
 for _name in ("add", "sub", "mul", "truediv", "mod", "pow"):
     _rule = _RULES[getattr(operator, _name)]
     setattr(DualNumber, f"__{_name}__", _rule)
+    # The default binds the rule of this pass of the loop.
     setattr(DualNumber, f"__r{_name}__", lambda x, y, rule=_rule: rule(y, x))
 for _name in ("lt", "le", "gt", "ge", "eq", "ne"):
     setattr(DualNumber, f"__{_name}__", _compare_values(getattr(operator, _name)))
@@ -161,12 +176,23 @@ def _seed_direction(number: float, direction: int, directions: int) -> DualNumbe
 
 
 def _differentiate_root(root: Any, error: Any, slope: Any) -> Any:
-    """Return a root with derivatives by the implicit function theorem: one Newton step whose value is zero."""
+    """Return a root with its derivatives, by the implicit function theorem.
+
+    From g(x, p) = 0 follows dx = -dg / (∂g/∂x). It is computed as one Newton step whose value is 0.
+
+    Args:
+        root: solution x, found without derivatives.
+        error: g at the root, with derivatives by the parameters.
+        slope: ∂g/∂x.
+    """
+    # One step of Newton's method with dual numbers: its value stays the root, its slopes are those
+    # of the implicit function.
     return root - (error - float(error)) / float(slope)
 
 
 def _is_zero(number: Any) -> bool:
     """Return whether a number and all its derivatives are 0."""
+    # A force that is zero here may still have a slope.
     return not number and not (isinstance(number, DualNumber) and any(number.slopes))
 
 
@@ -187,6 +213,7 @@ DUAL_REPLACEMENTS: dict[Any, Any] = {
 @cache
 def make_dual(function: Any) -> Any:
     """Return a kernel or law that also accepts dual numbers, together with the functions that it calls."""
+    # The code of the function stays the same; the names that it calls are bound to other functions.
     scope = dict(function.__globals__)
     for name in function.__code__.co_names:
         value = scope.get(name, float if name == "float" else None)

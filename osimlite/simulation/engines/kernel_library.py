@@ -29,7 +29,7 @@ TABLE_SYMBOL = "osimlite_kernel_table"
 
 
 class KernelLibrary:
-    """A loaded library of kernels.
+    """Loaded library of kernels.
 
     Args:
         path: path of the shared library.
@@ -51,7 +51,14 @@ class KernelLibrary:
         self.table: dict[str, Any] = json.loads(ctypes.string_at(address))
 
     def get_address(self, name: str) -> int | None:
-        """Return the address of a law; None if the library has none for the present sources."""
+        """Return the address of a kernel.
+
+        Args:
+            name: name of the kernel.
+
+        Returns:
+            The address; None if the library lacks the kernel, or has it from other sources.
+        """
         digest = self.table["laws"].get(name)
         if digest is None or not self._is_current(name, digest):
             return None
@@ -88,7 +95,11 @@ class KernelLibrary:
 
 @cache
 def load_library() -> KernelLibrary | None:
-    """Load the best library for this processor; None if there is none."""
+    """Load the best library for this processor.
+
+    Returns:
+        The library; None if no library fits.
+    """
     for target in (NATIVE, X86_64_V3, BASELINE):
         path = LIBRARY_FOLDER / f"kernels-{target}{library_suffix()}"
         if path.exists() and (target != X86_64_V3 or supports_v3()):
@@ -97,6 +108,7 @@ def load_library() -> KernelLibrary | None:
             except (OSError, ValueError) as error:
                 _problems.append(f"{path.name} cannot be loaded: {error}")
                 continue
+            # A native library of another machine may use instructions that this processor lacks.
             if set(library.table.get("features", ())) <= processor_features():
                 return library
             _problems.append(f"{path.name} was compiled for another processor")

@@ -52,7 +52,14 @@ class Code(ABC):
 
     @abstractmethod
     def make_ready(self, functions: Sequence[str]) -> None:
-        """Compile functions together, if the backend compiles."""
+        """Compile functions together, if the backend compiles.
+
+        Args:
+            functions: names of the functions.
+
+        Raises:
+            CompilationError: a function cannot be compiled here.
+        """
 
     @abstractmethod
     def get_address(self, function: str) -> int:
@@ -64,19 +71,29 @@ class Code(ABC):
 
     @abstractmethod
     def bind_entry(self, function: str, *arrays: Any) -> Callable[[int], int]:
-        """Return a function with its arrays bound, which is called with one integer; the caller keeps the arrays."""
+        """Return a function with its arrays bound, which is called with one integer.
+
+        Args:
+            function: name of the function.
+            arrays: contiguous arrays, which the caller must keep.
+        """
 
     @abstractmethod
     def make_callback(self, python: Callable[..., int], sizes: Sequence[int]) -> tuple[int, Any]:
-        """Return the address of a Python function as a kernel, and an object that the caller has to keep.
+        """Return a Python function in the form of a kernel.
 
         Args:
             python: function of the five arrays and an integer.
             sizes: lengths of the arrays.
+
+        Returns:
+            The address of the kernel, and an object that the caller has to keep.
         """
 
 
 class _MachineCode(Code):
+    """Backend of machine code; see :class:`Code`."""
+
     def select_for(self, functions: Sequence[str], later: Sequence[str] = ()) -> Code:
         if not machine_code.can_prepare((*functions, *later)):
             warn_of_python()
@@ -106,7 +123,8 @@ class _MachineCode(Code):
         )
 
     def bind_entry(self, function: str, *arrays: Any) -> Callable[[int], int]:
-        code, addresses = self._make_function(function), [item.ctypes.data for item in arrays]
+        code = self._make_function(function)
+        addresses = [item.ctypes.data for item in arrays]
         return lambda number: code(*addresses, number)
 
     def _make_function(self, function: str) -> Callable[..., int]:
@@ -121,10 +139,10 @@ class _MachineCode(Code):
     def make_callback(self, python: Callable[..., int], sizes: Sequence[int]) -> tuple[int, Any]:
         kinds = ctypes.c_int64, *[ctypes.c_double] * 4
 
-        def called(*parts: int) -> int:
+        def call_python(*parts: int) -> int:
             return python(*map(self._view_values, parts, kinds, sizes), parts[5])
 
-        callback = KERNEL(called)
+        callback = KERNEL(call_python)
         return int(ctypes.cast(callback, ctypes.c_void_p).value or 0), callback
 
     def _view_values(self, address: int, kind: Any, count: int) -> Any:
@@ -144,7 +162,8 @@ class Tangents(_MachineCode):
 
     def __init__(self, directions: int) -> None:
         super().__init__(f"machine code along {directions} directions")
-        self._width, self._suffix = 1 + directions, f"{ALONG}{directions}"
+        self._width = 1 + directions
+        self._suffix = f"{ALONG}{directions}"
 
     def select_for(self, functions: Sequence[str], later: Sequence[str] = ()) -> Code:
         """Return this backend, or Python where the functions cannot be compiled."""
@@ -163,11 +182,15 @@ class Tangents(_MachineCode):
         return PythonTangents(self._width - 1)
 
     def make_ready(self, functions: Sequence[str]) -> None:
-        """Compile functions together."""
+        """Compile functions of dual numbers together.
+
+        Args:
+            functions: names of the functions.
+        """
         super().make_ready([name + self._suffix for name in functions])
 
     def get_address(self, function: str) -> int:
-        """Return the address of a function."""
+        """Return the address of a function of dual numbers."""
         return super().get_address(function + self._suffix)
 
     def _view_values(self, address: int, kind: Any, count: int) -> Any:
@@ -185,6 +208,8 @@ class ReadyCode(_MachineCode):
 
 
 class _PythonCode(Code):
+    """Backend that interprets the kernels; see :class:`Code`."""
+
     def make_ready(self, functions: Sequence[str]) -> None:
         pass
 
@@ -226,19 +251,33 @@ class PythonTangents(_PythonCode):
         return lambda *parts: kernel(*map(_to_duals, parts))
 
     def bind_entry(self, function: str, *arrays: Any) -> Callable[[int], int]:
-        """Return a function with its arrays bound, which is called with one integer."""
-        kernel, vectors = make_dual(find_function(function)), [_to_duals(item) for item in arrays]
+        """Return a function with its arrays bound, which is called with one integer.
+
+        Args:
+            function: name of the function.
+            arrays: arrays of floats with derivatives, and arrays of integers.
+        """
+        kernel = make_dual(find_function(function))
+        vectors = [_to_duals(item) for item in arrays]
         return lambda number: kernel(*vectors, number)
 
     def make_callback(self, python: Callable[..., int], sizes: Sequence[int]) -> tuple[int, Any]:
-        """Return the number that stands for the address of a Python function, which gets the values alone."""
+        """Return a Python function as a kernel; it gets the values alone.
 
-        def called(*parts: Any) -> int:
+        Args:
+            python: function of the five arrays and an integer.
+            sizes: lengths of the arrays.
+
+        Returns:
+            The number that stands for the address of the kernel, and None.
+        """
+
+        def call_with_values(*parts: Any) -> int:
             return python(
                 *(part.values if isinstance(part, DualVector) else part for part in parts)
             )
 
-        return pointers.register_law(called), None
+        return pointers.register_law(call_with_values), None
 
 
 def _to_duals(part: Any) -> Any:
@@ -278,7 +317,9 @@ def warn_of_python(reason: str = "") -> None:
 
 
 class Program:
-    """The structure of a packed model with the addresses of all functions that it calls, valid in this process only.
+    """Structure of a packed model with the addresses of all functions that it calls.
+
+    It is valid in this process only.
 
     Args:
         packed: the packed model.
@@ -292,6 +333,7 @@ class Program:
     """
 
     def __init__(self, packed: PackedModel, code: Code, entries: Sequence[str] = ()) -> None:
+        # Addresses of functions are written into the copy: each program has its own.
         self.ints: Ints = packed.structure.copy()
         kernels = [kernel for kernel in packed.kernels.values() if isinstance(kernel, str)]
         # Batched kernels do not support dual numbers.
@@ -300,10 +342,13 @@ class Program:
         self._equilibria, self.responses = packed.equilibria, packed.responses
         later = *packed.equilibria.values(), *packed.responses.values()
         self.code = code = code.select_for(functions, () if isinstance(code, Tangents) else later)
+        # Batched kernels are faster as machine code only.
         runs = runs if code is MACHINE_CODE else {}
         self.failures: list[Exception] = []
         self._kept: list[Any] = []
         code.make_ready(functions)
+        # Kernels call each other by addresses that they read here, so that one kernel serves all
+        # models.
         for name in packed.laws:
             self.ints[MODEL.LAWS + LAW_NUMBERS[name]] = code.get_address(name)
         self._count = len(packed.numbers)
@@ -311,8 +356,14 @@ class Program:
             self._link_kernel(place, kernel)
 
     def set_controls(self, structure: Ints, kernel: str | Callable[..., None]) -> None:
-        """Replace the record of the controls, the last one, by that of another structure."""
+        """Replace the record of the controls, the last one, by that of another structure.
+
+        Args:
+            structure: the new structure without addresses.
+            kernel: kernel of the controls: a name, or a Python function.
+        """
         place = int(structure[MODEL.CONTROLS])
+        # The controls are the last record; what lies before it keeps its addresses.
         self.ints = np.concatenate((self.ints[:place], structure[place:]))
         if isinstance(kernel, str):
             self.code.make_ready((kernel,))
@@ -326,12 +377,18 @@ class Program:
         size = int(self.ints[MODEL.STATE_SIZE])
         sizes = len(self.ints), self._count, int(self.ints[MODEL.WORK_SIZE]), size, size
         self.ints[place], kept = self.code.make_callback(self._catch_errors(kernel), sizes)
+        # ctypes frees a callback that Python does not refer to, while the kernels still call it.
         self._kept.append(kept)
 
     def link_responses(self, method: str) -> None:
-        """Prepare an implicit method and the derivatives that it needs."""
+        """Prepare an implicit method and the derivatives that it needs.
+
+        Args:
+            method: name of the integrator.
+        """
         self.code.make_ready((method, *dict.fromkeys(self.responses.values())))
         for place, kernel in self.responses.items():
+            # An address other than 0: the response is linked already.
             if not self.ints[place]:
                 self._link_kernel(place, kernel)
 
@@ -346,7 +403,15 @@ class Program:
 
         If the model calls Python functions, Ctrl-C is deferred to the end of the call, because
         exceptions cannot pass through machine code.
+
+        Args:
+            function: the kernel.
+            parts: its arguments.
+
+        Returns:
+            Its outcome.
         """
+        # Without Python kernels no signal handler can run inside the call.
         if not any(self._kept):
             return function(*parts)
         with defer_sigint():
@@ -355,7 +420,10 @@ class Program:
     def _catch_errors(self, python: Callable[..., None]) -> Callable[..., int]:
         """Return a function that stores exceptions in `failures`.
 
-        Exceptions cannot pass through machine code, so the caller raises them.
+        They cannot pass through machine code; the caller raises them afterwards.
+
+        Args:
+            python: function of the five arrays and an integer.
         """
 
         def kernel(*parts: Any) -> int:
@@ -371,5 +439,13 @@ class Program:
 
 @lru_cache(maxsize=128)
 def _view_array(address: int, kind: Any, count: int) -> Any:
-    """Return the numbers at an address as an array; cached, because machine code asks for the same ones repeatedly."""
+    """Return the numbers at an address as an array.
+
+    The result is cached, because machine code asks for the same arrays repeatedly.
+
+    Args:
+        address: address of the first number.
+        kind: C type of a number.
+        count: number of numbers.
+    """
     return np.ctypeslib.as_array((kind * count).from_address(address))

@@ -1,8 +1,9 @@
-"""Addresses of laws as machine code, from any source.
+"""Addresses of kernels as machine code, from any source.
 
-A law comes from the library that was compiled at installation. An edited law, or one of a user's
-own force type, is compiled alone by the C++ compiler of the machine, else by numba. The environment
-variable OSIMLITE_KERNELS restricts the sources to one: library, compiler, numba or python.
+A kernel comes from the library that was compiled at installation. An edited kernel, or one of a
+user's own force type, is compiled alone by the C++ compiler of the machine, else by numba. The
+environment variable OSIMLITE_KERNELS restricts the sources to one: library, compiler, numba or
+python.
 """
 
 from __future__ import annotations
@@ -69,7 +70,11 @@ def use_addresses(addresses: Mapping[str, int]) -> None:
 
 
 def is_ready(name: str) -> bool:
-    """Return whether a law is loaded, in the library, or in a file; it is loaded then."""
+    """Return whether a kernel can be used without compiling it, and load it then.
+
+    Args:
+        name: name of the kernel. It may be loaded already, in the library, or in a file.
+    """
     if name in _addresses:
         return True
     address = None
@@ -85,10 +90,13 @@ def is_ready(name: str) -> bool:
 
 
 def prepare_laws(names: Sequence[str]) -> None:
-    """Load laws, and compile those that no library or file has.
+    """Load kernels, and compile those that no library or file has.
+
+    Args:
+        names: names of the kernels.
 
     Raises:
-        CompilationError: a law cannot be compiled here.
+        CompilationError: a kernel cannot be compiled here.
     """
     missing = [name for name in dict.fromkeys(names) if not is_ready(name)]
     if not missing:
@@ -102,6 +110,7 @@ def prepare_laws(names: Sequence[str]) -> None:
             return
         except CompilationError as error:
             reason = error
+    # Numba compiles without derivatives, so it comes last.
     if is_allowed(NUMBA) and _has_numba():
         from osimlite.simulation.engines import numba_laws
 

@@ -33,10 +33,13 @@ if TYPE_CHECKING:
 
 
 class NumberUpdater:
-    """Updater of the parts of a model that forces, masses and gravity affect.
+    """Updater of the numbers of a packed model after changes of forces, masses or gravity.
+
+    Searches and sweeps change few numbers of a model many times. Packing it anew takes longer than
+    many a motion, so the numbers are replaced where the structure stays the same.
 
     Args:
-        model: the model, of which nothing else changes.
+        model: the model; nothing else in it changes.
         engine: engine of the model before the change.
         folder: folder of its file.
         wrapping: how its paths wrap.
@@ -62,11 +65,14 @@ class NumberUpdater:
             place += _count_numbers(items)
 
     def update(self, owners: Sequence[Component]) -> UpdatedModel | None:
-        """Return the model with the present properties of its forces and bodies; None if more than numbers changed.
+        """Return the model with the present properties of its forces and bodies.
 
         Args:
             owners: forces, controllers, bodies and the model itself, if one of their properties has
                 changed.
+
+        Returns:
+            The changed model; None if more than numbers changed.
         """
         made: dict[str, Any] = {}
         owners, controls = list(owners), self._forces.controls
@@ -121,7 +127,15 @@ class NumberUpdater:
         return None if numbers is None else UpdatedModel(mechanism, forces, numbers, self._engine)
 
     def _replace_force_numbers(self, made: Mapping[str, Any], controls: Controls) -> Floats | None:
-        """Return the numbers with those of some elements and of the controls replaced; None if their structure changed."""
+        """Return the numbers of the model with those of some forces replaced.
+
+        Args:
+            made: new force elements by path.
+            controls: the controls, new or as before.
+
+        Returns:
+            The numbers (m,); None if the structure of a force or of the controls changed.
+        """
         numbers = self._engine.numbers.copy()
         for path, element in made.items():
             items = element.make_records(self._places)
@@ -143,7 +157,11 @@ class NumberUpdater:
         return numbers
 
     def _replace_masses(self) -> Mechanism | None:
-        """Return the mechanism with the present masses and gravity; None if more than numbers changed."""
+        """Return the mechanism with the present masses and gravity.
+
+        Returns:
+            The mechanism; None if more than numbers may have changed.
+        """
         mechanism = self._mechanism
         if not all(isinstance(item, Lock) for item in mechanism.constraints):
             # The masses decide where loops are cut and bodies are split.
@@ -159,7 +177,15 @@ class NumberUpdater:
         )
 
     def _pack_numbers(self, mechanism: Mechanism, forces: Forces) -> Floats | None:
-        """Return the numbers of a newly packed model; None if its structure changed."""
+        """Return the numbers of a newly packed model.
+
+        Args:
+            mechanism: its mechanism.
+            forces: its forces.
+
+        Returns:
+            The numbers (m,); None if the structure differs from the engine's.
+        """
         packed = pack(mechanism, forces)
         is_alike = np.array_equal(packed.structure, self._engine.structure)
         return packed.numbers if is_alike and packed.order == self._engine.order else None

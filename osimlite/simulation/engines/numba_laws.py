@@ -1,4 +1,4 @@
-"""Laws that numba compiles, where there is neither a compiled library nor a C++ compiler.
+"""Kernels that numba compiles, where there is neither a compiled library nor a C++ compiler.
 
 Only documented functions of numba are used: `njit`, `cfunc` and `intrinsic`. Numba caches compiled
 functions in its own files.
@@ -35,10 +35,16 @@ def has_numba() -> bool:
 
 
 def compile_law(name: str) -> int:
-    """Compile a law of floats, and return its address.
+    """Compile a kernel of floats.
+
+    Args:
+        name: name of the kernel.
+
+    Returns:
+        Its address.
 
     Raises:
-        CompilationError: the law needs dual numbers, or numba cannot compile it.
+        CompilationError: the kernel needs dual numbers, or numba cannot compile it.
     """
     function, directions = find_law(name)
     if directions:
@@ -83,13 +89,15 @@ class _Tools:
             "int": types.int64,
         }
 
-        def at(context: Any, vector: Any, place: Any) -> Any:
+        # The kernels address parts of vectors and call functions by address, which Python and numba
+        # cannot express. Two intrinsics generate the machine instructions.
+        def offset_pointer(context: Any, vector: Any, place: Any) -> Any:
             def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
                 return builder.gep(arguments[0], [arguments[1]])
 
             return vector(vector, types.int64), generate
 
-        def call(
+        def call_address(
             context: Any,
             address: Any,
             model: Any,
@@ -109,8 +117,8 @@ class _Tools:
             return types.int64(types.int64, model, reals, data, y, f, types.int64), generate
 
         self.replacements: dict[Any, Any] = {
-            pointers.at: intrinsic(at),
-            pointers.call: intrinsic(call),
+            pointers.at: intrinsic(offset_pointer),
+            pointers.call: intrinsic(call_address),
         }
 
 
@@ -135,7 +143,12 @@ def _to_module(record: Record) -> ModuleType:
 
 
 def _link_callees(function: Any, tools: _Tools) -> Any:
-    """Return a copy of a function whose calls within this package lead to compiled functions."""
+    """Return a copy of a function whose calls within this package lead to compiled functions.
+
+    Args:
+        function: the function.
+        tools: numba's functions.
+    """
     scope = dict(function.__globals__)
     for called in {
         item.argval for item in dis.get_instructions(function) if item.opname == "LOAD_GLOBAL"

@@ -1,4 +1,7 @@
-"""Files that only the user can have written: whoever can change a file that is executed can execute anything."""
+"""Files that nobody but the user can have written.
+
+Compiled kernels are executed, and whoever can change a file that is executed can execute anything.
+"""
 
 from __future__ import annotations
 
@@ -12,15 +15,24 @@ from osimlite.errors import OsimliteError
 
 
 def read_private(path: Path) -> bytes | None:
-    """Return the content of a file; None if it does not exist, or if others could have written it."""
+    """Return the content of a file that only the user can have written.
+
+    Args:
+        path: the file.
+
+    Returns:
+        The content; None if the file does not exist, or if others could have written it.
+    """
     folder = Path(os.path.realpath(path.parent))
     if find_other_writers(folder) is not None:
         return None
+    # No links, and no waiting for a pipe. Windows lacks the first two flags and needs the third.
     flags = os.O_RDONLY | sum(
         getattr(os, name, 0) for name in ("O_NOFOLLOW", "O_NONBLOCK", "O_BINARY")
     )
     try:
         with open(os.open(folder / path.name, flags), "rb") as stream:
+            # The open file is examined, not its name, which another program could replace meanwhile.
             info = os.fstat(stream.fileno())
             return (
                 stream.read()
@@ -32,7 +44,11 @@ def read_private(path: Path) -> bytes | None:
 
 
 def write_private(path: Path, content: bytes) -> None:
-    """Write a file that only the user can read and change, completely or not at all; make its folder.
+    """Write a file that only the user can read and change, completely or not at all.
+
+    Args:
+        path: the file; its folder is made if necessary.
+        content: the content.
 
     Raises:
         OsimliteError: the file cannot be written, or others can write to the folder or replace it.
@@ -57,16 +73,19 @@ def write_private(path: Path, content: bytes) -> None:
 
 
 def find_other_writers(folder: Path) -> str | None:
-    """Return the reason why others than the user and the administrator can put files into a folder; None if they cannot.
+    """Find out whether others than the user and the administrator can put files into a folder.
 
     Args:
         folder: an absolute path without links.
+
+    Returns:
+        The reason why they can; None if they cannot.
     """
     for place in (folder, *folder.parents):
         try:
             info = place.lstat()
         except OSError as error:
-            return f"'{place}' cannot be looked at: {error.strerror}"
+            return f"'{place}' cannot be examined: {error.strerror}"
         # In a sticky folder such as /tmp anyone can create files, but can move or replace only
         # their own.
         is_passage = place != folder and info.st_mode & stat.S_ISVTX
@@ -76,12 +95,20 @@ def find_other_writers(folder: Path) -> str | None:
 
 
 def _describe_other_writers(info: os.stat_result, *, is_passage: bool = False) -> str | None:
-    """Return why others can write to a file or folder; None if they cannot."""
+    """Return why others can write to a file or folder.
+
+    Args:
+        info: status of the file or folder.
+        is_passage: whether it is a sticky folder on the way to the file.
+
+    Returns:
+        The end of a sentence; None if they cannot.
+    """
     if sys.platform == "win32":
         # Windows protects the user's folders by access lists, which these bits do not show.
         return None
     if info.st_uid not in (0, os.geteuid()):
         return "belongs to another user"
     if info.st_mode & (stat.S_IWGRP | stat.S_IWOTH) and not is_passage:
-        return "can be written by others (chmod go-w mends that)"
+        return "can be written by others (run chmod go-w)"
     return None

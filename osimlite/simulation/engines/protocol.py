@@ -26,15 +26,21 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Settings(IntegrationOptions):
-    """Settings of an engine and of one motion that it computes."""
+    """Settings of an engine and of one motion that it computes.
 
-    # length (s) of fixed steps, which replace error control
+    Attributes:
+        fixed_step: length (s) of fixed steps, which replace error control.
+        route: how the accelerations are computed, in the engine's terms; "auto" lets it choose.
+        show: whether a window shows the motion meanwhile.
+        visuals: shapes of the bodies in the window.
+        held: controllers of the runs.
+    """
+
     fixed_step: float | None = None
-    # how the accelerations are computed, in the engine's terms; "auto" lets it choose
     route: str = "auto"
-    show: bool = False  # whether a window shows the motion meanwhile
-    visuals: Visuals | None = None  # shapes of the bodies in the window
-    held: ControllerRuns | None = None  # controllers of the runs
+    show: bool = False
+    visuals: Visuals | None = None
+    held: ControllerRuns | None = None
 
 
 class Engine(Protocol):
@@ -42,22 +48,36 @@ class Engine(Protocol):
 
     Close it after use, or use it in a ``with`` statement. Methods that take a state raise an
     OsimliteError if its length differs from that of `state`.
+
+    Attributes:
+        name: name of the engine.
+        version: version of the program that computes.
+        route: how the accelerations are computed.
+        order: index in the mechanism of each coordinate of the state.
+        state: layout of the state.
+        contacts: names of the contacts, by index.
+        columns: labels of the force records.
+        probes: probes of the model.
+        loads: contact forces of the last evaluation: entry i is the force (N, in ground) of contact
+            i if it touches; the last entry has one bit for each contact that touches.
     """
 
-    name: str  # name of the engine
-    version: str  # version of the program that computes
-    route: str  # how the accelerations are computed
-    order: tuple[int, ...]  # index in the mechanism of each coordinate of the state
-    state: StateLayout  # layout of the state
-    contacts: tuple[str, ...]  # names of the contacts, by index
-    columns: tuple[str, ...]  # labels of the force records
-    probes: tuple[DeclaredProbe, ...]  # probes of the model
-    # contact forces of the last evaluation: entry i is the force (N, in ground) of contact i if it
-    # touches; the last entry has one bit for each contact that touches
+    name: str
+    version: str
+    route: str
+    order: tuple[int, ...]
+    state: StateLayout
+    contacts: tuple[str, ...]
+    columns: tuple[str, ...]
+    probes: tuple[DeclaredProbe, ...]
     loads: list[object]
 
     def compute_derivative(self, t: float, y: list[float]) -> list[float]:
         """Return (qdot, udot, zdot) at a state.
+
+        Args:
+            t: time, s.
+            y: state (y,).
 
         Raises:
             SimulationError: an admissible motion moves no mass, or speeds are not defined in a
@@ -67,20 +87,31 @@ class Engine(Protocol):
     def compute_accelerations(
         self, t: float, q: Sequence[float], u: Sequence[float]
     ) -> list[float]:
-        """Return the derivatives of the speeds of all coordinates, in the mechanism's order; 0 if locked.
+        """Return the derivatives of the speeds of all coordinates.
 
         The auxiliary states have their initial values.
+
+        Args:
+            t: time, s.
+            q: values (n,) in the mechanism's order.
+            u: generalized speeds (n,).
+
+        Returns:
+            Accelerations (n,) in the mechanism's order; 0 for locked coordinates.
         """
 
     def equilibrate_muscles(
         self, t: float, y: Sequence[float], numbers: Floats | None = None
     ) -> list[float]:
-        """Return the state with auxiliary states in equilibrium.
+        """Return a state with auxiliary states in equilibrium.
 
         Args:
             t: time, s.
-            y: state.
+            y: state (y,).
             numbers: numbers of a model of the same structure; by default the engine's.
+
+        Returns:
+            The state (y,).
 
         Raises:
             SimulationError: a force has no equilibrium there.
@@ -108,10 +139,21 @@ class Engine(Protocol):
     def make_stepper(
         self, t: float, y: list[float], settings: Settings, observe: Observer
     ) -> Stepper:
-        """Return a stepper from a state on."""
+        """Return a stepper that continues from a state.
+
+        Args:
+            t: time, s.
+            y: state (y,).
+            settings: how to step.
+            observe: called with time and state after each step.
+        """
 
     def set_controls(self, controls: Controls) -> None:
-        """Set the controls of the actuators for all later evaluations and motions."""
+        """Set the controls of the actuators for all later evaluations and motions.
+
+        Args:
+            controls: controls with the same names as those of the model.
+        """
 
     def hold_window(self) -> None:
         """Keep the window, if there is one, until the user closes it."""

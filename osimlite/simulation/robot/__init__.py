@@ -1,1 +1,1 @@
-"""The neutral robot: a mechanism as links and one-axis joints, which engines and robot formats are made from."""
+"""Neutral robot: a mechanism as links and one-axis joints, from which engines and robot formats are made."""

@@ -1,4 +1,7 @@
-"""From the mechanism to the neutral robot: each joint is spread out into motions along or about one axis."""
+"""Conversion of a mechanism to the neutral robot.
+
+Each joint is expanded into joints that move along or about one axis.
+"""
 
 from __future__ import annotations
 
@@ -20,11 +23,11 @@ from osimlite.mechanics.multibody.joints import Mobilizer
 from osimlite.mechanics.multibody.mechanism import Mechanism, Values
 from osimlite.mechanics.multibody.motions import AxisMotion, FixedTransform
 from osimlite.mechanics.multibody.spatial import Array
-from osimlite.simulation.robot.couplings import as_line
+from osimlite.simulation.robot.couplings import find_line
 from osimlite.simulation.robot.robot import WORLD, Link, Robot, RobotJoint, Visual
 
 _ALONG = 1e-14
-"""How far off an axis, relative to its own length, a vector may be and still count as lying along it."""
+"""Largest distance of a vector from an axis, relative to the length of the vector, at which it counts as parallel."""
 
 
 def build_robot(
@@ -36,19 +39,22 @@ def build_robot(
     visuals: Mapping[str, Sequence[Visual]] | None = None,
     collisions: Mapping[str, Sequence[Visual]] | None = None,
 ) -> Robot:
-    """Spread a mechanism out into one-axis joints.
+    """Expand a mechanism into one-axis joints.
 
     Args:
-        mechanism: what to spread out.
-        locked: whether a locked coordinate becomes a fixed joint or stays a joint that moves; or
-            which coordinates become fixed joints, by their places in the mechanism.
-        body_frames: give every body a link whose frame is the body's own. Where the body's frame is
-            off the axis of its joint, that takes a massless link at the axis and a fixed joint;
-            without it the body's link has its frame at the joint, which saves a link, and
-            `Link.bodies` tells where the body is.
-        at: coordinate values at which locked coordinates are fixed; their defaults if left out.
+        mechanism: the mechanism.
+        locked: "fixed" if a locked coordinate becomes a fixed joint, "joint" if it stays a joint
+            that moves; or indices of the coordinates that become fixed joints.
+        body_frames: whether every body has a link whose frame is the body's. Where the body's frame
+            is off the axis of its joint, this takes a massless link at the axis and a fixed joint.
+            Without it, the body's link has its frame at the joint, which saves a link, and
+            `Link.bodies` locates the body.
+        at: coordinate values at which locked coordinates are fixed; by default their defaults.
         visuals: shapes by absolute path of the body (or ``"/ground"``), placed in the body's frame.
-        collisions: what bodies touch others with, likewise.
+        collisions: contact shapes of the bodies, in the same form.
+
+    Returns:
+        The robot.
     """
     values = mechanism.values({} if at is None else at)
     if isinstance(locked, str):
@@ -59,6 +65,16 @@ def build_robot(
 
 
 class _Builder:
+    """Builder of one robot; for the arguments see :func:`build_robot`.
+
+    Attributes:
+        taken: names of links and joints so far.
+        body_names: name of the link of each body.
+        coordinate_names: name of the joint of each coordinate; None once it is used.
+        links: links so far.
+        joints: joints so far.
+    """
+
     def __init__(
         self, mechanism: Mechanism, still: Collection[int], body_frames: bool, values: Array
     ) -> None:
@@ -66,8 +82,7 @@ class _Builder:
         self.body_frames = body_frames
         self.values = values
         self.still = frozenset(still)
-        # Bodies and coordinates have the first call on their own names; what has to be invented
-        # steps aside.
+        # Bodies and coordinates get their own names; names that are invented give way.
         self.taken = {WORLD}
         self.body_names = [self._unique(body.name) for body in mechanism.bodies]
         self.coordinate_names = [
@@ -80,6 +95,12 @@ class _Builder:
     def robot(
         self, visuals: Mapping[str, Sequence[Visual]], collisions: Mapping[str, Sequence[Visual]]
     ) -> Robot:
+        """Return the robot.
+
+        Args:
+            visuals: shapes by path of the body.
+            collisions: contact shapes by path of the body.
+        """
         ground = "/ground"
         self.links.append(
             Link(
@@ -102,16 +123,28 @@ class _Builder:
         return Robot(self.mechanism.name, tuple(self.links), tuple(self.joints), self.mechanism)
 
     def _body(self, index: int, parent: str, start: Array) -> tuple[str, Array]:
-        """Add the joints and links up to a body, its own link last; returns its name and the body's frame in it."""
+        """Add the joints and links up to a body, its own link last.
+
+        Args:
+            index: index of the body.
+            parent: name of the link of the parent body.
+            start: frame of the parent body in that link (4, 4).
+
+        Returns:
+            Name of the body's link, and the body's frame in it (4, 4).
+        """
         body = self.mechanism.bodies[index]
         mobilizer = body.mobilizer
         motions, frames = self._split(mobilizer, start)
         name = self.body_names[index]
+        # Most often the body's frame can be moved onto the axis of its joint, which needs no
+        # further link.
         if motions and self.body_frames:
             _carry_back(motions, frames)
         last = frames.pop()
         off_axis = bool(motions) and self.body_frames and not np.array_equal(last, np.eye(4))
         for place, (motion, origin) in enumerate(zip(motions, frames, strict=True)):
+            # The other joints of a mobilizer lead to massless links.
             carries_body = place == len(motions) - 1 and not off_axis
             joint = self._joint(
                 motion, mobilizer, origin, parent, "" if carries_body else None, name
@@ -133,6 +166,7 @@ class _Builder:
                 name,
                 properties.mass,
                 last[:3, :3] @ properties.center + last[:3, 3],
+                # Inertia along the axes of the link, about the mass centre.
                 last[:3, :3] @ properties.inertia @ last[:3, :3].T,
                 bodies={body.path: last},
             )
@@ -148,6 +182,16 @@ class _Builder:
         child: str | None,
         body_name: str,
     ) -> RobotJoint:
+        """Return the joint of one motion.
+
+        Args:
+            motion: the motion.
+            mobilizer: mobilizer of the body.
+            origin: frame of the joint in the parent link (4, 4).
+            parent: name of the parent link.
+            child: None if the child is a new massless link, else the child is the body's link.
+            body_name: name of the body's link.
+        """
         places = tuple(mobilizer.coordinates[place] for place in motion.coordinates)
         name = self.coordinate_names[places[0]] if motion.coordinate is not None else None
         if name is not None:
@@ -168,7 +212,15 @@ class _Builder:
         )
 
     def _split(self, mobilizer: Mobilizer, start: Array) -> tuple[list[AxisMotion], list[Array]]:
-        """The m motions on the way to the body, and the m + 1 fixed transforms before, between and after them."""
+        """Split a mobilizer into motions of one axis and fixed transforms.
+
+        Args:
+            mobilizer: the mobilizer.
+            start: first fixed transform (4, 4).
+
+        Returns:
+            The m motions, and the m + 1 fixed transforms before, between and after them.
+        """
         own = list(mobilizer.coordinates)
         motions: list[AxisMotion] = []
         frames = [start]
@@ -184,14 +236,22 @@ class _Builder:
     def _simplify_motion(
         self, part: FixedTransform | AxisMotion, own: Sequence[int]
     ) -> Iterator[FixedTransform | AxisMotion]:
-        """The same motion with what is constant in it taken out."""
+        """Yield a motion with its constant part as a fixed transform.
+
+        Args:
+            part: part of a mobilizer.
+            own: indices in the mechanism of the mobilizer's coordinates.
+
+        Yields:
+            Fixed transforms and at most one motion, whose product is the part.
+        """
         if isinstance(part, FixedTransform):
             yield part
         elif _is_constant(part.function) or all(
             own[place] in self.still for place in part.coordinates
         ):
             yield FixedTransform(part.transform(self.values[own]))
-        elif part.function == IDENTITY or (line := as_line(part.function)) is None:
+        elif part.function == IDENTITY or (line := find_line(part.function)) is None:
             yield part
         else:
             slope = line.slope
@@ -200,6 +260,7 @@ class _Builder:
             unit = abs(slope) == 1.0
             yield AxisMotion(
                 part.kind,
+                # A slope of -1 is the opposite axis, which every format can express.
                 part.axis * slope if unit else part.axis,
                 part.coordinates,
                 IDENTITY if unit else Linear(slope),
@@ -214,13 +275,20 @@ class _Builder:
 def _carry_back(motions: list[AxisMotion], frames: list[Array]) -> None:
     """Move the last fixed transform in front of the last motion if that leaves the product unchanged.
 
-    A translation lets any transform pass, a rotation one that does not leave its axis; the axis
+    Any transform commutes with a translation, and one along its axis with a rotation; the axis
     turns with it.
+
+    Args:
+        motions: motions of one axis; the last one may be replaced.
+        frames: fixed transforms around them; the last two may be replaced.
     """
     motion, last = motions[-1], frames[-1]
     turn, shift = last[:3, :3], last[:3, 3]
     along = np.linalg.norm(np.cross(motion.axis, shift)) <= _ALONG * float(np.linalg.norm(shift))
+    # A fixed offset commutes with a translation, and with a rotation about an axis through its
+    # origin.
     if motion.kind == "translate" or along:
+        # Behind the offset the same axis has other components.
         motions[-1] = replace(motion, axis=turn.T @ motion.axis)
         frames[-2:] = [frames[-2] @ last, np.eye(4)]
 
@@ -232,10 +300,10 @@ def _place_link(shapes: Sequence[Visual], frame: Array) -> tuple[Visual, ...]:
 def _is_constant(function: Function) -> bool:
     if isinstance(function, ScaledFunction):
         return function.scale == 0.0 or _is_constant(function.function)
-    line = as_line(function)
+    line = find_line(function)
     return isinstance(function, Constant) or (line is not None and line.slope == 0.0)
 
 
 def _letter(motion: AxisMotion) -> str:
-    """Name for a joint that is not its coordinate: the axis it is nearest to, ``rx`` or ``tz``."""
+    """Return the end of the name of a joint that is not its coordinate: the nearest axis, such as ``rx`` or ``tz``."""
     return ("r" if motion.kind == "rotate" else "t") + "xyz"[int(np.argmax(np.abs(motion.axis)))]

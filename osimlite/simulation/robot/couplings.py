@@ -1,4 +1,7 @@
-"""Functions that are straight lines, whatever their class: formats for robots can say these."""
+"""Functions of coordinates that are straight lines, and what drives the joints of a robot.
+
+Formats of robots can express a joint that is a multiple of another one, but no other function.
+"""
 
 from __future__ import annotations
 
@@ -15,31 +18,48 @@ from osimlite.simulation.robot.robot import Robot, RobotJoint
 
 
 class Line(NamedTuple):
-    """``slope * x + start``."""
+    """Straight line ``slope * x + start``.
+
+    Attributes:
+        slope: slope of the line.
+        start: value at x = 0.
+    """
 
     slope: float
     start: float
 
-    def after(self, inner: Line) -> Line:
-        """This line of the inner one."""
+    def compose(self, inner: Line) -> Line:
+        """Return the composition of this line with an inner one.
+
+        Args:
+            inner: line whose value is the argument of this one.
+        """
         return Line(self.slope * inner.slope, self.slope * inner.start + self.start)
 
     def inverse(self) -> Line:
-        """The line that gives x for its value; the slope must not be zero."""
+        """Return the line that gives x for its value; the slope must not be zero."""
+        # The identity keeps its exact numbers: -0.0 would be written as an offset.
         return self if self == (1.0, 0.0) else Line(1.0 / self.slope, -self.start / self.slope)
 
 
-def as_line(function: f.Function) -> Line | None:
-    """The straight line that a function of one argument is, or None.
+def find_line(function: f.Function) -> Line | None:
+    """Return the straight line that a function of one argument is.
 
     Splines count if they are straight to the last digit, as one through two points is, or one
     through points of equal height.
+
+    Args:
+        function: the function.
+
+    Returns:
+        The line; None if the function is not straight.
     """
     match function:
         case f.Linear(rate, start):
             return Line(rate, start)
         case f.WeightedSum((weight,), start):
             return Line(weight, start)
+        # The highest power comes first, as in OpenSim.
         case f.Polynomial((*high, slope, start)) if not any(high):
             return Line(slope, start)
         case f.MultivariatePolynomial(coefficients, powers) if all(
@@ -52,8 +72,8 @@ def as_line(function: f.Function) -> Line | None:
             if not any(factor for power, factor in factors.items() if power > 1):
                 return Line(factors.get(1, 0.0), factors.get(0, 0.0))
         case f.ScaledFunction(scale, inner):
-            line = as_line(inner)
-            return None if line is None else Line(scale, 0.0).after(line)
+            line = find_line(inner)
+            return None if line is None else Line(scale, 0.0).compose(line)
         case f.PiecewiseLinear((_, _)) | f.SimmSpline() if _is_straight(function):
             start, slopes, _ = function.evaluate(np.zeros(1))
             return Line(float(slopes[0]), start)
@@ -66,41 +86,61 @@ def _is_straight(function: f.Function) -> bool:
     # Where points lie on each other, the curve may jump.
     if any(right - left <= 1e-7 for left, right in pairwise(function.x)):
         return False
+    # The last piece is the point at the end, whose bend has no effect.
     return len({slope for _, slope, _, _ in function.pieces}) == 1 and not any(
         bend for piece in function.pieces[:-1] for bend in piece[2:]
     )
 
 
 class Mimic(NamedTuple):
-    """What a joint follows: the value of the joint named `leader`, by a straight line."""
+    """Dependence of a joint on another one by a straight line.
+
+    Attributes:
+        leader: name of the other joint.
+        line: value of the joint as a function of the value of the leader.
+    """
 
     leader: str
     line: Line
 
 
 def couplers(robot: Robot) -> list[Coupler]:
-    """The constraints that make one coordinate a function of others."""
+    """Return the constraints of a robot's mechanism that make one coordinate a function of others."""
     return [
         constraint for constraint in robot.mechanism.constraints if isinstance(constraint, Coupler)
     ]
 
 
 def mimics(robot: Robot) -> dict[str, Mimic]:
-    """The joints whose value is a straight line of another's, by name.
+    """Return the joints whose value is a straight line of another's.
 
-    That is so where several motions of a joint are driven by one coordinate, and where a coupler
-    makes a coordinate a straight line of another. A leader never follows another joint itself: most
-    readers do not look further.
+    Such joints exist where one coordinate drives several motions of a joint, and where a coupler
+    makes a coordinate a straight line of another. A leader never follows another joint itself,
+    because most programs do not resolve chains.
+
+    Args:
+        robot: the robot.
+
+    Returns:
+        Leader and line by the name of the joint.
     """
     leads = leaders(robot)
     follows: dict[int, tuple[int, Line]] = {}
     for coupler in couplers(robot):
-        line = as_line(coupler.function)
+        line = find_line(coupler.function)
         if len(coupler.independent) == 1 and line is not None:
+            # Of two couplers of a coordinate the first one counts; both must agree anyway.
             follows.setdefault(coupler.dependent, (coupler.independent[0], line))
 
-    def origin(place: int) -> tuple[int, Line]:
-        """The coordinate farthest up that has a leader, and the line from it to this one."""
+    def find_origin(place: int) -> tuple[int, Line]:
+        """Return the most remote coordinate that has a leader, and the line from it to this one.
+
+        Args:
+            place: index of the coordinate.
+
+        Returns:
+            Index of that coordinate, and this coordinate as a line of it.
+        """
         results = place, Line(1.0, 0.0)
         line, seen = results[1], {place}
         while place in follows:
@@ -109,53 +149,84 @@ def mimics(robot: Robot) -> dict[str, Mimic]:
                 # Couplers in a circle: each coordinate keeps its own joint.
                 return min(seen), Line(1.0, 0.0)
             seen.add(place)
-            line = line.after(step)
+            line = line.compose(step)
+            # Only a coordinate that a joint follows as a line can lead others in the file.
             if place in leads:
                 results = place, line
         return results
 
     result: dict[str, Mimic] = {}
     for joint in robot.moving:
-        line = as_line(joint.function)
+        line = find_line(joint.function)
         if len(joint.coordinates) != 1 or line is None:
             continue
-        place, way = origin(joint.coordinates[0])
+        place, way = find_origin(joint.coordinates[0])
+        # The leader of a coordinate mimics none, and is not its own follower.
         if place not in leads or leads[place][0] is joint:
             continue
         leader, own = leads[place]
-        result[joint.name] = Mimic(leader.name, line.after(way).after(own.inverse()))
+        result[joint.name] = Mimic(leader.name, line.compose(way).compose(own.inverse()))
     return result
 
 
 def leaders(robot: Robot) -> dict[int, tuple[RobotJoint, Line]]:
-    """For coordinates the joint that others follow: the one that is the coordinate, else one that is a line of it."""
+    """Return the joint that others follow for each coordinate.
+
+    It is the joint that equals the coordinate, else the first one that is a line of it.
+
+    Args:
+        robot: the robot.
+
+    Returns:
+        The joint, and its value as a line of the coordinate, by index of the coordinate.
+    """
     result: dict[int, tuple[RobotJoint, Line]] = {}
     for joint in robot.moving:
-        line = as_line(joint.function)
+        line = find_line(joint.function)
         if len(joint.coordinates) == 1 and line is not None and line.slope:
+            # A joint whose value is the coordinate itself is the better leader: it replaces these
+            # below.
             result.setdefault(joint.coordinates[0], (joint, line))
     return result | {place: (joint, Line(1.0, 0.0)) for place, joint in robot.joint_of.items()}
 
 
 class Driver(NamedTuple):
-    """A value is `function` of the coordinate at the place `coordinate`, or constant if that is None."""
+    """Value as a function of a coordinate that moves freely.
+
+    Attributes:
+        coordinate: index of the coordinate; None if the value is constant.
+        function: the function of it.
+    """
 
     coordinate: int | None
     function: f.Function
 
 
 @dataclass(frozen=True)
-class Composed(f.Function):
-    """The `outer` function, of one argument, of the value of the `inner`."""
+class Composition(f.Function):
+    """Composition of two functions.
+
+    Attributes:
+        outer: function of one argument, the value of `inner`.
+        inner: inner function.
+    """
 
     outer: f.Function
     inner: f.Function
 
     def evaluate(self, arguments: f.Arguments) -> f.Evaluated:
-        """Value, gradient and Hessian, by the chain rule."""
+        """Return value, gradient and Hessian, by the chain rule.
+
+        Args:
+            arguments: arguments of the inner function.
+
+        Returns:
+            Value g(h(x)), gradient g' h_i, and Hessian g' h_ij + g'' h_i h_j.
+        """
         inner, gradient, hessian = self.inner.evaluate(arguments)
         value, (first,), ((second,),) = self.outer.evaluate((inner,))
         bends = [
+            # Second derivative of a composition: f'(g) g'' + f''(g) g' g'.
             [first * bend + second * one * two for bend, two in zip(row, gradient, strict=True)]
             for row, one in zip(hessian, gradient, strict=True)
         ]
@@ -163,12 +234,20 @@ class Composed(f.Function):
 
 
 def coordinate_drivers(robot: Robot) -> dict[int, Driver]:
-    """For every coordinate that does not move freely, what decides it: a lock, or couplers of one coordinate.
+    """Return what determines the coordinates that do not move freely.
 
-    A coupler of several coordinates is not followed, and couplers in a circle leave the first
+    A lock makes a coordinate constant, and a coupler of one coordinate makes it a function of that
+    one. Couplers of several coordinates are not followed, and couplers in a circle leave the first
     coordinate free.
+
+    Args:
+        robot: the robot.
+
+    Returns:
+        Drivers by index of the coordinate.
     """
-    infos, values = robot.mechanism.coordinates, robot.mechanism.values({})
+    infos = robot.mechanism.coordinates
+    values = robot.mechanism.values({})
     result = {
         place: Driver(None, f.Constant(float(values[place])))
         for place, info in enumerate(infos)
@@ -180,6 +259,7 @@ def coordinate_drivers(robot: Robot) -> dict[int, Driver]:
         if place in result:
             return result[place]
         step = steps.get(place)
+        # Couplers in a circle: the coordinate at which it closes moves freely.
         if step is None or step.independent[0] in above | {place}:
             return Driver(place, f.IDENTITY)
         return _substitute(step.function, drive(step.independent[0], above | {place}))
@@ -191,7 +271,15 @@ def coordinate_drivers(robot: Robot) -> dict[int, Driver]:
 
 
 def joint_driver(joint: RobotJoint, drivers: dict[int, Driver]) -> Driver | None:
-    """What decides the value of a moving joint; None where its function is of several coordinates."""
+    """Return what determines the value of a moving joint.
+
+    Args:
+        joint: the joint.
+        drivers: drivers of the coordinates, see :func:`coordinate_drivers`.
+
+    Returns:
+        The driver; None if the joint's function has several coordinates.
+    """
     if len(joint.coordinates) != 1:
         return None
     (place,) = joint.coordinates
@@ -199,16 +287,24 @@ def joint_driver(joint: RobotJoint, drivers: dict[int, Driver]) -> Driver | None
 
 
 def knots(function: f.Function) -> tuple[float, ...]:
-    """Arguments at which the pieces of a function meet; empty for a function of one piece."""
+    """Return the arguments at which the pieces of a function meet.
+
+    Args:
+        function: the function.
+
+    Returns:
+        Increasing arguments; empty for a function of one piece.
+    """
     match function:
         case f.SimmSpline() | f.PiecewiseLinear() | f.PiecewiseConstant():
+            # Between these points such functions are smooth, so that samples go there.
             return tuple(function.x)
         case PiecewisePolynomial():
             return tuple(function.knots[1:].tolist())
-        case f.ScaledFunction(_, inner) | Composed(_, inner):
+        case f.ScaledFunction(_, inner) | Composition(_, inner):
             own = knots(inner)
-            line = as_line(inner)
-            if isinstance(function, Composed) and line is not None and line.slope:
+            line = find_line(inner)
+            if isinstance(function, Composition) and line is not None and line.slope:
                 own = tuple((x - line.start) / line.slope for x in knots(function.outer))
             return own
     return ()
@@ -217,19 +313,25 @@ def knots(function: f.Function) -> tuple[float, ...]:
 def _substitute(outer: f.Function, driver: Driver) -> Driver:
     if driver.coordinate is None:
         return Driver(None, f.Constant(outer.evaluate((driver.function.evaluate((0.0,))[0],))[0]))
-    first, second = as_line(driver.function), as_line(outer)
+    first, second = find_line(driver.function), find_line(outer)
     if first == (1.0, 0.0):
         return Driver(driver.coordinate, outer)
     if first is not None and second is not None:
-        return Driver(driver.coordinate, f.Linear(*second.after(first)))
-    return Driver(driver.coordinate, Composed(outer, driver.function))
+        return Driver(driver.coordinate, f.Linear(*second.compose(first)))
+    return Driver(driver.coordinate, Composition(outer, driver.function))
 
 
 def range_limits(robot: Robot) -> Robot:
-    """The same robot, with every joint that is a straight line of one coordinate limited to the coordinate's range."""
+    """Return a robot whose joints are limited to the ranges of their coordinates.
 
-    def limited(joint: RobotJoint) -> RobotJoint:
-        line = as_line(joint.function)
+    Only joints that are a straight line of one coordinate are limited.
+
+    Args:
+        robot: the robot.
+    """
+
+    def limit_joint(joint: RobotJoint) -> RobotJoint:
+        line = find_line(joint.function)
         if joint.kind == "fixed" or len(joint.coordinates) != 1 or line is None:
             return joint
         low, high = (
@@ -238,4 +340,4 @@ def range_limits(robot: Robot) -> Robot:
         )
         return replace(joint, limits=(min(low, high), max(low, high)))
 
-    return replace(robot, joints=tuple(limited(joint) for joint in robot.joints))
+    return replace(robot, joints=tuple(limit_joint(joint) for joint in robot.joints))

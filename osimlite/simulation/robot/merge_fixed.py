@@ -1,4 +1,4 @@
-"""Bodies that do not move relative to each other, made one link."""
+"""Merging of links that do not move relative to each other."""
 
 from __future__ import annotations
 
@@ -10,10 +10,14 @@ from osimlite.simulation.robot.robot import Link, Robot
 
 
 def merge_fixed(robot: Robot) -> Robot:
-    """The same robot without fixed joints: what a fixed joint carries becomes part of the link that carries it.
+    """Return a robot without fixed joints: links behind them become part of the links before them.
 
-    A massless link that stands between two joints takes the name of the body it gets. What is fixed
-    to ground becomes part of the root link; its mass is left out, since the root does not move.
+    A massless link between two joints takes the name of the body that it receives. Links that are
+    fixed to ground become part of the root link; their mass is left out, since the root does not
+    move.
+
+    Args:
+        robot: the robot.
     """
     links = {link.name: link for link in robot.links}
     # For every link, the link it became part of and its frame there.
@@ -42,7 +46,14 @@ def merge_fixed(robot: Robot) -> Robot:
 
 
 def _weld_links(link: Link, other: Link, placed: Array, *, massless: bool) -> Link:
-    """`link` with `other` welded to it, whose frame is `placed` (4, 4) in its own."""
+    """Return a link with another one welded to it.
+
+    Args:
+        link: the link.
+        other: the other link.
+        placed: frame of the other link in the first (4, 4).
+        massless: whether the mass of the other link is left out.
+    """
     turn, shift = placed[:3, :3], placed[:3, 3]
     visuals, collisions = (
         tuple(replace(shape, origin=placed @ shape.origin) for shape in shapes)
@@ -67,6 +78,12 @@ def _weld_links(link: Link, other: Link, placed: Array, *, massless: bool) -> Li
 
 
 def _about(inertia: Array, mass: float, arm: Array) -> Array:
-    """Inertia about a point from which the mass centre is `arm` away (parallel axes)."""
+    """Return an inertia about another point, by the parallel axis theorem.
+
+    Args:
+        inertia: inertia about the mass centre (3, 3), kg·m².
+        mass: mass, kg.
+        arm: mass centre relative to the point (3,), m.
+    """
     cross = skew_matrix(arm)
     return inertia - mass * cross @ cross

@@ -1,4 +1,4 @@
-"""The mesh files that a model names, made readable for robot programs."""
+"""Mesh files of a model, converted for robot programs."""
 
 from __future__ import annotations
 
@@ -16,43 +16,60 @@ MESH_FOLDER = "meshes"
 """Folder of the mesh files, beside the robot's own file."""
 
 _WRITTEN = {".obj": ".obj", ".stl": ".stl", ".vtp": ".obj"}
-"""Kinds of mesh files that OpenSim reads, and what they become."""
+"""Suffix of the written file by the suffix of a mesh file that OpenSim reads."""
 
 Signs = tuple[float, float, float]
+"""Signs of the scale factors along the axes; negative ones mirror a mesh."""
 
 
 class MeshProblem(Exception):
-    """Why a mesh cannot be had, as what was done about it."""
+    """Error of a mesh that cannot be used; the message says what was done instead."""
 
 
 @dataclass(frozen=True, slots=True)
 class MeshCopy:
-    """A mesh file of the robot."""
+    """Mesh file of the robot.
 
-    file: str  # relative to the robot's own file
-    source: Path  # where it was found
-    converted: str  # what was done to it, or ""
-    misspelt: bool  # whether its name has other capitals or slashes than the model says
+    Attributes:
+        file: path relative to the robot's own file.
+        source: file that was found.
+        converted: what was converted, or "".
+        misspelt: whether the name of the file differs from that in the model in capitals or
+            slashes.
+    """
+
+    file: str
+    source: Path
+    converted: str
+    misspelt: bool
 
 
 @dataclass
 class MeshFiles:
-    """Mesh files for a robot, each once, and each written from what was read of it."""
+    """Mesh files for a robot, each written once.
 
-    folders: MeshFolders = field(default_factory=MeshFolders)  # where files may be
-    # contents by name relative to the robot's own file
+    Attributes:
+        folders: folders in which the files are searched.
+        files: contents by name relative to the robot's own file.
+    """
+
+    folders: MeshFolders = field(default_factory=MeshFolders)
     files: dict[str, bytes] = field(default_factory=dict)
     _made: dict[tuple[object, ...], str] = field(default_factory=dict)
 
     def copy(self, name: str, signs: Signs = (1.0, 1.0, 1.0)) -> MeshCopy:
-        """Take over a file that the model names.
+        """Convert a file that the model names.
 
         Args:
-            name: as in the model.
-            signs: of the scale factors; negative ones are put into the file.
+            name: name in the model.
+            signs: signs of the scale factors; negative ones are applied to the file, because not
+                every program accepts them.
+
+        Returns:
+            The copy.
 
         Raises:
-            MeshProblem: it is not there, or nothing can be made of it.
+            MeshProblem: the file does not exist, or cannot be converted.
         """
         kind = Path(name.replace("\\", "/")).suffix.lower()
         if kind not in _WRITTEN:
@@ -66,7 +83,7 @@ class MeshFiles:
                     "left out: the file is neither beside the model, nor in its folder Geometry, nor in the folders "
                     f"named {MESH_FOLDER_HINT}"
                 )
-            content, converted = _written(source, kind, signs)
+            content, converted = _convert_mesh(source, kind, signs)
         except OsimliteError as error:
             raise MeshProblem(f"left out: {error}") from None
         file = self.add((str(source), signs), source.stem, _WRITTEN[kind], content)
@@ -74,12 +91,34 @@ class MeshFiles:
         return MeshCopy(file, source, converted, misspelt)
 
     def name_of_stretched(self, name: str, shape: Surface, size: tuple[float, float, float]) -> str:
-        """Relative name of the file of a unit shape that is stretched along its axes."""
+        """Return the name of the file of a unit shape that is stretched along its axes.
+
+        Args:
+            name: name of the shape.
+            shape: surface of the unit shape.
+            size: factors along the axes, m.
+
+        Returns:
+            Name relative to the robot's own file.
+        """
         return self.add((name, *size), name, ".obj", shape.stretch(size).obj().encode())
 
     def add(self, key: tuple[object, ...], stem: str, kind: str, content: bytes) -> str:
-        """Relative name of a mesh file, the same for the same key and unlike any other, whatever the capitals."""
+        """Return the name of a mesh file, and add the file if it is new.
+
+        Args:
+            key: what the file depends on; equal keys give the same file.
+            stem: name without suffix.
+            kind: suffix.
+            content: content of the file.
+
+        Returns:
+            Name relative to the robot's own file. It differs from all others even where capitals do
+            not
+                count.
+        """
         if key not in self._made:
+            # Names that differ by case only are one file on Windows and macOS.
             taken = {name.casefold() for name in self.files}
             base = f"{MESH_FOLDER}/{legal(stem)}"
             name, count = f"{base}{kind}", 1
@@ -91,8 +130,17 @@ class MeshFiles:
         return self._made[key]
 
 
-def _written(source: Path, kind: str, signs: Signs) -> tuple[bytes, str]:
-    """What is written of a file, and what was done to it."""
+def _convert_mesh(source: Path, kind: str, signs: Signs) -> tuple[bytes, str]:
+    """Return the content of a converted mesh file.
+
+    Args:
+        source: the file.
+        kind: its suffix.
+        signs: signs of the scale factors.
+
+    Returns:
+        Content, and a phrase that says what was converted, or "".
+    """
     if kind == ".stl":
         content = read_file(source)
         binary = format_binary_stl(content, source.name, signs)

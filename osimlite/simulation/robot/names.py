@@ -1,6 +1,7 @@
-"""Names that readers take: those of URDF letters, digits, ``_``, ``-`` and ``.``, those of MJCF what XML can hold.
+"""Names that readers of robot files accept.
 
-No two are alike.
+URDF has letters, digits, ``_``, ``-`` and ``.``; MJCF has all characters that XML can hold. All
+names of a file differ.
 """
 
 from __future__ import annotations
@@ -17,40 +18,70 @@ if TYPE_CHECKING:
     from osimlite.mechanics.multibody.mechanism import Mechanism
 
 LONGEST = 200
-"""Characters in a name; some readers cut lines that are too long."""
+"""Largest number of characters in a name; some readers cut lines that are too long."""
 
 
 def legal(name: str) -> str:
-    """The name with every illegal character replaced by ``_``, starting with a letter or ``_``, and not too long."""
+    """Return a legal name for URDF.
+
+    Args:
+        name: any name.
+
+    Returns:
+        The name with ``_`` for every illegal character, beginning with a letter or ``_``, and not
+        too
+            long.
+    """
     word = re.sub(r"[^A-Za-z0-9_.-]", "_", name)[:LONGEST] or "_"
     return word if word[0].isalpha() or word[0] == "_" else f"_{word}"
 
 
-def dotted_name(path: str) -> str:
-    """A component path as a name."""
+def to_dotted_name(path: str) -> str:
+    """Return a component path as a name, with dots in place of slashes."""
     return path.strip("/").replace("/", ".")
 
 
 class UniqueNames:
-    """Gives out legal names, none of them twice."""
+    """Function that makes names legal and never returns the same name twice."""
 
     def __init__(self) -> None:
         self._taken: set[str] = set()
 
     def __call__(self, name: str) -> str:
-        """The name made legal, with a number behind it if it was given out before."""
+        """Return a legal name that was not returned before.
+
+        Args:
+            name: any name; a number is appended if necessary.
+        """
         word = make_unique_name(legal(name), self._taken)
         self._taken.add(word)
         return word
 
 
 def xml_name(name: str) -> str:
-    """The name with ``_`` for every character that XML has no way to write, and ``_`` for none at all."""
+    """Return a name that XML can hold.
+
+    Args:
+        name: any name.
+
+    Returns:
+        The name with ``_`` for every character that XML cannot write; ``_`` for an empty name.
+    """
     return re.sub("[^\t\n\r -\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]", "_", name) or "_"
 
 
 def distinct(names: Sequence[str], spell: Callable[[str], str]) -> list[str]:
-    """The names as they are spelt, no two alike; one that keeps its spelling comes before those that turn into it."""
+    """Return different names in a new spelling.
+
+    A name that keeps its spelling has precedence over names that turn into it.
+
+    Args:
+        names: the names.
+        spell: function that returns the new spelling of a name.
+
+    Returns:
+        One name for each, in the same order.
+    """
     result, taken = [*names], set[str]()
     for place in sorted(range(len(names)), key=lambda place: spell(names[place]) != names[place]):
         result[place] = make_unique_name(spell(names[place]), taken)
@@ -59,12 +90,23 @@ def distinct(names: Sequence[str], spell: Callable[[str], str]) -> list[str]:
 
 
 def joint_names(mechanism: Mechanism) -> list[str]:
-    """Of the joints that are coordinates: the coordinate's name, its path with dots where coordinates share a name."""
-    return distinct(mechanism.coordinate_names, lambda name: xml_name(dotted_name(name)))
+    """Return the names of the joints that are coordinates.
+
+    Args:
+        mechanism: the mechanism.
+
+    Returns:
+        For each coordinate its name; its path with dots where coordinates share a name.
+    """
+    return distinct(mechanism.coordinate_names, lambda name: xml_name(to_dotted_name(name)))
 
 
 def coordinate_names(robot: Robot) -> Robot:
-    """The same robot with joints named by their coordinates (see :func:`joint_names`), and names that XML can hold."""
+    """Return a robot with joints named by their coordinates, and names that XML can hold.
+
+    Args:
+        robot: the robot; see :func:`joint_names`.
+    """
     names = joint_names(robot.mechanism)
     own = {joint.name: names[place] for place, joint in robot.joint_of.items()}
     others = [joint.name for joint in robot.joints if joint.name not in own]
@@ -78,9 +120,12 @@ def coordinate_names(robot: Robot) -> Robot:
 
 
 def legal_names(robot: Robot) -> Robot:
-    """The same robot with legal names.
+    """Return a robot with legal names.
 
     Links and joints share one set of names, because some readers put both into one namespace.
+
+    Args:
+        robot: the robot.
     """
     names = [link.name for link in robot.links] + [joint.name for joint in robot.joints]
     renamed = dict(zip(names, distinct(names, legal), strict=True))

@@ -1,25 +1,25 @@
 """URDF text of a neutral robot.
 
-What is written so that readers take the same mechanics from it:
+The text is written so that readers get the same mechanics from it:
 
-- Links and joints one to one, so a reader's joints are `Robot.joints` by name (readers number them
-  in orders of their own) and its links `Robot.links`. The root link "world" is massless and fixed.
-- Every link has its ``<inertial>``: the origin stands at the mass centre and its axes are the
-  principal axes, so the tensor is diagonal. A link that only stands between two joints says mass 0
-  and inertia 0; left out, some readers take 1 kg.
+- Links and joints correspond one to one, so a reader's joints are `Robot.joints` by name (readers
+  number them in orders of their own) and its links `Robot.links`. The root link "world" is massless
+  and fixed.
+- Every link has its ``<inertial>``: the origin is at the mass centre and its axes are the
+  principal axes, so the tensor is diagonal. A link that only connects two joints has mass 0
+  and inertia 0; without the element, some readers assume 1 kg.
 - A rotation without hard limits is a ``continuous`` joint. A ``prismatic`` joint must have limits:
   `UNLIMITED` where the model has none. OpenSim's coordinate ranges limit no motion, so they are no
-  limits here unless the robot says so.
-- A joint driven by a multiple of the coordinate of another joint says so with ``<mimic>``; any
-  other function cannot be said.
+  limits here unless the robot has them.
+- A joint driven by a multiple of the coordinate of another joint has a ``<mimic>``; any
+  other function cannot be expressed.
 - MuJoCo refuses a body without mass that moves. A ``<mujoco>`` element, which other readers skip,
-  tells it to give such bodies `LEAST_MASS`, and to look for mesh files where the text says they
-  are.
-- PyBullet tells the frames of links in single precision and their inertial frames (mass centre,
-  principal axes) in double: who needs more than 1e-7 has to start from the latter and take out the
-  ``<inertial>`` origin.
-- No ``<collision>``: contact in OpenSim is a force between a few named surfaces, not a property of
-  shapes.
+  makes it give such bodies `LEAST_MASS`, and search mesh files where the text names them.
+- PyBullet reports the frames of links in single precision and their inertial frames (mass centre,
+  principal axes) in double: a program that needs more than 1e-7 has to start from the latter and
+  remove the ``<inertial>`` origin.
+- There is no ``<collision>`` unless the robot has collision shapes: contact in OpenSim is a force
+  between a few named surfaces, not a property of shapes.
 """
 
 from __future__ import annotations
@@ -50,20 +50,24 @@ UNLIMITED = 1e9
 """Limit of position, velocity or effort (m, m/s, rad/s, N, N·m) where the model has none."""
 
 LEAST_MASS = 1e-9
-"""Mass (kg) and principal moments (kg·m²) of a massless link in MuJoCo; all else reads zero."""
+"""Mass (kg) and principal moments (kg·m²) of a massless link in MuJoCo; other programs read zero."""
 
 LONGEST_LINE = 1000
-"""Characters; Bullet breaks a line of more than 8191 in the middle of whatever is there."""
+"""Largest number of characters of a line; Bullet cuts a line of more than 8191 anywhere."""
 
 Attributes = dict[str, str]
+"""Attributes of an XML element by name."""
 
 
 def urdf_text(robot: Robot, *, visuals: bool = True) -> str:
-    """Write a robot as URDF.
+    """Return a robot as URDF.
 
     Args:
-        robot: with legal names (see `osimlite.simulation.robot.names`).
-        visuals: whether to say what links look like.
+        robot: robot with legal names (see `osimlite.simulation.robot.names`).
+        visuals: whether shapes for drawing are written.
+
+    Returns:
+        The text of the file.
     """
     out, unique = _Writer(), UniqueNames()
     with_visuals = [visual for link in robot.links for visual in link.visuals] if visuals else []
@@ -97,25 +101,33 @@ def urdf_text(robot: Robot, *, visuals: bool = True) -> str:
 
 
 def number(value: float) -> str:
-    """The shortest text that reads back as the same float."""
-    # Not -0 either.
+    """Return the shortest text that reads back as the same float."""
+    # Adding 0 turns -0 into 0.
     return format_shortest(float(value) + 0.0)
 
 
 def numbers(values: Sequence[float] | Array) -> str:
-    """Numbers separated by blanks."""
+    """Return numbers as text, separated by blanks."""
     return " ".join(number(float(value)) for value in values)
 
 
 def roll_pitch_yaw(rotation: Array) -> tuple[float, float, float]:
-    """Angles (rad) with Rz(yaw) Ry(pitch) Rx(roll) = rotation, exact to rounding for any rotation.
+    """Return the angles of a rotation in URDF's convention.
 
-    Yaw comes first and is taken out before the others are computed; at a pitch of ±90 degrees,
-    where roll and yaw do the same, that still gives a pair that fits.
+    Yaw is computed first and removed before the others are computed. At a pitch of ±90 degrees,
+    where roll and yaw have the same effect, this still gives a pair that fits.
+
+    Args:
+        rotation: rotation matrix (3, 3).
+
+    Returns:
+        Roll, pitch and yaw (rad) with Rz(yaw) Ry(pitch) Rx(roll) = rotation, exact to rounding.
     """
     r = rotation.tolist()
     yaw = math.atan2(r[1][0], r[0][0])
     s, c = math.sin(yaw), math.cos(yaw)
+    # By the yaw the other angles follow without division by cos(pitch), which vanishes at a right
+    # angle.
     pitch = math.atan2(-r[2][0], c * r[0][0] + s * r[1][0])
     roll = math.atan2(s * r[0][2] - c * r[1][2], c * r[1][1] - s * r[0][1])
     return roll, pitch, yaw
@@ -147,6 +159,7 @@ def _write_shape(out: _Writer, shape: Visual) -> None:
 
 
 def _write_joint(out: _Writer, joint: RobotJoint, mimic: Mimic | None) -> None:
+    # URDF requires limits of a revolute joint, and has no prismatic joint without them.
     kind = "continuous" if joint.kind == "revolute" and joint.limits is None else joint.kind
     with out.element("joint", {"name": joint.name, "type": kind}):
         out.empty("parent", {"link": joint.parent})
@@ -182,7 +195,7 @@ def _material_name(color: tuple[float, float, float, float]) -> str:
 
 
 class _Writer:
-    """Indented XML, one element a line."""
+    """Writer of indented XML, one element a line."""
 
     def __init__(self) -> None:
         self._lines: list[str] = []
@@ -217,7 +230,12 @@ class _Writer:
 
 
 def _wrap_tag(words: Sequence[str], end: str) -> Iterator[str]:
-    """The words of a start tag on one line, or one a line if that gets too long."""
+    """Yield a start tag on one line, or one word a line if that is too long.
+
+    Args:
+        words: the tag and its attributes.
+        end: end of the tag.
+    """
     whole = " ".join(words) + end
     if len(whole) <= LONGEST_LINE:
         yield whole

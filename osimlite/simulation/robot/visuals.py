@@ -1,4 +1,4 @@
-"""What bodies look like, taken from the geometry attached to the frames of a model."""
+"""Shapes of bodies for drawing, from the geometry attached to the frames of a model."""
 
 from __future__ import annotations
 
@@ -28,29 +28,46 @@ from osimlite.simulation.robot.mesh_files import MeshFiles, MeshProblem
 from osimlite.simulation.robot.robot import Ball, Box, MeshFile, Shape, Tube, Visual
 
 _Y_TO_Z = make_transform(rotation_about(np.array((1.0, 0.0, 0.0)), -np.pi / 2))
-"""The frame, in OpenSim's cylinder frame, in which the cylinder lies along Z."""
+"""Frame in OpenSim's cylinder frame, whose cylinders are along Y, in which the cylinder is along Z."""
+# The cosine of a right angle rounds to 6e-17, which would be written into files.
 _Y_TO_Z[np.abs(_Y_TO_Z) < 1e-15] = 0.0
 
 GREATEST = 3e38
-"""Of sizes (m): programs draw in numbers of single precision."""
+"""Largest size, m: programs draw in numbers of single precision."""
 
 
 class Note(Protocol):
-    """Is told what a shape cannot say; `osimlite.translate.fidelity.Fidelity.add` is one."""
+    """Function that records what a shape cannot express.
+
+    `osimlite.translate.fidelity.Fidelity.add` is one.
+    """
 
     def __call__(
         self, kind: str, component: str, cannot_say: str, done: str, detail: str = ""
     ) -> None:
-        """Take note of it; the arguments are those of a record of the translation."""
+        """Record it; the arguments are those of a record of the translation.
+
+        Args:
+            kind: kind of the loss.
+            component: path of the component.
+            cannot_say: what the format cannot express.
+            done: what was done instead.
+            detail: details.
+        """
 
 
-def _unheard(kind: str, component: str, cannot_say: str, done: str, detail: str = "") -> None:
-    """Let nobody know."""
+def _ignore_note(kind: str, component: str, cannot_say: str, done: str, detail: str = "") -> None:
+    """Ignore a note; the default of :func:`collect_visuals`."""
 
 
 @dataclass
 class Visuals:
-    """Shapes by absolute path of the body (or ``"/ground"``), and the mesh files they need, by relative name."""
+    """Shapes of a model, and the mesh files that they need.
+
+    Attributes:
+        by_body: shapes by absolute path of the body (or ``"/ground"``).
+        files: mesh files by relative name.
+    """
 
     by_body: dict[str, list[Visual]] = field(default_factory=dict)
     files: dict[str, bytes] = field(default_factory=dict)
@@ -59,21 +76,26 @@ class Visuals:
 def collect_visuals(
     model: Model,
     mechanism: Mechanism,
-    note: Note = _unheard,
+    note: Note = _ignore_note,
     mesh_files: MeshFiles | None = None,
 ) -> Visuals:
-    """Gather the shapes of a model, each placed in the frame of the body that carries it.
+    """Collect the shapes of a model, each placed in the frame of the body that carries it.
 
     Args:
-        model: where the geometry is.
-        mechanism: of the same model; knows where frames are.
-        note: is told of what cannot be drawn.
-        mesh_files: takes the mesh files up, and knows the folders; without it there are none.
+        model: the model.
+        mechanism: mechanism of the same model.
+        note: called for what cannot be drawn.
+        mesh_files: converts the mesh files and knows the folders; without it none are found.
+
+    Returns:
+        Shapes and mesh files.
     """
     return _Collector(model, mechanism, note, mesh_files or MeshFiles()).collect()
 
 
 class _Collector:
+    """Collector of the shapes of one model; for the arguments see :func:`collect_visuals`."""
+
     def __init__(
         self, model: Model, mechanism: Mechanism, note: Note, mesh_files: MeshFiles
     ) -> None:
@@ -104,6 +126,7 @@ class _Collector:
             return
         shape, placed = made
         surface = appearance.surface_properties
+        # 3 is OpenSim's number for filled surfaces.
         if surface.representation != 3 or surface.texture:
             note(
                 "appearance",
@@ -120,7 +143,15 @@ class _Collector:
         self.found.by_body.setdefault(owner, []).append(visual)
 
     def _shape(self, geometry: Geometry, path: str) -> tuple[Shape, Array] | None:
-        """The shape, and its frame in the frame of the geometry."""
+        """Return the shape of a geometry, and its frame in the frame of the geometry.
+
+        Args:
+            geometry: the geometry.
+            path: its path.
+
+        Returns:
+            Shape and frame (4, 4); None if it cannot be drawn, which is noted.
+        """
         note, here = self.note, np.eye(4)
         scale = tuple(abs(factor) for factor in geometry.scale_factors)
         match geometry:
@@ -175,12 +206,17 @@ class _Collector:
         return None
 
     def _is_drawable(self, path: str, sizes: Sequence[float]) -> bool:
-        """Whether programs can draw a shape of these sizes; otherwise that is noted."""
+        """Return whether programs can draw a shape of these sizes; note it otherwise.
+
+        Args:
+            path: path of the geometry.
+            sizes: its sizes, m.
+        """
         if all(0.0 < size < GREATEST for size in sizes):
             return True
         given = " ".join(f"{size:g}" for size in sizes)
         self.note(
-            "visual", path, "a shape whose size is no positive number", "left out", f"{given} m"
+            "visual", path, "a shape whose size is not a positive number", "left out", f"{given} m"
         )
         return False
 
@@ -192,10 +228,19 @@ class _Collector:
 
 
 def frame_of(tree: Tree, geometry: Geometry) -> str | None:
-    """Path of the frame a shape is in: the one its socket names, else the component above that is a frame.
+    """Return the path of the frame that a shape is in.
+
+    It is the frame that its socket names, else the component above it if that is a frame.
+
+    Args:
+        tree: component tree of the model.
+        geometry: the shape.
+
+    Returns:
+        The path; None if there is no frame.
 
     Raises:
-        ModelError: the socket leads nowhere.
+        ModelError: the socket names no component.
     """
     socket = geometry.socket_frame
     if socket and not (isinstance(socket, str) and socket.strip() == ".."):
@@ -211,20 +256,23 @@ def mesh_shape(
     note: Note,
     scale: tuple[float, float, float] = (1.0, 1.0, 1.0),
 ) -> MeshFile | None:
-    """A mesh file of the model as a shape; None, and a record that tells why, if nothing can be made of it.
+    """Return a mesh file of the model as a shape.
 
     Args:
-        name: of the file, as in the model.
+        name: name of the file in the model.
         path: absolute path of the component that names it.
-        mesh_files: finds the file and takes it up.
-        note: is told what became of the file.
-        scale: factors, of which negative ones mirror the surface.
+        mesh_files: finds and converts the file.
+        note: called for what was changed.
+        scale: factors along the axes; negative ones mirror the surface.
+
+    Returns:
+        The shape; None if the file cannot be used, which is noted.
     """
     signs = (copysign(1.0, scale[0]), copysign(1.0, scale[1]), copysign(1.0, scale[2]))
     try:
         copy = mesh_files.copy(name, signs)
     except MeshProblem as problem:
-        note("mesh", path, "a mesh whose file cannot be taken", str(problem), name)
+        note("mesh", path, "a mesh whose file cannot be used", str(problem), name)
         return None
     if copy.converted:
         form = (
@@ -238,7 +286,7 @@ def mesh_shape(
             "mesh-name",
             path,
             "a file name in other capitals than the file's",
-            "the file taken",
+            "the file with the other name used",
             f"{name} as {copy.source.name}",
         )
     x, y, z = (abs(factor) for factor in scale)

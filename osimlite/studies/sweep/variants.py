@@ -318,7 +318,12 @@ class Variants:
             if isinstance(target, Property):
                 setters = [item.make_setter(model) for item in target.places]
                 self._setters.append(
-                    (place, [item.as_factor() for item in setters] if target.is_scaled else setters)
+                    (
+                        place,
+                        [item.make_factor_setter() for item in setters]
+                        if target.is_scaled
+                        else setters,
+                    )
                 )
                 owners += [model.tree().by_path[item.component] for item in target.places]
             elif isinstance(target, Slope):

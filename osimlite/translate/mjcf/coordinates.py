@@ -8,7 +8,7 @@ import numpy as np
 
 from osimlite.mechanics.multibody.functions import Linear
 from osimlite.schema.joints import Joint
-from osimlite.simulation.robot.couplings import Composed
+from osimlite.simulation.robot.couplings import Composition
 from osimlite.translate.mjcf.draft import Draft, Follower
 
 
@@ -41,7 +41,9 @@ def add_coordinates(draft: Draft) -> None:
         if info.prescribed is not None and not info.locked and lead is not None:
             start = info.prescribed.evaluate(np.zeros(1))[0]
             # The driver evaluates the function of time at every step.
-            exact = Composed(Linear(*lead.line), info.prescribed) if draft.options.driver else None
+            exact = (
+                Composition(Linear(*lead.line), info.prescribed) if draft.options.driver else None
+            )
             draft.add_follower(
                 lead.joint, Follower(None, (lead.line.slope * start + lead.line.start,), exact)
             )

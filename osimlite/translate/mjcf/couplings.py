@@ -11,7 +11,7 @@ from osimlite.mechanics.multibody.functions import IDENTITY, Linear
 from osimlite.mechanics.multibody.mechanism import GROUND
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.simulation.robot.couplings import (
-    Composed,
+    Composition,
     Driver,
     Line,
     coordinate_drivers,
@@ -90,7 +90,7 @@ def _add_follower(draft: Draft, joint: RobotJoint, driver: Driver, whose: str) -
     own, function = lead.line.inverse(), driver.function
     low, high = select_span(function, info.range, info.default_value)
     first, last = sorted(lead.line.slope * end + lead.line.start for end in (low, high))
-    exact = function if own == (1.0, 0.0) else Composed(function, Linear(*own))
+    exact = function if own == (1.0, 0.0) else Composition(function, Linear(*own))
     fit = fit_quartic(exact, (first, last), unit)
     follower = Follower(lead.joint, fit.coefficients)
     done = "a quartic, fitted"

@@ -26,7 +26,7 @@ from osimlite.schema.model import Model
 from osimlite.schema.tree import Tree
 from osimlite.simulation.robot.couplings import Line
 from osimlite.simulation.robot.mesh_files import MeshFiles
-from osimlite.simulation.robot.names import dotted_name, joint_names, xml_name
+from osimlite.simulation.robot.names import joint_names, to_dotted_name, xml_name
 from osimlite.simulation.robot.robot import Link, Robot
 from osimlite.simulation.robot.urdf import number, numbers
 from osimlite.translate.fidelity import Fidelity
@@ -277,7 +277,7 @@ class Draft:
         """
         taken = self._names.setdefault(kind, set())
         own = path.rsplit("/", 1)[-1]
-        whole = xml_name(dotted_name(path))
+        whole = xml_name(to_dotted_name(path))
         name = xml_name(own or whole)
         if name in taken:
             # The path is unique in the model, but another pass may have used it.
@@ -398,7 +398,7 @@ class Draft:
         """Transforms (4, 4) of all links in ground by name, with all joints at zero."""
         placed = {self.robot.links[0].name: np.eye(4)}
         for joint in self.robot.joints:
-            placed[joint.child] = placed[joint.parent] @ joint.across(0.0)
+            placed[joint.child] = placed[joint.parent] @ joint.compute_transform(0.0)
         return placed
 
     def add_mesh(self, file: str, scale: tuple[float, float, float]) -> str:

@@ -9,7 +9,7 @@ from numpy.polynomial import Chebyshev, Polynomial
 
 from osimlite.mechanics.multibody import functions as f
 from osimlite.mechanics.multibody.spatial import Array
-from osimlite.simulation.robot.couplings import Composed, as_line, knots
+from osimlite.simulation.robot.couplings import Composition, find_line, knots
 from osimlite.translate.fidelity import Error
 
 DEGREE = 4
@@ -37,7 +37,7 @@ class Fit(NamedTuple):
 
 def find_polynomial(function: f.Function) -> Polynomial | None:
     """Return the polynomial that a function of one argument is, or None."""
-    line = as_line(function)
+    line = find_line(function)
     if line is not None:
         return Polynomial((line.start, line.slope))
     match function:
@@ -56,7 +56,7 @@ def find_polynomial(function: f.Function) -> Polynomial | None:
         case f.ScaledFunction(scale, inner):
             own = find_polynomial(inner)
             return None if own is None else scale * own
-        case Composed(outer, inner):
+        case Composition(outer, inner):
             first = find_polynomial(inner)
             second = find_polynomial(outer)
             if first is not None and second is not None:

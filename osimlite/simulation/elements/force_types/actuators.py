@@ -20,7 +20,15 @@ from osimlite.simulation.elements.registry import register_force_type
 
 
 def scale_control(control: float, optimal_force: float) -> float:
-    """Return the control times the optimal force (N, N.m)."""
+    """Return the force F x of an ideal actuator.
+
+    Args:
+        control: x.
+        optimal_force: F, N or N.m.
+
+    Returns:
+        Force (N) or torque (N.m).
+    """
     return optimal_force * control
 
 
@@ -31,6 +39,9 @@ def define_actuator(component: type, geometry: Geometry, output: str) -> ForceTy
         component: class of the actuator.
         geometry: where the output acts.
         output: name of the output that the geometry applies.
+
+    Returns:
+        The declaration, which still has to be registered.
     """
     return ForceType(
         component,

@@ -19,7 +19,7 @@ from osimlite.simulation.elements.geometries.frames import (
     add_damping,
     mask_undamped_rate,
 )
-from osimlite.simulation.elements.integral import integrate
+from osimlite.simulation.elements.integral import integrate_function
 from osimlite.simulation.elements.parameters import Curve, Expressions, Vector
 from osimlite.simulation.elements.registry import register_force_type
 
@@ -29,11 +29,20 @@ def compute_linear_bushing(
 ) -> tuple[float, float]:
     """Fill the loads k x + d v of the six deviations x with rates v.
 
+    Args:
+        deviations: three angles (rad) and a translation (m) (6,).
+        rates: their rates (6,).
+        loads: receives moments (N.m) and forces (N) (6,).
+        stiffness: k of each deviation (6,), N.m/rad and N/m.
+        damping: d of each deviation (6,), N.m.s/rad and N.s/m.
+
     Returns:
         Energy (J), and the power that the dampers dissipate (W).
     """
     energy = power = 0.0
     for k in range(6):
+        # The rates of angles are infinite at gimbal lock, where zero damping times infinity would
+        # be NaN.
         rate = mask_undamped_rate(rates[k], damping[k])
         loads[k] = bushing_load(deviations[k], rate, stiffness[k], damping[k])
         energy += spring_energy(deviations[k], stiffness[k])
@@ -77,7 +86,21 @@ def compute_function_bushing(
     fy: Floats,
     fz: Floats,
 ) -> None:
-    """Fill the loads by one function of each deviation, and add damping."""
+    """Fill the loads by one function of each deviation, and add damping.
+
+    Args:
+        deviations: three angles (rad) and a translation (m) (6,).
+        rates: their rates (6,).
+        loads: receives moments (N.m) and forces (N) (6,).
+        damping: damping of each deviation (6,).
+        mx: table of the resisting moment over the first angle.
+        my: table over the second angle.
+        mz: table over the third angle.
+        fx: table of the resisting force over the translation along x.
+        fy: table over the translation along y.
+        fz: table over the translation along z.
+    """
+    # One line per function, as kernels have no lists of tables.
     loads[0], _, _ = evaluate_function(mx, deviations[0])
     loads[1], _, _ = evaluate_function(my, deviations[1])
     loads[2], _, _ = evaluate_function(mz, deviations[2])
@@ -91,7 +114,7 @@ def _compute_function_energy(force: DeclaredForce, record: Sequence[float]) -> f
     _, *functions = force.values
     deviations = record[DEVIATIONS : DEVIATIONS + 6]
     return sum(
-        integrate(function, 0.0, value)
+        integrate_function(function, 0.0, value)
         for function, value in zip(functions, deviations, strict=True)
     )
 
@@ -130,7 +153,17 @@ def compute_expression_bushing(
     constants: Floats,
     registers: Floats,
 ) -> None:
-    """Fill the loads by expressions of all six deviations, and add damping; the energy is unknown."""
+    """Fill the loads by expressions of all six deviations, and add damping; the energy is unknown.
+
+    Args:
+        deviations: three angles (rad) and a translation (m) (6,).
+        rates: their rates (6,).
+        loads: receives moments (N.m) and forces (N) (6,).
+        damping: damping of each deviation (6,).
+        steps: steps of the six expressions.
+        constants: their constants.
+        registers: registers of the expressions; the first six are the deviations.
+    """
     for k in range(6):
         registers[k] = deviations[k]
     for k in range(6):

@@ -87,6 +87,7 @@ def compute_coordinate_limit(
     Returns:
         Generalized force (N.m, N), dissipated power (W), and energy (J).
     """
+    # Within the limits the smooth steps of the law are exactly zero: their evaluation is saved.
     if ql <= q <= qu:
         return 0.0, 0.0, 0.0
     force = limit_force(q, u, Ku, qu, Kl, ql, D, t)
@@ -157,6 +158,7 @@ def compute_linear_stop(
         Generalized force (N.m, N) and energy (J).
     """
     if q > upper:
+        # A stop only pushes back: it does not hold a coordinate that leaves it fast.
         return min(0.0, -k * (q - upper) * (1.0 + d * u)), 0.5 * k * (q - upper) * (q - upper)
     if q < lower:
         return max(0.0, -k * (q - lower) * (1.0 - d * u)), 0.5 * k * (q - lower) * (q - lower)
@@ -205,6 +207,7 @@ def compute_exponential_limit(
     Returns:
         Generalized force (N.m, N) and energy (J).
     """
+    # Both exponentials act everywhere; each is small away from its limit.
     below, above = a * exp(-b * (q - lower)), c * exp(d * (q - upper))
     return below - above, below / b + above / d
 

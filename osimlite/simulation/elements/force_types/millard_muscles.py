@@ -1,4 +1,4 @@
-"""The muscles of Millard 2012: fibers and tendon in equilibrium, or with a mass between them."""
+"""Muscles of Millard et al. 2013: fibers and tendon in equilibrium, or with a mass between them."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -84,6 +84,8 @@ def _min_fiber_length(force: Any) -> float:
 
 
 def _read_equilibrium_fields(builder: ElementBuilder, force: Any) -> tuple[float, ...]:
+    # OpenSim takes smaller damping for none and uses the classic form, which divides by the active
+    # force.
     damping = force.fiber_damping if force.fiber_damping >= MIN_FIBER_DAMPING else 0.0
     return (
         damping,
@@ -94,6 +96,8 @@ def _read_equilibrium_fields(builder: ElementBuilder, force: Any) -> tuple[float
 
 
 def _adapt_active_curve(force: Any) -> dict[str, float]:
+    # For the classic elastic muscle OpenSim keeps the curve above 0.1, since that form
+    # divides by the active force.
     least = force.active_force_length_curve.minimum_value
     return {"minimum_value": max(least, 0.1) if force.is_classic else min(least, 0.0)}
 
@@ -101,6 +105,7 @@ def _adapt_active_curve(force: Any) -> dict[str, float]:
 def _adapt_velocity_curve(force: Any) -> dict[str, float]:
     curve = force.force_velocity_curve
     ends = curve.concentric_slope_at_vmax, curve.eccentric_slope_at_vmax
+    # The classic form inverts the force-velocity curve, which must then not be flat at its ends.
     if force.is_classic:
         return _set_end_slopes(*map(max, ends, _adapt_inverse_curve(force).values()))
     return _set_end_slopes(*(min(end, 0.0) for end in ends))
@@ -118,6 +123,7 @@ def _set_end_slopes(concentric: float, eccentric: float) -> dict[str, float]:
 
 
 def _check_equilibrium_muscle(builder: ElementBuilder, force: Any) -> None:
+    # The classic form divides by the activation.
     least = 0.01 if force.is_classic else 0.0
     slack = Number("tendon_slack_length", lambda x: x >= 0.0, "is negative")
     check_muscle(

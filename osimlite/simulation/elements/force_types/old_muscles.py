@@ -1,4 +1,4 @@
-"""The deprecated muscles that OpenSim keeps for old files: Delp 1990, Schutte 1993 and the first Thelen 2003."""
+"""Deprecated muscles that OpenSim keeps for old files: Delp 1990, Schutte 1993 and the first Thelen 2003."""
 
 from collections.abc import Callable
 from math import nan
@@ -64,6 +64,9 @@ def compute_fiber_forces(
         force_law: forces of the class.
         fields: numbers of the class.
         curves: curves of the class.
+
+    Returns:
+        Cosine of pennation, and active, passive and tendon force over the maximum isometric force.
     """
     fiber_length = now.fiber_length
     cos = cos_upright(fiber_length, m.height)
@@ -108,7 +111,7 @@ def find_isometric_length(
     fields: Any,
     curves: Any,
 ) -> float:
-    """Return the fiber length (m) at which resting fibers and tendon are in equilibrium.
+    """Return the fiber length at which resting fibers and tendon are in equilibrium.
 
     The search is that of OpenSim's computeIsometricForce: it ends at an error of 0.01 N or after
     its last iteration. Fibers are perpendicular to the tendon if the path is too short.
@@ -121,17 +124,23 @@ def find_isometric_length(
         force_law: forces of the class.
         fields: numbers of the class.
         curves: curves of the class.
+
+    Returns:
+        Fiber length, m.
     """
+    # The path is too short to leave any length along the tendon: the fibers are across it.
     if length < m.slack:
         return m.height
     guess = make_guess(length, start, m)
     before, error_before = guess.length, 0.0
     for number in range(ROUNDS):
         active, passive, tendon = force_law(guess.length / m.optimal, guess.strain, fields, curves)
+        # Fibers only pull; curves of users can be negative.
         fibers = max(activation * active, 0.0) + max(passive, 0.0)
         error = (tendon - fibers * guess.cos) * m.strength
         if abs(error) <= TOLERANCE:
             break
+        # The first round has no earlier error to compare with.
         if number == 0:
             error_before = error
         tried = next_length(guess, before, error, error_before, fibers, active + passive, tendon, m)
@@ -143,7 +152,7 @@ def find_isometric_length(
 def compute_full_force(
     now: MuscleInputs, start: float, m: OldMuscle, force_law: ForceLaw, fields: Any, curves: Any
 ) -> float:
-    """Return the force (N) in equilibrium at rest and full activation, times a factor of the path's rate.
+    """Return the force in equilibrium at rest and full activation, times a factor of the path's rate.
 
     OpenSim uses it as the active force along a rigid tendon; see
     calcInextensibleTendonActiveFiberForce of ActivationFiberLengthMuscle_Deprecated.
@@ -155,10 +164,14 @@ def compute_full_force(
         force_law: forces of the class.
         fields: numbers of the class.
         curves: curves of the class.
+
+    Returns:
+        Force, N; 0 for a path that is shorter than the tendon.
     """
     if now.length < m.slack:
         return 0.0
     fiber_length = find_isometric_length(now.length, start, 1.0, m, force_law, fields, curves)
+    # Fully active fibers at rest; the factor of the velocity multiplies their force afterwards.
     at_rest = MuscleInputs(now.length, now.rate, 1.0, 1.0, fiber_length, 0.0, 0.0)
     _, _, _, tendon = compute_fiber_forces(at_rest, m, force_law, fields, curves)
     return m.strength * tendon * generic_velocity_factor(now.rate, m)
@@ -189,6 +202,9 @@ def define_old_muscle(
         parameters: parameters of these functions after the muscle's numbers.
         rates: outputs after the rates of activation and fiber length.
         states: states after activation and fiber length.
+
+    Returns:
+        The declaration, which still has to be registered.
     """
     numbers = (
         Number("max_isometric_force"),
@@ -211,7 +227,14 @@ def define_old_muscle(
 
 
 class DelpCurves(NamedTuple):
-    """Curves of Delp1990Muscle_Deprecated."""
+    """Tables of the curves of Delp1990Muscle_Deprecated, all normalized.
+
+    Attributes:
+        active: active force over fiber length.
+        passive: passive force over fiber length.
+        tendon: tendon force over tendon strain.
+        velocity: factor of the active force over fiber velocity.
+    """
 
     active: Floats
     passive: Floats
@@ -220,7 +243,14 @@ class DelpCurves(NamedTuple):
 
 
 class DelpFields(NamedTuple):
-    """Numbers of Delp1990Muscle_Deprecated."""
+    """Numbers of Delp1990Muscle_Deprecated.
+
+    Attributes:
+        time: time_scale, s, the unit of time of the equations.
+        more: activation1, a rate constant of the activation.
+        least: activation2, a rate constant of the activation.
+        mass: mass between fibers and tendon, normalized.
+    """
 
     time: float
     more: float
@@ -233,8 +263,14 @@ def compute_delp_forces(
 ) -> tuple[float, float, float]:
     """Return active, passive and tendon force, normalized.
 
+    Args:
+        length: fiber length over the optimal one.
+        strain: strain of the tendon.
+        fields: numbers of the class.
+        curves: curves of the class.
+
     Returns:
-        The three forces.
+        The three forces over the maximum isometric force.
     """
     active, _, _ = evaluate_function(curves.active, length)
     passive, _, _ = evaluate_function(curves.passive, length)
@@ -247,14 +283,21 @@ def compute_delp(
 ) -> tuple[float, ...]:
     """Return the quantities of a muscle with a mass between fibers and tendon.
 
-    Source: Delp1990Muscle_Deprecated::computeActuation of OpenSim. The acceleration is NaN while the
-    fiber length is 0, before the equilibrium is computed.
+    Source: Delp1990Muscle_Deprecated::computeActuation of OpenSim. The acceleration is NaN while
+    the fiber length is 0, before the equilibrium is computed.
+
+    Args:
+        now: path, excitation and states.
+        m: numbers that all deprecated muscles have.
+        fields: numbers of the class.
+        curves: curves of the class.
 
     Returns:
         `RECORDED`, then activation rate (1/s), fiber velocity (m/s) and fiber acceleration (m/s^2).
     """
     fibers = compute_fiber_forces(now, m, compute_delp_forces, fields, curves)
     cos, active, passive, tendon = fibers
+    # Delp's model is in normalized time: lengths in optimal fiber lengths, times in time_scale.
     unit = m.optimal / fields.time
     velocity = now.fiber_velocity / unit
     factor, _, _ = evaluate_function(curves.velocity, velocity)
@@ -263,6 +306,8 @@ def compute_delp(
         * cos
         / (fields.mass * unit * unit)
     )
+    # The fibers keep their height, so that they turn while they move: the centrifugal part of the
+    # acceleration.
     turned = velocity * velocity * (1.0 - cos * cos) / (cos * cos) / (now.fiber_length / m.optimal)
     activation_rate = scaled_activation_rate(
         now.excitation, now.activation, fields.more, fields.least, fields.time
@@ -276,6 +321,12 @@ def equilibrate_delp(
 ) -> tuple[bool, float]:
     """Return the fiber length in equilibrium; the velocity does not change.
 
+    Args:
+        now: path, excitation and states.
+        m: numbers that all deprecated muscles have.
+        fields: numbers of the class.
+        curves: curves of the class.
+
     Returns:
         True, and the fiber length (m).
     """
@@ -287,7 +338,17 @@ def equilibrate_delp(
 def compute_rigid_delp(
     now: MuscleInputs, m: OldMuscle, fields: DelpFields, curves: DelpCurves
 ) -> float:
-    """Return the force (N) of fully active fibers."""
+    """Return the force of fully active fibers along a rigid tendon.
+
+    Args:
+        now: path, excitation and states.
+        m: numbers that all deprecated muscles have.
+        fields: numbers of the class.
+        curves: curves of the class.
+
+    Returns:
+        Force, N.
+    """
     return compute_full_force(now, now.length - m.slack, m, compute_delp_forces, fields, curves)
 
 
@@ -322,7 +383,13 @@ register_force_type(
 
 
 class SchutteCurves(NamedTuple):
-    """Curves of Schutte1993Muscle_Deprecated."""
+    """Tables of the curves of Schutte1993Muscle_Deprecated, all normalized.
+
+    Attributes:
+        active: active force over fiber length.
+        passive: passive force over fiber length.
+        tendon: tendon force over tendon strain.
+    """
 
     active: Floats
     passive: Floats
@@ -330,7 +397,15 @@ class SchutteCurves(NamedTuple):
 
 
 class SchutteFields(NamedTuple):
-    """Numbers of Schutte1993Muscle_Deprecated, and whether the file has a passive curve."""
+    """Numbers of Schutte1993Muscle_Deprecated.
+
+    Attributes:
+        time: time_scale, s, the unit of time of the equations.
+        more: activation1, a rate constant of the activation.
+        least: activation2, a rate constant of the activation.
+        damping: damping of the fibers, normalized.
+        has_curve: 1 if the file has a passive curve, else 0.
+    """
 
     time: float
     more: float
@@ -344,8 +419,14 @@ def compute_schutte_forces(
 ) -> tuple[float, float, float]:
     """Return active, passive and tendon force, normalized.
 
+    Args:
+        length: fiber length over the optimal one.
+        strain: strain of the tendon.
+        fields: numbers of the class.
+        curves: curves of the class.
+
     Returns:
-        The three forces.
+        The three forces over the maximum isometric force.
     """
     active, _, _ = evaluate_function(curves.active, length)
     tendon, _, _ = evaluate_function(curves.tendon, strain)
@@ -364,11 +445,18 @@ def compute_schutte(
 
     Source: Schutte1993Muscle_Deprecated::computeActuation of OpenSim.
 
+    Args:
+        now: path, excitation and states.
+        m: numbers that all deprecated muscles have.
+        fields: numbers of the class.
+        curves: curves of the class.
+
     Returns:
         `RECORDED`, then activation rate (1/s) and fiber velocity (m/s).
     """
     fibers = compute_fiber_forces(now, m, compute_schutte_forces, fields, curves)
     cos, active, passive, tendon = fibers
+    # Fibers across the tendon carry nothing along it; OpenSim then takes the velocity of the path.
     if cos > NOTHING:
         borne = max(tendon / cos - passive, 0.0)
         velocity = (
@@ -389,6 +477,12 @@ def equilibrate_schutte(
 ) -> tuple[bool, float]:
     """Return the fiber length in equilibrium.
 
+    Args:
+        now: path, excitation and states.
+        m: numbers that all deprecated muscles have.
+        fields: numbers of the class.
+        curves: curves of the class.
+
     Returns:
         True, and the fiber length (m).
     """
@@ -400,7 +494,17 @@ def equilibrate_schutte(
 def compute_rigid_schutte(
     now: MuscleInputs, m: OldMuscle, fields: SchutteFields, curves: SchutteCurves
 ) -> float:
-    """Return the force (N) of fully active fibers."""
+    """Return the force of fully active fibers along a rigid tendon.
+
+    Args:
+        now: path, excitation and states.
+        m: numbers that all deprecated muscles have.
+        fields: numbers of the class.
+        curves: curves of the class.
+
+    Returns:
+        Force, N.
+    """
     return compute_full_force(now, m.optimal, m, compute_schutte_forces, fields, curves)
 
 
@@ -433,7 +537,21 @@ register_force_type(
 
 
 class ThelenFields(NamedTuple):
-    """Numbers of Thelen2003Muscle_Deprecated, in the order and with the units of the file."""
+    """Numbers of Thelen2003Muscle_Deprecated, in the order and with the units of the file.
+
+    Attributes:
+        rising: activation_time_constant, s.
+        falling: deactivation_time_constant, s.
+        fastest: Vmax, the maximum contraction velocity at full activation.
+        slowest: Vmax0, the maximum contraction velocity at low activation.
+        tendon_strain: FmaxTendonStrain, tendon strain at the maximum isometric force.
+        passive_strain: FmaxMuscleStrain, fiber strain at which the passive force equals it.
+        width: KshapeActive, width of the active curve.
+        passive_shape: KshapePassive, growth of the passive curve.
+        damping: damping of the fibers.
+        shape: Af, shape of the force-velocity curve.
+        most: Flen, largest factor of the active force while lengthening.
+    """
 
     rising: float
     falling: float
@@ -453,8 +571,14 @@ def compute_thelen_forces(
 ) -> tuple[float, float, float]:
     """Return active, passive and tendon force, normalized.
 
+    Args:
+        length: fiber length over the optimal one.
+        strain: strain of the tendon.
+        fields: numbers of the class.
+        curves: nothing; the class has formulas in place of curves.
+
     Returns:
-        The three forces.
+        The three forces over the maximum isometric force.
     """
     passive = thelen_passive_force(length, fields.passive_strain, fields.passive_shape)
     return (
@@ -469,12 +593,19 @@ def compute_thelen(now: MuscleInputs, m: OldMuscle, fields: ThelenFields) -> tup
 
     Source: Thelen2003Muscle_Deprecated::computeActuation of OpenSim.
 
+    Args:
+        now: path, excitation and states.
+        m: numbers that all deprecated muscles have.
+        fields: numbers of the class.
+
     Returns:
         `RECORDED`, then activation rate (1/s) and fiber velocity (m/s).
     """
     fibers = compute_fiber_forces(now, m, compute_thelen_forces, fields, ())
     cos, active, passive, tendon = fibers
     if cos > NOTHING:
+        # In this version the maximum speed depends on the activation: Vmax0 without, Vmax with full
+        # activation.
         fastest = fields.slowest + min(now.activation, 1.0) * (fields.fastest - fields.slowest)
         borne = tendon / cos - passive
         velocity = thelen_velocity(
@@ -483,12 +614,19 @@ def compute_thelen(now: MuscleInputs, m: OldMuscle, fields: ThelenFields) -> tup
         velocity *= fastest * m.optimal
     else:
         velocity = now.rate / rigid_cos(now.length, m) if abs(tendon) > NOTHING else 0.0
+    # Thelen's first activation dynamics: two constants, and no product with the activation as in
+    # later models.
     time = fields.rising if now.excitation >= now.activation else fields.falling
     return *list_recorded(now, fibers, m), (now.excitation - now.activation) / time, velocity
 
 
 def equilibrate_thelen(now: MuscleInputs, m: OldMuscle, fields: ThelenFields) -> tuple[bool, float]:
     """Return the fiber length in equilibrium.
+
+    Args:
+        now: path, excitation and states.
+        m: numbers that all deprecated muscles have.
+        fields: numbers of the class.
 
     Returns:
         True, and the fiber length (m).
@@ -499,7 +637,16 @@ def equilibrate_thelen(now: MuscleInputs, m: OldMuscle, fields: ThelenFields) ->
 
 
 def compute_rigid_thelen(now: MuscleInputs, m: OldMuscle, fields: ThelenFields) -> float:
-    """Return the force (N) of fully active fibers."""
+    """Return the force of fully active fibers along a rigid tendon.
+
+    Args:
+        now: path, excitation and states.
+        m: numbers that all deprecated muscles have.
+        fields: numbers of the class.
+
+    Returns:
+        Force, N.
+    """
     return compute_full_force(now, m.optimal, m, compute_thelen_forces, fields, ())
 
 

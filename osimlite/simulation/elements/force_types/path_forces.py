@@ -21,7 +21,7 @@ from osimlite.schema.path_forces import (
 )
 from osimlite.simulation.elements.force_type import DeclaredForce, ForceType, State
 from osimlite.simulation.elements.geometries.path import PATH
-from osimlite.simulation.elements.integral import integrate
+from osimlite.simulation.elements.integral import integrate_function
 from osimlite.simulation.elements.parameters import Curve, Expression, Number, require_positive
 from osimlite.simulation.elements.registry import register_force_type
 
@@ -78,6 +78,7 @@ def compute_clutched_spring(
     Returns:
         Tension (N) and rate of the stretch (m/s).
     """
+    # OpenSim clamps the control of the clutch, and the stretch decays while the clutch is open.
     tension = min(max(control, 0.0), 1.0) * k * stretch * (1.0 + d * rate)
     return tension, rate if control > MIN_ENGAGING_CONTROL else -stretch / relaxation
 
@@ -119,6 +120,7 @@ def compute_ligament(length: float, l0: float, force: float, curve: Floats) -> t
         Tension (N), which is 0 up to the resting length, and length over resting length.
     """
     ratio = length / l0
+    # `not >` also catches NaN.
     if not length > l0:
         return 0.0, ratio
     value, _, _ = evaluate_function(curve, ratio)
@@ -128,7 +130,7 @@ def compute_ligament(length: float, l0: float, force: float, curve: Floats) -> t
 def _compute_ligament_energy(force: DeclaredForce, record: Sequence[float]) -> float:
     l0, largest, curve = force.values
     ratio = record[1]
-    return float(largest * l0 * integrate(curve, 1.0, ratio)) if ratio > 1.0 else 0.0
+    return float(largest * l0 * integrate_function(curve, 1.0, ratio)) if ratio > 1.0 else 0.0
 
 
 register_force_type(
@@ -163,6 +165,7 @@ def compute_blankevoort_ligament(
         (1/s), energy (J).
     """
     tension = blankevoort_tension(length, rate, l0, k, e1, c)
+    # The record reports the spring apart from the damper, whose part is the rest.
     elastic = blankevoort_tension(length, 0.0, l0, k, e1, c)
     energy = blankevoort_energy(length, l0, k, e1)
     return tension, elastic, tension - elastic, length, rate, length / l0 - 1.0, rate / l0, energy
@@ -211,7 +214,7 @@ def compute_expression_tension(
     constants: Floats,
     registers: Floats,
 ) -> float:
-    """Return the tension (N) by an expression of stretch and lengthening speed; the energy is unknown.
+    """Return the tension by an expression of stretch and lengthening speed; the energy is unknown.
 
     Args:
         length: length of the path, m.
@@ -221,6 +224,9 @@ def compute_expression_tension(
         steps: steps of the expression.
         constants: its constants.
         registers: its registers.
+
+    Returns:
+        Tension, N.
     """
     return run_binary_program(
         path_stretch(length, l0, clamped > 0.0), rate, steps, constants, registers

@@ -18,7 +18,7 @@ from osimlite.simulation.elements.registry import register_force_type
 
 
 def compute_point_spring(length: float, k: float, l0: float) -> tuple[float, float]:
-    """Return tension (N) and energy (J) of a spring between two points.
+    """Return tension and energy of a spring between two points.
 
     Args:
         length: distance of the points, m.
@@ -55,7 +55,10 @@ register_force_type(
 
 
 class PrescribedLoad(GivenLoad):
-    """Load of a PrescribedForce; as in OpenSim, a set that does not have three functions is ignored."""
+    """Load of a PrescribedForce.
+
+    As in OpenSim, a set that does not have three functions is ignored.
+    """
 
     def read(self, builder: ElementBuilder, force: Any) -> Load:
         """Return the load of a force."""

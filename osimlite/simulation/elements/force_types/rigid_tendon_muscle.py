@@ -1,4 +1,4 @@
-"""A muscle whose tendon keeps its slack length."""
+"""RigidTendonMuscle: a muscle whose tendon keeps its slack length."""
 
 from math import sqrt
 from typing import NamedTuple
@@ -22,17 +22,31 @@ MAX_PARALLEL_HEIGHT_M = 2.0**-26
 
 
 class RigidTendonFields(NamedTuple):
-    """Numbers of a muscle with a rigid tendon."""
+    """Numbers of a muscle with a rigid tendon.
 
-    strength: float  # max_isometric_force, N
-    optimal: float  # optimal_fiber_length, m
-    slack: float  # tendon_slack_length, m
-    fastest: float  # max_contraction_velocity, 1/s
-    height: float  # height of the fibers across the tendon, m
+    Attributes:
+        strength: max_isometric_force, N.
+        optimal: optimal_fiber_length, m.
+        slack: tendon_slack_length, m.
+        fastest: max_contraction_velocity, optimal fiber lengths per second.
+        height: height of the fibers across the tendon, m.
+    """
+
+    strength: float
+    optimal: float
+    slack: float
+    fastest: float
+    height: float
 
 
 class RigidTendonCurves(NamedTuple):
-    """Curves: active and passive force over length (the latter limited to 0 to 10), factor over velocity, normalized."""
+    """Tables of the curves of a muscle with a rigid tendon, all normalized.
+
+    Attributes:
+        active: active force over fiber length.
+        passive: passive force over fiber length; the law limits it to 0 to 10.
+        velocity: factor of the active force over fiber velocity.
+    """
 
     active: Floats
     passive: Floats
@@ -80,7 +94,16 @@ def compute_rigid_tendon_muscle(
 
 
 def compute_full_force(now: MuscleInputs, m: RigidTendonFields, curves: RigidTendonCurves) -> float:
-    """Return the force (N) of fully active fibers along the tendon."""
+    """Return the force of fully active fibers along the tendon.
+
+    Args:
+        now: path, excitation and states.
+        m: numbers of the muscle.
+        curves: curves of the muscle.
+
+    Returns:
+        Force, N.
+    """
     _, _, _, cos, active, factor, _, _, _ = compute_rigid_tendon_muscle(now, m, curves)
     return m.strength * active * factor * cos
 

@@ -51,7 +51,7 @@ def compute_smooth_contact(
         bv: sharpness of the release over the speed, s/m.
 
     Returns:
-        Components of the force (N) and energy (J).
+        Components of the force on the sphere (N) in ground, and energy (J).
     """
     hertz = smooth_hertz(d, radius, E, cf, bd)
     fx, fy, fz = smooth_contact_force(hertz, c, us, ud, uv, vt, cf, bv, n, v)

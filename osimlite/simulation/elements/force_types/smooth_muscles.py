@@ -22,6 +22,7 @@ from osimlite.simulation.elements.parameters import Fields, Number, require_posi
 from osimlite.simulation.elements.registry import register_force_type
 
 ACTIVATION = State("activation")
+"""State of both muscles, which starts at `default_activation`."""
 
 
 def define_smooth_fields(
@@ -31,6 +32,9 @@ def define_smooth_fields(
 
     Args:
         timed: function that returns the muscle whose activation constants are used.
+
+    Returns:
+        Parameter with the fields of `SmoothMuscle`.
     """
 
     def others(builder: ElementBuilder, force: Any) -> tuple[float, ...]:
@@ -59,7 +63,11 @@ def define_smooth_fields(
 
 
 def check_smooth(builder: ElementBuilder, force: Any) -> None:
-    """Raise an error if OpenSim refuses the muscle.
+    """Check the properties of a smooth muscle as OpenSim does.
+
+    Args:
+        builder: builder of the model's elements.
+        force: the muscle.
 
     Raises:
         ModelError: a property has no meaning; the message names it.

@@ -1,4 +1,4 @@
-"""The muscle of Thelen 2003."""
+"""Thelen2003Muscle: fibers and tendon in equilibrium, with formulas in place of curves."""
 
 from collections.abc import Sequence
 from math import exp
@@ -31,6 +31,7 @@ def _check_muscle(builder: ElementBuilder, force: Thelen2003Muscle) -> None:
         ),
         Number("minimum_activation", lambda x: x >= 0.01, "is less than 0.01"),
         *map(require_positive, ("FmaxTendonStrain", "FmaxMuscleStrain")),
+        # exp(KshapePassive) must be finite and differ from 1.
         Number("KshapePassive", lambda x: 1e-9 < x < 700.0, "is not between 1e-9 and 700"),
         Number(
             "fv_linear_extrap_threshold", lambda x: x * force.Flen > 1.0, "is not above 1 / Flen"

@@ -29,21 +29,38 @@ from osimlite.mechanics.laws.vectors import (
 )
 from osimlite.mechanics.multibody.links import Places
 from osimlite.mechanics.multibody.mechanism import GROUND
-from osimlite.simulation.elements.builder import ElementBuilder, Triple, as_triple
+from osimlite.simulation.elements.builder import ElementBuilder, Triple, to_triple
 from osimlite.simulation.elements.geometries.geometry import Geometry
 
 
 def turn_bodies(model: Ints, data: Floats, g: Ints, gp: Floats, torque: float) -> None:
-    """Apply a torque about an axis to one body, and the opposite torque to another."""
+    """Apply a torque about an axis to one body, and the opposite torque to another.
+
+    Args:
+        model: integers of the model.
+        data: work vector.
+        g: links of both bodies, and of the axis.
+        gp: the axis in its link (3,), and as given (3,).
+        torque: torque, N.m.
+    """
     axis = direction(model, data, g[2], vector(gp, 0))
     apply_torque(model, data, g[0], times(torque, axis))
     apply_torque(model, data, g[1], times(-torque, axis))
 
 
 def compute_turning_speed(model: Ints, data: Floats, g: Ints, gp: Floats) -> float:
-    """Return the angular velocity of one body relative to another about an axis, rad/s.
+    """Return the angular velocity of one body relative to another about an axis.
 
     As in OpenSim, the axis is read as an axis of ground.
+
+    Args:
+        model: integers of the model.
+        data: work vector.
+        g: links of both bodies, and of the axis.
+        gp: the axis in its link (3,), and as given (3,).
+
+    Returns:
+        Angular velocity, rad/s.
     """
     return dot(
         vector(gp, 3),
@@ -52,7 +69,15 @@ def compute_turning_speed(model: Ints, data: Floats, g: Ints, gp: Floats) -> flo
 
 
 def push_along(model: Ints, data: Floats, g: Ints, gp: Floats, force: float) -> None:
-    """Apply a force along a direction at a point of a body."""
+    """Apply a force along a direction at a point of a body.
+
+    Args:
+        model: integers of the model.
+        data: work vector.
+        g: links of the body, of the point, of the station, and of the direction.
+        gp: point (3,), station (3,) and direction (3,) in these links.
+        force: force, N.
+    """
     apply_force(
         model,
         data,
@@ -63,22 +88,51 @@ def push_along(model: Ints, data: Floats, g: Ints, gp: Floats, force: float) -> 
 
 
 def compute_station_speed(model: Ints, data: Floats, g: Ints, gp: Floats) -> float:
-    """Return the magnitude of the velocity of a station (m/s), as OpenSim does, whatever its direction."""
+    """Return the magnitude of the velocity of a station, as OpenSim does, whatever its direction.
+
+    Args:
+        model: integers of the model.
+        data: work vector.
+        g: links, see :func:`push_along`.
+        gp: numbers, see :func:`push_along`.
+
+    Returns:
+        Speed, m/s.
+    """
     return norm(velocity(model, data, g[2], station(model, data, g[2], vector(gp, 3))))
 
 
 def push_apart(model: Ints, data: Floats, g: Ints, gp: Floats, force: float) -> None:
-    """Apply opposite forces to two points along the line between them."""
+    """Apply opposite forces to two points along the line between them.
+
+    Args:
+        model: integers of the model.
+        data: work vector.
+        g: links of both bodies, and of both points.
+        gp: the points in their links (6,), m.
+        force: force, N; positive forces push the points apart.
+    """
     point = station(model, data, g[2], vector(gp, 0))
     between = minus(point, station(model, data, g[3], vector(gp, 3)))
     length = norm(between)
+    # Points on each other have no direction between them; a division by zero would be NaN.
     size = force / length if length > 0.0 else 0.0
     apply_force(model, data, g[0], point, times(size, between))
     apply_force(model, data, g[1], point, times(-size, between))
 
 
 def compute_parting_speed(model: Ints, data: Floats, g: Ints, gp: Floats) -> float:
-    """Return the rate of the distance between two points, m/s."""
+    """Return the rate of the distance between two points.
+
+    Args:
+        model: integers of the model.
+        data: work vector.
+        g: links, see :func:`push_apart`.
+        gp: numbers, see :func:`push_apart`.
+
+    Returns:
+        Rate, m/s.
+    """
     one, two = station(model, data, g[2], vector(gp, 0)), station(model, data, g[3], vector(gp, 3))
     between, parting = (
         minus(one, two),
@@ -91,7 +145,16 @@ def compute_parting_speed(model: Ints, data: Floats, g: Ints, gp: Floats) -> flo
 def push_body(
     model: Ints, data: Floats, g: Ints, gp: Floats, torque: Vector, force: Vector
 ) -> None:
-    """Apply a torque to a body and a force at a point of it, given along three axes that are rows of `gp`."""
+    """Apply a torque to a body and a force at a point of it.
+
+    Args:
+        model: integers of the model.
+        data: work vector.
+        g: links of the body, of the point, and of the axes.
+        gp: the point (3,), and the axes as rows (9,).
+        torque: torque along the axes, N.m.
+        force: force along the axes, N.
+    """
     apply_torque(model, data, g[0], direction(model, data, g[2], rotate_back(at(gp, 3), torque)))
     point = station(model, data, g[1], vector(gp, 0))
     apply_force(
@@ -102,7 +165,14 @@ def push_body(
 def compute_station_motion(
     model: Ints, data: Floats, g: Ints, gp: Floats, work: Floats
 ) -> tuple[float, float, float, float]:
-    """Return the height and velocity of a station in ground; its position goes into the record.
+    """Compute the position and velocity of a station in ground.
+
+    Args:
+        model: integers of the model.
+        data: work vector.
+        g: link of the station.
+        gp: the station in the link (3,), m.
+        work: receives the position (3,), m.
 
     Returns:
         Height (m) and the three components of the velocity (m/s).
@@ -110,12 +180,22 @@ def compute_station_motion(
     point = station(model, data, g[0], vector(gp, 0))
     store_vector(work, 0, point)
     vx, vy, vz = velocity(model, data, g[0], point)
+    # work[1] is the Y of the point, which is up in OpenSim's ground.
     return work[1], vx, vy, vz
 
 
 def push_station(model: Ints, data: Floats, g: Ints, work: Floats, force: Vector) -> None:
-    """Apply a force to a station; the record then has the force."""
+    """Apply a force to a station.
+
+    Args:
+        model: integers of the model.
+        data: work vector.
+        g: link of the station.
+        work: position of the station; receives the force.
+        force: force in ground, N.
+    """
     apply_force(model, data, g[0], vector(work, 0), force)
+    # The record keeps the force in place of the point, which is no longer needed.
     store_vector(work, 0, force)
 
 
@@ -139,6 +219,10 @@ class OnBodies(Geometry):
     def pack(self, location: Anchors, places: Places) -> tuple[Sequence[int], Sequence[float]]:
         """Return the links of the bodies, points and directions, and the vectors in these links.
 
+        Args:
+            location: the bodies, points and directions.
+            places: placement of the bodies in the links of the tree.
+
         Returns:
             Integers and numbers.
         """
@@ -155,7 +239,10 @@ class OnBodies(Geometry):
 
 
 class AboutAxis(OnBodies):
-    """Axis fixed to ground or the first of two bodies: the output `torque` (N.m) turns the first against the second."""
+    """Axis that is fixed to ground or to the first of two bodies.
+
+    The output `torque` (N.m) turns the first body, and its opposite the second.
+    """
 
     inputs = ("speed",)
     speed = "speed"
@@ -171,7 +258,8 @@ class AboutAxis(OnBodies):
         )
         axis = as_given = _normalize_direction(builder, force, force.axis)
         if not force.torque_is_global:
-            axis = as_triple(placed[:3, :3] @ axis)
+            # The axis is given along the frame of bodyA, but stored along its body.
+            axis = to_triple(placed[:3, :3] @ axis)
         return Anchors(
             (one, two), (), ((GROUND if force.torque_is_global else one, axis), (GROUND, as_given))
         )
@@ -190,13 +278,13 @@ class AtPoint(OnBodies):
         """Return the body, the point and the direction of an actuator; the last two are fixed to ground or the body."""
         body = builder.find_placement(builder.resolve_target(force, "body", force.body)).body
         builder.check_finite(force, force.point)
-        point = GROUND if force.point_is_global else body, as_triple(force.point)
+        point = GROUND if force.point_is_global else body, to_triple(force.point)
         along = (
             GROUND if force.force_is_global else body,
             _normalize_direction(builder, force, force.direction),
         )
         # OpenSim computes the speed of the same coordinates as a station of the body.
-        return Anchors((body,), (point, (body, as_triple(force.point))), (along,))
+        return Anchors((body,), (point, (body, to_triple(force.point))), (along,))
 
 
 class ApartPoints(OnBodies):
@@ -217,7 +305,7 @@ class ApartPoints(OnBodies):
         builder.check_finite(force, (*force.pointA, *force.pointB))
         first, second = (GROUND, GROUND) if force.points_are_global else (one, two)
         return Anchors(
-            (one, two), ((first, as_triple(force.pointA)), (second, as_triple(force.pointB)))
+            (one, two), ((first, to_triple(force.pointA)), (second, to_triple(force.pointB)))
         )
 
 
@@ -234,12 +322,18 @@ class OnBody(OnBodies):
         ).body
         builder.check_finite(force, force.point)
         axes = GROUND if force.spatial_force_is_global else body
-        point = GROUND if force.point_is_global else body, as_triple(force.point)
-        return Anchors((body,), (point,), tuple((axes, as_triple(axis)) for axis in np.eye(3)))
+        point = GROUND if force.point_is_global else body, to_triple(force.point)
+        return Anchors((body,), (point,), tuple((axes, to_triple(axis)) for axis in np.eye(3)))
 
 
 class NamedStation(NamedTuple):
-    """Station of the model: its name, its body, and its position in the body (m)."""
+    """Station of the model.
+
+    Attributes:
+        name: its name.
+        body: index of its body.
+        point: its position in the body, m.
+    """
 
     name: str
     body: int
@@ -260,7 +354,7 @@ class AtStation(Geometry):
         body, placed = builder.find_placement(
             builder.resolve_target(result, "socket_parent_frame", result.socket_parent_frame)
         )
-        point = as_triple(placed[:3, :3] @ result.location + placed[:3, 3])
+        point = to_triple(placed[:3, :3] @ result.location + placed[:3, 3])
         builder.check_finite(force, point)
         return NamedStation(result.name, body, point)
 
@@ -294,4 +388,4 @@ def _normalize_direction(builder: ElementBuilder, force: Any, along: Sequence[fl
     size = float(np.linalg.norm(along))
     if size == 0.0:
         raise ModelError(f"'{builder.path(force)}' has a direction of length 0; give it one")
-    return as_triple(np.array(along) / size)
+    return to_triple(np.array(along) / size)

@@ -32,9 +32,15 @@ def get_coordinate(model: Ints, y: Floats, g: Ints, gp: Floats) -> tuple[float, 
 
 @dataclass(frozen=True)
 class OnCoordinate(Geometry):
-    """Coordinate: value q (rad, m) and speed u; the output `force` (N.m, N) is conjugate to the speed."""
+    """Coordinate, with value q (rad, m) and speed u as inputs of the law.
 
-    field: str = "coordinate"  # property that names the coordinate
+    The output `force` (N.m, N) is conjugate to the speed.
+
+    Attributes:
+        field: property that names the coordinate.
+    """
+
+    field: str = "coordinate"
 
     inputs = ("q", "u")
     speed = "u"
@@ -48,12 +54,19 @@ class OnCoordinate(Geometry):
         return builder.find_coordinate(force, self.field)
 
     def pack(self, location: int, places: Places) -> tuple[Sequence[int], Sequence[float]]:
-        """Return the degree of freedom (-1 if the coordinate is locked) and the value of a locked coordinate.
+        """Return the degree of freedom and the value of a locked coordinate.
+
+        Args:
+            location: index of the coordinate in the mechanism.
+            places: placement of the bodies in the links of the tree.
 
         Returns:
-            Integers and numbers.
+            Integers: the degree of freedom, -1 if the coordinate is locked. Numbers: the value,
+            which counts
+                only then.
         """
         return (places.freedom(location),), (places.locked_value(location),)
 
 
 COORDINATE = OnCoordinate()
+"""Coordinate that the property `coordinate` names."""

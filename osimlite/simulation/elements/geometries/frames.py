@@ -42,6 +42,13 @@ def compute_deviations(model: Ints, data: Floats, g: Ints, gp: Floats, work: Flo
     """Compute the deviations of the second frame from the first, and their rates, into the record.
 
     The angles are body-fixed X-Y-Z angles of the second frame in the first.
+
+    Args:
+        model: integers of the model.
+        data: work vector.
+        g: links of both frames.
+        gp: axes (9,) and origin (3,) of each frame in its link.
+        work: record of the bushing.
     """
     d, rates = at(work, DEVIATIONS), at(work, RATES)
     for k in range(3):
@@ -70,7 +77,14 @@ def compute_deviations(model: Ints, data: Floats, g: Ints, gp: Floats, work: Flo
 
 
 def load_frames(model: Ints, data: Floats, g: Ints, work: Floats) -> None:
-    """Apply the loads to both bodies; the record then has force and moment on the second frame."""
+    """Apply the loads to both bodies; the record then has force and moment on the second frame.
+
+    Args:
+        model: integers of the model.
+        data: work vector.
+        g: links of both frames.
+        work: record of the bushing.
+    """
     loads, d = at(work, LOADS), at(work, DEVIATIONS)
     force = rotate_back(at(work, AXES), vector(loads, 3))
     moment = rotate_back(at(work, AXES + 9), xyz_moment(d[1], d[2], loads[0], loads[1], loads[2]))
@@ -83,18 +97,35 @@ def load_frames(model: Ints, data: Floats, g: Ints, work: Floats) -> None:
 
 
 def mask_undamped_rate(rate: float, damping: float) -> float:
-    """Return the rate, or 0 without damping, because rates of angles may be infinite."""
+    """Return the rate, or 0 without damping, because rates of angles may be infinite.
+
+    Args:
+        rate: rate of a deviation.
+        damping: its damping.
+    """
     return rate if damping != 0.0 else 0.0
 
 
 def add_damping(loads: Floats, rates: Floats, damping: Floats) -> None:
-    """Replace resisting loads by applied loads, with damping: load = -load - damping * rate."""
+    """Replace resisting loads by applied loads with damping: load = -load - damping * rate.
+
+    Args:
+        loads: loads of the law (6,), which are replaced.
+        rates: rates of the deviations (6,).
+        damping: damping of each deviation (6,).
+    """
     for k in range(6):
         loads[k] = -loads[k] - damping[k] * mask_undamped_rate(rates[k], damping[k])
 
 
 class Frame(NamedTuple):
-    """Frame of a bushing: its name, its body, and its placement in the body (4, 4)."""
+    """Frame of a bushing.
+
+    Attributes:
+        name: its name.
+        body: index of its body.
+        placed: its placement in the body (4, 4).
+    """
 
     name: str
     body: int
@@ -103,13 +134,16 @@ class Frame(NamedTuple):
 
 @dataclass(frozen=True)
 class BetweenFrames(Geometry):
-    """Two frames: deviations of the second from the first, three angles (rad) and a translation (m), and their rates.
+    """Two frames, with the deviations of the second from the first as inputs of the law.
 
-    The law fills `loads`: moments (N.m) of the angles and forces (N) of the translation on the second
-    frame.
+    The deviations are three angles (rad) and a translation (m). The law fills `loads`: moments
+    (N.m) of the angles and forces (N) of the translation on the second frame.
+
+    Attributes:
+        about_bodies: whether reported torques are about the origins of the bodies instead of the
+            frames.
     """
 
-    # whether reported torques are about the origins of the bodies instead of the frames
     about_bodies: bool = False
 
     inputs = ("deviations", "rates", "loads")
@@ -161,11 +195,23 @@ class BetweenFrames(Geometry):
     def report(
         self, force: Any, record: Sequence[float], origins: Sequence[Sequence[float]]
     ) -> list[float]:
-        """Return forces and torques in ground, about the origins of the frames or of their bodies."""
+        """Return the loads on both frames.
+
+        Args:
+            force: the element.
+            record: record of the bushing.
+            origins: origin of each body in ground, m; ground's origin is the last.
+
+        Returns:
+            Force (N) and torque (N.m) on the first and on the second frame in ground, about the
+            origins of
+                the frames or of their bodies.
+        """
         push, moment, start, end = np.array(record[:12], dtype=float).reshape(4, 3)
         first, second = start, end
         if self.about_bodies:
             first, second = (np.array(origins[frame.body]) for frame in force.location)
+        # Both forces act at the origin of the second frame.
         row: list[Array] = [
             -push,
             -moment - np.cross(end - first, push),

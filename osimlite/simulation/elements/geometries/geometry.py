@@ -11,25 +11,30 @@ from osimlite.simulation.elements.force_records import ForceRecord
 
 
 class Geometry:
-    """Place where a force acts: it computes inputs of the law, and applies the law's outputs.
+    """Base class of the places where forces act: it computes inputs of the law, and applies its outputs.
 
     In the code of a kernel, `g` are the geometry's integers, `gp` its numbers and `work` its part
     of the record; `model`, `reals`, `data`, `y`, `f` are the vectors that every kernel has.
+
+    Attributes:
+        inputs: arguments of the law that `setup_code` computes.
+        speed: input by which an actuator's force, or its negative, is multiplied for its power.
+        setup_code: code before the call of the law.
+        recorded_setup_code: cheaper setup code after an evaluation, if there is one.
+        displacement_output: output that acts along one displacement, and 1 if it pushes, -1 if it
+            pulls; the displacement is the first input, its speed the second. "" if there is no such
+            output.
+        apply_code: code that applies the outputs of the law.
+        called_functions: functions that the code calls.
     """
 
-    # arguments of the law that `setup_code` computes
     inputs: ClassVar[tuple[str, ...]] = ()
-    # input by which an actuator's force, or its negative, is multiplied for its power
     speed: ClassVar[str] = ""
-    setup_code: ClassVar[tuple[str, ...]] = ()  # code before the call of the law
-    recorded_setup_code: ClassVar[
-        tuple[str, ...]
-    ] = ()  # cheaper setup code after an evaluation, if there is one
-    # output that acts along one displacement, and 1 if it pushes, -1 if it pulls; the displacement
-    # is the first input, its speed the second. "" if there is no such output.
+    setup_code: ClassVar[tuple[str, ...]] = ()
+    recorded_setup_code: ClassVar[tuple[str, ...]] = ()
     displacement_output: ClassVar[tuple[str, int]] = ("", 0)
-    apply_code: ClassVar[tuple[str, ...]] = ()  # code that applies the outputs of the law
-    called_functions: ClassVar[tuple[Callable[..., Any], ...]] = ()  # functions that the code calls
+    apply_code: ClassVar[tuple[str, ...]] = ()
+    called_functions: ClassVar[tuple[Callable[..., Any], ...]] = ()
 
     def list_functions(self) -> dict[str, Callable[..., Any]]:
         """Return the functions that its code calls.
@@ -52,7 +57,12 @@ class Geometry:
         """
 
     def make_parts(self, location: Any, places: Places) -> list[ForceRecord]:
-        """Return records that the code calls; `item - g[0]` is the offset of the last of them."""
+        """Return records that the code calls; `item - g[0]` is the offset of the last of them.
+
+        Args:
+            location: result of `read`.
+            places: placement of the bodies in the links of the tree.
+        """
         return []
 
     def pack(self, location: Any, places: Places) -> tuple[Sequence[int], Sequence[float]]:
@@ -68,11 +78,22 @@ class Geometry:
         return (), ()
 
     def record_size(self, location: Any) -> int:
-        """Return the size of its part of the record."""
+        """Return the size of its part of the record.
+
+        Args:
+            location: result of `read`.
+        """
         return 0
 
     def list_columns(self, force: Any) -> tuple[str, ...]:
-        """Return the labels of its part of the record, for force types without labels."""
+        """Return the labels of its part of the record, for force types without labels.
+
+        Args:
+            force: the element.
+
+        Returns:
+            Labels in the order of `report`; none by default.
+        """
         return ()
 
     def report(

@@ -10,14 +10,21 @@ from osimlite.mechanics.kernels.pointers import Floats, Ints
 from osimlite.mechanics.kernels.points import apply_force, station, velocity
 from osimlite.mechanics.laws.vectors import dot, minus, norm, store_vector, times, vector
 from osimlite.mechanics.multibody.links import Places
-from osimlite.simulation.elements.builder import ElementBuilder, Triple, as_triple
+from osimlite.simulation.elements.builder import ElementBuilder, Triple, to_triple
 from osimlite.simulation.elements.geometries.geometry import Geometry
 
 
 def measure_line(
     model: Ints, data: Floats, g: Ints, gp: Floats, work: Floats
 ) -> tuple[float, float]:
-    """Return length and rate of the line; its direction and its ends go into the record.
+    """Compute length and rate of the line between two points.
+
+    Args:
+        model: integers of the model.
+        data: work vector.
+        g: links of both ends.
+        gp: ends in their links (6,), m.
+        work: receives the direction from the first to the second end, and both ends in ground (9,).
 
     Returns:
         Length (m) and rate (m/s).
@@ -25,6 +32,7 @@ def measure_line(
     one, two = station(model, data, g[0], vector(gp, 0)), station(model, data, g[1], vector(gp, 3))
     between = minus(two, one)
     length = norm(between)
+    # Ends on each other have no direction, so that the tension pulls nowhere.
     ahead = times(1.0 / length if length > 0.0 else 0.0, between)
     store_vector(work, 0, ahead)
     store_vector(work, 3, one)
@@ -35,11 +43,21 @@ def measure_line(
 
 
 def pull_ends(model: Ints, data: Floats, g: Ints, gp: Floats, work: Floats, tension: float) -> None:
-    """Apply the tension at both ends; the record then has force and reported point of each end."""
+    """Apply the tension at both ends.
+
+    Args:
+        model: integers of the model.
+        data: work vector.
+        g: links of both ends.
+        gp: ends, and points that OpenSim reports, in their links (12,), m.
+        work: direction and ends in ground; receives force and reported point of each end (12,).
+        tension: tension, N; positive tensions pull the ends together.
+    """
     pull, back = times(tension, vector(work, 0)), times(-tension, vector(work, 0))
     apply_force(model, data, g[0], vector(work, 3), pull)
     apply_force(model, data, g[1], vector(work, 6), back)
     store_vector(work, 0, pull)
+    # OpenSim reports these points in the frames that the force names, and acts at others: see `Ends`.
     store_vector(work, 3, station(model, data, g[0], vector(gp, 6)))
     store_vector(work, 6, back)
     store_vector(work, 9, station(model, data, g[1], vector(gp, 9)))
@@ -50,17 +68,31 @@ class Ends(NamedTuple):
 
     OpenSim uses the points as stations of the base bodies, even where a force names other frames;
     the points that it reports are those of the frames.
+
+    Attributes:
+        frames: names of the frames in the record.
+        bodies: bodies of the ends.
+        points: stations of the ends in the bodies, m.
+        recorded: stations that OpenSim reports, m.
     """
 
-    frames: tuple[str, str]  # names of the frames in the record
-    bodies: tuple[int, int]  # bodies of the ends
-    points: tuple[Triple, Triple]  # stations of the ends in the bodies, m
-    recorded: tuple[Triple, Triple]  # stations that OpenSim reports, m
+    frames: tuple[str, str]
+    bodies: tuple[int, int]
+    points: tuple[Triple, Triple]
+    recorded: tuple[Triple, Triple]
 
 
 @dataclass(frozen=True)
 class BetweenPoints(Geometry):
-    """Line between two points: length (m) and rate (m/s); the output `tension` (N) pulls the ends together."""
+    """Line between two points, with length (m) and rate (m/s) as inputs of the law.
+
+    The output `tension` (N) pulls the ends together.
+
+    Attributes:
+        fields: properties that name the frames.
+        as_written: whether labels contain the text by which the force names the frames, instead of
+            their names.
+    """
 
     fields: tuple[str, str]  # properties that name the frames
     # whether labels contain the text by which the force names the frames, instead of their names
@@ -79,14 +111,14 @@ class BetweenPoints(Geometry):
             builder.resolve_target(force, field, word)
             for field, word in zip(self.fields, words, strict=True)
         ]
-        points = as_triple(force.point1), as_triple(force.point2)
+        points = to_triple(force.point1), to_triple(force.point2)
         (one, first), (two, second) = (builder.find_placement(frame) for frame in frames)
         names = [
             word if isinstance(word, str) and self.as_written else frame.name
             for word, frame in zip(words, frames, strict=True)
         ]
         first_point, second_point = (
-            as_triple(frame[:3, :3] @ point + frame[:3, 3])
+            to_triple(frame[:3, :3] @ point + frame[:3, 3])
             for frame, point in zip((first, second), points, strict=True)
         )
         return Ends((names[0], names[1]), (one, two), points, (first_point, second_point))

@@ -22,16 +22,24 @@ FRAME = 12
 def apply_load(model: Ints, data: Floats, g: Ints, gp: Floats, work: Floats, t: float) -> None:
     """Apply force and torque; the record has the force, the point in the first frame, and the torque.
 
-    The integers are the links of three frames (where the force acts, the axes of force and torque,
-    the frame of the point), whether there are a force, a point and a torque, and the offsets of nine
-    tables.
+    Args:
+        model: integers of the model.
+        data: work vector.
+        g: links of three frames (where the force acts, the axes of force and torque, the frame of
+            the point), whether there are a force, a point and a torque, and the offsets of nine
+            tables.
+        gp: placements of the frames in their links (3 `FRAME`,), then the tables.
+        work: receives force (N), point (m) and torque (N.m) (9,).
+        t: time, s.
     """
     evaluate_load(g, gp, work, t)
     link = g[0]
+    # g[3], g[4] and g[5]: whether there are a force, a point and a torque.
     if g[3] > 0:
         turn_vector(model, data, g[1], at(gp, FRAME), work)
         point = station(model, data, link, vector(gp, 9))
         if g[4] > 0:
+            # The recorded point is along the axes of the pushed frame, from its origin.
             origin = point
             turn_vector(model, data, g[2], at(gp, 2 * FRAME), at(work, 3))
             point = plus(station(model, data, g[2], vector(gp, 33)), vector(work, 3))
@@ -45,26 +53,50 @@ def apply_load(model: Ints, data: Floats, g: Ints, gp: Floats, work: Floats, t: 
 
 
 def evaluate_load(g: Ints, gp: Floats, work: Floats, t: float) -> None:
-    """Write the values of the tables of a load at time t into the record."""
+    """Write the values of the tables of a load into the record.
+
+    Args:
+        g: integers of the load, see :func:`apply_load`.
+        gp: its numbers.
+        work: receives the values (9,).
+        t: time, s.
+    """
     for k in range(9):
         if g[3 + k // 3] > 0:
             work[k], _, _ = evaluate_function(at(gp, g[6 + k]), t)
 
 
 def turn_vector(model: Ints, data: Floats, link: int, axes: Floats, turning: Floats) -> None:
-    """Rotate a vector from the axes of a frame, given by columns in its link, to those of ground."""
+    """Rotate a vector from the axes of a frame to those of ground.
+
+    Args:
+        model: integers of the model.
+        data: work vector.
+        link: link of the frame.
+        axes: axes of the frame in the link, by columns (9,).
+        turning: the vector (3,), which is replaced.
+    """
     store_vector(turning, 0, direction(model, data, link, rotate_back(axes, vector(turning, 0))))
 
 
 class Load(NamedTuple):
-    """Load of a force: where it acts, and its functions of time."""
+    """Load on a body: where it acts, and its functions of time.
 
-    labels: tuple[str, str, str]  # labels of force, point and torque, without the axes
-    # frame whose origin receives a force without a point, and in which the point is reported
+    Attributes:
+        labels: labels of force, point and torque, without the axes.
+        frame: frame whose origin receives a force without a point, and in which the point is
+            reported.
+        force_frame: frame of the components of force and torque.
+        point_frame: frame of the point.
+        force: three functions of time in N; empty without a force.
+        point: three functions of time in m; empty without a point.
+        torque: three functions of time in N.m; empty without a torque.
+    """
+
+    labels: tuple[str, str, str]
     frame: FramePlacement
-    force_frame: FramePlacement  # frame of the components of force and torque
-    point_frame: FramePlacement  # frame of the point
-    # three functions of time in N, m and N.m; empty for a part that does not exist
+    force_frame: FramePlacement
+    point_frame: FramePlacement
     force: Sequence[Function]
     point: Sequence[Function]
     torque: Sequence[Function]
@@ -80,7 +112,7 @@ class Load(NamedTuple):
 
 
 class GivenLoad(Geometry):
-    """Prescribed load; there is no law."""
+    """Place of a prescribed load, which has functions of time in place of a law."""
 
     apply_code = ("apply_load(model, data, g, gp, work, data[WORK.TIME])",)
     called_functions = (apply_load,)

@@ -13,13 +13,21 @@ from osimlite.simulation.elements.registry import PATHS
 
 
 class Path(Protocol):
-    """Path in terms of the mechanism."""
+    """Path in terms of the mechanism.
 
-    # whether its moment arm about a coordinate includes coordinates that are coupled to it
+    Attributes:
+        coupled: whether its moment arm about a coordinate includes coordinates that are coupled to
+            it.
+    """
+
     coupled: bool
 
     def make_records(self, places: Places) -> list[ForceRecord]:
-        """Return its records; the last is the path itself, see :mod:`osimlite.mechanics.kernels.paths`."""
+        """Return its records; the last is the path itself, see :mod:`osimlite.mechanics.kernels.paths`.
+
+        Args:
+            places: placement of the bodies in the links of the tree.
+        """
 
 
 class AlongPath(Geometry):
@@ -30,6 +38,7 @@ class AlongPath(Geometry):
     displacement_output = "tension", -1
     setup_code = (
         "length, rate = path_length(model, reals, data, y, f, item - g[0])",
+        # Only NaN differs from itself: a path without a length.
         "if length != length:",
         "    return OUTCOME.UNSOLVED",
     )
@@ -56,3 +65,4 @@ class AlongPath(Geometry):
 
 
 PATH = AlongPath()
+"""Geometry of all forces along paths."""

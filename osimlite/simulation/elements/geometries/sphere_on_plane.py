@@ -32,13 +32,24 @@ NO_MATERIAL = (0.0, 0.0, 0.0, 0.0, 0.0)
 def compute_sphere_depth(
     model: Ints, data: Floats, g: Ints, gp: Floats, work: Floats
 ) -> tuple[float, float, Vector]:
-    """Return depth, radius and normal; the point of contact goes into the record.
+    """Compute how deep a sphere is in a half space.
+
+    Args:
+        model: integers of the model.
+        data: work vector.
+        g: links of the half space and of the sphere.
+        gp: point (3,) and normal (3,) of the plane, centre (3,) and radius of the sphere, in these
+            links.
+        work: receives the point of contact in ground (offset 3), m.
 
     Returns:
-        Depth (m), radius (m), and outward unit normal of the half space in ground.
+        Depth (m, negative if they are apart), radius (m), and outward unit normal of the half space
+        in
+            ground.
     """
     o, n = station(model, data, g[0], vector(gp, 0)), direction(model, data, g[0], vector(gp, 3))
     center = station(model, data, g[1], vector(gp, 6))
+    # Depth of the sphere below the plane: positive in contact. n points out of the half space.
     d = gp[9] - dot(minus(center, o), n)
     # The point of contact is midway between the surfaces.
     store_vector(work, 3, add_scaled(center, 0.5 * d - gp[9], n))
@@ -46,7 +57,17 @@ def compute_sphere_depth(
 
 
 def compute_approach_velocity(model: Ints, data: Floats, g: Ints, work: Floats) -> Vector:
-    """Return the velocity of the half space relative to the sphere at the point of contact, m/s."""
+    """Return the velocity of the half space relative to the sphere at the point of contact.
+
+    Args:
+        model: integers of the model.
+        data: work vector.
+        g: links of the half space and of the sphere.
+        work: record with the point of contact.
+
+    Returns:
+        Velocity in ground (3,), m/s.
+    """
     return minus(
         velocity(model, data, g[0], vector(work, 3)), velocity(model, data, g[1], vector(work, 3))
     )
@@ -55,7 +76,12 @@ def compute_approach_velocity(model: Ints, data: Floats, g: Ints, work: Floats) 
 def push_both(model: Ints, data: Floats, g: Ints, work: Floats, force: Vector) -> None:
     """Apply a force to the sphere and its opposite to the half space at the point of contact.
 
-    The force goes into the record.
+    Args:
+        model: integers of the model.
+        data: work vector.
+        g: links of the half space and of the sphere.
+        work: record with the point of contact; receives the force.
+        force: force on the sphere in ground, N.
     """
     store_vector(work, 0, force)
     apply_force(model, data, g[1], vector(work, 3), force)
@@ -63,9 +89,10 @@ def push_both(model: Ints, data: Floats, g: Ints, work: Floats, force: Vector) -
 
 
 class SphereOnPlane(Geometry):
-    """Half space and sphere: depth and radius (m), normal, and velocity of the half space relative to the sphere.
+    """Half space and sphere, at any distance.
 
-    The outputs fx, fy, fz (N) push the sphere.
+    Inputs of the law are depth and radius (m), normal, and velocity of the half space relative to
+    the sphere (m/s). The outputs fx, fy, fz (N) push the sphere.
     """
 
     inputs = ("d", "radius", "n", "v")
@@ -136,7 +163,18 @@ class SphereOnPlane(Geometry):
     def report(
         self, force: Any, record: Sequence[float], origins: Sequence[Sequence[float]]
     ) -> list[float]:
-        """Return forces, and torques about the origins of the bodies, in ground."""
+        """Return the loads on both bodies.
+
+        Args:
+            force: the element.
+            record: force (N) and point of contact (m) in ground.
+            origins: origin of each body in ground, m; ground's origin is the last.
+
+        Returns:
+            Force (N) and torque (N.m) about the body's origin in ground, of the sphere's body, then
+            of the
+                half space's.
+        """
         half_space, sphere = force.location
         pushed, point = np.array(record[:3], dtype=float), np.array(record[3:6], dtype=float)
         row: list[float] = []
@@ -149,3 +187,4 @@ class SphereOnPlane(Geometry):
 
 
 SPHERE_ON_PLANE = SphereOnPlane()
+"""Half space and sphere that a force names."""

@@ -1,4 +1,4 @@
-"""The PyBullet engine: Bullet computes mass matrix and bias, or takes the steps; the kernels compute the rest.
+"""PyBullet engine: Bullet computes mass matrix and bias, or takes the steps; the kernels compute the rest.
 
 Bullet simulates the expanded chain, in which each axis of a joint is a joint. Two routes lead to
 the accelerations. "mass-matrix" uses the matrix and the bias of Bullet's inverse dynamics.
@@ -52,17 +52,30 @@ ARTICULATED_BODY = "articulated-body"
 """Route by Bullet's articulated-body algorithm."""
 
 ROUTES = ("auto", MASS_MATRIX, ARTICULATED_BODY)
+"""Accepted routes; "auto" selects one of the others."""
 
 
 def make_engine(mechanism: Mechanism, forces: Forces, settings: Settings) -> BulletEngine:
-    """Return a Bullet engine."""
+    """Return a Bullet engine.
+
+    Args:
+        mechanism: the mechanism.
+        forces: forces on it besides gravity.
+        settings: settings; `route`, `show` and `visuals` are used.
+
+    Raises:
+        UnsupportedError: the joints or constraints do not allow the requested route.
+        SimulationError: a body at the end of a chain has no mass, or there is no screen.
+    """
     return BulletEngine(
         mechanism, forces, route=settings.route, show=settings.show, visuals=settings.visuals
     )
 
 
 class BulletEngine(KernelEngine):
-    """Engine that computes accelerations by PyBullet; see :class:`osimlite.simulation.engines.protocol.Engine`.
+    """Engine that computes accelerations by PyBullet.
+
+    Its methods are those of :class:`osimlite.simulation.engines.protocol.Engine`.
 
     Args:
         mechanism: the mechanism.
@@ -154,8 +167,8 @@ class BulletEngine(KernelEngine):
             forces = bullet.calculateInverseDynamics(robot, values, rates, accelerations, 0, client)
         except SystemError:
             raise SimulationError(
-                f"Bullet refuses the inertias of '{self.mechanism.name}', which are none after its own rounding; look "
-                "for masses and mass centers beyond belief, or take --engine compiled"
+                f"Bullet refuses the inertias of '{self.mechanism.name}', which are invalid after its rounding; check "
+                "masses and mass centers, or use --engine compiled"
             ) from None
         self._pack_forces(data, 8 * first, *forces)
         # numpy reads tuples at half the speed.
@@ -165,7 +178,12 @@ class BulletEngine(KernelEngine):
     def _supply_by_step(
         self, model: Ints, reals: Floats, data: Floats, y: Floats, f: Floats, unused: int
     ) -> None:
-        """Write an identity mass matrix, and b - a as forces to overcome, where a are Bullet's accelerations."""
+        """Write an identity mass matrix, and forces that give the joints Bullet's accelerations.
+
+        The kernels solve Pᵀ (M P udot + f) = applied forces, where the forces f are those that the
+        bias b of the joints needs. With M = 1, f = b - a and no applied forces, the joints get the
+        accelerations a of Bullet's step.
+        """
         first, size = self._forces, len(self.order)
         values, rates, biases = data[self._moves : first].reshape(3, -1)
         count, applied = len(values), f[size : 2 * size]
@@ -176,7 +194,17 @@ class BulletEngine(KernelEngine):
         data[first + count : first + count + count * count] = np.eye(count).ravel()
 
     def compute_joint_forces(self, y: Sequence[float], forces: Array) -> list[float]:
-        """Return forces on joints that equal coordinates, equivalent to forces along the generalized speeds."""
+        """Return forces on joints that equal coordinates, equivalent to generalized forces.
+
+        With qdot = N u, power is equal if f_u = Nᵀ f_q.
+
+        Args:
+            y: state (y,).
+            forces: forces along the generalized speeds in the state's order.
+
+        Returns:
+            Forces (N or N m) in the order of Bullet's joints.
+        """
         rates = self.mechanism.rate_matrix(self.state.values(y))
         spread = self.state.spread_to_all(forces.tolist(), [0.0] * len(rates))
         return np.linalg.solve(rates.T, spread)[self.coordinates].tolist()
@@ -185,7 +213,14 @@ class BulletEngine(KernelEngine):
     def make_stepper(
         self, t: float, y: Sequence[float], settings: Settings, observe: Observer
     ) -> Stepper:
-        """Return a stepper from a state on: error-controlled steps, or fixed steps, by Bullet if it can."""
+        """Return a stepper that continues from a state.
+
+        Args:
+            t: time, s.
+            y: state (y,).
+            settings: how to step; Bullet takes fixed steps itself if its joints are coordinates.
+            observe: called with time and state after each step.
+        """
         window = self.window
         if window is not None:
             tell = observe
@@ -215,7 +250,12 @@ class BulletEngine(KernelEngine):
 
 
 def _has_own_coordinates(mechanism: Mechanism, robot: Robot) -> bool:
-    """Return whether nothing constrains the mechanism and each joint of the robot equals a coordinate of its own."""
+    """Return whether each joint of the robot equals a coordinate of its own, without constraints.
+
+    Args:
+        mechanism: the mechanism.
+        robot: its robot.
+    """
     places = [joint.coordinates[0] for joint in robot.moving]
     return (
         all(joint.coordinate is not None for joint in robot.moving)
@@ -226,10 +266,11 @@ def _has_own_coordinates(mechanism: Mechanism, robot: Robot) -> bool:
 
 
 class BulletStepper(SemiImplicitEuler):
-    """Bullet's fixed steps: new speeds from the accelerations at the start of the step, then values from the new speeds.
+    """Stepper with Bullet's fixed steps.
 
-    This is what ``stepSimulation`` of PyBullet does: a first-order method with one evaluation of
-    the forces per step. The derivative contains forces in place of the accelerations.
+    New speeds follow from the accelerations at the start of the step, then values from the new
+    speeds. This is what ``stepSimulation`` of PyBullet does: a first-order method with one
+    evaluation of the forces per step. The derivative contains forces in place of the accelerations.
 
     Args:
         engine: engine in which each of Bullet's joints is a coordinate.
@@ -253,6 +294,7 @@ class BulletStepper(SemiImplicitEuler):
         )
         self._engine, self.world, self._places = engine, engine.world, engine.coordinates
         q, u = engine.state.values(y), engine.state.speeds(y)
+        # Bullet's joints have rates of coordinates, the state has generalized speeds.
         rates = engine.mechanism.coordinate_rates(q, u)[self._places]
         self.world.set_state([q[place] for place in self._places], rates.tolist())
 
@@ -260,7 +302,8 @@ class BulletStepper(SemiImplicitEuler):
         layout, mechanism, count = self._engine.state, self._engine.mechanism, self._nq
         forces = np.array(self.derivative[count : 2 * count])
         self.world.step(h, self._engine.compute_joint_forces(self.state, forces))
-        q, rates = np.array(layout.values(self.state)), np.zeros(len(mechanism.coordinates))
+        q = np.array(layout.values(self.state))
+        rates = np.zeros(len(mechanism.coordinates))
         q[self._places], rates[self._places] = self.world.get_state()
         z = [
             x + h * rate

@@ -42,7 +42,7 @@ ESCAPE = 27
 
 
 class Window:
-    """A window with its own robot, which does not take part in the simulation.
+    """Window with its own robot, which does not take part in the simulation.
 
     Args:
         robot: the robot with the shapes of its links.
@@ -94,7 +94,13 @@ class Window:
         self._last: Sequence[float] | None = None
 
     def show(self, t: float, y: Sequence[float]) -> None:
-        """Show a state when t (s) has passed since the first call.
+        """Show a state when its time has passed since the first call.
+
+        States between two pictures are skipped. The space bar pauses the motion.
+
+        Args:
+            t: time of the state, s.
+            y: the state (y,).
 
         Raises:
             SimulationError: the user has closed the window.
@@ -103,6 +109,7 @@ class Window:
         if self._start is None:
             self._start = t, now
         due = self._start[1] + t - self._start[0]
+        # Steps are much shorter than the time between pictures.
         if due < self._next and now < self._next:
             return
         if due > now:
@@ -169,7 +176,11 @@ class Window:
         )
 
     def _get_selected_view(self) -> tuple[float, float, float] | None:
-        """Return the view that the user has selected; None while it is the initial one."""
+        """Return the view that the user has selected.
+
+        Returns:
+            Yaw and pitch (degrees) and distance (m); None while they are the initial ones.
+        """
         # PyBullet reports the camera of the first world only, and for some pictures an outdated
         # one.
         if self.client != 0:

@@ -1,4 +1,4 @@
-"""A robot in its own Bullet world, configured to obey mechanics only.
+"""Robot in its own Bullet world, configured to obey mechanics only.
 
 Bullet is made for games. Each change that it needs to compute mechanics is one method or constant
 here, as are the properties of the URDF file that make Bullet read it correctly.
@@ -28,7 +28,11 @@ __all__ = ["World", "bullet", "mute_output"]
 
 @contextmanager
 def mute_output(descriptor: int = 2) -> Iterator[None]:
-    """Discard standard error (2) or output (1) meanwhile; PyBullet prints its build there."""
+    """Discard standard error or output within a block; PyBullet prints its build there.
+
+    Args:
+        descriptor: 2 for standard error, 1 for standard output.
+    """
     try:
         kept = os.dup(descriptor)
     except OSError:
@@ -59,7 +63,13 @@ UNLIMITED_SPEED = 1e9
 
 
 class World:
-    """A robot in its own Bullet world, configured to obey mechanics only.
+    """Robot in its own Bullet world, configured to obey mechanics only.
+
+    Args:
+        robot: the robot.
+        gravity: gravity (3,), m/s².
+        files: mesh files that the robot names.
+        exact: whether inertias that no real body has are set after loading.
 
     Attributes:
         client: Bullet's number of the world.
@@ -120,12 +130,17 @@ class World:
 
     @staticmethod
     def sort_joints(robot: Robot, infos: Sequence[Sequence[Any]]) -> list[RobotJoint]:
-        """Return the joints in Bullet's order, which differs from that of the model and of the robot."""
+        """Return the joints in Bullet's order, which differs from that of the model and of the robot.
+
+        Args:
+            robot: the robot.
+            infos: Bullet's descriptions of its joints.
+        """
         joints = {joint.name: joint for joint in robot.moving}
         return [joints[info[1].decode()] for info in infos if info[3] >= 0]
 
     def _remove_damping(self, infos: Sequence[Sequence[Any]]) -> None:
-        """Remove everything that slows a joint down."""
+        """Remove everything that slows a joint down: damping, speed limits and motors."""
         client = self.client
         for index in (-1, *(int(info[0]) for info in infos)):
             bullet.changeDynamics(
@@ -166,7 +181,12 @@ class World:
                 )
 
     def set_state(self, q: Sequence[float], rates: Sequence[float]) -> None:
-        """Set values and rates of the joints, and update all links."""
+        """Set values and rates of the joints, and update all links.
+
+        Args:
+            q: values of the joints, rad or m.
+            rates: their rates.
+        """
         bullet.resetJointStatesMultiDof(
             self.id, self._indices, [(x,) for x in q], [(x,) for x in rates], self.client
         )
@@ -181,7 +201,12 @@ class World:
         return [state[0] for state in states], [state[1] for state in states]
 
     def step(self, h: float, forces: Sequence[float]) -> None:
-        """Take one of Bullet's steps of length h (s), with forces on the joints that act during this step only."""
+        """Take one of Bullet's steps.
+
+        Args:
+            h: length of the step, s.
+            forces: forces on the joints (N or N m), which act during this step only.
+        """
         client = self.client
         if h != self._step:
             bullet.setTimeStep(h, client)
@@ -194,14 +219,22 @@ class World:
     def accelerations_by_step(
         self, q: list[float], rates: list[float], forces: Sequence[float]
     ) -> list[float]:
-        """Return the second derivatives of the joint values: the change of the rates in a step of one second."""
+        """Return the second derivatives of the joint values.
+
+        They are the change of the rates in a step of one second.
+
+        Args:
+            q: values of the joints.
+            rates: their rates.
+            forces: forces on the joints, N or N m.
+        """
         self.set_state(q, rates)
         self.step(1.0, forces)
         states = bullet.getJointStates(self.id, self._indices, self.client)
         return [state[1] - rate for state, rate in zip(states, rates, strict=True)]
 
     def close(self) -> None:
-        """Close the world."""
+        """Close the world; may be called repeatedly."""
         if self.client >= 0:
             self._leave()
             self.client = -1
@@ -228,12 +261,20 @@ def write_robot(robot: Robot) -> str:
 
 
 def compute_inertia_excess(link: Link) -> float:
-    """Return what to add to each principal moment of inertia; 0 if the moments are valid.
+    """Return what to add to the moments of inertia so that Bullet accepts them.
 
-    Bullet would replace invalid moments by zero.
+    Bullet replaces moments by zero that violate the triangle inequality or are negative.
+
+    Args:
+        link: the link.
+
+    Returns:
+        The largest principal moment (kg·m²); 0 if the inertia is valid.
     """
     moments = [float(moment) for moment in principal_axes(link.inertia)[0]]
     low, middle, high = sorted(moments)
+    # With `high` added to all three, the largest is at most the sum of the others: 2 high <= low +
+    # middle + 2 high.
     return high if high > low + middle or low < 0.0 else 0.0
 
 
@@ -249,8 +290,8 @@ def require_masses(robot: Robot) -> None:
         if joint.child not in carriers and links[joint.child].mass == 0.0:
             body = next(iter(links[joint.child].bodies), joint.child)
             raise SimulationError(
-                f"the body '{body}' has no mass and carries none, so that nothing decides how the joint "
-                f"'{joint.source}' moves; give it mass and inertia, or lock the coordinates of the joint"
+                f"the body '{body}' has no mass and carries none, so the motion of the joint "
+                f"'{joint.source}' is undetermined; give it mass and inertia, or lock the coordinates of the joint"
             )
 
 

@@ -28,21 +28,35 @@ from osimlite.simulation.elements.registry import register_path
 
 @dataclass(frozen=True)
 class CoordinatePath:
-    """Path that acts on coordinates only."""
+    """Path that acts on coordinates only.
 
-    path: str  # path of its owner
-    coordinates: tuple[int, ...]  # indices in the mechanism of the coordinates that it depends on
-    length: Function | Formula  # length as a function of the coordinates
-    # moment arms as functions of the coordinates; if empty, the negative derivatives of the length
+    Attributes:
+        path: component path of its owner.
+        coordinates: indices in the mechanism of the coordinates that it depends on.
+        length: length (m) as a function of the coordinates.
+        arms: moment arms as functions of the coordinates; if empty, the negative derivatives of the
+            length.
+        speed: lengthening speed (m/s) as a function of the values and then the speeds of the
+            coordinates; if None, it follows from the moment arms.
+    """
+
+    path: str
+    coordinates: tuple[int, ...]
+    length: Function | Formula
     arms: tuple[Function | Formula, ...] = ()
-    # lengthening speed as a function of the values and then the speeds of the coordinates; if None,
-    # it follows from the moment arms
     speed: Function | Formula | None = None
 
     coupled: ClassVar[bool] = False
 
     def make_records(self, places: Places) -> list[ForceRecord]:
-        """Return records that pull, those of the functions, and that of the path."""
+        """Return the records of the path.
+
+        Args:
+            places: placement of the bodies in the links of the tree.
+
+        Returns:
+            The record that pulls, those of the functions, and last that of the path.
+        """
         values = [places.locked_value(coordinate) for coordinate in self.coordinates]
         freedoms = [places.freedom(coordinate) for coordinate in self.coordinates]
         speeds = [freedom + len(places.freedoms) if freedom >= 0 else -1 for freedom in freedoms]
@@ -59,6 +73,7 @@ class CoordinatePath:
             else []
         )
         parts = [ForceRecord("pull_coordinates", is_part=True), *of_values, *of_speeds]
+        # The record of the path refers to the others by the distance back to them.
         backs = [
             sum(ITEM.OWN + len(item.ints) for item in parts[index:]) for index in range(len(parts))
         ]
@@ -72,9 +87,17 @@ class CoordinatePath:
     def _make_function_record(
         self, function: Function | Formula, arguments: Sequence[int], values: Sequence[float]
     ) -> ForceRecord:
-        """Return the record of a function of states; a negative index stands for the value at that position."""
+        """Return the record of a function of states.
+
+        Args:
+            function: the function.
+            arguments: index in y of each argument, -1 for a locked coordinate.
+            values: value of each argument that is locked.
+        """
         size, work = len(arguments), DERIVATIVES + len(arguments)
         if isinstance(function, Formula):
+            # A formula is differentiated symbolically, and its derivatives are formulas of the same
+            # record.
             formulas = [function, *(function.derivative(k) for k in range(size))]
             ints, numbers = [size, len(formulas), *arguments], [*values]
             for steps, constants in map(program, formulas):
@@ -94,6 +117,8 @@ class CoordinatePath:
                 is_part=True,
             )
         factor = 1.0
+        # Factors are multiplied into the coefficients, so that one kernel evaluates all
+        # polynomials.
         while isinstance(function, ScaledFunction):
             factor, function = factor * function.scale, function.function
         if isinstance(function, WeightedSum):
@@ -111,6 +136,10 @@ class CoordinatePath:
 @register_path(FunctionBasedPath)
 def read_function_path(builder: ElementBuilder, owner: Any) -> CoordinatePath:
     """Return the functions of an owner's path.
+
+    Args:
+        builder: builder of the model's elements.
+        owner: component with the path.
 
     Raises:
         UnsupportedError: a function has an unknown class.

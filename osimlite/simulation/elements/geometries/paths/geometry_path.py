@@ -52,16 +52,27 @@ TOLERANCE = 1e-5
 
 @dataclass(frozen=True, eq=False)
 class Node:
-    """Point of a path."""
+    """Point of a path.
 
-    body: int  # body of the point
-    frame: Array  # frame (4, 4) of the location in the body
-    location: Array  # position in the frame, m, to which `functions` are added
-    kind: int = FIXED  # kind of the node
-    coordinate: int = -1  # index in the mechanism of the coordinate that it depends on, or -1
-    range: tuple[float, float] = (-inf, inf)  # range of this coordinate
-    functions: tuple[Function, ...] = ()  # functions of the coordinate for a moving location
-    name: str = ""  # name of the point, or of the surface that it is on
+    Attributes:
+        body: index of its body.
+        frame: frame (4, 4) of the location in the body.
+        location: position in the frame, m, to which `functions` are added.
+        kind: kind of the node.
+        coordinate: index in the mechanism of the coordinate that it depends on, or -1.
+        range: range of this coordinate, rad or m.
+        functions: functions of the coordinate for a moving location.
+        name: name of the point, or of the surface that it is on.
+    """
+
+    body: int
+    frame: Array
+    location: Array
+    kind: int = FIXED
+    coordinate: int = -1
+    range: tuple[float, float] = (-inf, inf)
+    functions: tuple[Function, ...] = ()
+    name: str = ""
 
     def pack(
         self, places: Places, of: int, first: int, path: str, piece: int
@@ -88,34 +99,51 @@ class Node:
         tables = []
         for function in self.functions:
             tables.append(first + len(numbers))
-            numbers += table_of_one(function, f"the place of a point of '{path}'")
+            numbers += table_of_one(function, f"the location of a point of '{path}'")
         return [link, piece, self.kind, of, first, *(tables or (0, 0, 0))], numbers
 
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """Surface that a path wraps around."""
+    """Surface that a path wraps around.
 
-    number: int  # number of the surface among those of the path
-    tangent: Node  # node at its center, with its axes
-    law: str  # name of the law of the surface; empty if the surface is not active
-    curve: str  # name of the law that traces a path on it, unless that is a geodesic
-    numbers: tuple[float, ...]  # parameters of the law, or those of `geodesic_starts`
-    first: int  # index of the first point of the range in which the path may wrap
-    last: int  # index of the last point of the range
-    begin: int = 0  # index of the first point of the complete range of the PathWrap
+    Attributes:
+        number: number of the surface among those of the path.
+        tangent: node at its center, with its axes.
+        law: name of the kernel of the surface; empty if the surface is not active.
+        curve: name of the kernel that traces a path on it, unless that is a geodesic.
+        numbers: parameters of the kernel, or those of `geodesic_starts`.
+        first: index of the first point of the range in which the path may wrap.
+        last: index of the last point of the range.
+        begin: index of the first point of the complete range of the PathWrap.
+    """
+
+    number: int
+    tangent: Node
+    law: str
+    curve: str
+    numbers: tuple[float, ...]
+    first: int
+    last: int
+    begin: int = 0
 
 
 @dataclass(frozen=True)
 class ThroughPoints:
-    """Path from point to point, around surfaces."""
+    """Path from point to point, around surfaces.
 
-    path: str  # path of its owner
-    points: tuple[Node, ...]  # points in their order
-    # surfaces that it wraps around; with geodesics, one entry for each point at which a segment
-    # around the surface may begin
+    Attributes:
+        path: component path of its owner.
+        points: points in their order.
+        surfaces: surfaces that it wraps around; with geodesics, one entry for each point at which a
+            segment around the surface may begin.
+        geodesic: whether it wraps along geodesics.
+    """
+
+    path: str
+    points: tuple[Node, ...]
     surfaces: tuple[Surface, ...] = ()
-    geodesic: bool = False  # whether it wraps along geodesics
+    geodesic: bool = False
 
     coupled: ClassVar[bool] = True
 
@@ -149,10 +177,19 @@ class ThroughPoints:
         return first.body, first.frame[:3, :3] @ first.location + first.frame[:3, 3]
 
     def make_records(self, places: Places) -> list[ForceRecord]:
-        """Return records that pull, those of the surfaces, and that of the path."""
+        """Return the records of the path.
+
+        Args:
+            places: placement of the bodies in the links of the tree.
+
+        Returns:
+            The record that pulls at the points, those of the surfaces, and last that of the path.
+        """
         parts = [ForceRecord("pull_points", is_part=True)]
         wraps: list[int] = []
         behind = sum(bool(surface.law) for surface in self.surfaces)
+        # OpenSim solves one surface after the other, each by a kernel of its own. Geodesics are
+        # solved together by the kernel of the path.
         for surface in () if self.geodesic else self.surfaces:
             if surface.law:
                 parts.append(
@@ -196,6 +233,10 @@ class ThroughPoints:
 @register_path(GeometryPath)
 def read_path(builder: ElementBuilder, owner: Any) -> ThroughPoints:
     """Return the points of an owner's path, and the surfaces that it wraps around.
+
+    Args:
+        builder: builder of the model's elements.
+        owner: component with the path.
 
     Raises:
         UnsupportedError: a point or a surface has an unknown class.
@@ -246,6 +287,7 @@ def read_path(builder: ElementBuilder, owner: Any) -> ThroughPoints:
         points = [
             replace(point, kind=CLAMPED) if point.kind == MOVING else point for point in points
         ]
+        # Each segment within the range of a wrap may go around the surface.
         end = len(points) - 1
         pieces = [
             (each, k)
@@ -299,7 +341,15 @@ def _read_surface(
 
 
 def _list_geodesic_numbers(surface: WrapObject) -> tuple[float, ...]:
-    """Return half the length of a surface, and its numbers in :mod:`osimlite.mechanics.kernels.cable_surfaces`."""
+    """Return the numbers of a surface for geodesics.
+
+    Args:
+        surface: the surface.
+
+    Returns:
+        Half its length (m, infinite for closed surfaces), and its numbers in
+            :mod:`osimlite.mechanics.kernels.cable_surfaces`.
+    """
     if isinstance(surface, WrapCylinder):
         return surface.length / 2.0, CYLINDER, surface.radius, surface.radius**2, 1.0, 1.0, 0.0
     if isinstance(surface, WrapSphere):
@@ -346,6 +396,7 @@ READERS: dict[type[AbstractPathPoint], Callable[[ElementBuilder, Any, int, Array
     ConditionalPathPoint: _read_conditional_point,
     MovingPathPoint: _read_moving_point,
 }
+"""Function that reads the points of each class."""
 
 LAWS: dict[type[WrapObject], tuple[str, str, tuple[str, ...]]] = {
     WrapCylinder: ("wrap_cylinder", "trace_cylinder", ("radius", "length")),
@@ -353,9 +404,10 @@ LAWS: dict[type[WrapObject], tuple[str, str, tuple[str, ...]]] = {
     WrapEllipsoid: ("wrap_ellipsoid", "trace_ellipsoid", ("dimensions",)),
     WrapTorus: ("wrap_torus", "trace_torus", ("inner_radius", "outer_radius")),
 }
-"""The law of each surface, that which traces a path on it, and the properties that are its sizes."""
+"""Kernel of each surface, kernel that traces a path on it, and properties that are its sizes."""
 
 SIGNS = {"": 1.0, "+": 1.0, "-": -1.0}
+"""Sign of a quadrant by its text."""
 SIDES = {
     sign + name: (float(axis), side)
     for axis, name in enumerate("xyz")
@@ -365,3 +417,4 @@ SIDES |= {"all": (0.0, 0.0), "unassigned": (0.0, 0.0)}
 """Axis and sign of a quadrant."""
 
 METHODS = {"hybrid": HYBRID, "midpoint": MIDPOINT, "axial": AXIAL, "unassigned": HYBRID}
+"""Number of a wrap method in the kernels, by the text in the file."""

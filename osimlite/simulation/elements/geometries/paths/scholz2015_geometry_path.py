@@ -1,7 +1,7 @@
-"""A cable: a path through points and over obstacles that it may touch.
+"""Cables: paths through points and over obstacles that they may touch (Scholz et al. 2015).
 
-OpenSim hands over the places of points and surfaces as if the frames that they are in were those of
-the bodies; only forces at points are applied where they belong. So it is here.
+OpenSim passes the locations of points and surfaces to Simbody as if their frames were those of the
+bodies; only forces at points are applied in the right place. This module reproduces that.
 """
 
 from __future__ import annotations
@@ -66,11 +66,17 @@ FIRST_STEP = 1e-10
 
 @dataclass(frozen=True, eq=False)
 class Point:
-    """Point of a cable."""
+    """Point of a cable.
 
-    body: int  # body of the point
-    runs: Array  # station in the body that the cable runs through, m
-    pulls: Array  # station in the body at which the force acts, m
+    Attributes:
+        body: index of its body.
+        runs: station in the body that the cable runs through, m.
+        pulls: station in the body at which the force acts, m.
+    """
+
+    body: int
+    runs: Array
+    pulls: Array
 
     size: ClassVar[int] = POINT_WORK
     is_obstacle: ClassVar[bool] = False
@@ -91,12 +97,19 @@ class Point:
 
 @dataclass(frozen=True, eq=False)
 class Obstacle:
-    """Surface that a cable may touch."""
+    """Surface that a cable may touch.
 
-    body: int  # body of the surface
-    frame: Array  # placement (4, 4) of the surface in the body
-    surface: tuple[float, ...]  # numbers of the surface
-    begin: Array  # initial guess of the contact with the cable
+    Attributes:
+        body: index of its body.
+        frame: placement (4, 4) of the surface in the body.
+        surface: numbers of the surface.
+        begin: initial guess of the contact with the cable.
+    """
+
+    body: int
+    frame: Array
+    surface: tuple[float, ...]
+    begin: Array
 
     size: ClassVar[int] = OBSTACLE_WORK
     is_obstacle: ClassVar[bool] = True
@@ -122,9 +135,12 @@ class Obstacle:
 
 @dataclass(frozen=True)
 class Cable:
-    """Path over obstacles."""
+    """Path over obstacles.
 
-    # points and obstacles in the order of the path
+    Attributes:
+        elements: points and obstacles in the order of the path.
+    """
+
     elements: tuple[Point | Obstacle, ...]
 
     coupled: ClassVar[bool] = True
@@ -148,10 +164,16 @@ class Cable:
         return first.body, first.runs
 
     def make_records(self, places: Places) -> list[ForceRecord]:
-        """Return the record that pulls, and that of the cable."""
+        """Return the record that pulls, and that of the cable.
+
+        Args:
+            places: placement of the bodies in the links of the tree.
+        """
         most = together = 0
         ints, numbers, work = list[int](), list[float](), FIRST
         for element in self.elements:
+            # The solver couples obstacles between two points, so its size follows from the longest
+            # run of obstacles.
             together = together + 1 if element.is_obstacle else 0
             most = max(most, together)
             link, own = element.pack(places)
@@ -169,11 +191,14 @@ class Cable:
         return [ForceRecord("pull_cable", is_part=True), path]
 
     def solve_at(self, mechanism: Mechanism, q: Array) -> Cable | None:
-        """Return the cable that starts from its solution in a pose; None if there is no solution.
+        """Return the cable that starts from its solution in a pose.
 
         Args:
             mechanism: the mechanism.
             q: values of the coordinates, rad or m.
+
+        Returns:
+            The cable with new initial guesses; None if there is no solution.
         """
         state = mechanism.at(q)
         placements = [
@@ -202,11 +227,15 @@ class Cable:
 
 @register_path(Scholz2015GeometryPath)
 def read_cable(builder: ElementBuilder, owner: Any) -> Cable:
-    """The elements of an owner's path.
+    """Return the cable of an owner's path, solved in the default pose.
+
+    Args:
+        builder: builder of the model's elements.
+        owner: component with the path.
 
     Raises:
         ModelError: the path does not begin and end with a point, a cable cannot run over an obstacle
-            of this class, or something makes no sense.
+            of this class, a parameter has no meaning, or no path over the obstacles is found.
     """
     elements = tuple(
         _read_point(builder, item)
@@ -225,7 +254,7 @@ def read_cable(builder: ElementBuilder, owner: Any) -> Cable:
         cable = cable.solve_at(builder.mechanism, assembled)
     if cable is None:
         raise ModelError(
-            f"the path of '{builder.path(owner)}' cannot be laid over its obstacles in the default pose: a point or "
+            f"the path of '{builder.path(owner)}' cannot be wrapped over its obstacles in the default pose: a point or "
             "another obstacle is inside one, or a contact_hint leads nowhere; move them apart"
         )
     return cable
@@ -234,9 +263,13 @@ def read_cable(builder: ElementBuilder, owner: Any) -> Cable:
 def check_cable(builder: ElementBuilder, owner: Any) -> None:
     """Check whether OpenSim can lay a path over its obstacles, and name a point that is inside one.
 
+    Args:
+        builder: builder of the model's elements.
+        owner: component with the path.
+
     Raises:
-        ModelError: a point is inside an obstacle, an obstacle is a mesh, a contact hint has no nearest
-            point on the surface, or the search fails.
+        ModelError: a point is inside an obstacle, an obstacle is a mesh, a contact hint has no
+            nearest point on the surface, or the search fails.
     """
     items = list(owner.geometry_path.path_elements)
     for index, item in enumerate(items):
@@ -260,7 +293,13 @@ def check_cable(builder: ElementBuilder, owner: Any) -> None:
 
 
 def _is_enclosed(builder: ElementBuilder, point_item: Any, geometry: ContactGeometry) -> bool:
-    """Return whether a point of a path is inside an obstacle in a pose that OpenSim starts from."""
+    """Return whether a point of a path is inside an obstacle in a pose that OpenSim starts from.
+
+    Args:
+        builder: builder of the model's elements.
+        point_item: the point.
+        geometry: surface of the obstacle.
+    """
     mechanism = builder.mechanism
     poses = [mechanism.values({})]
     # Another rule reports constraints that no pose satisfies.
@@ -333,7 +372,16 @@ def _read_obstacle(builder: ElementBuilder, owner: Any, item: Any) -> Obstacle:
 
 
 def _list_surface_numbers(geometry: ContactGeometry) -> tuple[float, ...] | None:
-    """Return the numbers of a surface; None if a cable cannot run over it."""
+    """Return the numbers of a surface for the kernels of cables.
+
+    Args:
+        geometry: the contact geometry.
+
+    Returns:
+        Kind, two sizes (m, m²) and three weights, see
+        :mod:`osimlite.mechanics.kernels.cable_surfaces`;
+            None if a cable cannot run over it.
+    """
     if isinstance(geometry, ContactSphere):
         return SPHERE, geometry.radius, geometry.radius**2, 1.0, 1.0, 1.0
     if isinstance(geometry, ContactCylinder):
@@ -354,7 +402,12 @@ def _list_surface_numbers(geometry: ContactGeometry) -> tuple[float, ...] | None
 
 
 def _is_middle(surface: tuple[float, ...], hint: Array) -> bool:
-    """Return whether a surface has no normal through a point: its center, its axis, the ring in a torus."""
+    """Return whether a surface has no normal through a point: its center, its axis, the ring in a torus.
+
+    Args:
+        surface: numbers of the surface.
+        hint: the point (3,) in the frame of the surface, m.
+    """
     kind, radius, _, *weights = surface
     if kind == TORUS:
         across = float(np.hypot(hint[0], hint[1]))
@@ -363,7 +416,15 @@ def _is_middle(surface: tuple[float, ...], hint: Array) -> bool:
 
 
 def _find_nearest_point(surface: tuple[float, ...], hint: Array) -> Array:
-    """Return the point of a surface that is nearest to another point."""
+    """Return the point of a surface that is nearest to another point.
+
+    Args:
+        surface: numbers of the surface.
+        hint: the other point (3,) in the frame of the surface, m.
+
+    Returns:
+        The nearest point (3,), m.
+    """
     kind, radius, square, *weights = surface
     if kind == TORUS:
         ring = hint * (1.0, 1.0, 0.0)
@@ -374,6 +435,7 @@ def _find_nearest_point(surface: tuple[float, ...], hint: Array) -> Array:
     k = np.array(weights)
     # The nearest point x satisfies x (1 + t k) = hint.
     t, nearest = 0.0, hint
+    # Newton's method for the multiplier t.
     for _ in range(50):
         t += float((k @ nearest**2 - square) / (2.0 * (k**2 / (1.0 + t * k)) @ nearest**2))
         nearest = hint / (1.0 + t * k)
