@@ -183,13 +183,13 @@ def test_loads_without_a_document(fixtures: Path, tmp_path: Path) -> None:
     wrong: list[tuple[tuple[str, ...], str]] = [
         (
             ("--external-loads", "push.sto"),
-            "push.sto: this is a table, which does not say what its forces push",
+            "push.sto: this table does not name the bodies on which its forces act",
         ),
-        (("--applied-to", "Pelvis=f_"), "name the table as external_loads"),
+        (("--applied-to", "Pelvis=f_"), "pass the table as `external_loads`"),
         (("--external-loads", "push.sto", "--applied-to", "Pelvic=f_"), "did you mean 'Pelvis'?"),
         (
             ("--external-loads", "push.sto", "--applied-to", "Pelvis=g_"),
-            "no column of 'push.sto' begins so",
+            "no column of 'push.sto' begins with it",
         ),
         (
             ("--external-loads", "push.sto", "--applied-to", "Pelvis"),

@@ -70,7 +70,7 @@ class Equations:
         self.structure, self.numbers, self.order = structure, packed.numbers, (0,) * n
         self.error_counts = (n, n) if counted is None else counted
         names = [f"state {k}" for k in range(size)] if names is None else names
-        self.state = SimpleNamespace(names=names, as_table=lambda rows: np.array(rows, dtype=float))
+        self.state = SimpleNamespace(names=names, to_table=lambda rows: np.array(rows, dtype=float))
         self.compute_derivative = f
 
     def project_state(self, t, y, tolerance):

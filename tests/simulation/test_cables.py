@@ -28,7 +28,7 @@ from tests.simulation.support import LEFT, RIGHT, cable, over, point
         (
             (LEFT, over(), RIGHT),
             ContactSphere(radius=0.4),
-            "cannot be laid over its obstacles in the default pose",
+            "cannot be wrapped over its obstacles in the default pose",
         ),
     ],
 )
@@ -80,5 +80,5 @@ def test_shortest():
 def test_a_point_that_gets_into_an_obstacle():
     """OpenSim throws in the middle of the motion."""
     model = cable(LEFT, over(), RIGHT, surface=ContactSphere(radius=0.1, location=(0, -0.01, 0)))
-    with pytest.raises(IntegrationError, match="no solution of the equations of '/forceset/s'"):
+    with pytest.raises(IntegrationError, match="there is no solution for '/forceset/s'"):
         osimlite.simulate(model, to=3.0, engine="compiled", accuracy=1e-3)

@@ -186,9 +186,9 @@ def test_a_jump_is_passed(method):
 
 
 @pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize(("accuracy", "advice"), [(1e-4, "less"), (3e-3, "more")])
+@pytest.mark.parametrize(("accuracy", "advice"), [(1e-4, "larger"), (3e-3, "smaller")])
 def test_a_motion_that_explodes_is_an_error(method, accuracy, advice):
-    words = rf"cannot go on at t = (0\.99|1\.00).* ask for {advice} accuracy"
+    words = rf"cannot continue at t = (0\.99|1\.00).* use a {advice} accuracy value"
     with pytest.raises(osimlite.errors.SimulationError, match=words):
         steps_of(lambda t, y: [y[0] * y[0]], [1.0], accuracy, method, to=2.0)
 

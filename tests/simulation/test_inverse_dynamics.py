@@ -55,7 +55,7 @@ def test_motions_in_every_form_are_the_same(tmp_path: Path) -> None:
         osimlite.inverse_dynamics(model, {"y": up}, times=TIMES).rows.tolist()
         == table.rows.tolist()
     )
-    with pytest.raises(SettingError, match="arrays of coordinates have no times of their own"):
+    with pytest.raises(SettingError, match="arrays of coordinates need `times`"):
         osimlite.inverse_dynamics(model, {"y": up})
     with pytest.raises(SettingError, match="'y' has 50 values for 51 times"):
         osimlite.kinematics(model, {"y": up[1:]}, times=TIMES)
@@ -128,16 +128,16 @@ def test_loads_without_a_document(tmp_path: Path) -> None:
     )
     assert two.rows - plain.rows == pytest.approx(2.0 * (one.rows - plain.rows), abs=1e-9)
     wrong: list[Any] = [
-        (plate, None, "a table, which does not say what its forces push"),
-        (tmp_path / "loads.xml", columns, "is no table of forces"),
-        (None, columns, "name the table as external_loads"),
+        (plate, None, "this table does not name the bodies on which its forces act"),
+        (tmp_path / "loads.xml", columns, "is not a table of forces"),
+        (None, columns, "pass the table as `external_loads`"),
         (plate, {"bok": [("f1_",)]}, "did you mean 'box'"),
         (plate, {"box": [("g1_",)]}, "the force_identifier of 'box' is 'g1_'"),
-        (plate, {"box": [()]}, "name what the labels of its force begin with"),
+        (plate, {"box": [()]}, "name the beginnings of the labels of its force"),
         (
             plate,
             {"box": [("f1_", "p1_", "m1_", "q1_")]},
-            "name what the labels of its force begin with",
+            "name the beginnings of the labels of its force",
         ),
     ]
     for file, applied, said in wrong:

@@ -104,14 +104,19 @@ def test_files_have_the_names_of_the_analysis(tmp_path: Path) -> None:
     ("model", "more", "error", "said"),
     [
         (lift(), {}, ModelError, "'lift' has no actuators"),
-        (lift(1.0), {"exponent": 1.0}, SettingError, "an exponent of 1 has not one answer"),
+        (
+            lift(1.0),
+            {"exponent": 1.0},
+            SettingError,
+            "an exponent of 1 does not determine the activations",
+        ),
         (lift(1.0), {"exponent": np.nan}, SettingError, "an exponent of nan"),
-        (lift(1.0), {"muscles": "strong"}, SettingError, "no 'strong' force"),
+        (lift(1.0), {"muscles": "strong"}, SettingError, "unknown muscle force 'strong'"),
         (lift(1.0), {"start": 3.0}, SettingError, "no time of the motion"),
         (lift(1.0), {"forces": ["nothing.xml"]}, OsimliteError, "nothing.xml"),
         (bounded(np.inf, np.inf), {}, ModelError, "controls from inf to inf only"),
         (bounded(1.0, 0.0), {}, ModelError, "a min_control of 1 above its max_control of 0"),
-        (lift(1.0), {"applied_to": {"body": [["f_"]]}}, SettingError, "name the table"),
+        (lift(1.0), {"applied_to": {"body": [["f_"]]}}, SettingError, "pass the table"),
     ],
 )
 def test_what_cannot_be_asked(

@@ -25,7 +25,7 @@ def test_what_does_not_exist_is_named():
         with pytest.raises(SettingError, match="there is no option 'to_time'"):
             simulation.run(0.1, to_time=3)
         with pytest.raises(
-            SettingError, match=r"'rolling' is chosen when a model is made ready: .*rolling="
+            SettingError, match=r"'rolling' belongs to the prepared model; .*rolling="
         ):
             simulation.run(0.1, rolling=True)
 
@@ -77,5 +77,7 @@ def test_steps_keep_their_bounds():
             SettingError, match="`step_bounds` cannot be combined with `fixed_step`"
         ):
             simulation.run(0.1, step_bounds=(0.0, 0.01), fixed_step=1e-3)
+        with pytest.raises(SettingError, match=r"no effect on the steps of 'adams'; .*merson or"):
+            simulation.run(0.1, step_bounds=(0.0, 0.01), integrator="adams")
     assert short.summary["steps"] >= 100 > free.summary["steps"]
     assert short.summary["settings"]["step_bounds"] == (0.0, 1e-3)

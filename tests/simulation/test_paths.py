@@ -111,6 +111,6 @@ def test_a_point_whose_place_is_no_number_is_refused():
     model.find("/forceset/mu").geometry_path.path_point_set.objects[0] = point
     with pytest.raises(
         ModelError,
-        match=r"the place of a point of '/forceset/mu.*' has a number that is not finite",
+        match=r"the location of a point of '/forceset/mu.*' has a number that is not finite",
     ):
         osimlite.simulate(model, 0.1)

@@ -164,11 +164,11 @@ def test_the_kernel_alone(model, code):
         ),
         (
             {"second": ([0.0, 0.0], [1.0, 2.0])},
-            "the control of 'second' has times that do not increase, or what is no number; mend it",
+            "the control of 'second' has times that do not increase, or a value that is not a finite number; correct it",
         ),
         (
             {"second": ([0.0, 1.0], [1.0, float("inf")])},
-            "the control of 'second' has times that do not increase, or what is no number; mend it",
+            "the control of 'second' has times that do not increase, or a value that is not a finite number; correct it",
         ),
         (
             {"second": lambda t: float("nan")},
@@ -216,6 +216,9 @@ def test_a_table_source_that_does_not_cover_the_motion(model, tmp_path):
         )
     )
     osimlite.simulate(fed, to=0.2, engine="compiled", folder=tmp_path)
-    message = "the table of '/table' goes from 0 to 0.2 s, and the motion from 0 to 0.3 s; outside of it OpenSim stops"
+    message = (
+        "the table of '/table' goes from 0 to 0.2 s, and the motion from 0 to 0.3 s; "
+        "OpenSim stops outside of the table, so extend it"
+    )
     with pytest.raises(SimulationError, match=message):
         osimlite.simulate(fed, to=0.3, engine="compiled", folder=tmp_path)

@@ -122,7 +122,7 @@ def test_what_has_no_solution_is_told_and_not_written(walk: Path) -> None:
     ("old", "new", "said"),
     [
         ("<use_model_force_set>true", "<use_model_force_set>false", "OpenSim crashes without"),
-        ("<activation_exponent>2", "<activation_exponent>1", "has not one answer"),
+        ("<activation_exponent>2", "<activation_exponent>1", "does not determine the activations"),
     ],
 )
 def test_what_cannot_be_asked(walk: Path, old: str, new: str, said: str) -> None:

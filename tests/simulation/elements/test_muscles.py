@@ -47,7 +47,7 @@ DIGITS = {"Millard2012EquilibriumMuscle": 2e-11, "Millard2012AccelerationMuscle"
 """How exactly the numbers of a muscle are known, where it is not 2e-12."""
 
 
-NOWHERE = r"no equilibrium was found of '/forceset/mu', whose path of 0\.\d+ m is 0\.\d+ m (long|short)er than its tendon"
+NOWHERE = r"no equilibrium was found for '/forceset/mu', whose path of 0\.\d+ m is 0\.\d+ m (long|short)er than its tendon"
 
 
 def system(model, code=None):
@@ -74,7 +74,7 @@ def test_derivatives_forces_and_energy(case, code):
         if row["error"]:
             with pytest.raises(
                 SimulationError,
-                match="no solution of the equations of '/forceset/mu', whose path of",
+                match="there is no solution for '/forceset/mu', whose path of",
             ):
                 ready.compute_applied_forces(float(number), y)
             continue
@@ -244,7 +244,7 @@ def test_no_muscle_is_in_equilibrium_where_there_is_none():
 @pytest.mark.parametrize(
     ("code", "words"),
     [
-        (None, "no equilibrium was found of"),
+        (None, "no equilibrium was found for"),
         (Checked("Python"), "cannot be computed: math range error"),
     ],
 )

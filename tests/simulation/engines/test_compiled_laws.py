@@ -101,7 +101,7 @@ def test_without_a_folder_the_code_lasts_for_the_process(tmp_path, monkeypatch, 
     for _ in range(2):
         assert run(compile_function("answer", answer, 0)) == 48
     (message,) = caplog.messages
-    assert "compiled anew in every run" in message and str(blocked) in message
+    assert "compiled again in every run" in message and str(blocked) in message
 
 
 def test_folders(monkeypatch, tmp_path):

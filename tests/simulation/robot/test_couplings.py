@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from osimlite.mechanics.multibody import functions as f
 from osimlite.mechanics.multibody.functions import Linear, ScaledFunction
-from osimlite.simulation.robot.couplings import Line, as_line
+from osimlite.simulation.robot.couplings import Line, find_line
 
 X, Y = (0.0, 1.0, 2.0, 3.5), (0.0, 1.0, -1.0, 0.5)
 
@@ -20,8 +20,8 @@ def test_straight_lines_are_known_in_any_form():
         ScaledFunction(0.5, f.SimmSpline((-1.0, 3.0), (-2.0, 14.0))),
         f.PiecewiseLinear((-1.0, 3.0), (-1.0, 7.0)),
     ]
-    assert [as_line(function) for function in lines] == [Line(2.0, 1.0)] * len(lines)
-    assert as_line(f.SimmSpline(X, [0.3] * len(X))) == Line(0.0, 0.3)
+    assert [find_line(function) for function in lines] == [Line(2.0, 1.0)] * len(lines)
+    assert find_line(f.SimmSpline(X, [0.3] * len(X))) == Line(0.0, 0.3)
     curves = [
         f.Polynomial((1.0, 2.0, 1.0)),
         f.WeightedSum((1.0, 2.0)),
@@ -32,4 +32,4 @@ def test_straight_lines_are_known_in_any_form():
         f.SimmSpline((0.0, 0.0), (0.0, 1.0)),
         f.PiecewiseLinear(X, Y),
     ]
-    assert [as_line(function) for function in curves] == [None] * len(curves)
+    assert [find_line(function) for function in curves] == [None] * len(curves)

@@ -220,14 +220,14 @@ def test_what_has_no_meaning_is_refused(model, tmp_path) -> None:
     (tmp_path / "first" / "controller.sto").unlink()
     for words, choices in (
         (
-            "goes on from 0.1 s on, and not to 0.05",
+            "after its start at 0.1 s, not 0.05",
             {"to": 0.05, "resume": first, "controller": feedback},
         ),
-        ("had a controller; give it", {"resume": first}),
-        ("so had no controller", {"resume": plain, "controller": feedback}),
-        (r"has left no controller\.sto", {"resume": tmp_path / "first", "controller": feedback}),
+        ("the earlier run had a controller; pass", {"resume": first}),
+        ("so it had no controller", {"resume": plain, "controller": feedback}),
+        (r"has no controller\.sto", {"resume": tmp_path / "first", "controller": feedback}),
         (
-            "say no other start",
+            "leave out initial values, speeds and equilibrate",
             {"resume": first, "controller": feedback, "initial": {"elbow": 1.0}},
         ),
         (
@@ -235,7 +235,10 @@ def test_what_has_no_meaning_is_refused(model, tmp_path) -> None:
             {"controller": "a.yaml"},
         ),
         ("leave out the fixed step", {"controller": feedback, "fixed_step": 0.001}),
-        ("not functions of Python", {"controller": feedback, "controls": {"motor": lambda t: t}}),
+        (
+            "combined with controls that are Python functions",
+            {"controller": feedback, "controls": {"motor": lambda t: t}},
+        ),
     ):
         with pytest.raises(OsimliteError, match=words):
             simulate(model, **{"to": 0.2, **choices})
@@ -248,9 +251,9 @@ def test_what_has_no_meaning_is_refused(model, tmp_path) -> None:
 @pytest.mark.parametrize(
     ("changed", "words"),
     [
-        ({"KP": 3.0}, r"'motor-elbow\.KP' 1, and this has 3"),
-        ({"P0": 1.0}, r"'motor-elbow\.P0' 1\.2, and this has 1"),
-        ({"delay": "0.006"}, r"'motor-elbow\.delay' 0\.005, and this has 0\.006"),
+        ({"KP": 3.0}, r"'motor-elbow\.KP' 1, this one has 3"),
+        ({"P0": 1.0}, r"'motor-elbow\.P0' 1\.2, this one has 1"),
+        ({"delay": "0.006"}, r"'motor-elbow\.delay' 0\.005, this one has 0\.006"),
         ({"allow_neg_P": 0}, "other reflexes, states of legs or noise"),
     ],
 )

@@ -88,7 +88,7 @@ def test_runs_may_start_in_equilibrium(engine):
     block = Runner(made).run(values)
     assert block.status == ["done"] * 3 + ["failed"]
     assert (
-        "no equilibrium was found of '/forceset/mu', whose path of 5 m is 4.68 m longer"
+        "no equilibrium was found for '/forceset/mu', whose path of 5 m is 4.68 m longer"
         in block.reasons[3]
     )
     for index, (x, length, activation) in enumerate(values[:3]):

@@ -139,7 +139,7 @@ def test_a_shape_without_a_size_is_left_out_with_a_word() -> None:
     model = with_shape(Brick(half_lengths=(0.1, 0.0, 0.1)))
     for translated in (osimlite.to_mjcf(model), osimlite.to_urdf(model)):
         (record,) = [record for record in translated.fidelity.records if record.kind == "visual"]
-        assert record.cannot_say == "a shape whose size is no positive number"
+        assert record.cannot_say == "a shape whose size is not a positive number"
         assert record.detail == "0.2 0 0.2 m"
 
 

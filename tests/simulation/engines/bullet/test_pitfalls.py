@@ -6,6 +6,8 @@ What is mended in the URDF file is tested with the URDF writer.
 
 from __future__ import annotations
 
+import gc
+
 import numpy as np
 import pytest
 
@@ -88,7 +90,7 @@ def test_fast_joints_are_not_clipped(monkeypatch):
         -1, 0
     ] == pytest.approx(150.0)
     monkeypatch.setattr(World, "FASTEST", 100.0)
-    with pytest.raises(OsimliteError, match="bursts"):
+    with pytest.raises(OsimliteError, match="diverges"):
         osimlite.simulate(spinning(150.0), to=0.1, fixed_step=0.01, engine="bullet")
 
 
@@ -213,6 +215,8 @@ def test_nothing_collides(mechanism):
 
 
 def test_worlds_are_left(mechanism):
+    # Engines that earlier tests left open are closed when they are collected: not during this test.
+    gc.collect()
     before = bullet.getConnectionInfo(0)["isConnected"]
     for _ in range(30):
         with BulletEngine(mechanism, Forces(())):
