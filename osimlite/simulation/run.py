@@ -115,6 +115,14 @@ def _borrow_simulation(
 
     While a thread uses a simulation, no other thread can take it. A simulation whose run failed is
     closed, not cached.
+
+    Args:
+        model: the model.
+        engine: name of the engine; None for the default one.
+        choices: options of the simulation and of its runs by name.
+
+    Yields:
+        Simulation of the model as it is now.
     """
     check_is_model(model)
     tree, chosen = model.tree(), Options.parse(choices)

@@ -297,7 +297,15 @@ def require_masses(robot: Robot) -> None:
 
 @contextmanager
 def write_temporary_file(text: str, files: Mapping[str, bytes]) -> Iterator[str]:
-    """Write a URDF file with its mesh files into a temporary folder, and yield its path."""
+    """Write a URDF file with its mesh files into a temporary folder.
+
+    Args:
+        text: text of the URDF file.
+        files: contents of the mesh files by their paths relative to it.
+
+    Yields:
+        Path of the URDF file; the folder is deleted afterwards.
+    """
     with tempfile.TemporaryDirectory(prefix="osimlite-") as folder:
         for name, content in {"robot.urdf": text.encode(), **files}.items():
             path = Path(folder, name)
