@@ -206,6 +206,7 @@ def _compute_mass_center(
     """
     parts = []
     for link in range(int(packed.structure[MODEL.LINKS])):
+        # Read from the numbers, which may be symbols or dual numbers: masses may be parameters.
         first = INERTIA_AT + INERTIA.SIZE * link
         parts.append(
             (
@@ -263,6 +264,7 @@ def _list_contact_values(
             and element.force_type.geometry is SPHERE_ON_PLANE
             and items
         ):
+            # The geometry's part of a record follows the results of the law: force, then point.
             pairs.append((element.path, items[-1][0] + len(element.force_type.record_offsets)))
     return [
         (f"{name}|{what}_{axis}", workspace.data[place + 3 * part + k])

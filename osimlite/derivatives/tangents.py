@@ -93,6 +93,7 @@ class DualMachine:
         # States are never projected onto constraints here.
         laws = tuple(name for name in packed.laws if name != "project")
         self.program = Program(replace(packed, laws=laws), _load_tangent_code(), entries)
+        # Dual numbers as rows: the value first, then the derivatives along each direction.
         self.x = np.zeros((len(packed.numbers), 1 + DIRECTIONS))
         self.x[:, 0] = packed.numbers
         self.w = np.zeros((int(packed.structure[MODEL.WORK_SIZE]) + extra_size, 1 + DIRECTIONS))
@@ -113,6 +114,8 @@ class DualMachine:
         Args:
             t: time, s.
         """
+        # Derivatives of an earlier call would be read where a kernel does not write all of its
+        # results.
         self.w[:, 1:] = 0.0
         self.w[WORK.TIME, 0] = t
 
@@ -173,6 +176,7 @@ class TangentModel(DifferentiableModel):
             dp: directions of the parameters (p, m).
             numbers: derivatives of the numbers (k, m), which are changed.
         """
+        # The numbers are linear in the parameters: their derivatives do not depend on p.
         numbers[self._parameter_rows] = self._slopes @ dp
 
     def along(
@@ -205,6 +209,7 @@ class TangentModel(DifferentiableModel):
         f = self._f
         y[self.state_indices, 0] = x
         self._control_rows[:, 0] = u
+        # NaN stays where the kernels report that a state cannot be evaluated.
         rates = np.full(len(x), np.nan)
         result = np.full(dx.shape, np.nan)
         # Machine code computes DIRECTIONS derivatives at once; more directions take more
@@ -251,6 +256,7 @@ class TangentModel(DifferentiableModel):
             Outputs (y,), and their derivatives by the state (y, x) and by the controls (y, u).
         """
         size = len(x)
+        # Unit directions: each state, then each control.
         both = np.eye(size + len(u))
         y = np.full(len(chosen), np.nan)
         slopes = np.full((len(chosen), size + len(u)), np.nan)
@@ -263,6 +269,7 @@ class TangentModel(DifferentiableModel):
                 number = known[group][1][k]
                 y[row] = number
                 slopes[row, part] = (
+                    # A number that depends on nothing has no slopes.
                     number.slopes[: own.stop - 1] if isinstance(number, DualNumber) else 0.0
                 )
 
@@ -446,6 +453,8 @@ class TangentSteps:
         self._number = -1
         self._numbers = [np.zeros(self._machine.x.shape) for _ in split_directions(self._count)]
         for (part, own), block in zip(split_directions(self._count), self._numbers, strict=True):
+            # Each block holds the numbers for DIRECTIONS directions, as parameters differ by
+            # direction.
             block[:, 0] = numbers
             block[:, own] = changes[:, part]
 

@@ -94,6 +94,7 @@ class SymbolicPath:
             python=register_symbolic(write_length),
         )
         speed = ForceRecord("", record_size=1, is_part=True, python=register_symbolic(write_speed))
+        # The records of a FunctionBasedPath, in which two kernels are replaced by these functions.
         before = [ForceRecord("pull_coordinates", is_part=True), given, speed]
         backs = [sum(ITEM.OWN + len(item.ints) for item in before[first:]) for first in range(3)]
         ints = backs[0], count, backs[1], backs[2], *freedoms, *[0] * count
@@ -132,6 +133,7 @@ class WrappedPaths:
         )
         poses = self._sample_poses(mechanism)
         arms = np.abs(self._system.compute_pulls(poses)).max(axis=0)
+        # A path depends on the coordinates about which it has a moment arm in one of the poses.
         moved = [[k for k in self._order if row[k] > 0.0] for row in arms]
         self.symbolic_paths = [SymbolicPath(coordinates) for coordinates in moved]
         self._groups = _group_coordinates(moved)
@@ -171,6 +173,7 @@ class WrappedPaths:
         Returns:
             Values of all coordinates (k, n).
         """
+        # A fixed seed makes the functions reproducible.
         rng = np.random.default_rng(0)
         bounds = np.array([info.range for info in mechanism.coordinates]).reshape(-1, 2)
         # Ranges without meaning, such as -99999 to 99999, are replaced by one unit around the
@@ -300,6 +303,7 @@ def _group_coordinates(paths: Sequence[Sequence[int]]) -> list[list[int]]:
     """
     groups: list[list[int]] = []
     for place in dict.fromkeys(place for own in paths for place in own):
+        # Coordinates that share a path with this one cannot be in its group.
         beside = {other for own in paths if place in own for other in own}
         group = next((each for each in groups if not beside & {*each}), None)
         if group is None:
@@ -348,6 +352,8 @@ class _NumericCallback(casadi.Callback):  # type: ignore[misc]
         self._out = out
         self._call = function
         self._slopes = slopes
+        # CasADi differentiates the slopes by finite differences, which gives the second
+        # derivatives.
         self.construct(name, {"enable_fd": slopes is None, "fd_method": "central"})
 
     def get_n_in(self) -> int:

@@ -405,6 +405,7 @@ class _SearchCallbacks:
         Returns:
             1 to stop the search, else 0.
         """
+        # The callback gets the values at the accepted iterate, which need no further evaluation.
         objective = float(f[0])
         worst = find_violations(self.program, self.unscale(x), rows, most=1)
         size = worst[0].size if worst else 0.0
@@ -421,9 +422,12 @@ class _SearchCallbacks:
     @contextmanager
     def stop_on_interrupt(self) -> Iterator[None]:
         """Let the first Ctrl-C stop the search after the iteration, and the second at once."""
+        # Python allows handlers of signals in the main thread only.
         if threading.current_thread() is not threading.main_thread():
             yield
             return
+        # Python only delivers signals between its own instructions, and Ipopt calls Python in each
+        # iteration.
         before = signal.getsignal(signal.SIGINT)
 
         def stop(*_: Any) -> None:

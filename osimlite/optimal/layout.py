@@ -62,6 +62,7 @@ class Layout:
             "projections": problem.projected_names,
         }
         force = read_range(problem.phase.multiplier_bounds) or (-np.inf, np.inf)
+        # Bounds that the study leaves open are infinite; Moco's defaults are in the schema.
         acceleration = read_range(solver.implicit_multibody_acceleration_bounds) or (
             -np.inf,
             np.inf,

@@ -206,6 +206,7 @@ class PrescribedMotion:
             u = np.zeros(len(force_model.controls))
             u[indices] = unit[1 : 1 + count]
             found.append(np.array(function(times[None], x, xdot, u, [], unit[1 + count :])))
+        # Less the value without forces, which every row contains.
         found[1:] = [item - found[0] for item in found[1:]]
         return np.vstack(found).T
 
@@ -242,6 +243,7 @@ class PrescribedDynamics(Dynamics):
 
     def __init__(self, problem: Problem) -> None:
         super().__init__(problem)
+        # No accelerations vary, whatever multibody_dynamics_mode says, as in Moco.
         self.is_implicit, self._first_rate = False, 0
         # The numbers of the motion are tabulated once, at the times of the grid.
         if any(low != high for low, high in problem.times):
@@ -394,6 +396,7 @@ class PrescribedDynamics(Dynamics):
         )
 
         def formula(point: Point) -> Formula:
+            # 1 multiplies the value without forces.
             given = casadi.vertcat(1.0, self._compute_actuator_forces(point), point.multipliers)
             return casadi.reshape(_stack_series(point, entries), size, -1) @ given
 

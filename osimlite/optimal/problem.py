@@ -295,6 +295,8 @@ class Problem(StudyContext):
                 # are costly as formulas.
                 functions = CasadiModel(self.model, parameters, self.folder, loads_given=True)
             except SettingError as error:
+                # The error of the model names a path; the parameter with this path is what the user
+                # wrote.
                 owners = (
                     part
                     for part in self.phase.parameters
@@ -423,6 +425,7 @@ class Problem(StudyContext):
             self._check_constraint_method(count)
         # OpenSim counts the constraints that lock or prescribe coordinates first.
         coordinates = [part for part in self.components.values() if isinstance(part, Coordinate)]
+        # Each coordinate has a lock, and one more constraint if it has a prescribed function.
         first = sum(1 + (part.prescribed_function is not None) for part in coordinates)
         return [
             f"cid{first + number}_p{row}" for number, row in _number_equations(self.model, count)
@@ -456,6 +459,7 @@ class Problem(StudyContext):
         """Return the ends of the mesh intervals, from 0 to 1."""
         solver = self.solver
         intervals = len(solver.mesh) or solver.num_mesh_intervals
+        # Checked before anything is allocated, as a typing error would use up the memory.
         most = min(MAX_MESH_INTERVALS, MAX_MESH_VALUES // max(1, len(self.functions.states)))
         if intervals > most:
             message = f"the mesh has {intervals} intervals; the maximum for this model is {most}"
@@ -573,6 +577,7 @@ def _number_equations(model: Model, count: int) -> Iterable[tuple[int, int]]:
     Returns:
         Number of its constraint, and row within the constraint, of each equation.
     """
+    # Other classes have one equation.
     sizes = {"WeldConstraint": 6, "PointConstraint": 3}
     rows: list[tuple[int, int]] = []
     constraints: Mapping[str, Any] = {part.path: part for part in model.constraint_set.objects}

@@ -69,11 +69,14 @@ class Program:
         ]
         points = range(len(problem.grid.fractions))
         is_mesh = problem.grid.is_mesh
+        # Points between nodes have no constraint errors, and maybe no path constraints: other
+        # formulas.
         groups = [[k for k in points if is_mesh[k]], [k for k in points if not is_mesh[k]]]
         inside = (
             problem.solver.enforce_path_constraint_mesh_interior_points or not problem.path_rows
         )
         if inside and not problem.has_constraints:
+            # Without such rows all points have the same formulas, which one call evaluates.
             groups = [[*points]]
         if problem.uses_projection:
             # No interval ends at the first point, so that it has no projection.
@@ -107,6 +110,7 @@ class Program:
             first += count
         parameters = [s[2 + owner] for owner in self.problem.parameter_owners]
         u = SX(len(self.problem.functions.controls), 1)
+        # Controls that do not vary stay structural zeros, which CasADi leaves out of formulas.
         u[[*map(self.problem.functions.controls.index, self.problem.controls)]] = parts["controls"]
         t = s[0] + fraction * (s[1] - s[0])
         return Point(
@@ -142,6 +146,7 @@ class Program:
         self.end_labels: list[str] = []
         limits: list[tuple[float, float]] = []
         for goal, terms in problem.goals:
+            # By identity: goals may be equal.
             indices = [k for k, pair in enumerate(self.integrals) if pair[0] is goal]
             ends = Endpoints(start, end, totals[indices[0]] if indices else None)
             value = SX(terms.value(ends))
@@ -153,6 +158,8 @@ class Program:
                 continue
             rows.append(self._divide_value(goal, value, ends))
             bounds = [read_range(each) or (0.0, 0.0) for each in goal.moco_constraint_info.bounds]
+            # A goal such as the periodicity has one value per pair, and its bounds are one range
+            # per value.
             count = rows[-1].numel()
             if bounds and len(bounds) != count:
                 raise problem.invalid_error(goal, f"it has {count} values and {len(bounds)} bounds")
@@ -379,6 +386,8 @@ class Program:
         """Make the sparse map from the Jacobians of the points to that of A w + B F, and the part of A."""
         width = len(self.layout.lower)
         rows, columns = self._entries("jacobian_rows", "jacobian_columns")
+        # An entry of a point's Jacobian appears once in each row of B F that contains its result of
+        # F.
         spread = self._b.select_columns(rows.astype(np.int64))
         constant = self._a
         keys = np.concatenate(
@@ -408,6 +417,7 @@ class Program:
         pattern = np.zeros((len(self.end_labels), width), dtype=bool)
         pattern[:, self.end_columns] |= self._end_pattern[:, :direct]
         for k in range(len(self.integrals)):
+            # Rows after those of g belong to the integrals.
             columns = self._jacobian_columns[self._jacobian_rows == self._row_count + k]
             # An integral depends on the variables of all points, and so does each endpoint
             # constraint on it.
@@ -447,6 +457,8 @@ class Program:
         """Return the arguments of F at fractions of time (n,) with variables z (n, ...)."""
         s = w[: self.layout.shared]
         times = w[0] + fractions * (w[1] - w[0])
+        # CasADi's mapped functions take one column per point, so that the shared variables are
+        # repeated.
         return [np.tile(s, len(fractions)), z, fractions, self._sample_time_functions(times)]
 
     def _evaluate_groups(self, name: str, w: Array) -> Array:

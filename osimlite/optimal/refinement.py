@@ -141,6 +141,8 @@ def solve_with_refinement(
         is_enough = len(rounds) > MAX_ROUNDS or len(mesh) > MAX_INTERVALS
         if not result.success or is_good or is_enough:
             return program, result, rounds
+        # A quasi-Newton search may find the first solution; from near it Newton's method needs few
+        # iterations.
         finer = _rebuild_program(program.problem, mesh, refinement.hessian)
         guess = interpolate_solution(program, result.w, finer)
         program = finer
@@ -320,6 +322,8 @@ class _SolutionPolynomials:
                 through = _integrate_basis(self.nodes, fractions)
                 change = np.einsum("nj,njs->ns", through, self.rates[intervals])
                 result[kind] = nodal[:, 0] + self.grid.lengths[intervals, None] * change
+            # As the study interpolates controls between the nodes: by lines, or by the polynomial
+            # of the scheme.
             elif kind == "controls" and self._lines:
                 result[kind] = nodal[:, 0] + fractions[:, None] * (nodal[:, -1] - nodal[:, 0])
             else:
@@ -338,6 +342,7 @@ def _evaluate_basis(nodes: Array, fractions: Array) -> Array:
 
 def _integrate_basis(nodes: Array, fractions: Array) -> Array:
     """Return the integrals (n, j) of the Lagrange polynomials of nodes (j,) from 0 to positions (n,)."""
+    # The integral of x ** k from 0 is x ** (k + 1) / (k + 1).
     powers = np.polynomial.polynomial.polyvander(fractions, len(nodes))[:, 1:] / np.arange(
         1, len(nodes) + 1
     )

@@ -42,6 +42,7 @@ def make_scheme(name: str) -> Scheme:
             with any degree.
     """
     if name == "trapezoidal":
+        # x1 - x0 = h (f0 + f1) / 2.
         half = np.array([0.5, 0.5])
         return Scheme(
             name, np.array([0.0, 1.0]), half, np.array([[-1.0, 1.0]]), -half[None], np.zeros((0, 2))
@@ -87,6 +88,7 @@ def _make_legendre_scheme(name: str, degree: int, is_radau: bool) -> Scheme:
     mean[1 : degree + 1] = weights.ravel()
     inner = fractions[1:-1]
     controls = np.zeros((len(inner), count))
+    # control(x) = (1 - x) first + x last at each inner point.
     controls[:, 0] = inner - 1.0
     controls[:, -1] = -inner
     controls[:, 1:-1] += np.eye(len(inner))

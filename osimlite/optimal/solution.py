@@ -165,6 +165,7 @@ def solve_program(
     """
     problem = program.problem
     rounds = list[Round]()
+    # A guess of the caller overrides that of the study.
     if guess is None and problem.solver.guess_file.strip():
         guess = problem.locate_file(problem.solver.guess_file)
     if isinstance(guess, str | Path):
@@ -187,6 +188,7 @@ def solve_program(
     terms = dict(zip(program.costs, costs.tolist(), strict=True))
     header = {
         "num_iterations": str(iterations),
+        # Entries and digits of the header are those of Moco's solution files.
         "objective": f"{costs.sum():.6f}",
         **{f"objective_{name}": f"{cost:.6f}" for name, cost in terms.items()},
         "solver_duration": f"{duration:.6f}",

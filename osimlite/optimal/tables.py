@@ -142,6 +142,7 @@ def _filter_lowpass(table: StoTable, operator: TabOpLowPassFilter) -> StoTable:
         times = even
     times, rows = filter_lowpass(times, rows, operator.cutoff_frequency)
     if operator.trim_to_original_time_range:
+        # Times after resampling differ from the original ones by rounding.
         slack = 1e-6 * (times[1] - times[0])
         is_within = (times >= table.times[0] - slack) & (times <= table.times[-1] + slack)
         times = times[is_within]
@@ -174,6 +175,7 @@ def _append_coupled_values(
             problem.check_name(operator, name, table.columns, "column", whose="the table")
         arguments = np.column_stack([table[name] for name in independent])
         others = [k for k, name in enumerate(table.columns) if name != paths[item.dependent]]
+        # Couplers are functions of rad and m, hence the refusal of degrees before.
         values = [item.function.evaluate(row)[0] for row in arguments]
         columns = (*(table.columns[k] for k in others), paths[item.dependent])
         table = replace(

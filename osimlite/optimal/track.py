@@ -70,6 +70,7 @@ def build_track_problem(
     if tool.states_reference.filepath.strip():
         table = process_table(bare, tool.states_reference, tool.states_reference, states, mechanism)
         if tool.track_reference_position_derivatives:
+            # Speeds are tracked too, at derivatives of the splines through the values.
             table = _append_speeds(table)
         tables["state_tracking"] = table
         phase.goals.append(
@@ -153,7 +154,9 @@ def solve_track(
 def _make_marker_goal(tool: MocoTrack) -> MocoMarkerTrackingGoal:
     """Return the goal that tracks markers; markers without a weight have weight 1."""
     weights = [
-        MarkerWeight(name=item.name, weight=item.weight) for item in tool.markers_weight_set.objects
+        # The tool has MocoWeights, and the goal MarkerWeights.
+        MarkerWeight(name=item.name, weight=item.weight)
+        for item in tool.markers_weight_set.objects
     ]
     reference = MarkersReference(
         name="markers_reference",

@@ -52,6 +52,7 @@ def build_step_time_asymmetry_goal(goal: MocoStepTimeAsymmetryGoal, problem: Pro
                 for path in paths
             )
             above = load - goal.contact_force_threshold
+            # 1 on the ground and 0 in the air.
             contacts.append(smooth_step(above, 0.5, 0.5, goal.contact_detection_smoothing))
             positions.append(get_component(goal.walking_direction, point.frame(foot).position))
         right, left = contacts

@@ -149,6 +149,7 @@ def compute_squared_angle(point: Point, frame: Frame, quaternion: Formula) -> Fo
         casadi.vertcat(2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x)),
         casadi.vertcat(2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)),
     )
+    # Rotation of the reference relative to the frame.
     turn = frame.rotation.T @ target
     cosine = (casadi.trace(turn) - 1) / 2
     square = (
@@ -277,6 +278,7 @@ class FrameReference:
             raise problem.invalid_error(self.goal, f"states_reference has no column '{missing[0]}'")
         frames = functions.frames(paths)
         rows = []
+        # Default values, for states that the motion leaves out.
         x = np.array(functions.x)
         indices = [functions.states.index(column) for column in motion.columns]
         for time, row in zip(motion.times, motion.rows, strict=True):

@@ -115,10 +115,12 @@ def build_marker_tracking_goal(goal: MocoMarkerTrackingGoal, problem: Problem) -
         if not reference.marker_file.strip():
             raise problem.invalid_error(goal, "markers_reference has no marker_file")
         table = read_table(problem.locate_file(reference.marker_file))
+    # Labels end in _1, _2 and _3; a marker with three columns is named once.
     measured = [*dict.fromkeys(label[:-2] for label in table.columns)]
     paths = {
         part.name: path for path, part in problem.components.items() if isinstance(part, Marker)
     }
+    # Tables may name markers by their paths, too.
     paths |= {path: path for path in paths.values()}
     tracked = [name for name in measured if name in paths or not goal.allow_unused_references]
     for name in tracked:
