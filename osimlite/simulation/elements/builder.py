@@ -110,6 +110,7 @@ class ElementBuilder:
         """
         for component in self.tree.components:
             unknown = (
+                # An unknown class in the force set may be a force: it gets an error, not silence.
                 isinstance(component, Unknown)
                 and self.tree.parent_of(component) is self.model.force_set
             )

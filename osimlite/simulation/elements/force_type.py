@@ -151,7 +151,10 @@ class ForceType:
             from osimlite.schema.muscles import Muscle
 
             is_muscle = issubclass(self.component, Muscle)
+            # Laws take the control first. Controllers that act by a muscle's lengthening speed add
+            # to it in the kernel.
             named.insert(0, ReflexControl() if is_muscle else Control(self.component.control_count))
+        # The record is frozen; this is its only field that follows from others.
         object.__setattr__(self, "terms", tuple(named))
         if self.inputs_type is not None and not {state.name for state in self.states} <= {
             *self.inputs_type._fields
@@ -219,6 +222,8 @@ class ForceType:
         Returns:
             Offsets by name, in the order of the record.
         """
+        # Rates go into the derivative of the state, and the success of a search into the outcome of
+        # the kernel.
         others = {SOLVED, *(state.rate for state in self.states)}
         names = [name for name in self.outputs if name not in others] + list(self.recorded_inputs)
         if self.geometry.speed and issubclass(self.component, Actuator):
@@ -273,6 +278,8 @@ class ForceType:
         at_states = tuple(
             len(offsets) + k for k, state in enumerate(force.optional_states) if state is not None
         )
+        # -1 stands for a state that the component lacks; the packer writes the offsets of the
+        # others.
         all_ints = (*offsets, *[-1] * len(self.states), *ints, *tail.ints)
         there = {
             state.name
@@ -300,6 +307,7 @@ class ForceType:
             derivatives = Response(self.contact_response, 0, 0, 1)
             size = ITEM.OWN + 2
             responses = [
+                # The first integer leads from this record to the contact behind all three.
                 ForceRecord(ints=(size * (3 - axis), axis), is_part=True, response=derivatives)
                 for axis in range(3)
             ]

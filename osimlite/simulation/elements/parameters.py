@@ -366,6 +366,7 @@ class Expression(Parameter):
             Integers and numbers of fixed position.
         """
         steps, constants = program(value)
+        # A step is three integers: operation and operands.
         count = len(steps) // 3
         # Each register may carry its derivatives with respect to the variables.
         registers = tail.reserve_record((1 + len(self.variables)) * (len(self.variables) + count))
@@ -413,6 +414,7 @@ class Expressions(Parameter):
         for formula in value:
             steps, constants = program(formula)
             ints += (len(steps) // 3, tail.append_numbers(constants), *steps)
+            # One expression is evaluated after another, so that all use the same registers.
             most = max(most, len(steps) // 3)
         return (tail.append_ints(ints), tail.reserve_record(len(self.variables) + most)), ()
 

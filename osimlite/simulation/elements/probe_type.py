@@ -188,6 +188,8 @@ class DeclaredProbe(Silent):
         reading, integrals = self.reading, len(self.states)
         numbers = [reading.constant, *(number for row in self.numbers for number in row)]
         ints = [len(self.places), reading.first, integrals, 0, len(numbers)]
+        # What a probe reads is in the records of forces, whose offsets are known after packing:
+        # they are references.
         reads = [read for row in self.places for read in row]
         references = tuple((len(ints) + number, owner) for number, (owner, _) in enumerate(reads))
         ints += [place for _, place in reads]
