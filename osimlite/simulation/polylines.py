@@ -104,6 +104,8 @@ class Polylines:
             *(() if self.bound else CONSTRAINT_LAWS),
         }
         for name in program.laws:
+            # Numbers of laws instead of addresses: JavaScript has none, and `_linked` replaces them
+            # here.
             ints[MODEL.LAWS + LAW_NUMBERS[name]] = 0 if name in unused else self._number_law(name)
         self._calls: list[int] = []
         for route in routes:

@@ -189,6 +189,7 @@ class RecordedMotion(Movement):
         """
         if not len(table.times):
             raise DocumentError("the motion has no rows", file=table.file)
+        # Coordinates without a column keep their default value.
         values = np.tile(mechanism.values({}), (len(table.times), 1))
         # Of columns with one label, the first counts.
         places = {label: place for place, label in reversed([*enumerate(table.columns)])}
@@ -247,6 +248,7 @@ class RecordedMotion(Movement):
             )
             values = np.delete(values, again, axis=0)
         expect_increasing_times(table.times, table.file)
+        # The negation also finds NaN.
         gaps = np.argwhere(~(np.abs(values) < MAX_COORDINATE))
         if len(gaps):
             row, place = gaps[0]
@@ -374,6 +376,7 @@ class RecordedMotion(Movement):
             angles = np.degrees(angles_xyz(state.rotations[:-1]))
             centres = MassCentres.of(state).positions()
             row[:-3] = np.concatenate([centres, angles], axis=1).ravel()
+            # A massless model has its mass centre at the origin, instead of NaN.
             row[-3:] = mechanism.inertial[0] @ centres / (mechanism.total_mass or 1.0)
         labels = (*columns, *(f"center_of_mass_{axis}" for axis in "XYZ"))
         return StoTable("Positions", self.times, labels, rows, in_degrees=True)

@@ -147,10 +147,12 @@ def _connect_points(
     if len(times) == 1:
         return Constant(values[0])
     widths = np.diff(times)
+    # Two points at one time make a step, without a slope between them.
     slopes = np.where(widths > 0.0, np.diff(values) / np.where(widths > 0.0, widths, 1.0), 0.0)
     lines = np.column_stack((values[:-1], slopes))
     if extrapolate:
         return PiecewisePolynomial(np.array(times[:-1]), lines)
+    # Constant before the first and after the last point.
     ends = np.array(((values[0], 0.0), (values[-1], 0.0)))
     return PiecewisePolynomial(np.array((times[0], *times)), np.vstack((ends[:1], lines, ends[1:])))
 

@@ -75,6 +75,7 @@ class Controls:
                     numbers += table_of_one(function, f"the control of '{name}'")
                 except UnsupportedError:
                     kernel = self._compute_in_python
+            # The sum of several functions is the control: ends tell which tables belong to it.
             ends.append(len(tables))
         return [len(ends), *ends, *tables], numbers, kernel
 
@@ -181,6 +182,8 @@ class ModelControls:
             Control per lengthening speed of the path, s/m.
         """
         fastest = actuator.optimal_fiber_length * actuator.max_contraction_velocity
+        # OpenSim's reflex multiplies the speed of the path relative to the greatest speed of the
+        # fibers.
         gain = self.reflexes.get(builder.path(actuator), 0.0)
         return gain / fastest if gain else 0.0
 
@@ -230,5 +233,6 @@ def map_actuators(builder: ElementBuilder) -> dict[str, Actuator]:
     """
     result: dict[str, Actuator] = {}
     for component in builder.find_components(Actuator):
+        # Of actuators of one name OpenSim finds the first.
         result.setdefault(component.name, component)
     return result

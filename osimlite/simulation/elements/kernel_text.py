@@ -126,6 +126,8 @@ class KernelText:
         force = self.force_type.geometry.displacement_output[0]
         rows, changed = (force, *(state.rate for state in force_type.states)), self.changed_outputs
         arguments = self._arguments
+        # Each input that matters gets a direction of the dual numbers; the other columns of the
+        # Jacobian are 0.
         directions = {column: direction for direction, column in enumerate(changed)}
         law = force_type.law_from_record or force_type.law
         count = len(changed)
@@ -150,6 +152,8 @@ class KernelText:
             f"{', '.join(f'{name}_0' for name in force_type.outputs)} = {self._write_call(arguments)}"
         ]
         lines += [
+            # The geometry applies a force of 1, whose generalized forces are the moment arms of the
+            # response.
             f"{force} = 1.0",
             *force_type.geometry.apply_code,
             "change = at(data, WORK.SCRATCH)",
@@ -190,6 +194,8 @@ class KernelText:
         begin = (
             f"{', '.join(known.values())} = {self._write_call(arguments[: of_moment + 1], 'begin')}"
         )
+        # Forces of one kind are computed in lanes: first all requests of a stage, then their curves
+        # together, then the law.
         first, second = made.asked, made.sought
         *_, curves = force_type.terms
         places, number = {}, self.size - curves.size
@@ -213,6 +219,7 @@ class KernelText:
             ),
         ]
         answers = ", ".join(f"request_result(lanes, {count} * asked + {k})" for k in range(count))
+        # The last curve needs no condition: one of the curves is always chosen.
         place = places[second.curves[-1]]
         for number, curve in reversed([*enumerate(second.curves[:-1])]):
             place = f"{places[curve]} if which == {number} else {place}"
