@@ -51,10 +51,11 @@ def format_help(name: str, command: Command, width: int, *, bold: bool = False) 
 
 
 def _name_argument(parameter: Any) -> str:
-    """Return an argument in capitals, with dots if there may be several."""
+    """Return an argument in capitals, with dots for several and brackets if it may be left out."""
     _, is_list = parameter.scalar()
     word = (parameter.declared.settings.get("metavar") or parameter.name).upper()
-    return f"{word}..." if is_list else word
+    word = f"{word}..." if is_list else word
+    return word if parameter.default is ... else f"[{word}]"
 
 
 def _name_option(parameter: Any) -> str:

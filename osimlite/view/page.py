@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from osimlite.base.text import format_count
 from osimlite.io.meshes.surface import Surface
 from osimlite.io.meshes.unit_shapes import compute_normals
 from osimlite.lint.diagnostic import Finding
@@ -110,7 +111,8 @@ def page_data(
     data: dict[str, Any] = replace_non_finite(
         {
             "name": model.name,
-            "facts": f"{len(mechanism.bodies)} bodies, {len(mechanism.coordinates)} coordinates, "
+            "facts": f"{format_count(len(mechanism.bodies), 'body')}, "
+            f"{format_count(len(mechanism.coordinates), 'coordinate')}, "
             f"{len(tree)} components",
             "server": server,
             "story": None if story is None else story._asdict(),

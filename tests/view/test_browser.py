@@ -465,3 +465,52 @@ def test_words_at_the_edge_are_whole(file_of, open_page, tmp_path):
     page.until(f"{inside.replace('x)', repr('#overlay span') + ')', 1)}.length > 3")
     assert all(page.run(inside, "#overlay span"))
     assert page.run(inside, "#layers div") == [True]
+
+
+def test_keys_play_step_and_choose_views(open_page, tmp_path):
+    model, motion = dynamic_walker(), stroll()
+    view = Shown.of(model, build_mechanism(model), motion=motion)
+    page = open_page(view.write_page(tmp_path / "page.html"))
+    page.page.keyboard.press("ArrowRight")
+    assert page.run("v.time") == pytest.approx(motion.times[1])
+    page.page.keyboard.press("ArrowRight")
+    page.page.keyboard.press("ArrowLeft")
+    assert page.run("v.time") == pytest.approx(motion.times[1])
+    before = page.run("v.stage.camera.position.toArray()")
+    page.page.keyboard.press("4")
+    assert page.run("v.stage.camera.position.toArray()") != before
+    page.page.keyboard.press(" ")
+    page.until("v.playing")
+    page.page.keyboard.press(" ")
+    page.until("!v.playing")
+
+
+def test_a_menu_closes_by_escape_and_by_a_click_elsewhere(open_page, tmp_path):
+    page = open_page(shown_walker().write_page(tmp_path / "page.html"))
+    for close in (
+        lambda: page.page.keyboard.press("Escape"),
+        lambda: page.page.mouse.click(640, 600),
+    ):
+        page.page.click("#layers summary")
+        assert page.page.locator("#layers").get_attribute("open") is not None
+        page.page.click("#layers label >> nth=0")
+        assert page.page.locator("#layers").get_attribute("open") is not None
+        close()
+        assert page.page.locator("#layers").get_attribute("open") is None
+
+
+def test_values_with_units_are_said_under_the_pointer(open_page, tmp_path):
+    model, motion = dynamic_walker(), stroll()
+    view = Shown.of(model, build_mechanism(model), motion=motion)
+    page = open_page(view.write_page(tmp_path / "page.html"))
+    page.run("v.setTime(0.2)")
+    assert page.run("v.measured('/forceset/RFootForce')") == ["force 100.0 N"]
+    from osimlite.models.source import make_model
+
+    page = open_page(Shown.of(make_model("jumper")).write_page(tmp_path / "jumper.html"))
+    (words,) = page.run("v.measured('/forceset/soleus_r')")
+    assert words.startswith("length 0.") and words.endswith(" m")
+
+
+def shown_walker() -> Shown:
+    return Shown.of(dynamic_walker())

@@ -3,6 +3,8 @@
 (() => {
   const { Curves, Mechanism, Stage, Tree, Sliders, showProperties, showFindings, make, $, bytes } = window.osimlite;
 
+  const VIEWS = ["home", "front", "side", "top"];
+
   class Viewer {
     constructor(data) {
       this.data = data;
@@ -18,6 +20,8 @@
       showFindings(this);
       this.player();
       this.mouse();
+      this.keys();
+      this.menus();
       this.stage.onDraw = () => this.placeLabels();
       new ResizeObserver(() => this.stage.resize()).observe($("main"));
       this.stage.resize();
@@ -137,10 +141,43 @@
       $("#play").addEventListener("click", () => this.playing ? this.pause() : this.play());
       $("#follow").checked = motion.travels;
       $("#follow").addEventListener("change", () => { this.stage.followed = null; });
+    }
+
+    // Space plays and pauses, arrows step through the moments, and 1 to 4 choose a view.
+    keys() {
       document.addEventListener("keydown", (event) => {
-        if (event.target.matches("input, select, #tree, button")) return;
-        if (event.key === " ") { event.preventDefault(); this.playing ? this.pause() : this.play(); }
+        if (event.ctrlKey || event.altKey || event.metaKey || !(event.target instanceof Element)) return;
+        // Text fields, sliders and the tree have these keys themselves.
+        if (event.target.matches("input:not([type=checkbox]), select, textarea, #tree, #tree *")) return;
+        const look = VIEWS[Number(event.key) - 1], motion = this.data.motion;
+        if (look) this.stage.look(this.data.directions[look]);
+        else if (motion && event.key === " " && !event.target.matches("button, summary, input")) {
+          event.preventDefault();
+          this.playing ? this.pause() : this.play();
+        } else if (motion && (event.key === "ArrowLeft" || event.key === "ArrowRight")) {
+          event.preventDefault();
+          this.pause();
+          this.step(event.key === "ArrowRight" ? 1 : -1);
+        }
       });
+    }
+
+    // Go to the next or the previous recorded moment.
+    step(way) {
+      const { times } = this.data.motion, near = 1e-9 * (times[times.length - 1] - times[0]);
+      const next = way > 0 ? times.find((time) => time > this.time + near) : times.findLast((time) => time < this.time - near);
+      if (next !== undefined) this.setTime(next);
+    }
+
+    // A menu closes when another place is clicked, or by Escape.
+    menus() {
+      const close = (inside) => {
+        for (const menu of document.querySelectorAll("details[open]")) {
+          if (menu.matches("#layers") && !menu.contains(inside)) menu.open = false;
+        }
+      };
+      document.addEventListener("pointerdown", (event) => close(event.target));
+      document.addEventListener("keydown", (event) => { if (event.key === "Escape") close(null); });
     }
 
     play() {
@@ -209,10 +246,26 @@
       }
     }
 
-    // What is said of a component under the pointer: its name, and its class.
+    // What is said of a component under the pointer: its name, its class, and its values with units.
     said(path) {
       const node = this.data.tree.find((item) => item.path === path);
-      return node ? [make("strong", { textContent: node.name }), node.kind] : [path];
+      if (!node) return [path];
+      const values = this.measured(path).map((words) => make("div", { textContent: words }));
+      return [make("strong", { textContent: node.name }), node.kind, ...values];
+    }
+
+    // Present values of a component, with their units.
+    measured(path) {
+      const words = [], motion = this.data.motion, row = this.stage.row;
+      const line = this.data.lines.find((item) => item.path === path && item.route != null);
+      if (line) words.push(`length ${this.mechanism.length(line.route, this.q).toFixed(4)} m`);
+      const level = motion?.activations[path]?.[row];
+      if (level !== undefined) words.push(`activation ${(level / 255).toFixed(2)}`);
+      for (const force of row >= 0 && motion ? motion.forces : []) {
+        const [x, y, z] = force.values.subarray(6 * row, 6 * row + 3), size = Math.hypot(x, y, z);
+        if (force.path === path && size > 0) words.push(`force ${size.toPrecision(4)} N`);
+      }
+      return words;
     }
 
     layers() {
