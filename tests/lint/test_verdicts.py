@@ -67,6 +67,20 @@ def test_a_force_that_is_not_finite_is_reported_beside_ignored_elements():
     assert {"OSIM101", "OSIM532"} <= set(check(small_model(forces=force)).codes)
 
 
+def test_an_actuator_in_a_list_that_no_set_holds():
+    """OpenSim does not read it, so that the controller drives the one in the ForceSet."""
+    actuator = '<CoordinateActuator name="act"><coordinate>q</coordinate></CoordinateActuator>'
+    controller = (
+        '<PrescribedController name="c"><actuator_list>act</actuator_list>'
+        '<FunctionSet name="ControlFunctions"><objects><Constant name="act"/></objects></FunctionSet>'
+        "</PrescribedController>"
+    )
+    text = small_model(forces=actuator, controllers=controller).replace("40600", "40000")
+    stray = text.replace("<BodySet", f"<objects>{actuator}</objects><BodySet", 1)
+    assert not check(text).errors
+    assert [finding.code for finding in check(stray).errors] == ["OSIM101"]
+
+
 def test_a_coupler_without_coordinates():
     """OpenSim reads memory that it has not set: it runs, or computes NaN."""
     constraint = (

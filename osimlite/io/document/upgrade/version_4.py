@@ -116,6 +116,15 @@ def name_paths(draft: Draft) -> None:
             draft.record_change(path)
 
 
+def _is_stray(draft: Draft, member: Element) -> bool:
+    """Return whether an element is in a list of objects that is not in a set."""
+    objects = member.getparent()
+    if objects is None or objects.tag != "objects":
+        return False
+    owner = objects.getparent()
+    return owner is None or not (draft.is_a(owner, "Set") or draft.is_a(owner, "ModelComponentSet"))
+
+
 def convert_controller_actuators(draft: Draft) -> None:
     """Turn the names in <actuator_list> into paths in <socket_actuators>.
 
@@ -127,8 +136,11 @@ def convert_controller_actuators(draft: Draft) -> None:
     listed = [*find_with_child(draft.find_all("Controller"), "actuator_list")]
     if not listed:
         return
+    # OpenSim does not read what is in a list that no set holds.
     actuators = [
-        (make_path(actuator), actuator.get("name", "")) for actuator in draft.find_all("Actuator")
+        (make_path(actuator), actuator.get("name", ""))
+        for actuator in draft.find_all("Actuator")
+        if not _is_stray(draft, actuator)
     ]
     forces = [
         (make_path(force), force.get("name", ""))
