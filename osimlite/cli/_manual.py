@@ -103,6 +103,7 @@ PAGES = {
     "osimlite.tools.trials": "docs/checking-trials.md",
     "osimlite.translate": "docs/urdf.md",
     "osimlite.translate.addbiomechanics": "docs/addbiomechanics.md",
+    "osimlite.translate.biomod": "docs/biorbd.md",
     "osimlite.translate.bvh": "docs/animation.md",
     "osimlite.translate.mjcf": "docs/mujoco.md",
     "osimlite.translate.nimble": "docs/addbiomechanics.md#models-made-for-nimblephysics",

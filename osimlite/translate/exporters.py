@@ -15,6 +15,7 @@ from osimlite.base.options import OptionSpec
 from osimlite.base.records import dataclass
 
 if TYPE_CHECKING:
+    from osimlite.translate.biomod import BioMod
     from osimlite.translate.bvh import Bvh
     from osimlite.translate.export import Urdf
     from osimlite.translate.mjcf.export import Mjcf
@@ -69,6 +70,13 @@ def write_bvh(*model: Any, **choices: Any) -> Bvh:
     from osimlite.translate.bvh import to_bvh
 
     return to_bvh(*model, **choices)
+
+
+def write_biomod(*model: Any, **choices: Any) -> BioMod:
+    """Translate a model for biorbd; see :func:`osimlite.translate.biomod.to_biomod`."""
+    from osimlite.translate.biomod import to_biomod
+
+    return to_biomod(*model, **choices)
 
 
 def write_page(shown: Shown, path: Path) -> str:
@@ -209,6 +217,15 @@ EXPORTERS: list[Exporter] = [
         suffix=".bvh",
         carries="skeleton and motion of all bodies; no masses, muscles or shapes",
         takes_motion=True,
+    ),
+    Exporter(
+        "biomod",
+        "convert",
+        "<file>.bioMod for biorbd",
+        write_biomod,
+        title="bioMod (biorbd)",
+        suffix=".bioMod",
+        carries="bodies, joints, markers, muscles with via points; no wrapping, constraints or contacts",
     ),
     Exporter(
         "glb",

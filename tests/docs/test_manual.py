@@ -31,8 +31,9 @@ PAGES = sorted(
     - {"docs/gallery.md"}
 )
 QUICK = (
-    "adoption", "addbiomechanics", "animation", "compiled", "constraints", "converting", "errors", "format-and-diff",
-    "from-mujoco", "from-urdf", "integrators", "lint-in-ci", "modifying", "plugin-classes", "rules", "urdf", "yaml",
+    "adoption", "addbiomechanics", "animation", "biorbd", "compiled", "constraints", "converting", "errors",
+    "format-and-diff", "from-mujoco", "from-urdf", "integrators", "lint-in-ci", "modifying", "plugin-classes", "rules",
+    "urdf", "yaml",
 )  # fmt: skip
 """Pages whose blocks take a second or two at most: the quick suite runs these, and reads all others
 (tests/docs/test_names_used.py)."""

@@ -57,7 +57,7 @@ def test_any_pose_of_a_tree_is_exact(tmp_path: Path) -> None:
     values = np.array(
         [mechanism.assemble(dict(zip(mechanism.coordinate_names, q, strict=True))) for q in values]
     )
-    result = make_bvh(mechanism, 0.01 * np.arange(30), values)
+    result = make_bvh(mechanism, np.linspace(0.0, 0.29, 30), values)
     path = to_bvh(make_walker(), name="it").write(tmp_path)[0]
     path.write_text("".join(osimlite.io.bvh.format_bvh(result.motion)))
     compare(path, mechanism, values)

@@ -1,0 +1,278 @@
+"""Models for biorbd (.bioMod): segments with one degree of freedom each, markers and muscles.
+
+biorbd has no joints that follow a function of a coordinate, and no constraints. So each motion of a
+joint along or about one axis becomes a degree of freedom, and ``<name>.coordinates.json`` says how
+the coordinates of the model give their values.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from osimlite.base.records import dataclass
+from osimlite.io.tables.storage import format_number
+from osimlite.mechanics.multibody import build_mechanism
+from osimlite.mechanics.multibody.schema_frames import Placements
+from osimlite.mechanics.multibody.spatial import Array
+from osimlite.schema.forces import Force
+from osimlite.schema.frames import PhysicalFrame
+from osimlite.schema.markers import Marker
+from osimlite.schema.model import Model
+from osimlite.schema.muscles import Muscle
+from osimlite.schema.paths import ConditionalPathPoint, GeometryPath, PathPoint
+from osimlite.schema.sets import Constraint
+from osimlite.simulation.robot.build import build_robot
+from osimlite.simulation.robot.names import UniqueNames, legal, legal_names
+from osimlite.simulation.robot.robot import Robot, RobotJoint
+from osimlite.translate.fidelity import LEFT_OUT, Fidelity
+from osimlite.translate.files import write_files
+from osimlite.translate.sidecar import format_coordinates
+
+AXES = {(1.0, 0.0, 0.0): "x", (0.0, 1.0, 0.0): "y", (0.0, 0.0, 1.0): "z"}
+"""Words for the axes of a segment."""
+
+MUSCLE_TYPE = "hillthelen"
+"""Class of biorbd's muscles that is nearest to those of OpenSim."""
+
+
+@dataclass(frozen=True)
+class BioMod:
+    """A model for biorbd.
+
+    Attributes:
+        name: name of the files without suffix.
+        text: the .bioMod file.
+        coordinates: JSON text that says how coordinates give the degrees of freedom.
+        fidelity: record of what was translated, approximated or left out.
+        robot: the links and joints of the segments.
+    """
+
+    name: str
+    text: str
+    coordinates: str
+    fidelity: Fidelity
+    robot: Robot
+
+    def write(self, folder: str | Path) -> list[Path]:
+        """Write ``<name>.bioMod`` and ``<name>.coordinates.json`` into a folder, which is made if it does not exist."""
+        files: dict[str, str | bytes] = {
+            f"{self.name}.bioMod": self.text,
+            f"{self.name}.coordinates.json": self.coordinates,
+        }
+        return write_files(Path(folder), files)
+
+
+def to_biomod(
+    model: Model,
+    *,
+    name: str | None = None,
+    folder: str | Path | None = None,
+    geometry: Sequence[str | Path] = (),
+) -> BioMod:
+    """Translate a model for biorbd.
+
+    Args:
+        model: the model.
+        name: name of the files without suffix; that of the model by default.
+        folder: not used; exporters have it in common.
+        geometry: not used; exporters have it in common.
+
+    Raises:
+        ModelError: the model is not a mechanism.
+        UnsupportedError: the model uses a joint or constraint that osimlite cannot compute.
+    """
+    mechanism = build_mechanism(model)
+    robot = legal_names(build_robot(mechanism))
+    fidelity = Fidelity(mechanism.name, "biomod")
+    for body in mechanism.bodies:
+        fidelity.translated[body.path] = f"segment {robot.link_of[body.path][0].name}"
+    for joint in robot.moving:
+        if joint.coordinate is None:
+            fidelity.add(
+                "function",
+                f"{joint.source}/{joint.name}",
+                "a motion that follows a function of coordinates",
+                "a degree of freedom of its own; the file of coordinates has the function",
+            )
+    for constraint in model.components(Constraint):
+        fidelity.add("constraint", constraint.path, "constraints", LEFT_OUT)
+    placements = Placements(model.tree())
+    lines = [
+        "version 4",
+        "",
+        f"gravity {_format_numbers(mechanism.gravity)}",
+        "",
+        *_format_segments(robot),
+        *_format_markers(model, robot, placements, fidelity),
+        *_format_muscles(model, robot, placements, fidelity),
+    ]
+    for force in model.components(Force):
+        if not isinstance(force, Muscle):
+            fidelity.add("force", force.path, "forces other than muscles", LEFT_OUT)
+    stem = legal(model.name or "model") if name is None else name
+    coordinates = format_coordinates(robot, f"{stem}.bioMod")
+    return BioMod(stem, "\n".join(lines) + "\n", coordinates, fidelity, robot)
+
+
+def _format_numbers(numbers: Sequence[float] | Array) -> str:
+    """Return numbers with all digits, separated by blanks."""
+    return " ".join(format_number(float(number)) for number in numbers)
+
+
+def _format_segments(robot: Robot) -> Iterator[str]:
+    """Yield the lines of all segments."""
+    root = robot.links[0]
+    # Biorbd's own root is called "root", whatever it carries.
+    yield from (f"segment {root.name}", "\tparent base", "endsegment", "")
+    joints = {joint.child: joint for joint in robot.joints}
+    for link in robot.links[1:]:
+        joint = joints[link.name]
+        parent, origin, word = joint.parent, joint.origin, _find_axis(joint)
+        if joint.kind != "fixed" and word is None:
+            # A segment moves along its own axes only: turn to the axis before, and back after.
+            turned = np.eye(4)
+            turned[:3, :3] = _align(joint.axis)
+            yield from _format_segment(
+                f"{link.name}_axis", parent, origin @ turned, joint, "z", robot
+            )
+            yield from ("\tmass 0", "endsegment", "")
+            parent, origin = f"{link.name}_axis", turned.T
+            yield from _format_segment(link.name, parent, origin, None, "", robot)
+        else:
+            moved = joint if joint.kind != "fixed" else None
+            yield from _format_segment(link.name, parent, origin, moved, word or "", robot)
+        # Without these lines biorbd gives the segment a small mass.
+        yield f"\tmass {format_number(link.mass)}"
+        yield "\tinertia"
+        yield from (f"\t\t{_format_numbers(row)}" for row in link.inertia)
+        yield f"\tcom {_format_numbers(link.center)}"
+        yield from ("endsegment", "")
+
+
+def _format_segment(
+    name: str, parent: str, origin: Array, joint: RobotJoint | None, word: str, robot: Robot
+) -> Iterator[str]:
+    """Yield the lines of a segment up to its mass.
+
+    Args:
+        name: name of the segment.
+        parent: name of the segment that carries it.
+        origin: frame of the segment in that of the parent (4, 4), before the motion.
+        joint: the joint that moves it; None if it does not move.
+        word: axis of the motion.
+        robot: the robot.
+    """
+    yield f"segment {name}"
+    yield f"\tparent {parent}"
+    yield "\trtinmatrix 1"
+    yield "\trt"
+    yield from (f"\t\t{_format_numbers(row)}" for row in origin)
+    if joint is not None:
+        yield f"\t{'rotations' if joint.kind == 'revolute' else 'translations'} {word}"
+        if joint.coordinate is not None:
+            low, high = robot.mechanism.coordinates[joint.coordinate].range
+            yield "\trangesQ"
+            yield f"\t\t{_format_numbers((low, high))}"
+
+
+def _find_axis(joint: RobotJoint) -> str | None:
+    """Return the word for the axis of a joint; None if it is not a positive coordinate axis."""
+    return AXES.get(tuple((joint.axis + 0.0).tolist()))
+
+
+def _align(axis: Array) -> Array:
+    """Return a rotation (3, 3) whose third column is an axis."""
+    helper = np.eye(3)[int(np.argmin(np.abs(axis)))]
+    first = np.cross(helper, axis)
+    first /= np.linalg.norm(first)
+    return np.column_stack([first, np.cross(axis, first), axis])
+
+
+def _place(station: Marker | PathPoint, robot: Robot, placements: Placements) -> tuple[str, Array]:
+    """Return the segment of a point, and its position there (3,), m."""
+    frame = placements.follow_socket(station, "socket_parent_frame")
+    assert isinstance(frame, PhysicalFrame)
+    base, matrix = placements.resolve_frame(frame)
+    link, body = robot.link_of[base]
+    point = matrix[:3, :3] @ np.array(station.location, dtype=float) + matrix[:3, 3]
+    return link.name, body[:3, :3] @ point + body[:3, 3]
+
+
+def _format_markers(
+    model: Model, robot: Robot, placements: Placements, fidelity: Fidelity
+) -> Iterator[str]:
+    """Yield the lines of all markers."""
+    names = UniqueNames()
+    for marker in model.components(Marker):
+        name = names(marker.name)
+        segment, point = _place(marker, robot, placements)
+        fidelity.translated[marker.path] = f"marker {name}"
+        yield from (f"marker {name}", f"\tparent {segment}", f"\tposition {_format_numbers(point)}")
+        yield from ("\ttechnical 1", "endmarker", "")
+
+
+def _format_muscles(
+    model: Model, robot: Robot, placements: Placements, fidelity: Fidelity
+) -> Iterator[str]:
+    """Yield the lines of all muscles, each with a group of its own."""
+    names = UniqueNames()
+    for muscle in model.components(Muscle):
+        path = muscle.geometry_path
+        if not isinstance(path, GeometryPath):
+            fidelity.add(
+                "muscle", muscle.path, "a path that is a function of coordinates", LEFT_OUT
+            )
+            continue
+        points = [point for point in path.path_point_set.objects if isinstance(point, PathPoint)]
+        odd = len(path.path_point_set.objects) - len(points)
+        conditional = sum(isinstance(point, ConditionalPathPoint) for point in points)
+        wraps = len(path.path_wrap_set.objects)
+        if len(points) < 2:
+            fidelity.add("muscle", muscle.path, "a path without two fixed points", LEFT_OUT)
+            continue
+        for count, words, done in (
+            (wraps, "a path around surfaces", "straight between its points"),
+            (odd, "points that move with a coordinate", "the path runs without them"),
+            (conditional, "points that count in a range only", "the path always runs through them"),
+        ):
+            if count:
+                fidelity.add("path", muscle.path, words, done, f"{count} in the path")
+        fidelity.add(
+            "muscle-law",
+            muscle.path,
+            "the force curves of OpenSim's muscles",
+            f"biorbd's '{MUSCLE_TYPE}'",
+        )
+        name = names(muscle.name)
+        placed = [_place(point, robot, placements) for point in points]
+        (first, origin), *inner, (last, insertion) = placed
+        yield from (
+            f"musclegroup {name}_group",
+            f"\toriginparent {first}",
+            f"\tinsertionparent {last}",
+        )
+        yield from (
+            "endmusclegroup",
+            "",
+            f"muscle {name}",
+            f"\ttype {MUSCLE_TYPE}",
+            f"\tmusclegroup {name}_group",
+        )
+        numbers: dict[str, Sequence[float] | Array] = {
+            "originposition": origin,
+            "insertionposition": insertion,
+            "optimallength": [muscle.optimal_fiber_length],
+            "maximalforce": [muscle.max_isometric_force],
+            "tendonslacklength": [muscle.tendon_slack_length],
+            "pennationangle": [muscle.pennation_angle_at_optimal],
+            "maxvelocity": [muscle.max_contraction_velocity],
+        }
+        yield from (f"\t{word} {_format_numbers(values)}" for word, values in numbers.items())
+        yield from ("endmuscle", "")
+        for index, (segment, point) in enumerate(inner):
+            yield from (f"viapoint {name}_{index + 1}", f"\tparent {segment}", f"\tmuscle {name}")
+            yield f"\tmusclegroup {name}_group"
+            yield from (f"\tposition {_format_numbers(point)}", "endviapoint", "")

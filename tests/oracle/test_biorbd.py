@@ -1,0 +1,102 @@
+"""biorbd, live: it reads our files, and has the poses, mass matrices, markers and path lengths of the model.
+
+The variable OSIMLITE_BIORBD names a Python that has biorbd (``pip install biorbd``).
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import osimlite
+from osimlite.models.dynamic_walker import dynamic_walker
+from osimlite.models.jumper import jumper
+from osimlite.translate.biomod import to_biomod
+from tests.translate.test_biomod import make_tilted
+
+pytestmark = pytest.mark.full
+
+VARIABLE = "OSIMLITE_BIORBD"
+
+SCRIPT = """
+import json, os, sys
+import numpy as np
+import biorbd
+
+path, states = json.load(sys.stdin)
+model = biorbd.Model(path)
+names = [model.segment(index).name().to_string() for index in range(model.nbSegment())]
+result = []
+for state in states:
+    q = biorbd.GeneralizedCoordinates(np.array(state, float))
+    if model.nbMuscles():
+        model.updateMuscles(q, True)
+    result.append({
+        "poses": {name: pose.to_array().tolist() for name, pose in zip(names, model.allGlobalJCS(q))},
+        "mass": model.massMatrix(q).to_array().tolist(),
+        "markers": [marker.to_array().tolist() for marker in model.markers(q)],
+        "lengths": [model.muscle(k).musculoTendonLength(model, q, False) for k in range(model.nbMuscles())],
+    })
+os.write(1, b"\\nANSWER" + json.dumps(result).encode() + b"\\n")
+"""
+
+
+def ask_biorbd(path: Path, states: list[list[float]]) -> Any:
+    python = os.environ.get(VARIABLE)
+    if not python:
+        pytest.skip(f"needs biorbd: {VARIABLE} names no Python that has it")
+    done = subprocess.run(
+        [python, "-c", SCRIPT],
+        input=json.dumps([str(path), states]),
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=240,
+        env={name: value for name, value in os.environ.items() if name != "PYTHONPATH"},
+    )
+    for line in done.stdout.splitlines():
+        if line.startswith("ANSWER"):
+            return json.loads(line.removeprefix("ANSWER"))
+    raise AssertionError(f"biorbd ended with {done.returncode}: {done.stderr[-500:]}")
+
+
+@pytest.mark.parametrize("make", [make_tilted, dynamic_walker, jumper])
+def test_biorbd_computes_the_same(tmp_path: Path, make: Callable[[], osimlite.Model]) -> None:
+    model = make()
+    made = to_biomod(model, name="it")
+    path = made.write(tmp_path)[0]
+    mechanism, moving = made.robot.mechanism, made.robot.moving
+    rng = np.random.default_rng(0)
+    states = []
+    for _ in range(10):
+        q = mechanism.values({}) + rng.uniform(-0.4, 0.4, len(mechanism.coordinates))
+        for index, info in enumerate(mechanism.coordinates):
+            if info.locked:
+                q[index] = info.default_value
+        states.append(q)
+    answer = ask_biorbd(path, [[float(joint.value(q)) for joint in moving] for q in states])
+    order = [joint.coordinate for joint in moving]
+    paths = osimlite.paths(model)
+    for q, result in zip(states, answer, strict=True):
+        state = mechanism.at(q)
+        for index, body in enumerate(mechanism.bodies):
+            link, frame = made.robot.link_of[body.path]
+            np.testing.assert_allclose(
+                np.array(result["poses"][link.name]) @ frame, state.transform(index), atol=1e-12
+            )
+        if None not in order:
+            mass = np.asarray(mechanism.mass_matrix(q))[np.ix_(order, order)]
+            np.testing.assert_allclose(result["mass"], mass, atol=1e-12 * np.abs(mass).max())
+        wrapped = {record.component for record in made.fidelity if record.kind == "path"}
+        lengths = paths.lengths(q)
+        muscles = [each for each in model.components(osimlite.Muscle)]
+        for muscle, length in zip(muscles, result["lengths"], strict=True):
+            if muscle.path not in wrapped:
+                assert length == pytest.approx(lengths[muscle.path], abs=1e-9)

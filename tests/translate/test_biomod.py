@@ -1,0 +1,105 @@
+"""Models for biorbd: segments, markers and muscles of a file give the poses of the model.
+
+tests/oracle/test_biorbd.py compares with biorbd itself.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import osimlite
+from osimlite.models.dynamic_walker import dynamic_walker
+from osimlite.models.jumper import jumper
+from osimlite.translate.biomod import BioMod, to_biomod
+from tests.cli.command import run
+from tests.io.b3d_files import make_walker
+
+
+def make_tilted() -> osimlite.Model:
+    """A walker with a hip whose axis is no axis of its frame, a marker and a muscle."""
+    model = make_walker()
+    function = osimlite.LinearFunction(coefficients=(1.0, 0.0))
+    axis = osimlite.TransformAxis(
+        name="rotation1", axis=(0.6, 0.0, -0.8), function=function, coordinates=("swing",)
+    )
+    tail = model.add(osimlite.Body(name="tail", mass=1.0, inertia=(1.0, 2.0, 2.5, 0.1, 0.0, 0.0)))
+    joint = osimlite.CustomJoint(
+        name="tail",
+        coordinates=[osimlite.Coordinate(name="swing")],
+        spatial_transform=osimlite.SpatialTransform(rotation1=axis),
+    )
+    model.add(joint.between(model["/bodyset/pelvis"], tail, at=(-0.1, 0.0, 0.0)))
+    model.add(osimlite.Marker(name="tip", socket_parent_frame=tail, location=(0.1, 0.2, 0.3)))
+    muscle = osimlite.Thelen2003Muscle(name="wagger", max_isometric_force=200.0)
+    muscle.geometry_path.add_point(model["/bodyset/pelvis"], (0.0, 0.1, 0.0))
+    muscle.geometry_path.add_point(model["/bodyset/pelvis"], (-0.05, 0.1, 0.0))
+    muscle.geometry_path.add_point(tail, (-0.2, 0.0, 0.05))
+    model.add(muscle)
+    return model
+
+
+def find_segments(made: BioMod, values: dict[str, float]) -> dict[str, np.ndarray]:
+    """Return the poses of all segments of a text, with a value for each moving segment."""
+    poses = {"base": np.eye(4)}
+    numbers = iter(values.values())
+    for name, body in re.findall(r"^segment (\S+)\n(.*?)^endsegment$", made.text, re.M | re.S):
+        parent = re.search(r"parent (\S+)", body)
+        assert parent is not None
+        pose = poses[parent[1]]
+        if matrix := re.search(r"\trt\n((?:\t\t.*\n){4})", body):
+            pose = pose @ np.array(matrix[1].split(), dtype=float).reshape(4, 4)
+        if motion := re.search(r"(rotations|translations) ([xyz])", body):
+            value, axis = next(numbers), "xyz".index(motion[2])
+            moved = np.eye(4)
+            if motion[1] == "translations":
+                moved[axis, 3] = value
+            else:
+                i, j = ((1, 2), (2, 0), (0, 1))[axis]
+                moved[i, i] = moved[j, j] = np.cos(value)
+                moved[j, i], moved[i, j] = np.sin(value), -np.sin(value)
+            pose = pose @ moved
+        poses[name] = pose
+    return poses
+
+
+@pytest.mark.parametrize("make", [make_tilted, dynamic_walker, jumper])
+def test_segments_have_the_poses_of_the_bodies(make) -> None:
+    made = to_biomod(make())
+    mechanism = made.robot.mechanism
+    rng = np.random.default_rng(0)
+    for _ in range(5):
+        q = mechanism.values({}) + rng.uniform(-0.5, 0.5, len(mechanism.coordinates))
+        for index, info in enumerate(mechanism.coordinates):
+            if info.locked:
+                q[index] = info.default_value
+        values = {joint.name: joint.value(q) for joint in made.robot.moving}
+        poses = find_segments(made, values)
+        state = mechanism.at(q)
+        for index, body in enumerate(mechanism.bodies):
+            link, frame = made.robot.link_of[body.path]
+            np.testing.assert_allclose(poses[link.name] @ frame, state.transform(index), atol=1e-12)
+
+
+def test_markers_and_muscles_are_written() -> None:
+    made = to_biomod(make_tilted())
+    assert "marker tip\n\tparent tail\n\tposition 0.1 0.2 0.3\n" in made.text
+    assert "muscle wagger\n\ttype hillthelen\n" in made.text and "\tmaximalforce 200\n" in made.text
+    assert "viapoint wagger_1\n\tparent pelvis\n\tmuscle wagger\n" in made.text
+    kinds = {record.kind for record in made.fidelity}
+    assert {"muscle-law", "constraint"} <= kinds
+
+
+def test_the_command_writes_all_files(tmp_path: Path) -> None:
+    osimlite.write(dynamic_walker(), tmp_path / "walker.osim")
+    done = run("convert", "walker.osim", "-o", "out/it.bioMod", folder=tmp_path)
+    assert done.code == 0, done.err
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {
+        "it.bioMod", "it.coordinates.json", "fidelity.json", "summary.json",
+    }  # fmt: skip
+    records = json.loads((tmp_path / "out/fidelity.json").read_text())["records"]
+    assert {"force"} <= {record["kind"] for record in records}
