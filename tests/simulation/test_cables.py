@@ -54,14 +54,14 @@ def test_a_path_beside_a_half_space_is_straight(hint: tuple[float, float, float]
 
 
 def test_a_path_that_is_normal_to_a_plane_at_its_hint():
-    with pytest.raises(ModelError, match="cannot be laid over its obstacles"):
+    with pytest.raises(ModelError, match="cannot be wrapped over its obstacles"):
         osimlite.paths(
             cable(LEFT, over((0, 0.1, 0)), RIGHT, surface=ContactHalfSpace(location=(9, 0, 0)))
         )
 
 
 def test_a_point_inside_a_half_space():
-    with pytest.raises(ModelError, match="cannot be laid over its obstacles"):
+    with pytest.raises(ModelError, match="cannot be wrapped over its obstacles"):
         osimlite.paths(cable(LEFT, over(), RIGHT, surface=ContactHalfSpace()))
 
 

@@ -233,6 +233,5 @@ def map_actuators(builder: ElementBuilder) -> dict[str, Actuator]:
     """
     result: dict[str, Actuator] = {}
     for component in builder.find_components(Actuator):
-        # Of actuators of one name OpenSim finds the first.
         result.setdefault(component.name, component)
     return result
