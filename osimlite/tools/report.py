@@ -17,9 +17,11 @@ from osimlite.base.text import join_words
 from osimlite.errors import OsimliteError
 from osimlite.fitting.fitted_motion import MARKER_ERROR_LIMITS_M
 from osimlite.io.document.cache import get_object
+from osimlite.io.tables.storage import StoTable
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.spatial import Array
+from osimlite.simulation.static_optimization import TITLE as ACTIVATION_TITLE
 from osimlite.tools.evidence import (
     Evidence,
     Steps,
@@ -32,9 +34,20 @@ from osimlite.tools.trials.check import check_trial
 from osimlite.tools.trials.folder import SETUPS
 from osimlite.view.lettering import plain_lettering
 from osimlite.view.motion import contact_forces
-from osimlite.view.panels import COLORS, STYLES, figure_of
+from osimlite.view.panels import (
+    COLORS,
+    STYLES,
+    Column,
+    Panel,
+    draw_pages,
+    figure_of,
+    group_columns,
+    has_cycles,
+    merge_panels,
+)
 from osimlite.view.recording import MeasuredMarkers, Recording, compute_forces
 from osimlite.view.shown import Shown
+from osimlite.view.table_plots import SECTIONS, Names, describe_columns
 
 SIDES = {"r": (COLORS[0], "right"), "l": (COLORS[1], "left"), "": ("#444444", "")}
 """Color and name of the curves of each side."""
@@ -74,6 +87,7 @@ class TrialOutcomes(NamedTuple):
 
     name: str  # name of the trial
     outcomes: Sequence[Outcome]  # outcomes of its setups
+    setups: Sequence[Path] = ()  # the setups, in the same order
 
     @property
     def evidence(self) -> Evidence | None:
@@ -142,36 +156,53 @@ def report(outcomes: Mapping[str | Path, Outcome], path: str | Path) -> Path:
 
 def collect_trials(outcomes: Mapping[str | Path, Outcome]) -> list[TrialOutcomes]:
     """Group outcomes by the folders of their setups."""
-    by_folder: dict[Path, list[Outcome]] = {}
+    by_folder: dict[Path, dict[Path, Outcome]] = {}
     for setup, outcome in outcomes.items():
-        by_folder.setdefault(Path(setup).resolve().parent, []).append(outcome)
+        by_folder.setdefault(Path(setup).resolve().parent, {})[Path(setup)] = outcome
     titles = [outcome.title for outcome in outcomes.values()]
     # The name of a single study says more than that of its folder.
     alone = titles[0] if len(titles) == 1 else ""
-    return [TrialOutcomes(alone or folder.name, group) for folder, group in by_folder.items()]
+    return [
+        TrialOutcomes(alone or folder.name, [*group.values()], [*group])
+        for folder, group in by_folder.items()
+    ]
 
 
 def _render_trials(trials: Sequence[TrialOutcomes]) -> Iterator[str]:
     """Yield the HTML of messages, viewers and figures of all trials."""
     for trial in trials:
-        rows = [(name, words) for outcome in trial.outcomes for name, words in outcome.told]
-        facts = "".join(
-            f"<tr><th>{html.escape(name)}</th><td>{html.escape(words)}</td></tr>"
-            for name, words in rows
-        )
+        facts = "".join(_render_messages(trial))
         heading = f"<h2>{html.escape(trial.name)}</h2>" if len(trials) > 1 else ""
         yield f"{heading}<table>{facts}</table>"
         if trial.evidence is not None:
-            yield _render_viewer(trial.evidence)
+            yield _render_viewer(trial.evidence, read_muscle_states(trial))
     shown = [trial for trial in trials if trial.evidence is not None]
     yield from _render_section("Joint angles", collect_angles(shown))
     yield from _render_section("Joint moments", collect_moments(shown))
+    for title, note, panels in collect_actuators(shown):
+        yield from _render_panels(title, note, panels)
     yield from _render_section("Controls", collect_controls(shown))
     yield from _render_section("Contact forces", collect_contacts(shown))
     for trial in shown:
         name = f": {trial.name}" if len(shown) > 1 else ""
         yield from _render_residuals(trial, name)
         yield from _render_errors(trial, name)
+
+
+def _render_messages(trial: TrialOutcomes) -> Iterator[str]:
+    """Yield the rows of the messages of a trial, with the tool and the setup that made them."""
+    for index, outcome in enumerate(trial.outcomes):
+        tool = ""
+        if index < len(trial.setups):
+            setup = trial.setups[index]
+            tool = f"{type(get_object(str(setup))).__name__}, {setup.name}"
+        for number, (name, words) in enumerate(outcome.told):
+            # The first row of a tool names it.
+            source = html.escape(tool) if number == 0 else ""
+            yield (
+                f'<tr><td class="source">{source}</td><th>{html.escape(name)}</th>'
+                f"<td>{html.escape(words)}</td></tr>"
+            )
 
 
 def _render_verdicts(outcomes: Mapping[str | Path, Outcome]) -> Iterator[str]:
@@ -203,8 +234,109 @@ def _render_verdicts(outcomes: Mapping[str | Path, Outcome]) -> Iterator[str]:
     )
 
 
-def _render_viewer(evidence: Evidence) -> str:
-    """Return the HTML of a viewer with the motion."""
+def read_muscle_states(trial: TrialOutcomes) -> dict[str, Array]:
+    """Return the activations of muscles that a tool has computed, at the times of the trial's motion.
+
+    Args:
+        trial: a trial with a motion.
+
+    Returns:
+        Activations by state labels; none if the motion has states itself.
+    """
+    evidence = trial.evidence
+    assert evidence is not None
+    if evidence.states:
+        return {}
+    result = {}
+    for outcome in trial.outcomes:
+        for table in outcome.tables.values():
+            if not len(table.times):
+                continue
+            for label, column in zip(table.columns, table.rows.T, strict=True):
+                if table.name == ACTIVATION_TITLE:
+                    label = f"{label}.activation"
+                elif not label.endswith("/activation"):
+                    continue
+                result[label] = np.interp(evidence.times, table.times, np.nan_to_num(column))
+    return result
+
+
+def collect_actuators(
+    trials: Sequence[TrialOutcomes],
+) -> list[tuple[str, str, list[Panel]]]:
+    """Return the panels of activations, muscle forces, reserves and residuals.
+
+    Args:
+        trials: trials that have a motion.
+
+    Returns:
+        Title, note and panels of each section that has any.
+    """
+    sections: dict[str, list[Panel]] = {"activation": [], "muscle": [], "other": []}
+    for number, trial in enumerate(trials):
+        evidence = trial.evidence
+        assert evidence is not None
+        names = Names.of_model(evidence.model, build_mechanism(evidence.model))
+        for outcome in trial.outcomes:
+            for table in outcome.tables.values():
+                for section, columns in _divide_actuators(table, names).items():
+                    panels, _ = group_columns(
+                        columns,
+                        table.times,
+                        steps=trial.steps,
+                        style=STYLES[number % 3],
+                        label=trial.name,
+                    )
+                    sections[section] += panels
+    titles = {
+        "activation": ("Muscle activations", "0 is at rest, 1 is fully active."),
+        "muscle": ("Muscle forces", ""),
+        "other": (
+            "Reserves and residuals",
+            "Forces and moments that no muscle makes; ideally small. The last table has their limits.",
+        ),
+    }
+    return [
+        (*titles[section], merge_panels(panels)) for section, panels in sections.items() if panels
+    ]
+
+
+def _divide_actuators(table: StoTable, names: Names) -> dict[str, list[Column]]:
+    """Return the columns of activations, of muscle forces and of other actuators of a table."""
+    result: dict[str, list[Column]] = {}
+    if table.name == ACTIVATION_TITLE:
+        columns = [item for item in describe_columns(table, names) if item.name in names.regions]
+        result["activation"] = columns
+    elif table.name in ("ActuatorForces", "ModelForces"):
+        for item in describe_columns(table, names):
+            if item.name in names.regions:
+                result.setdefault("muscle", []).append(item)
+            elif item.name in names.units:
+                result.setdefault("other", []).append(item)
+    else:
+        columns = [
+            item._replace(section="")
+            for item in describe_columns(table, names)
+            if item.section == SECTIONS["activation"]
+        ]
+        result["activation"] = columns
+    return result
+
+
+def _render_panels(title: str, note: str, panels: Sequence[Panel]) -> Iterator[str]:
+    """Yield the HTML of pages of panels."""
+    over = "Over the gait cycle." if has_cycles(panels) else "Over time."
+    pictures = "".join(_render_image(figure) for figure in draw_pages("", panels))
+    yield f'<h2>{title}</h2><p class="note">{over} {note}</p>{pictures}'
+
+
+def _render_viewer(evidence: Evidence, states: Mapping[str, Array]) -> str:
+    """Return the HTML of a viewer with the motion.
+
+    Args:
+        evidence: the motion.
+        states: activations that a tool has computed, which color the muscles.
+    """
     mechanism = build_mechanism(evidence.model)
     measured = None
     if evidence.measured is not None:
@@ -218,7 +350,9 @@ def _render_viewer(evidence: Evidence) -> str:
             for name in names
         ]
         measured = MeasuredMarkers(names, stations, evidence.measured[:, known])
-    motion = _create_recording(evidence, mechanism, measured)
+    motion = _create_recording(
+        replace(evidence, states={**evidence.states, **states}), mechanism, measured
+    )
     shown = Shown.of(evidence.model, mechanism, file=evidence.file, motion=motion)
     # A report shows no findings about the model.
     page = (

@@ -170,3 +170,28 @@ def test_what_is_drawn_are_the_tables(trials: Path, loads: Path) -> None:
 def test_nothing_to_report_is_told(tmp_path: Path) -> None:
     with pytest.raises(OsimliteError, match="no setup has a motion"):
         report({"scale.xml": Outcome()}, tmp_path / "report.html")
+
+
+def test_a_report_of_muscle_forces_has_them_and_names_its_tools(tmp_path: Path) -> None:
+    from tests.labs import copy_lab
+
+    copy_lab("unbalanced", tmp_path)
+    done = run("run", "so.xml", "--report", "so.html", folder=tmp_path)
+    page = (tmp_path / "so.html").read_text()
+    assert done.code in (0, 1), done.err
+    assert "AnalyzeTool, so.xml" in page
+    for title in ("Muscle activations", "Muscle forces"):
+        assert f"<h2>{title}</h2>" in page
+
+
+def test_activations_of_a_tool_color_the_muscles(tmp_path: Path) -> None:
+    from osimlite.tools.report import collect_trials, read_muscle_states
+    from tests.labs import copy_lab
+
+    copy_lab("unbalanced", tmp_path)
+    outcome = osimlite.run(tmp_path / "so.xml")
+    (trial,) = collect_trials({tmp_path / "so.xml": outcome})
+    states = read_muscle_states(trial)
+    assert states and all(label.endswith(".activation") for label in states)
+    assert trial.evidence is not None
+    assert {len(column) for column in states.values()} == {len(trial.evidence.times)}
