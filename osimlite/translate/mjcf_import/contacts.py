@@ -70,8 +70,6 @@ def _find_colliding_geoms(draft: Draft) -> set[int]:
     result = {int(geom) for pair in range(model.npair) for geom in _pair(model, pair)}
     types, affinities = model.geom_contype, model.geom_conaffinity
     for geom in range(model.ngeom):
-        if geom in draft.wrapping_geoms:
-            continue
         others = (types[geom] & affinities) | (affinities[geom] & types)
         if np.any(others[np.arange(model.ngeom) != geom]):
             result.add(geom)

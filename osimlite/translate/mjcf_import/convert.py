@@ -205,4 +205,7 @@ def start_draft(path: Path, options: Options) -> Draft:
             name="world", socket_parent=model.ground, orientation=(-math.pi / 2.0, 0.0, 0.0)
         )
         model.add(world)
-    return Draft(source, options, model, Fidelity(source.name, "osim"), world)
+    fidelity = Fidelity(source.name, "osim")
+    for text in source.warnings:
+        fidelity.add("warning", "/model", "a model that MuJoCo warns of", "used as it is", text)
+    return Draft(source, options, model, fidelity, world)

@@ -167,7 +167,9 @@ def _make_coordinate(draft: Draft, joint: int, value: float) -> Coordinate:
     rotational = int(model.jnt_type[joint]) == HINGE
     limited = bool(model.jnt_limited[joint])
     half = math.pi if rotational else FREE_RANGE_M
-    low, high = map(float, model.jnt_range[joint]) if limited else (value - half, value + half)
+    low, high = map(float, model.jnt_range[joint])
+    if not low < high:
+        low, high = value - half, value + half
     if not low <= value <= high:
         # OpenSim moves a default value into the range of a clamped coordinate.
         draft.record(

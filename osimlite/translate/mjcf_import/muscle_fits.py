@@ -35,6 +35,8 @@ POINTS = 41
 """Number of points in which a curve is fitted."""
 FITTED_LENGTHS = (0.4, 1.65)
 """Normalized lengths between which the active curve is fitted: fibers are hardly ever outside."""
+NO_CURVE = 10.0
+"""Error in each point of properties that make no curve."""
 SEARCHES = 2
 """Number of starts, the best of all, from which a fit is searched."""
 DIGITS = 6
@@ -176,6 +178,13 @@ def _fit_active(lmin: float, lmax: float) -> dict[str, float]:
     return _search(
         properties,
         lambda p: _evaluate(active_force_length(*p.values()), x) - target,
+        {
+            "min_norm_active_fiber_length": 0.4441,
+            "transition_norm_fiber_length": 0.73,
+            "max_norm_active_fiber_length": max(lmax, 1.2),
+            "shallow_ascending_slope": 0.8616,
+            "minimum_value": 0.0,
+        },
         *(
             (min(least + 0.1 * (1.0 - least), 0.85), inside, longest, slope)
             for inside in (0.3, 0.45, 0.6, 0.75, 0.9)
@@ -191,6 +200,8 @@ def _fit_velocity(fvmax: float) -> dict[str, float]:
     most = max(fvmax, LEAST_FVMAX)
     x = np.linspace(-1.05, 1.05, POINTS)
     target = Shape(0.5, 1.6, most).velocity(x)
+    # The curve must be steeper at 0 than on average beyond.
+    steep = max(2.0, 2.0 * (most - 1.0))
 
     def properties(p: Array) -> dict[str, float]:
         near, isometric, eccentric, one, other = map(float, p)
@@ -208,9 +219,10 @@ def _fit_velocity(fvmax: float) -> dict[str, float]:
     return _search(
         properties,
         lambda p: _evaluate(force_velocity(*p.values()), x) - target,
-        (0.25, 2.0, 0.1, 0.6, 0.9),
+        properties(np.array((0.25, steep, 0.1, 0.6, 0.9))),
+        (0.25, steep, 0.1, 0.6, 0.9),
         (0.02, 1.02, 1e-3, 0.0, 0.0),
-        (0.95, 12.0, 0.9, 1.0, 1.0),
+        (0.95, 6.0 * steep, 0.9, 1.0, 1.0),
     )
 
 
@@ -241,6 +253,7 @@ def _fit_passive(start: float, width: float, fpmax: float) -> dict[str, float]:
     return _search(
         properties,
         lambda p: _evaluate(fiber_force_length(*p.values()), x) - target,
+        {"strain_at_zero_force": zero, "strain_at_one_norm_force": one - 1.0},
         (0.0, 0.0, 0.2, 2.0, 0.75),
         (-0.3, -0.2, 0.01, 1.05, 0.0),
         (0.3, 0.2, 0.95, 6.0, 1.0),
@@ -250,6 +263,7 @@ def _fit_passive(start: float, width: float, fpmax: float) -> dict[str, float]:
 def _search(
     properties: Callable[[Array], dict[str, float]],
     residual: Callable[[dict[str, float]], Array],
+    fallback: dict[str, float],
     *numbers: tuple[float, ...],
 ) -> dict[str, float]:
     """Return the properties with the least sum of squares.
@@ -257,6 +271,7 @@ def _search(
     Args:
         properties: properties of a curve by the numbers that are sought.
         residual: errors of a curve with these properties; ValueError if there is no such curve.
+        fallback: properties of a curve that exists, for the case that none is found.
         *numbers: numbers to start from, once or several times, then the bounds of the numbers.
     """
     *starts, low, high = numbers
@@ -266,7 +281,7 @@ def _search(
         try:
             return residual(properties(p))
         except ValueError:
-            return np.full(POINTS, 10.0)
+            return np.full(POINTS, NO_CURVE)
 
     begins = [np.clip(start, np.array(low) + 1e-3, np.array(high) - 1e-3) for start in starts]
     begins.sort(key=lambda p: float(np.sum(np.square(errors(p)))))
@@ -276,4 +291,7 @@ def _search(
         )
         for start in begins[:SEARCHES]
     ]
-    return properties(min(solutions, key=lambda item: float(item.cost)).x)
+    best = min(solutions, key=lambda item: float(item.cost))
+    if float(best.cost) >= 0.5 * POINTS * NO_CURVE**2:
+        return fallback
+    return properties(best.x)

@@ -9,8 +9,8 @@ from osimlite.mechanics.multibody.spatial import Array
 from osimlite.translate.mjcf_import.joints import BALL, FREE, HINGE
 from osimlite.translate.mjcf_import.source import Source
 
-UNLIMITED = {"hinge": 1.0, "slide": 0.1}
-"""Distance from the default (rad, m) within which joints without limits are sampled."""
+UNLIMITED = {"hinge": 1.5, "slide": 0.1}
+"""Distance from the default (rad, m) within which joints without a range are sampled."""
 EQUALITY_ROUNDS = 4
 """Rounds in which dependent joints are set: one that follows another dependent joint needs two."""
 
@@ -51,9 +51,8 @@ def sample_qpos(source: Source, count: int, seed: int) -> Array:
             half = 0.5 * random.uniform(0.0, 1.0, (count, 1))
             qpos[:, address : address + 4] = np.hstack((np.cos(half), np.sin(half) * axes))
             continue
-        if model.jnt_limited[joint]:
-            low, high = map(float, model.jnt_range[joint])
-        else:
+        low, high = map(float, model.jnt_range[joint])
+        if not low < high:
             half_range = UNLIMITED["hinge" if kind == HINGE else "slide"]
             low, high = (float(model.qpos0[address]) + sign * half_range for sign in (-1.0, 1.0))
         qpos[:, address] = random.uniform(low, high, count)

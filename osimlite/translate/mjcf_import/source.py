@@ -7,6 +7,7 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from osimlite.base.records import dataclass
@@ -28,12 +29,14 @@ class Source:
         mujoco: MuJoCo's module.
         model: the compiled model (``MjModel``).
         major: first number of the version of MuJoCo that compiled it.
+        warnings: what MuJoCo warned of while it compiled the file.
     """
 
     path: Path
     mujoco: Any
     model: Any
     major: int
+    warnings: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:
@@ -82,22 +85,30 @@ def load_mjcf(path: Path) -> Source:
             file=str(path),
         )
     _try_in_another_process(path)
+    warnings: list[str] = []
+    before = mujoco.get_mju_user_warning()
+    # Without a handler MuJoCo writes warnings into a file in the current folder.
+    mujoco.set_mju_user_warning(lambda text: warnings.append(str(text)))
     try:
         model = mujoco.MjModel.from_xml_path(str(path))
     except Exception as error:  # MuJoCo raises ValueError, and others for lack of memory
         raise _explain_failure(path, str(error)) from error
+    finally:
+        mujoco.set_mju_user_warning(before)
     if model.nbody < 2:
         raise UnsupportedError(
             "the MJCF file has no bodies besides the world; there is nothing to convert",
             file=str(path),
         )
-    return Source(path, mujoco, model, int(mujoco.__version__.split(".")[0]))
+    major = int(mujoco.__version__.split(".")[0])
+    return Source(path, mujoco, model, major, tuple(dict.fromkeys(warnings)))
 
 
 def _try_in_another_process(path: Path) -> None:
     """Raise an error if MuJoCo rejects the file, or crashes on it."""
     code = (
         "import sys, mujoco\n"
+        "mujoco.set_mju_user_warning(lambda text: None)\n"
         "try:\n"
         "    mujoco.MjModel.from_xml_path(sys.argv[1])\n"
         "except Exception as error:\n"
@@ -105,14 +116,15 @@ def _try_in_another_process(path: Path) -> None:
     )
     environment = {**os.environ, "PYTHONSAFEPATH": "1", "PYTHONIOENCODING": "utf-8"}
     try:
-        done = subprocess.run(
-            [sys.executable, "-c", code, str(path.absolute())],
-            capture_output=True,
-            timeout=TRIAL_SECONDS,
-            check=False,
-            env=environment,
-            cwd=Path(__file__).parent,
-        )
+        with TemporaryDirectory() as folder:
+            done = subprocess.run(
+                [sys.executable, "-c", code, str(path.absolute())],
+                capture_output=True,
+                timeout=TRIAL_SECONDS,
+                check=False,
+                env=environment,
+                cwd=folder,
+            )
     except subprocess.TimeoutExpired as error:
         raise DocumentError(
             f"MuJoCo did not compile the file within {TRIAL_SECONDS} s", file=str(path)

@@ -74,6 +74,10 @@ def add_tendon_paths(draft: Draft) -> None:
             draft.path_sites |= {item.first, item.second, *({item.side} - {-1})}
             if item.geom >= 0:
                 draft.wrapping_geoms.add(item.geom)
+    for site in draft.path_sites:
+        draft.translated("site", site, "point of a path, or side of a wrap surface")
+    for geom in draft.wrapping_geoms:
+        draft.translated("geom", geom, "wrap surface of paths")
     spatial = [tendon for tendon in tendons if not tendon.is_fixed]
     for tendon in tendons:
         if tendon.is_fixed:
@@ -268,7 +272,8 @@ class _Selection:
                     tendon.number,
                     reason,
                     "a FunctionBasedPath: a polynomial of the coordinates, fitted in sampled poses",
-                    f"order {function.order} of {function.dimension} coordinates",  # type: ignore[union-attr]
+                    f"order {function.order} of {function.dimension} coordinates, not to be used "  # type: ignore[union-attr]
+                    "outside of their ranges",
                     errors,
                 )
             elif errors["length"].max > EXACT_M:

@@ -1,0 +1,68 @@
+"""Damaged MJCF files end in one clear error, or in a model that can be written and read."""
+
+from __future__ import annotations
+
+import random
+import re
+
+import pytest
+
+import osimlite
+from osimlite.errors import OsimliteError
+
+pytest.importorskip("mujoco", reason="needs mujoco (extra 'mujoco')")
+
+from tests.translate.mjcf_import import models
+
+TEXTS = (models.MECHANISM, models.LOOPS, models.SIDES)
+NUMBERS = ("0", "-1", "1e300", "-1e-300", "nan", "inf", "", "abc", "1 2 3 4 5 6 7 8", "99999999999")
+NUMBER = re.compile(r"(?<=[\" ])-?\d*\.?\d+(?=[\" ])")
+ATTRIBUTE = re.compile(r" [a-z0-9]+=\"[^\"]*\"")
+ELEMENT = re.compile(r"<[a-z][^<>]*/>")
+
+
+def damage(text: str, choose: random.Random) -> str:
+    """Return the text with one change of a random kind."""
+    kind = choose.randrange(7)
+    if kind == 0:
+        return _replace(text, NUMBER, choose, lambda _: choose.choice(NUMBERS))
+    if kind == 1:
+        return _replace(text, ATTRIBUTE, choose, lambda _: "")
+    if kind == 2:
+        return _replace(text, ELEMENT, choose, lambda _: "")
+    if kind == 3:
+        return _replace(text, ELEMENT, choose, lambda found: found * 2)
+    if kind == 4 or not text:
+        return text[: choose.randrange(len(text) + 1)]
+    if kind == 5:
+        place = choose.randrange(len(text))
+        return text[:place] + chr(choose.randrange(32, 0x250)) + text[place + 1 :]
+    # An attribute of another element.
+    other = choose.choice(ATTRIBUTE.findall(text) or [""])
+    return _replace(text, ATTRIBUTE, choose, lambda _: other)
+
+
+def _replace(text, pattern, choose, make):
+    places = list(pattern.finditer(text))
+    if not places:
+        return text
+    found = choose.choice(places)
+    return text[: found.start()] + make(found[0]) + text[found.end() :]
+
+
+@pytest.mark.parametrize("batch", range(50))
+def test_a_damaged_file_gives_a_clear_error(batch, tmp_path):
+    for number in range(10):
+        choose = random.Random(10 * batch + number)
+        text = choose.choice(TEXTS)
+        for _ in range(choose.randrange(1, 4)):
+            text = damage(text, choose)
+        path = tmp_path / f"{number}.xml"
+        path.write_text(text, encoding="utf-8")
+        try:
+            made = osimlite.from_mjcf(path, written_for=4, keyframe=None)
+        except OsimliteError as error:
+            assert "\n" not in str(error) and len(str(error)) > 10
+            continue
+        assert osimlite.read_text(made.text).name == made.model.name
+        made.fidelity.to_json()
