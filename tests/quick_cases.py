@@ -39,6 +39,7 @@ QUICK_CASES: dict[str, tuple[str, ...]] = {
     "tests/studies/sweep/test_run.py::test_a_command_that_is_ended_goes_on": ("2",),
     "tests/optimal/check_faults.py::test_a_fault_is_told": ("placed",),
     "tests/oracle/test_random_faults.py::test_what_opensim_refuses_is_found": ("pendulum",),
+    "tests/translate/mjcf_import/test_mutations.py::test_a_damaged_file_gives_a_clear_error": ("0",),
     "tests/oracle/test_simulation.py::test_motion_forces_and_labels": (
         "mass-matrix-tumbling-start1-0.6", "articulated-body-dynamic_walker-start0-1.0",
     ),

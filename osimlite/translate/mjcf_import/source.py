@@ -10,12 +10,25 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+import numpy as np
+
 from osimlite.base.records import dataclass
 from osimlite.base.require import require
 from osimlite.errors import DocumentError, MissingFileError, UnsupportedError
 
 LARGEST_FILE = 50_000_000
 """Size (bytes) up to which a file is given to MuJoCo."""
+LARGEST_NUMBER = 1e12
+"""Absolute value that no number of a mechanism exceeds."""
+CHECKED_ARRAYS = (
+    "qpos0", "body_pos", "body_ipos", "body_mass", "body_inertia", "jnt_pos", "jnt_axis", "jnt_range", "jnt_stiffness",
+    "dof_damping", "dof_armature", "geom_pos", "geom_size", "geom_solref", "site_pos", "eq_data", "tendon_stiffness",
+    "tendon_damping", "tendon_lengthspring", "wrap_prm", "actuator_gear", "actuator_gainprm", "actuator_biasprm",
+    "actuator_dynprm", "actuator_lengthrange", "key_qpos",
+)  # fmt: skip
+"""Arrays of a compiled model whose numbers are checked."""
+AXIS_TOLERANCE = 1e-6
+"""Difference from 1 of the length of a compiled joint axis, which MuJoCo normalizes."""
 TRIAL_SECONDS = 600
 """Time after which the trial compilation in another process ends."""
 
@@ -100,8 +113,25 @@ def load_mjcf(path: Path) -> Source:
             "the MJCF file has no bodies besides the world; there is nothing to convert",
             file=str(path),
         )
+    _require_plausible_numbers(path, model)
     major = int(mujoco.__version__.split(".")[0])
     return Source(path, mujoco, model, major, tuple(dict.fromkeys(warnings)))
+
+
+def _require_plausible_numbers(path: Path, model: Any) -> None:
+    """Raise an error for numbers that no mechanism has."""
+    for name in CHECKED_ARRAYS:
+        values = np.asarray(getattr(model, name), dtype=float)
+        if not np.all(np.abs(values) <= LARGEST_NUMBER):
+            raise DocumentError(
+                f"the compiled model has a number in '{name}' that is not finite or larger than "
+                f"{LARGEST_NUMBER:g}",
+                file=str(path),
+            )
+    straight = np.asarray(model.jnt_type) >= 2  # slides and hinges
+    lengths = np.linalg.norm(np.asarray(model.jnt_axis), axis=1)
+    if np.any(np.abs(lengths[straight] - 1.0) > AXIS_TOLERANCE):
+        raise DocumentError("a joint has an axis without a direction", file=str(path))
 
 
 def _try_in_another_process(path: Path) -> None:
