@@ -1,10 +1,14 @@
-"""The pictures of the gallery, made by the lines below them when the site is built. A hook of MkDocs.
+"""Make the pictures of the gallery by the lines below them.
 
-The environment variable ``OSIMLITE_MANUAL=quick`` builds the site with empty files in their place.
+    python docs/_gallery.py [WORD ...]     all pictures, or those whose names contain a WORD
+
+The pictures are tracked, small PNG files in ``docs/gallery``, so that a clone and the site show them,
+and a build of the site computes none. Run this after a change of what they show, and look at them.
 """
 
 from __future__ import annotations
 
+import io
 import os
 import re
 import subprocess
@@ -13,23 +17,16 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from mkdocs.config.defaults import MkDocsConfig
-from mkdocs.structure.files import File, Files
-
 PAGE = Path(__file__).with_name("gallery.md")
-
-
-def on_files(files: Files, config: MkDocsConfig) -> Files:
-    """Add the pictures."""
-    make = leave_empty if os.environ.get("OSIMLITE_MANUAL") == "quick" else made
-    with ThreadPoolExecutor(2) as pool:
-        for name, picture in pool.map(make, sections(PAGE.read_text(encoding="utf-8"))):
-            files.append(File.generated(config, f"gallery/{name}", content=picture))
-    return files
+FOLDER = PAGE.parent / "gallery"
+MAX_WIDTH = 900
+"""Largest width of a picture, pixels."""
+COLORS = 128
+"""Colors of a picture; more make the file larger, and look the same."""
 
 
 def sections(text: str) -> list[str]:
-    """The parts of the page, each of which makes its picture in a folder of its own."""
+    """Return the parts of the page, each of which makes its picture in a folder of its own."""
     return re.split(r"^## ", text, flags=re.M)[1:]
 
 
@@ -39,13 +36,8 @@ def name_of(section: str) -> str:
     return str(name)
 
 
-def leave_empty(section: str) -> tuple[str, bytes]:
-    """Return the name of the picture of a section, and no bytes."""
-    return name_of(section), b""
-
-
 def made(section: str) -> tuple[str, bytes]:
-    """Name and bytes of the picture that the blocks of a section make."""
+    """Return name and bytes of the picture that the blocks of a section make."""
     name = name_of(section)
     path = os.pathsep.join((str(Path(sys.executable).parent), os.environ.get("PATH", "")))
     with TemporaryDirectory() as folder:
@@ -58,3 +50,40 @@ def made(section: str) -> tuple[str, bytes]:
                 command, cwd=folder, env=environment, check=True, stdout=subprocess.DEVNULL
             )
         return name, (Path(folder) / name).read_bytes()
+
+
+def shrink(picture: bytes) -> bytes:
+    """Return a picture as a small PNG file."""
+    from PIL import Image
+
+    image = Image.open(io.BytesIO(picture)).convert("RGB")
+    if image.width > MAX_WIDTH:
+        image = image.resize((MAX_WIDTH, round(image.height * MAX_WIDTH / image.width)))
+    out = io.BytesIO()
+    image.quantize(COLORS).save(out, format="png", optimize=True)
+    return out.getvalue()
+
+
+def write_pictures(words: list[str]) -> None:
+    """Make the pictures whose names contain one of the words, or all, and write them."""
+    parts = [
+        part
+        for part in sections(PAGE.read_text(encoding="utf-8"))
+        if not words or any(word in name_of(part) for word in words)
+    ]
+    with ThreadPoolExecutor(2) as pool:
+        for line in pool.map(write_picture, parts):
+            print(line, flush=True)
+
+
+def write_picture(section: str) -> str:
+    """Make the picture of a section, write it, and return a line about it."""
+    name, picture = made(section)
+    path = FOLDER / name
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(shrink(picture))
+    return f"wrote {path} ({path.stat().st_size / 1000.0:.0f} kB)"
+
+
+if __name__ == "__main__":
+    write_pictures(sys.argv[1:])

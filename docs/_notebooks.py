@@ -33,7 +33,7 @@ KERNELS = 2
 """How many notebooks are executed at a time."""
 
 EXECUTE = os.environ.get("OSIMLITE_MANUAL") != "quick"
-"""Whether notebooks are executed, and the pictures of the gallery made."""
+"""Whether notebooks are executed."""
 
 _outputs: dict[str, str] = {}
 """HTML of what cells show, by the text that stands for it in the pages."""

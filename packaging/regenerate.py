@@ -52,7 +52,8 @@ GENERATED: dict[str, Callable[[], str]] = {
 OTHERS = {
     "benchmarks/cost.json": "python benchmarks/cost.py --accept, if a feature is worth what it costs",
     "osimlite/native/": "python packaging/kernel_library.py library (45 s; not in git)",
-    "pages on commands, components and rules, gallery, llms.txt": "mkdocs build (not in git)",
+    "pages on commands, components and rules, llms.txt": "mkdocs build (not in git)",
+    "docs/gallery/": "python docs/_gallery.py, after a change of what the pictures show",
     "osimlite/lint/history.json": "python schemas/history.py CLONE osimlite/lint/history.json, after a release of OpenSim",
     "osimlite/view/web/three.js": "the commands in osimlite/view/web/three.entry.js, for a new three.js",
     "docs/images/integrators.png": "python benchmarks/integrators.py",

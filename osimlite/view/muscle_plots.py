@@ -133,7 +133,16 @@ def _draw_lines(
             _draw_pairs(place, across, pairs, columns, beside, sides)
             place.set_title(region, fontsize=10, loc="left")
             style_axes(place, label)
+            _widen_constant(place)
         yield figure
+
+
+def _widen_constant(place: Any) -> None:
+    """Give a panel whose curves are constant a range in which rounding errors do not show."""
+    low, high = place.dataLim.intervaly
+    size = max(abs(low), abs(high))
+    if high - low <= 1e-6 * size:
+        place.set_ylim(low - 0.1 * size, high + 0.1 * size)
 
 
 def _draw_pairs(

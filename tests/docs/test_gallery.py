@@ -1,4 +1,4 @@
-"""Every part of the gallery has a picture and what makes it; the site's build makes them all, this makes one."""
+"""Every part of the gallery has a small picture in the repository and what makes it; this makes one."""
 
 from __future__ import annotations
 
@@ -30,3 +30,23 @@ def test_a_part_makes_its_picture() -> None:
     )
     name, picture = gallery.made(elbow)
     assert name == "elbow.png" and picture.startswith(PNG)
+
+
+def test_every_picture_is_in_the_repository_and_small() -> None:
+    names = [
+        gallery.name_of(part) for part in gallery.sections(gallery.PAGE.read_text(encoding="utf-8"))
+    ]
+    files = {path.relative_to(gallery.FOLDER).as_posix() for path in gallery.FOLDER.rglob("*.png")}
+    assert files == {*names}
+    for name in names:
+        picture = (gallery.FOLDER / name).read_bytes()
+        assert picture.startswith(PNG) and len(picture) < 150_000
+
+
+def test_pictures_are_shrunk() -> None:
+    image = pytest.importorskip("PIL.Image", reason="needs pillow (extra 'view')")
+    import io
+
+    out = io.BytesIO()
+    image.new("RGB", (1800, 90), "white").save(out, format="png")
+    assert image.open(io.BytesIO(gallery.shrink(out.getvalue()))).size == (900, 45)

@@ -223,3 +223,14 @@ def test_results_draw_themselves(tmp_path):
     item = table("Coordinates", {"a_r": wave(), "a_l": wave(1.0)}, file="x/walk.mot")
     assert repr(item.plot()) == "Pages: walk.png"
     assert "nothing changes" in repr(table("x", {"a": 0 * TIMES}).plot())
+
+
+def test_rounding_errors_of_a_constant_moment_arm_do_not_show():
+    from osimlite.view.muscle_plots import _widen_constant
+    from osimlite.view.panels import figure_of
+
+    place = figure_of("", (4.0, 3.0)).subplots()
+    place.plot(TIMES, 0.042 + 1e-17 * wave())
+    _widen_constant(place)
+    low, high = place.get_ylim()
+    assert high - low > 0.008
