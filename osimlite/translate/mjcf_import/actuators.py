@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from osimlite.base.progress import report_progress
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.actuators import (
     ActivationCoordinateActuator,
@@ -36,6 +37,7 @@ def add_actuators(draft: Draft) -> None:
     lengths = _sample_lengths(draft)
     kinds = mujoco.mjtTrn
     for actuator in range(model.nu):
+        report_progress("converting actuators", actuator, model.nu)
         transmission = int(model.actuator_trntype[actuator])
         target = int(model.actuator_trnid[actuator, 0])
         is_muscle = int(model.actuator_gaintype[actuator]) == int(mujoco.mjtGain.mjGAIN_MUSCLE)

@@ -31,14 +31,16 @@ from osimlite.schema.muscle_curves import (
     ForceVelocityCurve,
 )
 
-POINTS = 41
+POINTS = 27
 """Number of points in which a curve is fitted."""
 FITTED_LENGTHS = (0.4, 1.65)
 """Normalized lengths between which the active curve is fitted: fibers are hardly ever outside."""
+CLOSE = 1e-6
+"""Relative change of the error, or of the numbers, at which a search ends."""
 NO_CURVE = 10.0
 """Error in each point of properties that make no curve."""
-SEARCHES = 2
-"""Number of starts, the best of all, from which a fit is searched."""
+SEARCHES = 1
+"""Number of starts, the best of all, from which a fit is searched; a second one finds nothing better."""
 DIGITS = 6
 """Digits of the parameters that the cache of fitted curves distinguishes."""
 LEAST_FVMAX = 1.001
@@ -287,7 +289,12 @@ def _search(
     begins.sort(key=lambda p: float(np.sum(np.square(errors(p)))))
     solutions = [
         optimize.least_squares(
-            errors, start, bounds=(low, high), x_scale=np.ptp((low, high), axis=0)
+            errors,
+            start,
+            bounds=(low, high),
+            x_scale=np.ptp((low, high), axis=0),
+            ftol=CLOSE,
+            xtol=CLOSE,
         )
         for start in begins[:SEARCHES]
     ]

@@ -17,6 +17,8 @@ MOST_ORDER = 8
 SAMPLES_PER_TERM = 4
 CLOSE_M = 1e-6
 """Error in poses that were not fitted (rms, m) at which the order is high enough."""
+SINGULAR = 1e-13
+"""Relative size of a part of the terms that counts as zero."""
 GAIN = 0.8
 """Factor by which a higher order must reduce the error to be preferred."""
 
@@ -77,26 +79,42 @@ def fit_polynomial(
         The function, and its errors (Q,) in the other poses, m.
     """
     count = values.shape[1]
+    orders = [
+        order
+        for order in possible_orders(count)
+        if order == 1 or SAMPLES_PER_TERM * math.comb(count + order, order) <= len(values)
+    ]
+    # One decomposition serves all orders, if the terms of lower orders come first.
+    exponents = list_exponents(count, orders[-1])
+    exponents = exponents[np.argsort(exponents.sum(1), kind="stable")]
+    terms = evaluate_terms(values, exponents)
+    scale = np.abs(terms).max(0)
+    scale[scale == 0.0] = 1.0
+    q, r = np.linalg.qr(terms / scale)
+    projected = q.T @ lengths
+    check_terms = evaluate_terms(checks, exponents)
     best: tuple[float, int, Array, Array] | None = None
-    for order in possible_orders(count):
-        exponents = list_exponents(count, order)
-        if SAMPLES_PER_TERM * len(exponents) > len(values) and best is not None:
+    for order in orders:
+        size = math.comb(count + order, order)
+        diagonal = np.abs(np.diag(r)[:size])
+        if diagonal.min() < SINGULAR * diagonal.max() and best is not None:
             break
-        terms = evaluate_terms(values, exponents)
-        scale = np.abs(terms).max(0)
-        scale[scale == 0.0] = 1.0
-        solution = np.linalg.lstsq(terms / scale, lengths, rcond=1e-13)[0] / scale
-        errors = evaluate_terms(checks, exponents) @ solution - expected
-        size = float(np.sqrt(np.mean(errors**2)))
-        if best is None or size < GAIN * best[0]:
-            best = size, order, solution, errors
+        solution = np.linalg.lstsq(r[:size, :size], projected[:size], rcond=SINGULAR)[0]
+        solution = solution / scale[:size]
+        errors = check_terms[:, :size] @ solution - expected
+        rms = float(np.sqrt(np.mean(errors**2)))
+        if best is None or rms < GAIN * best[0]:
+            best = rms, order, solution, errors
         if best[0] < CLOSE_M:
             break
     assert best is not None
     _, order, solution, errors = best
+    found = dict(zip(map(tuple, exponents[: len(solution)].tolist()), solution, strict=True))
     function = MultivariatePolynomialFunction(
         name="length_function",
-        coefficients=tuple(float(value) for value in solution),
+        coefficients=tuple(
+            float(found[tuple(row)]) for row in list_exponents(count, order).tolist()
+        ),
         dimension=count,
         order=order,
     )

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from osimlite.base.progress import report_progress
 from osimlite.errors import SettingError
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.functions import LinearFunction
@@ -121,6 +122,7 @@ class _Selection:
         errors = {row: lengths[number] - self.truth[row] for row, number in numbers.items()}
         polynomials: dict[int, tuple[FunctionBasedPath, Array]] = {}
         for row in range(len(self.tendons)):
+            report_progress("fitting paths", row, len(self.tendons))
             rms = _rms(errors[row]) if row in errors else np.inf
             if rms > GOOD_WRAP_M:
                 path, off = self._fit(row)
