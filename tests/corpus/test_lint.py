@@ -30,8 +30,6 @@ PROVED = {
     "m0239": {"OSIM311"},
     # No model in the document: OpenSim loads an empty one.
     "m0356": {"OSIM003"},
-    # An empty default_value: OpenSim logs that it ignores the property.
-    "m0462": {"OSIM204"},
 }
 
 REASONS = {

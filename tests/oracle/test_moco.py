@@ -457,11 +457,11 @@ print(json.dumps(solution.getStatus()))
     ("old", "new", "said"),
     [
         (r"<bounds>(0.6 0.9)<", "nan 1", "bounds is nan, which is not a number"),
-        (r"<bounds>(0.6 0.9)<", "-2 -1", "ends at -1 s at the latest, and begins at 0 s"),
+        (r"<bounds>(0.6 0.9)<", "-2 -1", "the latest final time, -1 s, is not after the earliest initial time, 0 s"),
         (
             r"<bounds>(0.6 0.9)<",
             "5 9",
-            "data from 0 s to 1 s, and the motion is at least from 0.2 s to 5 s",
+            "the table covers 0 s to 1 s, but the motion lasts at least from 0.2 s to 5 s",
         ),
         (
             r"(<MocoVariableInfo name=\"/jointset/j0/q0/value.*?</MocoVariableInfo>)",

@@ -145,8 +145,8 @@ def test_a_second_process_compiles_nothing(tmp_path):
     program = (
         "import sys\n"
         "from osimlite.simulation.engines import machine_code\n"
-        "machine_code.make_ready(['wrap_sphere'])\n"
-        "print(machine_code.is_at_hand('wrap_sphere'), 'numba' in sys.modules)\n"
+        "machine_code.prepare_laws(['wrap_sphere'])\n"
+        "print(machine_code.is_ready('wrap_sphere'), 'numba' in sys.modules)\n"
     )
     kept = {
         **os.environ,
