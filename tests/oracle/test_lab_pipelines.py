@@ -111,7 +111,6 @@ LOOPS = {
         ("<location_body_2>0 -0.3 0", "<location_body_2>0.1 -0.3 0"),
         ("<constant_distance>0.4", "<constant_distance>0.5"),
     ],
-    "a rod and a coupler": [(ROD, COUPLER)],
     "bars of two lengths": [
         ("<location_body_1>0 -0.3 0", "<location_body_1>0 -0.25 0"),
         ("<constant_distance>0.4", "<constant_distance>0.403112887414927"),
@@ -126,6 +125,27 @@ def test_closed_loops_are_tracked(tmp_path: Path, loop: str) -> None:
     change(folder / "bars.osim", *LOOPS[loop])
     compare_runs(folder, "rra.xml" if loop != "as it is" else "rra2.xml")
     compare_runs(folder, "cmc.xml")
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("setup", ["rra2.xml", "cmc.xml"])
+def test_a_redundant_constraint_changes_nothing(tmp_path: Path, setup: str) -> None:
+    """A coupler that the rod implies leaves the tables as they are without it.
+
+    OpenSim's assembly of redundant constraints depends on the processor: with the same wheel it
+    started at 13 degrees on one machine and at 0 on another.
+    """
+    tables = []
+    for name, edits in (("rod", []), ("both", [(ROD, COUPLER)])):
+        (tmp_path / name).mkdir()
+        folder = copy_lab("loop", tmp_path / name)
+        change(folder / "bars.osim", *edits)
+        tables.append(osimlite.run(folder / setup, folder / "ours").tables)
+    one, two = tables
+    assert one
+    assert one.keys() == two.keys()
+    for name, table in one.items():
+        assert np.allclose(table.rows, two[name].rows, rtol=0.0, atol=1e-6), name
 
 
 @pytest.mark.parametrize("setup", ["rra.xml", "cmc.xml"])
