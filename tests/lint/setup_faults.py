@@ -530,6 +530,7 @@ HARMLESS = [
     Fault(153, "loads.xml", ">ground_torque_<", "><"),
     Fault(156, "loads.xml", "<data_source_name>Unassigned", "<data_source_name>other.mot"),
     Fault(165, "id.xml", "> Muscles<", ">ALL<"),
+    Fault(241, "scale.xml", "<axes>X Y Z", "<axes>x Y z"),
     Fault(223, "so.xml", "list>all</moment", "list> all </moment"),
     Fault(288, "loads.xml", ">1_ground_torque_<", "><"),
     Fault(291, "loads.xml", ">ground_force_v<", "> ground_force_v <"),

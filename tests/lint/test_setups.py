@@ -390,3 +390,17 @@ def test_a_weight_of_zero_is_a_warning_where_nobody_gave_it(project):
         "warning",
         "info",
     ]
+
+
+@pytest.mark.parametrize("body", ["", "<body><a/></body>", "<body>ground<!-- --></body>"])
+@pytest.mark.parametrize("version", [20302, 30000, 30500, 30501])
+def test_a_marker_of_an_old_file_needs_a_body(tmp_path, body, version):
+    """OpenSim 4.6 reads the body of such a marker without asking whether it is there."""
+    path = tmp_path / "markers.xml"
+    path.write_text(
+        f'<OpenSimDocument Version="{version}"><MarkerSet name="s"><objects><Marker name="a">{body}'
+        "<location>0 0 0</location></Marker></objects></MarkerSet></OpenSimDocument>"
+    )
+    is_rejected = version < 30501 and "<!--" not in body
+    codes = {"OSIM112"} if "<a/>" not in body else {"OSIM107"}
+    assert bool(codes & {*validate(path).codes}) == is_rejected

@@ -33,7 +33,7 @@ def safely_mended(text: str) -> tuple[str, int]:
 
 
 def printed(text: str, path: Path) -> str | None:
-    """OpenSim's print of a document, None if it refuses it."""
+    """Return OpenSim's print of a document with one spelling of ground, None if it rejects it."""
     opensim = pytest.importorskip("opensim")
     opensim.Logger.setLevelString("Off")
     path.write_text(text, encoding="utf-8")
@@ -42,7 +42,9 @@ def printed(text: str, path: Path) -> str | None:
         model.initSystem()
     except RuntimeError:
         return None
-    return re.sub(r"<!--.*?-->", "", str(model.dump()), flags=re.DOTALL)
+    text = re.sub(r"<!--.*?-->", "", str(model.dump()), flags=re.DOTALL)
+    # Relative and absolute paths to ground are the same reference.
+    return text.replace(">../../ground<", ">/ground<")
 
 
 def test_after_a_safe_mend_opensim_reads_what_was_meant(tmp_path):

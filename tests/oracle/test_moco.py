@@ -457,7 +457,11 @@ print(json.dumps(solution.getStatus()))
     ("old", "new", "said"),
     [
         (r"<bounds>(0.6 0.9)<", "nan 1", "bounds is nan, which is not a number"),
-        (r"<bounds>(0.6 0.9)<", "-2 -1", "the latest final time, -1 s, is not after the earliest initial time, 0 s"),
+        (
+            r"<bounds>(0.6 0.9)<",
+            "-2 -1",
+            "the latest final time, -1 s, is not after the earliest initial time, 0 s",
+        ),
         (
             r"<bounds>(0.6 0.9)<",
             "5 9",

@@ -231,8 +231,9 @@ def report_not_upgradable(subject: Subject, report: FindingCollector) -> None:
     """OpenSim cannot upgrade an old document.
 
     Reports content that OpenSim needs to upgrade a document of an older version, and that is
-    missing or unreadable: a body without `<Joint>`, a transform that is not six finite numbers, a
-    display preference that is not a whole number, a connector without a name.
+    missing or unreadable: a body without `<Joint>`, a marker without `<body>`, a transform that is
+    not six finite numbers, a display preference that is not a whole number, a connector without a
+    name.
 
     OpenSim rejects the file. `osimlite upgrade` is more lenient, and writes the current format.
 

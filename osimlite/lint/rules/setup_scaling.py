@@ -67,9 +67,9 @@ measurements and manualScale, and rejects others.
 08 marker-paired-with-itself, warning, in pairs: Both markers of a pair are the same. OpenSim ignores the measurement.
 - <MarkerPair> <markers>asis asis</markers> </MarkerPair>
 + <MarkerPair> <markers>asis knee_marker</markers> </MarkerPair>
-09 unknown-scale-axis, error, fix safe, in axes: A body is scaled along an unknown axis. OpenSim ignores what is
+09 unknown-scale-axis, error, in axes: A body is scaled along an unknown axis. OpenSim ignores what is
 not X, Y or Z, without a message, and the body keeps its size.
-- <BodyScale name="thigh"> <axes>X y</axes> </BodyScale>
+- <BodyScale name="thigh"> <axes>XY</axes> </BodyScale>
 + <BodyScale name="thigh"> <axes>X Y</axes> </BodyScale>
 10 markers-not-placed, warning, in placer: The marker placer is disabled. The tool reports a failure.
 - <apply>false</apply>
@@ -165,13 +165,13 @@ def report_scale_setting(setup: Setup, report: FindingCollector) -> None:
                 )
     for scale in setup.find_by_class("BodyScale"):
         for axis in scale.axes:
-            if axis not in ("X", "Y", "Z"):
+            # OpenSim compares whole words, in upper and in lower case.
+            if axis.upper() not in ("X", "Y", "Z"):
                 report(
                     f"expected an axis X, Y or Z, found '{axis}': OpenSim ignores it",
                     scale,
                     tag="axes",
                     word=axis,
-                    suggestion=axis.upper() if axis.upper() in ("X", "Y", "Z") else None,
                     fault="unknown-scale-axis",
                 )
     for placer in setup.find_by_class("MarkerPlacer"):

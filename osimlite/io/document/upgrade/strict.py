@@ -23,6 +23,9 @@ def check_strict_reading(draft: Draft) -> None:
     _check_values(draft)
     if draft.version < 30501:
         _check_bodies(draft)
+        for marker in draft.find_all("Marker"):
+            if marker.find("body") is None:
+                draft.record_refusal(marker, marker, f"<{marker.tag}> has no <body>")
     if draft.version < 30508:
         for component in draft.find_all("Component"):
             _check_connectors(draft, component)
@@ -236,6 +239,7 @@ _STRICT_VALUES: tuple[tuple[str, int, int, str, str], ...] = (
         "location_body_1 orientation_body_1 location_body_2 orientation_body_2",
         "three",
     ),
+    ("Marker", 0, 30501, "body", "text"),
     ("ContactGeometry", 0, 30507, "display_preference", "text"),
     ("Muscle", 0, 30513, "min_control max_control", "number"),
     ("GeometryPath", 0, 30516, "VisibleObject/display_preference", "integer"),
