@@ -33,6 +33,9 @@ OMITTED_JOINTS = ("patellofemoral_r", "patellofemoral_l")
 OMITTED_BODIES = ("patella_r", "patella_l")
 """Bodies that Nimble leaves out, by their names."""
 
+JOINT_SET_VERSION = 30501
+"""Version of a document from which joints are no longer parts of their bodies."""
+
 JOINT_CLASSES = (
     CustomJoint,
     WeldJoint,
@@ -147,7 +150,8 @@ def list_coordinates(model: Model) -> list[Coordinate]:
     """Return the coordinates of a model in the order of Nimble's degrees of freedom.
 
     The bodies are visited depth-first, the children of a body in the order of their joints in the
-    file. Within a joint the coordinates have the order of the file.
+    file. In files of OpenSim 3, where joints are parts of bodies, the order is that of the file.
+    Within a joint the coordinates have the order of the file.
     """
     tree = model.tree()
     children: dict[str, list[tuple[Joint, str]]] = {}
@@ -165,10 +169,13 @@ def list_coordinates(model: Model) -> list[Coordinate]:
         parent = _find_body(tree, joint, "socket_parent_frame")
         edges = children.setdefault(parent, []) if parent in bodies and parent else roots
         edges.append((joint, child))
-    trees = [_walk(children, root) for root in roots]
+    joints = max((_walk(children, root) for root in roots), key=len, default=[])
+    if model.document_version < JOINT_SET_VERSION:
+        selected = {id(joint) for joint in joints}
+        joints = [each for each in parts if isinstance(each, Joint) and id(each) in selected]
     return [
         coordinate
-        for joint in max(trees, key=len, default=[])
+        for joint in joints
         for coordinate in list(joint.coordinates)[: count_dofs(joint)]
     ]
 

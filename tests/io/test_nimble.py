@@ -71,3 +71,31 @@ def test_a_socket_that_leads_nowhere_hides_its_joint_only() -> None:
     joint = model["/jointset/mtp_r"]
     joint.socket_child_frame = "/bodyset/gone"
     assert "mtp_r_angle" not in [each.name for each in list_coordinates(model)]
+
+
+def test_files_of_opensim_3_keep_the_order_of_their_bodies() -> None:
+    def write_body(name: str, parent: str) -> str:
+        return f"""<Body name="{name}"><mass>1</mass><mass_center>0 0 0</mass_center><inertia_xx>1</inertia_xx>
+<inertia_yy>1</inertia_yy><inertia_zz>1</inertia_zz><Joint><PinJoint name="to_{name}">
+<parent_body>{parent}</parent_body><location_in_parent>0 0 0</location_in_parent>
+<orientation_in_parent>0 0 0</orientation_in_parent><location>0 0 0</location><orientation>0 0 0</orientation>
+<CoordinateSet><objects><Coordinate name="q_{name}"/></objects></CoordinateSet></PinJoint></Joint></Body>"""
+
+    tree = {
+        "pelvis": "ground",
+        "leg_r": "pelvis",
+        "leg_l": "pelvis",
+        "foot_r": "leg_r",
+        "foot_l": "leg_l",
+    }
+    bodies = "".join(write_body(name, parent) for name, parent in tree.items())
+    text = (
+        '<OpenSimDocument Version="30000"><Model name="m"><BodySet><objects><Body name="ground"/>'
+        f"{bodies}</objects></BodySet></Model></OpenSimDocument>"
+    )
+    model = osimlite.read_text(text)
+    assert [each.name for each in list_coordinates(model)] == [f"q_{name}" for name in tree]
+    # In the present format one leg follows the other.
+    again = osimlite.read_text(osimlite.to_text(model))
+    legs = ["pelvis", "leg_r", "foot_r", "leg_l", "foot_l"]
+    assert [each.name for each in list_coordinates(again)] == [f"q_{name}" for name in legs]

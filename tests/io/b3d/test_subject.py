@@ -213,3 +213,30 @@ def test_importing_osimlite_does_not_load_the_reader() -> None:
     code = "import sys, osimlite; print(*[name for name in sys.modules if 'b3d' in name or 'numpy' in name])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == ""
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_changed_bytes_give_clear_errors_only(tmp_path: Path, seed: int) -> None:
+    """Change bytes and keep the size of the file, so that the frames are read too."""
+    rng = np.random.default_rng(seed)
+    content = files.make_subject((4, 3))
+    refused = 0
+    for _ in range(25):
+        changed = bytearray(content)
+        # The text of the models is most of the header, and harmless.
+        start = rng.choice([8, len(content) - 10_000])
+        for position in rng.integers(start, min(start + 10_000, len(content)), 3):
+            changed[position] = rng.integers(256)
+        (tmp_path / "it.b3d").write_bytes(changed)
+        try:
+            subject = read_b3d(tmp_path / "it.b3d")
+            for trial in subject.trials:
+                trial.read_arrays()
+                trial.read_ground_forces()
+                trial.read_coordinates()
+                trial.read_markers()
+                trial.read_force_plates()
+        except OsimliteError as error:
+            refused += 1
+            assert error.message
+    assert refused
