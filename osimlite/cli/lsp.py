@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+import os
+import signal
+from typing import Annotated, NoReturn
 
 from osimlite.cli._command import Option, command
+from osimlite.cli._console import complain
 
 
 @command
@@ -22,6 +25,13 @@ def lsp(
     from osimlite.base.require import require
 
     require("pygls", extra="lsp", purpose="the language server")
+    signal.signal(signal.SIGINT, _stop)
     from osimlite.cli.language_server.server import create_server
 
     create_server().start_io()
+
+
+def _stop(*_: object) -> NoReturn:
+    """End the server; its thread that waits for the editor would not end by itself."""
+    complain("interrupted")
+    os._exit(130)

@@ -54,13 +54,16 @@ def list_code_actions(analysis: Analysis, uri: str, wanted: types.Range) -> list
     Args:
         analysis: the file.
         uri: URI of the file.
-        wanted: range that the editor asks about.
+        wanted: range that the editor asks about; all of its lines count.
     """
     result: list[types.CodeAction] = []
     if not analysis.is_checked:
         # Do not run the rules here: the editor requests actions again after diagnostics arrive.
         return result
-    first, last = analysis.text.offset(wanted.start), analysis.text.offset(wanted.end)
+    # People ask anywhere in a line, and a finding may be about one word of it.
+    lines = types.Position(wanted.start.line, 0), types.Position(wanted.end.line + 1, 0)
+    first, last = (analysis.text.offset(position) for position in lines)
+    last = max(first, last - 1)
     for finding in analysis.report:
         start, end = _find_offsets(analysis, finding)
         if start > last or end < first:

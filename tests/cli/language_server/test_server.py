@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import signal
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -30,6 +34,24 @@ async def test_a_misspelt_contact_name_is_underlined_and_mended(client, walker) 
     actions = await client.text_document_code_action_async(asked)
     mend = next(action for action in actions if "RFootContact" in action.title)
     assert "RFootContact Platform" in walker.after(mend.edit.changes[walker.uri])
+    # The cursor may stand anywhere in the line.
+    for column in (0, found[0].range.end.character + 3):
+        place = types.Position(found[0].range.start.line, column)
+        asked = types.CodeActionParams(walker.document, types.Range(place, place), context)
+        again = await client.text_document_code_action_async(asked)
+        assert mend.title in [action.title for action in again]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="needs signals as POSIX has them")
+def test_ctrl_c_ends_the_server_at_once_with_a_sentence() -> None:
+    command = [sys.executable, "-m", "osimlite", "lsp"]
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    with subprocess.Popen(command, text=True, **pipes) as server:
+        # The server reads from the editor when it is ready.
+        time.sleep(2.0)
+        server.send_signal(signal.SIGINT)
+        assert server.wait(5.0) in (130, -signal.SIGINT)
+        assert "Traceback" not in server.stderr.read()
 
 
 @pytest.mark.asyncio
