@@ -11,7 +11,6 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from typing import Any
 
-from osimlite.base.progress import listen_to_progress
 from osimlite.base.text import escape_unprintable
 from osimlite.cli._console import before_output, complain, count_columns, get_raw_stream
 
@@ -181,6 +180,8 @@ _stack = ExitStack()
 def watch_command(name: str) -> None:
     """Show what a command does while it prints nothing, at a terminal only."""
     if name not in INTERACTIVE:
+        from osimlite.base.progress import listen_to_progress
+
         task = _Task(ACTIVITIES.get(name, "working"), None)
         _line.tasks.append(task)
         _stack.enter_context(listen_to_progress(task.receive))
