@@ -17,6 +17,8 @@ LEAST_SLACK_M = 1e-4
 """Least tendon slack length; OpenSim requires one above 0."""
 MOST_PASSIVE = 10.0
 """Passive force at which a RigidTendonMuscle cuts its curve off, as a part of the isometric force."""
+DEFAULT_ACTIVATION = 0.01
+"""Activation at the start. MuJoCo starts with 0, which OpenSim's muscle of De Groote does not accept."""
 SPEEDS = (-0.5, -0.25, 0.0, 0.25, 0.5)
 """Normalized velocities at which forces are compared."""
 
@@ -161,7 +163,7 @@ def make_muscle(
         min_control=limits[0],
         max_control=limits[1],
         fiber_damping=0.0,
-        default_activation=0.0,
+        default_activation=DEFAULT_ACTIVATION,
         default_fiber_length=data.fiber,
         minimum_activation=0.0,
         active_force_length_curve=active,
