@@ -217,7 +217,8 @@ def write_results(
         if plot:
             from osimlite.view.plots import plot_simulation
 
-            written += plot_simulation(trajectory, temporary)
+            with progress_bar("drawing", None):
+                written += plot_simulation(trajectory, temporary)
         if film is not None:
             written.append(film(temporary / "animation.gif"))
         for path in written:
