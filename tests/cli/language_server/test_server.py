@@ -45,13 +45,13 @@ async def test_a_misspelt_contact_name_is_underlined_and_mended(client, walker) 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs signals as POSIX has them")
 def test_ctrl_c_ends_the_server_at_once_with_a_sentence() -> None:
     command = [sys.executable, "-m", "osimlite", "lsp"]
-    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
-    with subprocess.Popen(command, text=True, **pipes) as server:
+    pipe = subprocess.PIPE
+    with subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, text=True) as server:
         # The server reads from the editor when it is ready.
         time.sleep(2.0)
         server.send_signal(signal.SIGINT)
         assert server.wait(5.0) in (130, -signal.SIGINT)
-        assert "Traceback" not in server.stderr.read()
+        assert server.stderr is not None and "Traceback" not in server.stderr.read()
 
 
 @pytest.mark.asyncio
