@@ -34,7 +34,7 @@ from osimlite.schema.muscles import (
     Thelen2003Muscle,
 )
 from tests.conftest import CorpusModel
-from tests.oracle.force_carrier import JOINTS, along, carrier, drive
+from tests.oracle.force_carrier import along, drive
 
 opensim = pytest.importorskip("opensim", reason="needs the opensim package (extra 'oracle')")
 
@@ -390,11 +390,6 @@ def with_muscles_of(model: Model, cls: type[Muscle], more: dict[str, Any]) -> Mo
 
 
 OPERATIONS = "value", "integrate", "differentiate", "minimum", "minabs", "maximum", "maxabs"
-
-
-@pytest.fixture(params=list(JOINTS.values()), ids=list(JOINTS))
-def model(request):
-    return carrier(request.param)
 
 
 def add_actuators(model):

@@ -43,6 +43,11 @@ from tests.oracle.support import OPERATIONS, add_actuators  # noqa: E402
 from tests.simulation.elements.muscle_rows import hung, line  # noqa: E402
 
 
+@pytest.fixture(params=list(JOINTS.values()), ids=list(JOINTS))
+def model(request):
+    return carrier(request.param)
+
+
 def opened(model, tmp_path):
     opensim.Logger.setLevelString("off")
     osimlite.write(model, tmp_path / "model.osim")

@@ -110,4 +110,4 @@ def test_what_is_computed_in_python_has_no_derivatives(tmp_path, monkeypatch):
         osimlite.tangents(model)
     made = plan(model, {"/bodyset/b1/mass": (1.0, 3.0)}, measures=("energy",), to=0.01)
     with pytest.raises(UnsupportedError, match="/forceset/push' is computed in Python"):
-        registry.gradients(made).at([2.0], [0])
+        registry.make_gradients(made).evaluate([2.0], [0])

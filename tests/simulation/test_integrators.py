@@ -316,7 +316,7 @@ def test_impossible_accuracies(accuracy):
 
 
 def test_sizes_that_do_not_fit():
-    with pytest.raises(ValueError, match="1 derivatives of 2 states"):
+    with pytest.raises(ValueError, match="1 derivatives for 2 states"):
         runge_kutta_merson(lambda t, y: [0.0], 0.0, [1.0, 0.0], 1)
     with pytest.raises(ValueError, match="2 coordinates and as many speeds do not fit"):
         SemiImplicitEuler(oscillator, 0.0, [1.0, 0.0], 2, 1e-3)

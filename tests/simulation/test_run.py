@@ -441,7 +441,7 @@ def test_trajectory_goes_to_another_process(walker):
     again = pickle.loads(pickle.dumps(trajectory))
     assert again.summary == trajectory.summary and again.forces.keys() == trajectory.forces.keys()
     assert np.array_equal(again.values, trajectory.values)
-    assert "6 moments" in repr(again)
+    assert "6 times" in repr(again)
 
 
 def test_what_becomes_of_the_model_changes_no_run_and_no_trajectory(walker):

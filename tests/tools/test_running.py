@@ -166,7 +166,7 @@ def test_an_analysis_that_cannot_be_computed_is_refused_before_anything_is_writt
 
 def test_times_and_files_that_mean_nothing(setup: Path) -> None:
     for old, new, said in (
-        ("0.02 0.1", "0.1 0.02", "give the first time first"),
+        ("0.02 0.1", "0.1 0.02", "the first time, 0.1 s, is after the last"),
         ("walker.osim", "", "the setup names no model_file"),
     ):
         setup.write_text(SETUP.replace(old, new))

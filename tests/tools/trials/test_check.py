@@ -208,7 +208,7 @@ def test_the_command_shows_verdicts_and_exits_as_validate(tmp_path: Path, capsys
     with pytest.raises(SystemExit) as stopped:
         main(["check-trial", str(tmp_path)])
     out = capsys.readouterr().out
-    assert stopped.value.code == 1 and "OSIM911" in out and "Not looked at: other results" in out
+    assert stopped.value.code == 1 and "OSIM911" in out and "Not checked: other results" in out
     assert any(line.startswith("bad") and "30 N" in line for line in out.splitlines())
     assert (
         max(
