@@ -207,10 +207,10 @@ class _Reader:
         return number
 
     def take_count(self) -> int:
-        """Return the next word as a number of things."""
+        """Return the next word as a count."""
         word = self.peek()
         if not (word.isascii() and word.isdigit() and len(word) < 10):
-            raise self.fail(f"expected a number of things, found '{word}'")
+            raise self.fail(f"expected a count, found '{word}'")
         self.position += 1
         return int(word)
 
@@ -247,6 +247,8 @@ def read_bvh(path: str | Path) -> BvhMotion:
     reader.take("MOTION")
     reader.take("Frames:")
     count = reader.take_count()
+    if count == 0:
+        raise reader.fail("the motion has no frames")
     reader.take("Frame")
     reader.take("Time:")
     frame_time = reader.take_number()

@@ -129,8 +129,16 @@ class BvhMarkers:
         names = UniqueNames()
         self.markers = [names(joint.name) for joint in self.motion.joints]
         self.positions = self.motion.compute_poses()[1] / scale
-        for marker in self.markers:
+        for joint, marker in zip(self.motion.joints, self.markers, strict=True):
             self.fidelity.translated[f"/{marker}"] = f"marker {marker}"
+            if joint.name != marker:
+                self.fidelity.add(
+                    "name",
+                    f"/{marker}",
+                    "a name with blanks or special characters, or of several joints",
+                    "written with '_', or with a number",
+                    f"'{joint.name}' became '{marker}'",
+                )
         self.fidelity.add(
             "rotation",
             "/",

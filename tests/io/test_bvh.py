@@ -115,7 +115,7 @@ def test_a_right_angle_has_an_answer() -> None:
         ("OFFSET 0 -40 0\n    CHANNELS", "OFFSET 0 nan 0\n    CHANNELS", 8, "expected a number"),
         ("Xposition", "Wposition", 5, "unknown channel 'Wposition'"),
         ("CHANNELS 3", "CHANNELS 9", 9, "9 channels; there are six at most"),
-        ("CHANNELS 3", "CHANNELS -1", 9, "expected a number of things"),
+        ("CHANNELS 3", "CHANNELS -1", 9, "expected a count"),
         (
             "Frames:\t2",
             "Frames: 3",
@@ -123,6 +123,7 @@ def test_a_right_angle_has_an_answer() -> None:
             "3 frames of 12 channels are 36 numbers, but 24 words follow",
         ),
         ("0.008333", "0", None, "frame time is 0 s"),
+        ("Frames:\t2", "Frames: 0", None, "the motion has no frames"),
         ("MOTION", "", None, "expected 'MOTION'"),
         ("90\n", "90 z", None, "but 25 words follow"),
         (

@@ -50,6 +50,19 @@ def test_poses_of_a_motion_are_exact(tmp_path: Path) -> None:
     ]
 
 
+def test_changed_names_of_markers_are_recorded(tmp_path: Path) -> None:
+    text = (
+        "HIERARCHY\nROOT Knie links ä\n{ OFFSET 0 0 0 CHANNELS 1 Xrotation\n"
+        "JOINT Hip\n{ OFFSET 0 1 0 } }\nMOTION\nFrames: 1\nFrame Time: 0.1\n0\n"
+    )
+    (tmp_path / "a.bvh").write_text(text, encoding="utf-8")
+    done = run("convert", "a.bvh", "-o", "a.trc", folder=tmp_path)
+    assert done.code == 0, done.err
+    records = json.loads((tmp_path / "fidelity.json").read_text())["records"]
+    assert [each["component"] for each in records if each["kind"] == "name"] == ["/Knie_links__"]
+    assert "'Knie links ä' became 'Knie_links__'" in str(records)
+
+
 def test_any_pose_of_a_tree_is_exact(tmp_path: Path) -> None:
     mechanism = osimlite.mechanism(make_walker())
     rng = np.random.default_rng(0)
