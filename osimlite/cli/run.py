@@ -113,7 +113,7 @@ def run(
     from osimlite.cli._progress import progress_bar
     from osimlite.cli._recorded import require_plots
     from osimlite.errors import SettingError
-    from osimlite.tools.many import find_setups, run_many
+    from osimlite.tools.many import assign_folders, find_setups, run_many
     from osimlite.tools.named_files import find_inputs
 
     require_plots(plot=plot)
@@ -141,7 +141,7 @@ def run(
         )
         _write_report({files[0]: outcome}, report)
         if plot:
-            _draw_outcome(files[0], outcome, output)
+            _draw_outcome(files[0], outcome, output, Path(output or ""))
         raise SystemExit(0 if outcome.done else 1)
     if refine is not None:
         raise SettingError(
@@ -171,8 +171,18 @@ def run(
         _show_trials(trials)
     if kept:
         _write_report(kept, report, err=as_json)
+        # Like the results, pictures mirror the folders of the setups: trials often have setups of
+        # the same name.
+        folders = assign_folders(files, output or Path())
         for setup, outcome in kept.items() if plot else ():
-            _draw_outcome(Path(setup), outcome, output, err=as_json)
+            folder = folders[Path(setup)] or Path()
+            _draw_outcome(
+                Path(setup),
+                outcome,
+                output,
+                folder.parent if len(files) > 1 else folder,
+                err=as_json,
+            )
     raise SystemExit(max(_list_exit_codes(trials), default=0))
 
 
@@ -226,13 +236,16 @@ def _write_report(
         say(f"wrote {write_report(outcomes, report)}", err=err)
 
 
-def _draw_outcome(setup: Path, outcome: Outcome, output: Path | None, *, err: bool = False) -> None:
+def _draw_outcome(
+    setup: Path, outcome: Outcome, output: Path | None, parent: Path, *, err: bool = False
+) -> None:
     """Draw the tables of a setup into a folder that is named after it.
 
     Args:
         setup: the setup.
         outcome: its results.
-        output: folder of all results; the current folder if the setups name theirs.
+        output: folder of all results; None if the setups name theirs.
+        parent: folder in which the folder of the pictures is made.
         err: whether to report on standard error.
     """
     from osimlite.base.writing import expect_folder_inside
@@ -241,7 +254,7 @@ def _draw_outcome(setup: Path, outcome: Outcome, output: Path | None, *, err: bo
 
     if not outcome.tables:
         return
-    folder = Path(output or "", f"{setup.stem}-plots")
+    folder = parent / f"{setup.stem}-plots"
     if output is None:
         expect_folder_inside(folder)
     evidence = outcome.evidence

@@ -76,6 +76,16 @@ def test_setups_are_drawn_into_folders_of_their_own(tmp_path, more):
     assert done.code == 2 and "--plot runs setups one after the other" in done.err
 
 
+@pytest.mark.parametrize("more", [(), ("-o", "out")])
+def test_setups_of_the_same_name_are_drawn_into_different_folders(tmp_path, more):
+    for name in "ab":
+        copy_lab("unbalanced", tmp_path / name)
+    done = run("run", "a/kin.xml", "b/kin.xml", *more, "--plot", folder=tmp_path)
+    assert done.code == 0, done.err
+    for name in "ab":
+        assert pictures(tmp_path / (more[1] if more else "") / name / "kin-plots")
+
+
 def test_sweeps_are_drawn(walk):
     pytest.importorskip("pyarrow", reason="needs pyarrow (extra 'sweep')")
     words = ("--vary", "RHip_rz=0.2:0.4:2", "--vary", "Pelvis_tx/speed=0:1:2", "--to", "0.05")
