@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from osimlite.base.files import make_folder
+from osimlite.base.files import make_folder, read_file
 from osimlite.base.records import dataclass, field
 from osimlite.base.text import format_json, join_words, suggest_name
 from osimlite.base.writing import write_into
@@ -92,6 +93,15 @@ class Request:
         by_suffix = None if output is None else _find_target(output, found)
         default = importers[found].target if found in importers else None
         goal = target or by_suffix or default
+        if None not in (target, by_suffix) and target != by_suffix and not _is_folder(output):
+            raise SettingError(
+                f"-o names a file of the format '{by_suffix}', but --to is '{target}'; leave out one of them"
+            )
+        if goal is None and output is not None and output.suffix and not _is_folder(output):
+            raise SettingError(
+                f"'{output.suffix}' is the suffix of no format that can be written; name another file with "
+                "-o, such as robot.urdf, or a format with --to; --formats lists the formats"
+            )
         if goal is None:
             raise SettingError(
                 "the format to write is unknown; name a file with -o, such as robot.urdf, or a format with --to"
@@ -99,7 +109,10 @@ class Request:
         # Only importers of models lead to other formats than their own.
         no_models = {MARKERS, PROJECT}
         if {goal, default} & no_models and goal != default:
-            raise SettingError(f"a file of the format '{found}' cannot be written as '{goal}'")
+            usual = f", only as '{default}'" if default in no_models else ""
+            raise SettingError(
+                f"a file of the format '{found}' cannot be written as '{goal}'{usual}"
+            )
         if goal == found:
             raise SettingError(
                 f"'{file.name}' already has the format '{goal}'; to bring a model to the current version, use "
@@ -121,9 +134,11 @@ class Request:
             chosen: options of the formats that were set.
 
         Raises:
-            SettingError: an option does not belong to the formats.
+            SettingError: an option does not belong to the formats, or the summary of another command
+                would be replaced.
             OsimliteError: the file cannot be read, or the results cannot be written.
         """
+        _protect_summary(self.folder)
         importer = list_importers().get(self.source)
         exporter = next((each for each in EXPORTERS if each.name == self.target), None)
         used = [each for each in (importer, exporter) if each is not None]
@@ -215,6 +230,29 @@ class Request:
         defaults = {choice.name: choice.default for choice in exporter.choices}
         exporter.write(shown, path, **{**defaults, **choices})
         return Conversion([path], fidelity)
+
+
+def _is_folder(output: Path | None) -> bool:
+    """Return whether an output is a folder that exists."""
+    return output is not None and output.is_dir()
+
+
+def _protect_summary(folder: Path) -> None:
+    """Raise SettingError if the folder has a summary that no conversion wrote.
+
+    Other commands, such as ``simulate``, write results and a summary of the same name.
+    """
+    path = folder / SUMMARY_FILE
+    if not path.is_file():
+        return
+    try:
+        summary = json.loads(read_file(path))
+    except ValueError:
+        summary = None
+    if not (isinstance(summary, dict) and {"source", "from", "to", "parts"} <= summary.keys()):
+        raise SettingError(
+            f"'{path}' was written by another command, and would be replaced; name another folder with -o"
+        )
 
 
 def _find_target(output: Path, source: str) -> str | None:

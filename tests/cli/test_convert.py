@@ -70,6 +70,8 @@ def test_formats_are_listed() -> None:
         (("gone.b3d",), "no such file"),
         (("walker.osim", "-o", "new.osim"), "'osimlite upgrade'"),
         (("walker.osim", "--to", "project"), "cannot be written as 'project'"),
+        (("walker.osim", "-o", "x.urdf", "--to", "mjcf"), "-o names a file of the format 'urdf'"),
+        (("walker.osim", "-o", "w.xyz"), "'.xyz' is the suffix of no format"),
         (("walker.osim", "--to", "mjcf", "--merge"), "--merge is no option of a conversion"),
         (("walker.osim", "--to", "urdf", "--motion", "m.mot"), "has no motion"),
     ],
@@ -119,6 +121,26 @@ def test_a_new_importer_is_one_entry(
         records = json.loads(Path(folder, "fidelity.json").read_text())["records"]
         assert records[0]["kind"] == "list"
         assert json.loads(Path(folder, "summary.json").read_text())["bodies"] == 2
+
+
+def test_summaries_of_other_commands_are_not_replaced(walker: Path) -> None:
+    assert run("simulate", "walker.osim", "--to", "0.02", "-o", "r", folder=walker).code == 0
+    before = (walker / "r" / "summary.json").read_bytes()
+    words = ("convert", "walker.osim", "--motion", "r/states.sto", "-o")
+    done = run(*words, "r/w.glb", folder=walker)
+    assert done.code == 2 and "r/summary.json" in done.err and "another folder" in done.err
+    assert (walker / "r" / "summary.json").read_bytes() == before
+    assert not (walker / "r" / "w.glb").exists()
+    # A conversion replaces the summary of an earlier one.
+    for _ in range(2):
+        assert run(*words, "new/w.glb", folder=walker).code == 0
+
+
+def test_folders_can_have_dots(walker: Path) -> None:
+    assert run("convert", "walker.osim", "-o", "v1.2", "--to", "urdf", folder=walker).code == 0
+    (walker / "old.xml").mkdir()
+    assert run("convert", "walker.osim", "-o", "old.xml", "--to", "urdf", folder=walker).code == 0
+    assert (walker / "v1.2" / "walker.urdf").exists() and (walker / "old.xml/walker.urdf").exists()
 
 
 def test_formats_are_listed_without_what_reads_them() -> None:
