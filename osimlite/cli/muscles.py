@@ -77,6 +77,7 @@ def muscles(
     from osimlite.base.text import join_words
     from osimlite.cli._console import say
     from osimlite.cli._progress import progress_bar
+    from osimlite.cli._recorded import require_plots
     from osimlite.errors import ModelError, SettingError
     from osimlite.io.document.reader import read
     from osimlite.mechanics.multibody import build_mechanism
@@ -90,6 +91,7 @@ def muscles(
         raise SettingError("--coordinate can be given once or twice")
     if plot and not coordinate:
         raise SettingError("--plot needs a --coordinate to draw over")
+    require_plots(plot=plot)
     model = read(file)
     mechanism = build_mechanism(model)
     values = _sample_coordinates(
