@@ -106,6 +106,7 @@ PAGES = {
     "osimlite.translate.biomod": "docs/biorbd.md",
     "osimlite.translate.bvh": "docs/animation.md",
     "osimlite.translate.mjcf": "docs/mujoco.md",
+    "osimlite.translate.mjcf_import": "docs/from-mjcf.md",
     "osimlite.translate.nimble": "docs/addbiomechanics.md#models-made-for-nimblephysics",
     "osimlite.view": "docs/viewer.md",
     "osimlite.base.writing": "docs/errors.md#files",

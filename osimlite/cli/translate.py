@@ -146,7 +146,9 @@ def _find_importer(file: Path) -> Importer:
     name = find_format(file)
     if name not in known:
         words = join_words([importer.title for importer in known.values()])
-        raise OsimliteError(f"--to {OSIM} converts files of {words}", file=str(file))
+        raise OsimliteError(
+            f"this is no file of {words}, which --to {OSIM} converts", file=str(file)
+        )
     return known[name]
 
 

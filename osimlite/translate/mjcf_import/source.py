@@ -124,7 +124,7 @@ def _require_plausible_numbers(path: Path, model: Any) -> None:
         values = np.asarray(getattr(model, name), dtype=float)
         if not np.all(np.abs(values) <= LARGEST_NUMBER):
             raise DocumentError(
-                f"the compiled model has a number in '{name}' that is not finite or larger than "
+                f"the compiled model has a number in '{name}' that is not finite, or is larger than "
                 f"{LARGEST_NUMBER:g}",
                 file=str(path),
             )
