@@ -451,6 +451,8 @@ def read_version(source: Source, root: etree._Element) -> int:
     if root.tag != ROOT:
         tag = decode_name(root.tag)
         message = f"the root element is <{tag}>, not <OpenSimDocument>: this is no OpenSim document"
+        if tag == "mujoco":
+            message += "; this is MJCF (MuJoCo): convert it with 'osimlite convert'"
         raise _add_suggestion(source.fault(DocumentError, message, place), _guess_root(tag, root))
     if number is None:
         result = (

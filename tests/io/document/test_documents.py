@@ -106,7 +106,8 @@ def test_old_names_at_the_top() -> None:
             "a <InverseKinemtaticsTool>, which is no class of OpenSim 4.6; did",
         ),
         (document(""), "the document holds no object"),
-        ("<project/>", "this is no OpenSim document"),
+        ("<project/>", "this is no OpenSim document$"),
+        ("<mujoco><worldbody/></mujoco>", "convert it with 'osimlite convert'"),
         (document("<Tool/>"), "a <Tool>, which is no class"),
     ],
 )
