@@ -20,7 +20,13 @@ import numpy as np
 import osimlite
 from osimlite.simulation import Simulation
 from osimlite.studies.gait.foot_contacts import find_footing
-from osimlite.studies.gait.steps import Scuff, Step, Walk, follow_events, measure_along_slope
+from osimlite.studies.gait.steps import (
+    GaitStep,
+    Scuff,
+    WalkerSteps,
+    follow_events,
+    measure_along_slope,
+)
 
 
 class Order(NamedTuple):
@@ -31,7 +37,7 @@ class Order(NamedTuple):
     accuracy: float
 
 
-def opensim_walks(orders: Mapping[str, Order]) -> dict[str, tuple[Walk, float]]:
+def opensim_walks(orders: Mapping[str, Order]) -> dict[str, tuple[WalkerSteps, float]]:
     """What OpenSim makes of each order, and the processor time (s) that it took; all at a time, each in its process."""
     with tempfile.TemporaryDirectory() as folder:
         running = {
@@ -55,7 +61,7 @@ def opensim_walks(orders: Mapping[str, Order]) -> dict[str, tuple[Walk, float]]:
     return {name: _from_json(text) for name, text in printed.items()}
 
 
-def opensim_walk(path: Path, to: float, accuracy: float) -> tuple[Walk, float]:
+def opensim_walk(path: Path, to: float, accuracy: float) -> tuple[WalkerSteps, float]:
     """What OpenSim makes of a file, and the processor time that it took (s).
 
     A touch-down is known to a step of its integrator; where the feet are then is computed from its
@@ -95,7 +101,7 @@ class _States(NamedTuple):
         return [values.get(self.paths.index(path)) for path in paths]
 
 
-def _read_off(engine: Any, forces: Any, states: _States) -> Walk:
+def _read_off(engine: Any, forces: Any, states: _States) -> WalkerSteps:
     labels = forces.getColumnLabels()
     columns = [labels.get(k) for k in range(labels.getSize())]
     times = _column(forces, "time")
@@ -136,16 +142,16 @@ def _column(storage: Any, label: str) -> Any:
     return np.array([found.get(k) for k in range(found.getSize())])
 
 
-def _to_json(walk: Walk, taken: float) -> str:
+def _to_json(walk: WalkerSteps, taken: float) -> str:
     """A walk without the states at its steps."""
     return json.dumps([{**vars(walk), "steps": [step[:4] for step in walk.steps]}, taken])
 
 
-def _from_json(text: str) -> tuple[Walk, float]:
+def _from_json(text: str) -> tuple[WalkerSteps, float]:
     found, taken = json.loads(text)
-    found["steps"] = [Step._make([*step, np.empty(0)]) for step in found["steps"]]
+    found["steps"] = [GaitStep._make([*step, np.empty(0)]) for step in found["steps"]]
     found["scuffs"] = [Scuff._make(scuff) for scuff in found["scuffs"]]
-    return Walk(**found), taken
+    return WalkerSteps(**found), taken
 
 
 if __name__ == "__main__":

@@ -26,7 +26,7 @@ from osimlite.simulation import Simulation
 from osimlite.studies.gait.basin import sample_perturbed_starts, simulate_walks
 from osimlite.studies.gait.cycle import find_cycle
 from osimlite.studies.gait.stepmap import StepMap
-from osimlite.studies.gait.steps import Walk, walk_many
+from osimlite.studies.gait.steps import WalkerSteps, walk_many
 
 TO = 60.0
 CONFIRMED = {"steady-walker": 1e-8, "human-walker": 1e-6, "furthest-walker": 1e-8}
@@ -77,7 +77,7 @@ def confirmation(names: list[str]) -> Table:
     return table
 
 
-def our_walk(model: osimlite.Model, to: float, accuracy: float) -> Walk:
+def our_walk(model: osimlite.Model, to: float, accuracy: float) -> WalkerSteps:
     with Simulation(model, "compiled") as simulation:
         engine: Any = simulation.engine
         (walk,) = walk_many(engine, [simulation.initial_state({}, {})], to, accuracy=accuracy)

@@ -32,7 +32,7 @@ from rich.table import Table
 import osimlite
 from _corpus import CORPUS
 from osimlite.simulation import Simulation
-from osimlite.simulation.engines.protocol import Settings
+from osimlite.simulation.engines.protocol import EngineSettings
 from osimlite.simulation.options import INTEGRATORS
 
 REAL = {
@@ -179,7 +179,7 @@ def our_motion(
     start = simulation.initial_state({}, {}, equilibrate=True)
 
     def motion() -> tuple[Any, float, int]:
-        settings = Settings(accuracy=accuracy, integrator=integrator)
+        settings = EngineSettings(accuracy=accuracy, integrator=integrator)
         began = time.process_time()
         stepper = simulation.engine.make_stepper(0.0, start, settings, lambda t, y: None)
         stepper.tabulate([TO])

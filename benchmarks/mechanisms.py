@@ -34,7 +34,7 @@ from osimlite.mechanics.multibody import Mechanism, build_mechanism
 from osimlite.schema.forces import Force
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.engines import engine_factory
-from osimlite.simulation.engines.protocol import Settings
+from osimlite.simulation.engines.protocol import EngineSettings
 
 CORPUS = Path(__file__).resolve().parents[2] / "shared" / "corpus" / "converted"
 LENGTHS = (2, 5, 10, 20, 40, 80)
@@ -139,7 +139,9 @@ def timed(model: Model, mechanism: Mechanism) -> dict[str, float | None]:
         for way, (engine, route) in WAYS.items():
             calls[way] = None
             try:
-                made: Any = engine_factory(engine)(mechanism, Forces(()), Settings(route=route))
+                made: Any = engine_factory(engine)(
+                    mechanism, Forces(()), EngineSettings(route=route)
+                )
             except OsimliteError:
                 continue
             stack.callback(made.close)

@@ -274,7 +274,7 @@ def show_engine_warnings() -> None:
     """Show people what the engine warns of, and that it compiles."""
     import logging
 
-    class Shown(logging.Handler):
+    class ProgressHandler(logging.Handler):
         def emit(self, record: logging.LogRecord) -> None:
             if record.levelno >= logging.WARNING:
                 complain(record.getMessage())
@@ -284,7 +284,7 @@ def show_engine_warnings() -> None:
                 _line.tasks[-1].details = "" if is_over else f"{words} (once per machine)"
 
     log = logging.getLogger("osimlite.simulation.engines")
-    log.addHandler(Shown())
+    log.addHandler(ProgressHandler())
     log.setLevel(logging.INFO)
 
 

@@ -96,10 +96,10 @@ def draw_tables(
         The PNG files.
     """
     from osimlite.cli._progress import progress_bar
-    from osimlite.view.table_plots import Names, plot_tables
+    from osimlite.view.table_plots import ColumnNames, plot_tables
 
     with progress_bar("drawing", len(tables)) as progress:
-        names = Names.of_model(model, mechanism)
+        names = ColumnNames.of_model(model, mechanism)
         steps = _find_steps(loads, mechanism)
         written = plot_tables(tables, folder, names, steps=steps, report=progress)
     say(describe_pictures(written), err=err)

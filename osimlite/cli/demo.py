@@ -32,7 +32,7 @@ MISSPELT = ("<geometry>RFootContact ", "<geometry>RFootContct ")
 """Text of the walker's file, and the misspelt text that replaces it to show a finding."""
 
 
-class Motion(NamedTuple):
+class TourMotion(NamedTuple):
     """Motion of the tour.
 
     Attributes:
@@ -355,7 +355,7 @@ def _describe_jump(motion: Trajectory) -> str:
 
 
 MOTIONS = (
-    Motion(
+    TourMotion(
         "dynamic-walker",
         2.0,
         "It falls",
@@ -363,7 +363,7 @@ MOTIONS = (
         "The arrows are the forces of the ground.",
         "osimlite optimize dynamic-walker --objective distance --vary RHip_rz=0:60deg --vary LHip_rz=-60deg:0",
     ),
-    Motion(
+    TourMotion(
         "steady-walker",
         5.0,
         "It walks",
@@ -371,7 +371,7 @@ MOTIONS = (
         "The lines on the slope are half a meter apart.",
         "osimlite gait steady-walker --perturb 0.05 --starts 10",
     ),
-    Motion(
+    TourMotion(
         "jumper",
         1.6,
         "It jumps",

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from osimlite.studies.gait.basin import Basin
     from osimlite.studies.gait.cycle import Cycle
     from osimlite.studies.gait.stepmap import StepMap
-    from osimlite.studies.gait.steps import Scuff, Step, Walk
+    from osimlite.studies.gait.steps import GaitStep, Scuff, WalkerSteps
 
 
 WALK_ACCURACY = 1e-6
@@ -209,7 +209,7 @@ class GaitReport:
 
     model: str
     coordinates: list[str]
-    walk: Walk
+    walk: WalkerSteps
     cycle: Cycle | None = None
     why_not: str = ""
     nearby: list[Nearby] = field(default_factory=list)
@@ -341,7 +341,7 @@ def _write(folder: Path, result: GaitReport, pictures: bool) -> list[Path]:
 def _make_json(result: GaitReport) -> dict[str, Any]:
     """Return the content of gait.json."""
 
-    def list_touches(events: Sequence[Step | Scuff]) -> list[dict[str, Any]]:
+    def list_touches(events: Sequence[GaitStep | Scuff]) -> list[dict[str, Any]]:
         return [
             {"time_s": each.time, "foot": each.foot, "length_m": each.length, "air_s": each.air}
             for each in events

@@ -125,11 +125,11 @@ def muscles(
         say(f"wrote {output}")
     if plot:
         from osimlite.view.muscle_plots import plot_muscles
-        from osimlite.view.table_plots import Names
+        from osimlite.view.table_plots import ColumnNames
 
         folder = output.parent / output.stem if output is not None else Path(f"{file.stem}-muscles")
         with progress_bar("drawing", None):
-            regions = Names.of_model(model, mechanism).regions
+            regions = ColumnNames.of_model(model, mechanism).regions
             beside = second if others else None
             written = plot_muscles(first, mechanism, folder, beside, regions=regions)
         say(f"wrote {len(written)} pictures into {folder}")

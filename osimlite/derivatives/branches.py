@@ -1,7 +1,7 @@
 """Execution of code that branches on symbols, so that the result holds on both sides.
 
 A branch whose sides only assign is run for both sides, and the assigned values are merged
-(`Branch`). Where a side returns or leaves a loop, the complete function is run once for each
+(`AssigningBranch`). Where a side returns or leaves a loop, the complete function is run once for each
 combination of sides (`run_all_branches`). Values that cannot be merged, such as the number of
 points of a path, become unmergeable; when one is used, a wider part of the code is run for both
 sides.
@@ -16,7 +16,7 @@ from osimlite.derivatives.symbols import (
     UNSET,
     BranchWideningSignal,
     NoFormula,
-    Vector,
+    RecordedVector,
     casadi,
     combine_condition,
     is_symbol,
@@ -85,7 +85,7 @@ def run_until_mergeable(function: Callable[[], Any]) -> Any:
         run.frame = None
         run.failures = []
         where.condition = None
-        Vector.journals.clear()
+        RecordedVector.journals.clear()
         try:
             return function()
         except BranchWideningSignal as wider:
@@ -98,7 +98,7 @@ def run_until_mergeable(function: Callable[[], Any]) -> Any:
             # branch.
             run.widened.add(wider.part)
         finally:
-            Vector.journals.clear()
+            RecordedVector.journals.clear()
             run.frame, where.condition = None, None
 
 
@@ -109,7 +109,7 @@ def _undo_writes() -> Writes:
         The undone writes, which `_apply_writes` can repeat.
     """
     written: Writes = {}
-    for key, (cells, place, before) in Vector.journals.pop().items():
+    for key, (cells, place, before) in RecordedVector.journals.pop().items():
         # Both sides of a branch must begin with the same vectors; the merge needs what this side wrote.
         written[key] = cells, place, cells[place]
         cells[place] = before
@@ -119,7 +119,7 @@ def _undo_writes() -> Writes:
 def _apply_writes(written: Writes) -> None:
     """Write values into their cells."""
     for cells, place, value in written.values():
-        Vector(cells)[place] = value
+        RecordedVector(cells)[place] = value
 
 
 def _merge_writes(test: Any, one: Writes, other: Writes, part: Any) -> Writes:
@@ -141,7 +141,7 @@ def _merge_writes(test: Any, one: Writes, other: Writes, part: Any) -> Writes:
     return result
 
 
-class Branch:
+class AssigningBranch:
     """Branch (`if`) whose sides only assign.
 
     Args:
@@ -174,7 +174,7 @@ class Branch:
         for side in (True, False):
             where.condition = before
             where.condition = combine_condition(self.test if side else casadi.logic_not(self.test))
-            Vector.journals.append({})
+            RecordedVector.journals.append({})
             yield side
             written.append(_undo_writes())
         where.condition = before
@@ -263,15 +263,15 @@ def run_all_branches(part: str, function: Callable[..., Any], *given: Any) -> An
     if part in run.widened and outer is not None:
         return function(*given)
     frame = run.frame = _FunctionFrame()
-    Vector.journals.append({})
+    RecordedVector.journals.append({})
     result = function(*given)
     # A function without branches on symbols has one combination; its writes belong to the outer
     # journal.
     if not frame.sides:
-        writes = Vector.journals.pop()
-        if Vector.journals:
-            Vector.journals[-1].update(
-                {key: writes[key] for key in writes if key not in Vector.journals[-1]}
+        writes = RecordedVector.journals.pop()
+        if RecordedVector.journals:
+            RecordedVector.journals[-1].update(
+                {key: writes[key] for key in writes if key not in RecordedVector.journals[-1]}
             )
         run.frame = outer
         where.condition = condition
@@ -302,7 +302,7 @@ def run_all_branches(part: str, function: Callable[..., Any], *given: Any) -> An
                     f"{part} has more than {MAX_BRANCH_COMBINATIONS} combinations of branches"
                 )
             where.condition = condition
-            Vector.journals.append({})
+            RecordedVector.journals.append({})
             other, also_written = run_others(k + 1, function(*given))
             result = merge_values(tests[k], result, other, part)
             written = _merge_writes(tests[k], written, also_written, part)
@@ -317,7 +317,7 @@ def run_all_branches(part: str, function: Callable[..., Any], *given: Any) -> An
 
 __all__ = [
     "UNSET",
-    "Branch",
+    "AssigningBranch",
     "NoFormula",
     "decide",
     "record_failure",

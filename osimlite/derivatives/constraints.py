@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from osimlite.derivatives.symbolic import make_symbolic
-from osimlite.derivatives.symbols import Vector, casadi
+from osimlite.derivatives.symbols import RecordedVector, casadi
 from osimlite.mechanics.kernels.constrained_dynamics import (
     evaluate_constraints,
     solve_factor,
@@ -135,7 +135,14 @@ def make_constrained_dynamics(equations: Sequence[int]) -> Law:
     accelerations by each equation's force.
     """
 
-    def law(model: Vector, reals: Vector, data: Vector, y: Vector, f: Vector, unused: int) -> int:
+    def law(
+        model: RecordedVector,
+        reals: RecordedVector,
+        data: RecordedVector,
+        y: RecordedVector,
+        f: RecordedVector,
+        unused: int,
+    ) -> int:
         h = model.rest(model[MODEL.CONSTRAINED])
         size = model[MODEL.DOFS]
         right = f.rest(size)
@@ -152,7 +159,7 @@ def make_constrained_dynamics(equations: Sequence[int]) -> Law:
                 data[h[CONSTRAINED.WORK_DRIFTS] + number]
                 - sum(a * right[k] for k, a in enumerate(row))
             )
-            turned = Vector(row)
+            turned = RecordedVector(row)
             # G M⁻¹ Gᵀ = (G L⁻¹) D⁻¹ (G L⁻¹)ᵀ: half of a solution per row suffices, and the product
             # is symmetric by its form.
             make_symbolic(solve_transposed_factor)(model, data, turned)
@@ -162,7 +169,7 @@ def make_constrained_dynamics(equations: Sequence[int]) -> Law:
         multipliers = casadi.ldl_solve(
             casadi.SX(casadi.vertcat(*missing)), *casadi.ldl(scaled @ g.T)
         )
-        push = Vector(casadi.vertsplit(casadi.densify(scaled.T @ multipliers)))
+        push = RecordedVector(casadi.vertsplit(casadi.densify(scaled.T @ multipliers)))
         make_symbolic(solve_factor)(model, data, push)
         for k in range(size):
             right[k] += push[k]

@@ -25,7 +25,7 @@ from osimlite.errors import SettingError, SimulationError
 from osimlite.io.tables.tabular import Tabular
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.model import Model, check_is_model
-from osimlite.simulation.engines.protocol import Settings
+from osimlite.simulation.engines.protocol import EngineSettings
 from osimlite.simulation.initial_state import resolve_initial_values
 from osimlite.simulation.options import RUN_OPTIONS
 from osimlite.simulation.properties import find_properties
@@ -271,7 +271,7 @@ class _SensitivityRun:
         # The trajectory has rows, but the derivative needs the steps; repeating the motion is
         # cheaper than storing all steps of every simulation.
         times, states, ended = self._simulation.record_every_step(
-            0.0, start, wanted[-1], Settings(accuracy=accuracy)
+            0.0, start, wanted[-1], EngineSettings(accuracy=accuracy)
         )
         if ended is not None:
             raise ended

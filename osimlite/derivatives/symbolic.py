@@ -19,7 +19,7 @@ from osimlite.derivatives.curves import (
     evaluate_pieces,
     solve_damped_velocity,
 )
-from osimlite.derivatives.symbols import COUNTERPARTS, UNSET, NoFormula, Vector
+from osimlite.derivatives.symbols import COUNTERPARTS, UNSET, NoFormula, RecordedVector
 from osimlite.mechanics.codegen.reader import (
     Function,
     Kernel,
@@ -44,7 +44,7 @@ HELPERS = {
     "either_": symbols.logical_or,
     "negated_": symbols.logical_not,
     "choose_": symbols.select_value,
-    "branch_": branches.Branch,
+    "branch_": branches.AssigningBranch,
     "decide_": branches.decide,
     "fails_": branches.record_failure,
     "unset_": UNSET,
@@ -65,7 +65,7 @@ OPERATOR_HELPERS: dict[type, str] = {
 
 def _slice_vector(vector: Any, place: int) -> Any:
     """Return the part of a vector that begins at an index."""
-    return vector.rest(place) if isinstance(vector, Vector) else vector[place:]
+    return vector.rest(place) if isinstance(vector, RecordedVector) else vector[place:]
 
 
 def _call_law(address: int, *given: Any) -> int:

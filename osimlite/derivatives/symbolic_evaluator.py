@@ -11,14 +11,14 @@ from osimlite.derivatives import branches
 from osimlite.derivatives.constraints import make_constrained_dynamics
 from osimlite.derivatives.outputs import list_probe_items
 from osimlite.derivatives.symbolic import make_symbolic, register_symbolic, replace_kernel
-from osimlite.derivatives.symbols import Vector, casadi
+from osimlite.derivatives.symbols import RecordedVector, casadi
 from osimlite.errors import UnsupportedError
 from osimlite.mechanics.kernels.constrained_dynamics import evaluate_constraints
 from osimlite.mechanics.kernels.constraint_equations import add_wrench_row
 from osimlite.mechanics.kernels.dynamics import evaluate, inverse
 from osimlite.mechanics.kernels.layout import CONSTRAINED, ITEM, MODEL, RUN, STAGE, WORK
 from osimlite.mechanics.kernels.pointers import call, register_law
-from osimlite.mechanics.multibody.functions import Function
+from osimlite.mechanics.multibody.functions import SmoothFunction
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.geometries.load import Load, evaluate_load
 from osimlite.simulation.engines.linking import PYTHON_CODE, Program
@@ -126,7 +126,13 @@ class SymbolicEvaluator:
         """Evaluate the model up to the accelerations, and its probes."""
         places = list_probe_items(self._packed, self._elements)
 
-        def law(model: Vector, reals: Vector, data: Vector, y: Vector, f: Vector) -> None:
+        def law(
+            model: RecordedVector,
+            reals: RecordedVector,
+            data: RecordedVector,
+            y: RecordedVector,
+            f: RecordedVector,
+        ) -> None:
             make_symbolic(evaluate)(model, reals, data, y, f, STAGE.ACCELERATION)
             for place in places:
                 make_symbolic(call)(model[place + ITEM.LAW], model, reals, data, y, f, place)
@@ -162,7 +168,13 @@ class SymbolicEvaluator:
             structure[run + RUN.FIRST] = 0
             structure[run + RUN.END] = len(items)
 
-        def law(model: Vector, reals: Vector, data: Vector, y: Vector, f: Vector) -> None:
+        def law(
+            model: RecordedVector,
+            reals: RecordedVector,
+            data: RecordedVector,
+            y: RecordedVector,
+            f: RecordedVector,
+        ) -> None:
             for k in range(size):
                 f[size + k] = udot[k]
             make_symbolic(inverse)(model, reals, data, y, f, 0)
@@ -181,13 +193,22 @@ class SymbolicEvaluator:
         size = self.structure[MODEL.DOFS]
 
         def law(
-            model: Vector, reals: Vector, data: Vector, y: Vector, f: Vector
+            model: RecordedVector,
+            reals: RecordedVector,
+            data: RecordedVector,
+            y: RecordedVector,
+            f: RecordedVector,
         ) -> dict[tuple[int, int], list[Any]]:
             wrenches: dict[tuple[int, int], list[Any]] = {}
             kernel = make_symbolic(add_wrench_row)
 
             def record_wrench(
-                model: Vector, data: Vector, link: int, torque: Any, force: Any, row: Vector
+                model: RecordedVector,
+                data: RecordedVector,
+                link: int,
+                torque: Any,
+                force: Any,
+                row: RecordedVector,
             ) -> None:
                 # The place of the row in the work vector tells the equation.
                 key = (row.first - first) // size, link
@@ -207,7 +228,9 @@ class SymbolicEvaluator:
 
     def run(
         self,
-        law: Callable[[Vector, Vector, Vector, Vector, Vector], Any],
+        law: Callable[
+            [RecordedVector, RecordedVector, RecordedVector, RecordedVector, RecordedVector], Any
+        ],
         structure: list[int] | None = None,
     ) -> SymbolicWorkspace:
         """Run a function of the five vectors of the kernels.
@@ -222,11 +245,11 @@ class SymbolicEvaluator:
 
         def run_once() -> SymbolicWorkspace:
             # New vectors for each attempt: a rerun must not see values of the one before.
-            model = Vector(self.structure if structure is None else structure)
-            reals = Vector(list(self.numbers))
-            data = Vector([0.0] * self.structure[MODEL.WORK_SIZE])
-            y = Vector(list(self._y))
-            f = Vector([0.0] * len(self._y))
+            model = RecordedVector(self.structure if structure is None else structure)
+            reals = RecordedVector(list(self.numbers))
+            data = RecordedVector([0.0] * self.structure[MODEL.WORK_SIZE])
+            y = RecordedVector(list(self._y))
+            f = RecordedVector([0.0] * len(self._y))
             data[WORK.TIME] = self._t
             for k, control in enumerate(self._controls):
                 data[self.structure[MODEL.WORK_CONTROL] + k] = control
@@ -245,7 +268,9 @@ class SymbolicEvaluator:
                 f"{whose} has no formula for CasADi: {error}; set its appliesForce to false, or use another class"
             ) from error
 
-    def _find_load(self, g: Vector, gp: Vector, room: Vector, t: Any) -> None:
+    def _find_load(
+        self, g: RecordedVector, gp: RecordedVector, room: RecordedVector, t: Any
+    ) -> None:
         """Write the values of loads into the work vector, instead of the kernel :func:`evaluate_load`.
 
         Args:
@@ -264,7 +289,7 @@ class SymbolicEvaluator:
             first += len(functions)
 
 
-def list_load_functions(elements: Sequence[Any]) -> list[Function]:
+def list_load_functions(elements: Sequence[Any]) -> list[SmoothFunction]:
     """Return the functions of time of all measured and prescribed forces, points and torques.
 
     Args:
@@ -298,10 +323,10 @@ class SymbolicWorkspace:
 
     def __init__(
         self,
-        model: Vector,
-        reals: Vector,
-        data: Vector,
-        f: Vector,
+        model: RecordedVector,
+        reals: RecordedVector,
+        data: RecordedVector,
+        f: RecordedVector,
         result: Any,
         failures: Sequence[Any],
     ) -> None:

@@ -89,7 +89,7 @@ class UnmergeableValue:
     __hash__ = None  # type: ignore[assignment]
 
 
-class Vector:
+class RecordedVector:
     """List from an index on; writes are recorded while a branch is being computed."""
 
     __slots__ = ("cells", "first")
@@ -119,13 +119,17 @@ class Vector:
         self.cells[place] = value
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Vector) and self.cells is other.cells and self.first == other.first
+        return (
+            isinstance(other, RecordedVector)
+            and self.cells is other.cells
+            and self.first == other.first
+        )
 
     __hash__ = None  # type: ignore[assignment]
 
-    def rest(self, place: int) -> Vector:
+    def rest(self, place: int) -> RecordedVector:
         """Return the vector from an index on."""
-        return Vector(self.cells, self.first + place)
+        return RecordedVector(self.cells, self.first + place)
 
 
 class _ActiveCondition:

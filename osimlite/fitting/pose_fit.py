@@ -20,7 +20,7 @@ from osimlite.mechanics.kernels import pose_record as fit
 from osimlite.mechanics.kernels.pointers import Floats, Ints
 from osimlite.mechanics.kernels.pose_fit import APART, STUCK, UNSEEN
 from osimlite.mechanics.multibody.constraints import Lock, PrescribedCoordinate
-from osimlite.mechanics.multibody.functions import Function
+from osimlite.mechanics.multibody.functions import SmoothFunction
 from osimlite.mechanics.multibody.links import Places
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.spatial import Array
@@ -89,7 +89,7 @@ class PoseFit:
         self.markers = len(markers)
         self.measured = 3 * len(markers) + 9 * len(sensors)
         infos = list(mechanism.coordinates)
-        self._held: dict[int, Function | None] = {}
+        self._held: dict[int, SmoothFunction | None] = {}
         free = set(find_free_coordinates(mechanism))
         for index, info in enumerate(infos):
             # Their values change from frame to frame or from fit to fit; as inputs they need no new

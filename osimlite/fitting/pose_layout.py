@@ -12,7 +12,7 @@ from osimlite.mechanics.kernels.layout import CONSTRAINED, LINK, MODEL, MOTION, 
 from osimlite.mechanics.kernels.linear_algebra import factor_size
 from osimlite.mechanics.kernels.pointers import Floats, Ints
 from osimlite.mechanics.kernels.pose_fit import POSES
-from osimlite.mechanics.multibody.constraints import Constraint, Coupler
+from osimlite.mechanics.multibody.constraints import ConstraintEquations, Coupler
 from osimlite.mechanics.multibody.function_tables import function_table
 from osimlite.mechanics.multibody.links import Places
 from osimlite.mechanics.multibody.mechanism import FramePlacement, Mechanism, StationPlacement
@@ -47,8 +47,8 @@ class CoordinateTarget:
 
 
 def separate_couplers(
-    constraints: Sequence[Constraint], fixed: set[int]
-) -> tuple[list[Coupler], list[Constraint]]:
+    constraints: Sequence[ConstraintEquations], fixed: set[int]
+) -> tuple[list[Coupler], list[ConstraintEquations]]:
     """Separate couplers that determine a coordinate from other constraints.
 
     Args:
@@ -59,7 +59,7 @@ def separate_couplers(
         Couplers, each after those that determine its arguments; and the other constraints.
     """
     couplers: list[Coupler] = []
-    others: list[Constraint] = []
+    others: list[ConstraintEquations] = []
     pending: list[Coupler] = []
     depend: set[int] = set()
     for item in constraints:

@@ -162,7 +162,7 @@ def _format_numbers(numbers: Sequence[float] | Array) -> str:
     return " ".join(format_number(float(number)) for number in numbers)
 
 
-class _Reader:
+class _BvhReader:
     """Words of a file, with the lines that they are in."""
 
     def __init__(self, path: str | Path) -> None:
@@ -236,7 +236,7 @@ def read_bvh(path: str | Path) -> BvhMotion:
         MissingFileError: the file does not exist or cannot be read.
         DocumentError: it is not a BVH file, or is damaged; the message names the line.
     """
-    reader = _Reader(path)
+    reader = _BvhReader(path)
     reader.take("HIERARCHY")
     joints: list[BvhJoint] = []
     while reader.peek().upper() == "ROOT":
@@ -264,7 +264,7 @@ def read_bvh(path: str | Path) -> BvhMotion:
     return BvhMotion(tuple(joints), frame_time, values, str(path))
 
 
-def _read_joints(reader: _Reader, joints: list[BvhJoint]) -> None:
+def _read_joints(reader: _BvhReader, joints: list[BvhJoint]) -> None:
     """Read a root and everything below it."""
     parents: list[int] = []
     while True:
@@ -296,7 +296,7 @@ def _read_joints(reader: _Reader, joints: list[BvhJoint]) -> None:
         reader.take("JOINT")
 
 
-def _take_channel_count(reader: _Reader) -> int:
+def _take_channel_count(reader: _BvhReader) -> int:
     """Read the number of channels; a joint without the keyword has none."""
     if reader.peek().upper() != "CHANNELS":
         return 0
@@ -307,7 +307,7 @@ def _take_channel_count(reader: _Reader) -> int:
     return count
 
 
-def _take_channel(reader: _Reader) -> str:
+def _take_channel(reader: _BvhReader) -> str:
     """Read the name of a channel."""
     word = reader.peek()
     known = {name.lower(): name for name in (*POSITIONS, *ROTATIONS)}

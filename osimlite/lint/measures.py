@@ -47,7 +47,7 @@ MAX_WRAPS_UNCOMPILED = 12
 _MEASURED = ("Muscle", "PathWrap", "ConditionalPathPoint", "MovingPathPoint")
 
 
-class Value(NamedTuple):
+class CoordinateSetting(NamedTuple):
     """A value of a coordinate in its unit: rad, m or none."""
 
     coordinate: str
@@ -63,10 +63,10 @@ class Value(NamedTuple):
         return f"{shown:.{digits}g} {unit}".rstrip()
 
 
-class Pose(NamedTuple):
+class MeasuringPose(NamedTuple):
     """Default pose except for some coordinates."""
 
-    values: tuple[Value, ...] = ()
+    values: tuple[CoordinateSetting, ...] = ()
 
     def __str__(self) -> str:
         return f"at {join_words(map(str, self.values))}" if self.values else "in the default pose"
@@ -79,7 +79,7 @@ class WrappingError(NamedTuple):
     surfaces: tuple[str, ...]  # names of the surfaces
     default: float  # by how much it is longer in the default pose, m; NaN if there is no geodesic
     worst: float  # where that is most, m
-    pose: Pose  # there
+    pose: MeasuringPose  # there
 
 
 class PathJump(NamedTuple):
@@ -87,7 +87,7 @@ class PathJump(NamedTuple):
 
     owner: str
     size: float
-    pose: Pose
+    pose: MeasuringPose
     parts: tuple[str, ...]
 
 
@@ -97,7 +97,7 @@ class LengthOnSurface(NamedTuple):
     owner: str
     surface: str
     length: float
-    pose: Pose
+    pose: MeasuringPose
 
 
 class MovingPoint(NamedTuple):
@@ -105,7 +105,7 @@ class MovingPoint(NamedTuple):
 
     owner: str  # path of what has the point
     point: str  # its name
-    end: Value  # of the range
+    end: CoordinateSetting  # of the range
     # distance of the coordinate from the range in which the functions are defined (rad or m), 0 if
     # inside
     beyond: float
@@ -128,7 +128,7 @@ class FiberReach(NamedTuple):
 
     owner: str  # path of the muscle
     is_active: bool  # whether they are
-    pose: Pose  # where
+    pose: MeasuringPose  # where
     length: float  # of the fibers, in optimal fiber lengths
     is_limit: bool  # whether that is the least that its curves and its pennation allow
 

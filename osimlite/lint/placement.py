@@ -47,7 +47,7 @@ from osimlite.schema.joints import EllipsoidJoint, GimbalJoint, Joint
 from osimlite.schema.tree import is_a
 
 if TYPE_CHECKING:
-    from osimlite.mechanics.multibody.functions import Function
+    from osimlite.mechanics.multibody.functions import SmoothFunction
     from osimlite.schema.custom_joint import CustomJoint, TransformAxis
 
 
@@ -182,7 +182,7 @@ class _JointMotion(NamedTuple):
     turns: bool
     axis: Vector  # a unit vector, or zeros
     names: list[str]
-    function: Function | None = None
+    function: SmoothFunction | None = None
 
     def amount(self, values: Mapping[str, float]) -> float:
         """Return how far the joint moves along this axis (rad or m)."""
@@ -222,7 +222,7 @@ def _find_joint_motions(subject: Subject, rough: bool) -> dict[int, list[_JointM
     return result
 
 
-def _make_function(axis: TransformAxis, rough: bool) -> Function | None:
+def _make_function(axis: TransformAxis, rough: bool) -> SmoothFunction | None:
     """Return the function of an axis; None if it is not known."""
     from osimlite.mechanics.multibody.schema_functions import convert_function
 

@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 from osimlite.base.records import dataclass, field
 from osimlite.base.text import format_count
-from osimlite.lint.shapes import MARKERS, ROWS, VECTORS, Layout, compute_shapes
+from osimlite.lint.shapes import MARKERS, ROWS, VECTORS, RowLayout, compute_shapes
 
 _MAX_FAULTS = 50
 """Largest number of faults of a kind that are reported, one for each column."""
@@ -368,7 +368,7 @@ class RowScanner:
             )
 
 
-def _compute_shapes(block: bytes, layout: Layout) -> tuple[bytes, bool]:
+def _compute_shapes(block: bytes, layout: RowLayout) -> tuple[bytes, bool]:
     """Return the shapes of lines; missing markers (NaN) count as empty."""
     if b"\r" in block:
         block = block.replace(b"\r\n", b"\n")

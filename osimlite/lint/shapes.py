@@ -37,7 +37,7 @@ _CHARACTERS = (
 """Characters, their class, and the classes that must not follow them."""
 
 
-class Layout(NamedTuple):
+class RowLayout(NamedTuple):
     """Layout of rows: a code byte for each character, and the characters of the resulting shapes."""
 
     codes: bytes
@@ -45,7 +45,7 @@ class Layout(NamedTuple):
     hidden: bytes
 
 
-def _make_layout(kept: bytes, *more: tuple[bytes, int, int]) -> Layout:
+def _make_layout(kept: bytes, *more: tuple[bytes, int, int]) -> RowLayout:
     """Return a layout with some separators kept in the shapes.
 
     Some characters are said to follow on each other never, though they may: that tells separators
@@ -61,7 +61,7 @@ def _make_layout(kept: bytes, *more: tuple[bytes, int, int]) -> Layout:
     for value in range(256):
         if value & 2:
             shown[value] = 10 if shown[value ^ 2] == 10 else ord("!")
-    return Layout(
+    return RowLayout(
         bytes(codes), bytes(shown), bytes(value for value in range(256) if not shown[value])
     )
 
@@ -82,7 +82,7 @@ _AS_NUMBERS = bytes.maketrans(b" \t", b"00")
 _NO_SEPARATORS = bytes(set(range(256)) - set(b" \t\n"))
 
 
-def compute_shapes(block: bytes, layout: Layout) -> tuple[bytes, bool]:
+def compute_shapes(block: bytes, layout: RowLayout) -> tuple[bytes, bool]:
     """Return the shapes of lines: ``0`` for each number, separators, and ``!`` where a line is not valid.
 
     Nothing is wrong with a line without ``!``: its numbers are such as C++ reads (no NaN, no

@@ -70,7 +70,7 @@ class Skeleton:
         return [link for link in self.links if base is link.parent_base or base is link.child_base]
 
 
-class _Edge(NamedTuple):
+class _SkeletonEdge(NamedTuple):
     """Edge of the tree of bodies: a joint, or a joint to ground that OpenSim adds; bodies by path."""
 
     parent: str
@@ -100,7 +100,7 @@ def grow_tree(subject: Subject) -> TreeGrowth:
     )
     edges = [
         # OpenSim asks an empty joint of the class how many coordinates it has.
-        _Edge(
+        _SkeletonEdge(
             subject.path(parent),
             subject.path(child),
             () if isinstance(link.joint, WeldJoint | CustomJoint) else (0,),
@@ -109,8 +109,8 @@ def grow_tree(subject: Subject) -> TreeGrowth:
         for link, parent, child in bones.iterate_pairs()
     ]
     joined = {path for edge in edges for path in edge[:2]}
-    edges += [_Edge(ground, path) for path in masses if path not in joined]
-    order: dict[str, _Edge] = {}
+    edges += [_SkeletonEdge(ground, path) for path in masses if path not in joined]
+    order: dict[str, _SkeletonEdge] = {}
     while True:
         branches, loops = spanning_tree(edges, ground, masses)
         for branch in branches:
@@ -118,14 +118,16 @@ def grow_tree(subject: Subject) -> TreeGrowth:
         loose = [path for path in masses if path not in order]
         if not loose:
             break
-        edges.append(_Edge(ground, new_base(loose, edges)))
+        edges.append(_SkeletonEdge(ground, new_base(loose, edges)))
     closing = [edge.link for edge in loops if edge.link is not None]
     return TreeGrowth(
         closing, any(edge.link is None for edge in edges) and _fails_to_build(subject, edges, order)
     )
 
 
-def _fails_to_build(subject: Subject, edges: list[_Edge], order: dict[str, _Edge]) -> bool:
+def _fails_to_build(
+    subject: Subject, edges: list[_SkeletonEdge], order: dict[str, _SkeletonEdge]
+) -> bool:
     paths = [*order]
     last = max(index for index, edge in enumerate(order.values()) if edge.link is None)
     late = {*paths[:last]}

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from osimlite.derivatives.symbols import casadi
-from osimlite.optimal.point import Formula, Point
+from osimlite.optimal.point import Formula, PointSymbols
 from osimlite.optimal.tendons import TendonEquations
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ class Dynamics:
         """Return the forces of the model with their paths."""
         return [(item.path, item) for item in self.functions.forces.elements]
 
-    def compute_path_lengths(self, point: Point) -> tuple[Formula, Formula]:
+    def compute_path_lengths(self, point: PointSymbols) -> tuple[Formula, Formula]:
         """Compute the lengths and speeds of the paths of ``functions.path_names``.
 
         Args:
@@ -57,7 +57,7 @@ class Dynamics:
         lengths, speeds, _ = self.functions.paths(point.t, point.x, point.p)
         return lengths, speeds
 
-    def compute_rates(self, point: Point) -> Formula:
+    def compute_rates(self, point: PointSymbols) -> Formula:
         """Compute the time derivative of the complete state (n, 1): speeds, accelerations, auxiliary rates.
 
         With explicit dynamics the accelerations are symbols, and the point receives the equations
@@ -85,7 +85,7 @@ class Dynamics:
             point, casadi.vertcat(speeds, accelerations, self._compute_auxiliary_rates(point))
         )
 
-    def _insert_tendon_rates(self, point: Point, rates: Formula) -> Formula:
+    def _insert_tendon_rates(self, point: PointSymbols, rates: Formula) -> Formula:
         """Return the rates with those rates of tendon forces that are variables in their places.
 
         Args:
@@ -97,7 +97,7 @@ class Dynamics:
             rates[place] = point.derivatives[self._first_rate + number]
         return rates
 
-    def _compute_auxiliary_rates(self, point: Point) -> Formula:
+    def _compute_auxiliary_rates(self, point: PointSymbols) -> Formula:
         """Compute the rates of the auxiliary states by the force laws, in the order of the states."""
         none = casadi.SX.zeros(len(self.functions.states))
         f = self.functions
@@ -107,7 +107,7 @@ class Dynamics:
             2 * self.size :
         ]
 
-    def correct_rates(self, point: Point) -> Formula:
+    def correct_rates(self, point: PointSymbols) -> Formula:
         """Return the rates with the velocity correction that keeps states on the constraints (Posa et al.).
 
         Args:
@@ -124,7 +124,7 @@ class Dynamics:
         g = self.functions.constraints(point.t, point.x, rates, point.p)[3]
         return casadi.vertcat(rates[: self.size] + g.T @ point.slacks, rates[self.size :])
 
-    def compute_residuals(self, point: Point) -> tuple[list[str], Formula]:
+    def compute_residuals(self, point: PointSymbols) -> tuple[list[str], Formula]:
         """Compute the residuals that are zero at all points: of implicit dynamics, then of implicit tendons.
 
         Args:
@@ -148,7 +148,9 @@ class Dynamics:
             rows, errors
         )
 
-    def compute_constraint_errors(self, point: Point, is_mesh: bool) -> tuple[list[str], Formula]:
+    def compute_constraint_errors(
+        self, point: PointSymbols, is_mesh: bool
+    ) -> tuple[list[str], Formula]:
         """Compute the errors of the model's constraints at a point.
 
         Args:
@@ -173,7 +175,9 @@ class Dynamics:
         names = [*labels, *(f"{name}d" for name in labels), *(f"{name}dd" for name in labels)]
         return names, casadi.vertcat(position, velocity, acceleration)
 
-    def make_joint_load(self, path: str, side: str, frame: str) -> Callable[[Point], Formula]:
+    def make_joint_load(
+        self, path: str, side: str, frame: str
+    ) -> Callable[[PointSymbols], Formula]:
         """Return the function of a point for the load of a joint on one of its bodies.
 
         Args:
@@ -186,7 +190,7 @@ class Dynamics:
         """
         load = self.functions.joint_load(path, side)
 
-        def formula(point: Point) -> Formula:
+        def formula(point: PointSymbols) -> Formula:
             force, moment = load(point.t, point.x, point.rates, point.u, point.p, point.multipliers)
             # The kernels give loads in ground; the transposed rotation expresses them along the
             # axes of the frame.
@@ -197,7 +201,7 @@ class Dynamics:
 
     def make_generalized_forces(
         self, pushing: Sequence[str], coordinates: Sequence[str]
-    ) -> Callable[[Point], Formula]:
+    ) -> Callable[[PointSymbols], Formula]:
         """Return the function of a point for the generalized forces that the motion needs.
 
         Args:
@@ -211,7 +215,7 @@ class Dynamics:
         rows = [*map(self.functions.coordinates.index, coordinates)]
         return lambda point: missing(point.t, point.x, point.rates, point.u, point.p)[rows]
 
-    def _evaluate_constraints(self, point: Point) -> Sequence[Formula]:
+    def _evaluate_constraints(self, point: PointSymbols) -> Sequence[Formula]:
         """Return the errors of the model's constraints at a point.
 
         Returns:
@@ -222,7 +226,7 @@ class Dynamics:
         )
         return result
 
-    def compute_projection_errors(self, point: Point) -> tuple[list[str], Formula]:
+    def compute_projection_errors(self, point: PointSymbols) -> tuple[list[str], Formula]:
         """Compute the errors of projected values and speeds: ``x - projections - Gᵀ slacks``.
 
         The first half of the slacks moves values and the second half speeds, as in Moco.

@@ -22,7 +22,7 @@ PROJECTION_SUFFIX = "/projection"
 """Suffix of the names of states at the end of an interval, before they are projected onto the constraints."""
 
 
-class Layout:
+class VariableLayout:
     """Vector of variables: initial and final time, parameters, then the variables of each point in turn.
 
     Args:

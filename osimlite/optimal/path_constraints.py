@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 from osimlite.derivatives.symbols import casadi
 from osimlite.mechanics.multibody.schema_functions import convert_function
 from osimlite.optimal.goals.outputs import build_output_formula
-from osimlite.optimal.point import ConstraintRows, Formula, Point, make_projection
+from osimlite.optimal.point import ConstraintRows, Formula, PointSymbols, make_projection
 from osimlite.optimal.tables import sample_function
 from osimlite.schema.moco.path_constraints import (
     MocoControlBoundConstraint,
@@ -43,7 +43,7 @@ def build_control_bound_rows(
     paths = [str(path) for path in constraint.control_paths]
     for path in paths:
         problem.check_name(constraint, path, problem.controls, "control")
-    return build_bound_rows(constraint, problem, paths, Point.control)
+    return build_bound_rows(constraint, problem, paths, PointSymbols.control)
 
 
 def build_state_bound_rows(
@@ -58,7 +58,7 @@ def build_state_bound_rows(
     paths = [str(path) for path in constraint.state_paths]
     for path in paths:
         problem.check_name(constraint, path, problem.functions.states, "state")
-    return build_bound_rows(constraint, problem, paths, Point.state)
+    return build_bound_rows(constraint, problem, paths, PointSymbols.state)
 
 
 def build_output_bound_rows(
@@ -105,7 +105,7 @@ def build_frame_distance_rows(
         limits.append((near * near, far * far))
     project = make_projection(constraint, problem)
 
-    def formula(point: Point) -> Formula:
+    def formula(point: PointSymbols) -> Formula:
         offsets = (point.frame(end).position - point.frame(start).position for start, end in pairs)
         return casadi.vertcat(*(casadi.sumsqr(project(offset)) for offset in offsets))
 
@@ -117,7 +117,7 @@ def build_bound_rows(
     constraint: MocoControlBoundConstraint | MocoStateBoundConstraint | MocoOutputBoundConstraint,
     problem: Problem,
     paths: Sequence[str],
-    variable: Callable[[Point, str], Formula],
+    variable: Callable[[PointSymbols, str], Formula],
 ) -> ConstraintRows:
     """Return the difference of each variable from each of the bounding functions of time.
 
@@ -155,7 +155,7 @@ def build_bound_rows(
     ]
     limits: list[Range] = [limit for _ in paths for _, limit in functions]
 
-    def formula(point: Point) -> Formula:
+    def formula(point: PointSymbols) -> Formula:
         return casadi.vertcat(
             *(variable(point, path) - point.evaluate(each) for path in paths for each in series)
         )

@@ -42,14 +42,14 @@ class TimeFunction:
 
         Args:
             t: time, s.
-            known: data of the functions of time, see :class:`Point`.
+            known: data of the functions of time, see :class:`PointSymbols`.
         """
         first = 1 + 3 * self.number
         since = t - known[0]
         return known[first] + since * (known[first + 1] + 0.5 * since * known[first + 2])
 
 
-class Frame(NamedTuple):
+class FrameSymbols(NamedTuple):
     """Pose and velocity of a frame in ground.
 
     Attributes:
@@ -66,7 +66,7 @@ class Frame(NamedTuple):
 
 
 @dataclass(eq=False)
-class Point:
+class PointSymbols:
     """Symbols of the variables at one time of the motion, and formulas of them.
 
     Attributes:
@@ -104,7 +104,7 @@ class Point:
     _outputs: dict[str, Any] = field(default_factory=dict)
 
     @cached_property
-    def before_projection(self) -> Point:
+    def before_projection(self) -> PointSymbols:
         """Return the same point with the values and speeds before projection; itself without projections."""
         size = self.projections.numel()
         x = casadi.vertcat(self.projections, self.x[size:])
@@ -153,13 +153,13 @@ class Point:
         labels = functions.output_names[name]
         return {label: self._outputs[name][place] for place, label in enumerate(labels)}
 
-    def frame(self, path: str) -> Frame:
+    def frame(self, path: str) -> FrameSymbols:
         """Return the pose and velocity of a frame of the model by its path."""
         found = self.problem.functions.frames([path])(self.t, self.x, self.p)
         # Each frame is a column of nine numbers, the rotation matrix column by column.
-        return Frame(found[0], casadi.reshape(found[1], 3, 3), *found[2:])
+        return FrameSymbols(found[0], casadi.reshape(found[1], 3, 3), *found[2:])
 
-    def acceleration(self, frame: Frame) -> Formula:
+    def acceleration(self, frame: FrameSymbols) -> Formula:
         """Return the acceleration of the origin of a frame in ground (3, 1), m/s²."""
         # The velocity depends on time by the state alone, so that the chain rule gives its rate.
         return casadi.jtimes(frame.velocity, self.x, self.rates)
@@ -179,8 +179,8 @@ class Endpoints:
         integral: integral of the goal's integrand over time; None without an integrand.
     """
 
-    start: Point
-    end: Point
+    start: PointSymbols
+    end: PointSymbols
     integral: Formula | None
 
     @property
@@ -215,7 +215,7 @@ class GoalTerms:
     """
 
     value: Callable[[Endpoints], Formula]
-    integrand: Callable[[Point], Formula] | None = None
+    integrand: Callable[[PointSymbols], Formula] | None = None
     modes: tuple[str, ...] = COST_ONLY
     is_sum: bool = False
 
@@ -231,12 +231,12 @@ class ConstraintRows:
     """
 
     labels: list[str]
-    formula: Callable[[Point], Formula]
+    formula: Callable[[PointSymbols], Formula]
     limits: list[tuple[float, float]]
 
 
 def make_integral_terms(
-    integrand: Callable[[Point], Formula], modes: tuple[str, ...] = COST_ONLY
+    integrand: Callable[[PointSymbols], Formula], modes: tuple[str, ...] = COST_ONLY
 ) -> GoalTerms:
     """Return the terms of a goal that is the integral of an integrand over time.
 

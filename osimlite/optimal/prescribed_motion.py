@@ -21,7 +21,7 @@ from osimlite.mechanics.multibody import build_mechanism
 from osimlite.mechanics.multibody.schema_functions import convert_function
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.optimal.dynamics import Dynamics
-from osimlite.optimal.point import Formula, Point, TimeFunction
+from osimlite.optimal.point import Formula, PointSymbols, TimeFunction
 from osimlite.optimal.point_functions import cache_last
 from osimlite.optimal.tables import sample_function
 from osimlite.schema.actuators import (
@@ -278,7 +278,7 @@ class PrescribedDynamics(Dynamics):
         """Return the actuators with their paths in the model."""
         return self.functions.list_forces()
 
-    def compute_path_lengths(self, point: Point) -> tuple[Formula, Formula]:
+    def compute_path_lengths(self, point: PointSymbols) -> tuple[Formula, Formula]:
         """Return the prescribed lengths and speeds of the actuators' paths.
 
         Args:
@@ -290,11 +290,11 @@ class PrescribedDynamics(Dynamics):
         count = len(self.functions.path_names)
         return self._select_entries(point, 0, count), self._select_entries(point, count, count)
 
-    def _select_entries(self, point: Point, first: int, count: int) -> Formula:
+    def _select_entries(self, point: PointSymbols, first: int, count: int) -> Formula:
         """Return the column of `count` numbers of the motion from the index `first` on."""
         return _stack_series(point, self._entries[first : first + count])
 
-    def _compute_bench_residual(self, point: Point) -> Formula:
+    def _compute_bench_residual(self, point: PointSymbols) -> Formula:
         """Compute the residual of the test bench with all rates at zero.
 
         Returns:
@@ -316,12 +316,12 @@ class PrescribedDynamics(Dynamics):
             casadi.SX(0, 1),
         )
 
-    def compute_rates(self, point: Point) -> Formula:
+    def compute_rates(self, point: PointSymbols) -> Formula:
         """Compute the rates of the auxiliary states (n, 1), the only states."""
         count = len(self.functions.path_names)
         return self._insert_tendon_rates(point, -self._compute_bench_residual(point)[2 * count :])
 
-    def compute_residuals(self, point: Point) -> tuple[list[str], Formula]:
+    def compute_residuals(self, point: PointSymbols) -> tuple[list[str], Formula]:
         """Compute the generalized forces that actuators and constraints leave missing, and tendon residuals.
 
         Args:
@@ -348,7 +348,9 @@ class PrescribedDynamics(Dynamics):
         rows = needed - pushes @ self._compute_actuator_forces(point) + bound @ point.multipliers
         return [*(f"{name} residual" for name in moving), *names], casadi.vertcat(rows, errors)
 
-    def make_joint_load(self, path: str, side: str, frame: str) -> Callable[[Point], Formula]:
+    def make_joint_load(
+        self, path: str, side: str, frame: str
+    ) -> Callable[[PointSymbols], Formula]:
         """Return the function of a point for the load of a joint in the motion, (6, 1).
 
         Args:
@@ -369,7 +371,7 @@ class PrescribedDynamics(Dynamics):
 
     def make_generalized_forces(
         self, pushing: Sequence[str], coordinates: Sequence[str]
-    ) -> Callable[[Point], Formula]:
+    ) -> Callable[[PointSymbols], Formula]:
         """Return the function of a point for the generalized forces that the motion needs, (k, 1).
 
         Args:
@@ -384,7 +386,7 @@ class PrescribedDynamics(Dynamics):
 
     def _make_linear_formula(
         self, function: Callable[..., Array], size: int
-    ) -> Callable[[Point], Formula]:
+    ) -> Callable[[PointSymbols], Formula]:
         """Return the function of a point for a column (size, 1) that depends linearly on forces.
 
         Args:
@@ -395,14 +397,14 @@ class PrescribedDynamics(Dynamics):
             cache_last(partial(self.functions.compute_linear_response, function))
         )
 
-        def formula(point: Point) -> Formula:
+        def formula(point: PointSymbols) -> Formula:
             # 1 multiplies the value without forces.
             given = casadi.vertcat(1.0, self._compute_actuator_forces(point), point.multipliers)
             return casadi.reshape(_stack_series(point, entries), size, -1) @ given
 
         return formula
 
-    def _compute_actuator_forces(self, point: Point) -> Formula:
+    def _compute_actuator_forces(self, point: PointSymbols) -> Formula:
         """Compute the forces of the actuators (m, 1), N or N m; tensions of muscles are positive."""
         count = len(self.functions.path_names)
         force = -self._compute_bench_residual(point)[count : 2 * count][self.functions.carriages]
@@ -415,7 +417,7 @@ class PrescribedDynamics(Dynamics):
         )
 
 
-def _stack_series(point: Point, entries: Sequence[TimeFunction | None]) -> Formula:
+def _stack_series(point: PointSymbols, entries: Sequence[TimeFunction | None]) -> Formula:
     """Return the column of values of functions of time; None stands for zero."""
     return casadi.vertcat(
         *(casadi.SX(1, 1) if entry is None else point.evaluate(entry) for entry in entries)

@@ -32,7 +32,7 @@ from osimlite.optimal.point import (
     ConstraintRows,
     Formula,
     GoalTerms,
-    Point,
+    PointSymbols,
     TimeFunction,
     make_integral_terms,
 )
@@ -550,12 +550,12 @@ class Problem(StudyContext):
         return [f"gamma_{name}" for name in self.constraint_names] if is_corrected else []
 
 
-def _compute_projection_distance(point: Point) -> Formula:
+def _compute_projection_distance(point: PointSymbols) -> Formula:
     """Return the squared distance by which states are projected at a point; zero at points without one."""
     return casadi.sumsqr(point.projections - point.x[: point.projections.numel()])
 
 
-def _sum_scaled_squares(part: str | slice, by: tuple[float, float], point: Point) -> Formula:
+def _sum_scaled_squares(part: str | slice, by: tuple[float, float], point: PointSymbols) -> Formula:
     """Return the sum of squares of scaled multipliers or derivatives that are variables.
 
     Args:

@@ -17,8 +17,8 @@ import numpy as np
 from osimlite.derivatives.symbols import casadi
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.optimal.bounds import read_range
-from osimlite.optimal.layout import VARIABLE_KINDS, Layout
-from osimlite.optimal.point import Endpoints, Point
+from osimlite.optimal.layout import VARIABLE_KINDS, VariableLayout
+from osimlite.optimal.point import Endpoints, PointSymbols
 from osimlite.optimal.point_functions import BufferedFunction, PointGroup, cache_last
 from osimlite.optimal.problem import Problem
 from osimlite.optimal.sparse import SparseMatrix
@@ -54,7 +54,7 @@ class Program:
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
-        self.layout = Layout(problem)
+        self.layout = VariableLayout(problem)
         self._time_data: dict[bytes, Array] = {}
         self._compute_rows = cache_last(
             lambda w: self._a @ w + self._b @ self._evaluate_groups("value", w)
@@ -89,7 +89,7 @@ class Program:
         self._map_ends()
 
     # --------------------------------------------------------------------------------------------- formulas
-    def point(self, s: Any, z: Any, fraction: Any, known: Any, number: int) -> Point:
+    def point(self, s: Any, z: Any, fraction: Any, known: Any, number: int) -> PointSymbols:
         """Return the formulas at a point of the grid, which hold for all points with the same variables.
 
         Args:
@@ -113,7 +113,7 @@ class Program:
         # Controls that do not vary stay structural zeros, which CasADi leaves out of formulas.
         u[[*map(self.problem.functions.controls.index, self.problem.controls)]] = parts["controls"]
         t = s[0] + fraction * (s[1] - s[0])
-        return Point(
+        return PointSymbols(
             problem=self.problem,
             t=casadi.vertcat(t, *(series.expand(t, known) for series in self.problem.loads)),
             x=parts["states"],

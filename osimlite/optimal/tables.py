@@ -15,7 +15,7 @@ from osimlite.errors import DocumentError
 from osimlite.fitting.marker_data import MarkerData
 from osimlite.io.tables.storage import StoTable, expect_increasing_times, read_sto
 from osimlite.mechanics.multibody.constraints import Coupler
-from osimlite.mechanics.multibody.functions import Function
+from osimlite.mechanics.multibody.functions import SmoothFunction
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.smoothing_spline import SampledCurves
 from osimlite.mechanics.multibody.spatial import Array
@@ -240,7 +240,7 @@ def fit_splines(problem: Problem, table: StoTable, columns: list[str]) -> list[T
     ]
 
 
-def sample_function(function: Function, times: Array) -> Array:
+def sample_function(function: SmoothFunction, times: Array) -> Array:
     """Evaluate a function of time.
 
     Args:

@@ -18,7 +18,7 @@ from osimlite.mechanics.laws.smooth_muscles import (
     degroote_residual,
     smooth_tendon_length,
 )
-from osimlite.optimal.point import Formula, Point
+from osimlite.optimal.point import Formula, PointSymbols
 from osimlite.schema.muscles import DeGrooteFregly2016Muscle
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ class TendonEquations:
         self.paths = [path for path, _, _ in self.muscles]
         self.names = [f"{path}/implicitderiv_normalized_tendon_force" for path in self.paths]
 
-    def compute_residuals(self, point: Point, rates: Formula) -> tuple[list[str], Formula]:
+    def compute_residuals(self, point: PointSymbols, rates: Formula) -> tuple[list[str], Formula]:
         """Compute the excess of each tendon force over the fiber force, relative to the muscle's strength.
 
         The rate of its force determines how fast the tendon lengthens; the fibers take the rest of
@@ -103,7 +103,7 @@ class TendonEquations:
             rows.append(residual(force, MuscleInputs(*given), muscle, tendon))
         return [f"{path} equilibrium" for path in self.paths], casadi.vertcat(*rows)
 
-    def compute_rate_errors(self, point: Point) -> Formula:
+    def compute_rate_errors(self, point: PointSymbols) -> Formula:
         """Compute the rate of each fiber force along the tendon less the rate of the tendon force, N/s.
 
         The fibers are springs here: neither the activation nor the force-velocity factor changes

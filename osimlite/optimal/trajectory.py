@@ -13,7 +13,7 @@ from osimlite.base.records import dataclass, field
 from osimlite.errors import DocumentError
 from osimlite.io.tables.storage import StoTable, format_adapter_table, read_sto
 from osimlite.mechanics.multibody.spatial import Array
-from osimlite.optimal.layout import Layout
+from osimlite.optimal.layout import VariableLayout
 
 COLUMN_KINDS = (
     "states",
@@ -47,7 +47,7 @@ class MocoTrajectory:
 
     @classmethod
     def from_variables(
-        cls, layout: Layout, w: Array, header: dict[str, str] | None = None
+        cls, layout: VariableLayout, w: Array, header: dict[str, str] | None = None
     ) -> MocoTrajectory:
         """Return the trajectory of the variables of a nonlinear program.
 

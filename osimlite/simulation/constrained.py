@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from osimlite.mechanics.multibody.constraints import Constraint, Lock, PrescribedCoordinate
-from osimlite.mechanics.multibody.functions import Constant
+from osimlite.mechanics.multibody.constraints import ConstraintEquations, Lock, PrescribedCoordinate
+from osimlite.mechanics.multibody.functions import ConstantValue
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.spatial import Array
 
@@ -39,7 +39,9 @@ def find_free_coordinates(mechanism: Mechanism) -> list[int]:
     ]
 
 
-def select_constraints(mechanism: Mechanism, order: Sequence[int]) -> tuple[list[Constraint], int]:
+def select_constraints(
+    mechanism: Mechanism, order: Sequence[int]
+) -> tuple[list[ConstraintEquations], int]:
     """Return the constraints on the coordinates of a state, and the number of coordinates that are locked besides.
 
     Args:
@@ -50,7 +52,7 @@ def select_constraints(mechanism: Mechanism, order: Sequence[int]) -> tuple[list
     Returns:
         The constraints, and the number of locked coordinates that are not in the state.
     """
-    kept: list[Constraint] = []
+    kept: list[ConstraintEquations] = []
     locks = 0
     for item in mechanism.constraints:
         if not isinstance(item, Lock):
@@ -59,7 +61,7 @@ def select_constraints(mechanism: Mechanism, order: Sequence[int]) -> tuple[list
             # A locked coordinate that stays in the state is held at its default value by a
             # constraint.
             value = mechanism.coordinates[item.coordinate].default_value
-            kept.append(PrescribedCoordinate(item.coordinate, Constant(value), item.name))
+            kept.append(PrescribedCoordinate(item.coordinate, ConstantValue(value), item.name))
         else:
             locks += 1
     return kept, locks

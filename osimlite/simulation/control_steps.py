@@ -22,7 +22,7 @@ from osimlite.mechanics.kernels.pointers import Floats, Ints
 from osimlite.mechanics.kernels.reflexes import EARLY_STANCE, REFLEXES, UNKNOWN
 from osimlite.mechanics.kernels.sensors import SENSES
 from osimlite.mechanics.kernels.walks import COUNTS, FRAMES, LEGS, STEPS
-from osimlite.mechanics.multibody.functions import Constant, Function, PiecewiseConstant
+from osimlite.mechanics.multibody.functions import ConstantValue, PiecewiseConstant, SmoothFunction
 from osimlite.simulation.options import INITIAL_STEP_S
 from osimlite.simulation.run_controls import find_constant_offsets
 
@@ -151,7 +151,7 @@ class KernelController:
         Raises:
             SettingError: a control is a Python function, to which machine code cannot add.
         """
-        result = controls.add_functions({path: Constant(0.0) for path in self.paths})
+        result = controls.add_functions({path: ConstantValue(0.0) for path in self.paths})
         if not isinstance(result.make_record()[2], str):
             raise SettingError(
                 "a controller cannot be combined with controls that are Python functions; use numbers or tables"
@@ -333,7 +333,7 @@ class ControllerRuns:
         """
         table = self.table()
         times = tuple(table.times.tolist())
-        added: Mapping[str, Function] = {
+        added: Mapping[str, SmoothFunction] = {
             path: PiecewiseConstant(times, tuple(table[path].tolist()))
             for path in self.controller.paths
         }

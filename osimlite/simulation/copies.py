@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from osimlite.base.cores import count_cores
 from osimlite.mechanics.kernels.pointers import Floats
-from osimlite.mechanics.multibody.functions import Constant
+from osimlite.mechanics.multibody.functions import ConstantValue
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.model import Model
 from osimlite.simulation.batches import BatchOptions
-from osimlite.simulation.engines.batch import Batch
+from osimlite.simulation.engines.batch import BatchWorkspace
 from osimlite.simulation.options import IntegrationOptions
 from osimlite.simulation.run import Simulation
 from osimlite.simulation.run_controls import find_constant_offsets
@@ -54,13 +54,15 @@ class Copies:
         own = simulation.forces.controls
         self.controls = own.names
         # Constants are numbers of the model, which the caller replaces at each step.
-        driven = own.add_functions({name: Constant(0.0) for name in own.names})
+        driven = own.add_functions({name: ConstantValue(0.0) for name in own.names})
         self.engine.set_controls(driven)
         self.start = np.array(simulation.initial_state({}, {}, equilibrate=True))
         self.places = find_constant_offsets(engine, driven)
         batch_options = BatchOptions(to=step, **options.integration_choices())
         batch_options.check()
-        self.batch = Batch(engine, np.tile(self.start, (count, 1)), batch_options, start_holds=True)
+        self.batch = BatchWorkspace(
+            engine, np.tile(self.start, (count, 1)), batch_options, start_holds=True
+        )
         self._first_step = float(self.batch.clocks[0, 1])
         self._parts = [
             (first, min(first + COPIES_PER_TASK, count))

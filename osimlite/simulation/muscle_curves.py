@@ -18,7 +18,7 @@ from osimlite.io.tables.tabular import Tabular
 from osimlite.mechanics.kernels.layout import OUTCOME, STAGE
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.mechanics.multibody.extremes import any_numbers
-from osimlite.mechanics.multibody.functions import Constant
+from osimlite.mechanics.multibody.functions import ConstantValue
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.model import Model
 from osimlite.schema.muscles import Muscle
@@ -205,7 +205,7 @@ def muscle_curves(
         # Raises an error that explains why the class is not supported.
         force_elements(model, mechanism, folder=folder)
     controls = Controls(
-        forces.controls.names, ((Constant(activation),),) * len(forces.controls.names)
+        forces.controls.names, ((ConstantValue(activation),),) * len(forces.controls.names)
     )
     # Poses are assembled first, so single muscles need no constraints.
     free = mechanism.without_constraints()

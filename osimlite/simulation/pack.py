@@ -12,7 +12,7 @@ from osimlite.mechanics.kernels.batched_curves import LANES, ROWS
 from osimlite.mechanics.kernels.layout import CONTACT_WORK, EQUILIBRIUM, ITEM, MODEL, RESPONSE, RUN
 from osimlite.mechanics.kernels.pointers import Floats, Ints
 from osimlite.mechanics.kernels.record import STATES
-from osimlite.mechanics.multibody.links import LinkPacker, Placement, Tree, tree_of
+from osimlite.mechanics.multibody.links import LinkPacker, LinkTree, Placement, tree_of
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.simulation.constrained import find_free_coordinates, select_constraints
 from osimlite.simulation.elements import Forces
@@ -82,7 +82,9 @@ class Packer(LinkPacker):
         chain: joints whose mass matrix another program computes, if any.
     """
 
-    def __init__(self, tree: Tree, forces: Forces, state: StateLayout, chain: Chain | None) -> None:
+    def __init__(
+        self, tree: LinkTree, forces: Forces, state: StateLayout, chain: Chain | None
+    ) -> None:
         super().__init__(tree)
         self.chain = chain
         self.elements: Sequence[ForceElement] = forces.elements

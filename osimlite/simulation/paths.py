@@ -12,9 +12,9 @@ from osimlite.base.lazy import make_notebook_repr
 from osimlite.mechanics.kernels.paths import LENGTH, SPEED
 from osimlite.mechanics.kernels.projection import REDUNDANT
 from osimlite.mechanics.multibody import build_mechanism
-from osimlite.mechanics.multibody.constraints import Constraint, Lock
+from osimlite.mechanics.multibody.constraints import ConstraintEquations, Lock
 from osimlite.mechanics.multibody.extremes import any_numbers, methods_of_any_numbers
-from osimlite.mechanics.multibody.kinematics import Kinematics
+from osimlite.mechanics.multibody.kinematics import MechanismKinematics
 from osimlite.mechanics.multibody.linear import solve_least_norm, stack_equations
 from osimlite.mechanics.multibody.mechanism import Mechanism, Values
 from osimlite.mechanics.multibody.spatial import Array
@@ -290,7 +290,7 @@ class Paths:
             coupling[:, [place]] = _compute_coupled_speeds(others, state, [place])[:, [place]]
         return coupling
 
-    def compute_free_coupling(self, state: Kinematics) -> Array:
+    def compute_free_coupling(self, state: MechanismKinematics) -> Array:
         """Return the coupling of the coordinates that are not locked.
 
         Args:
@@ -314,7 +314,7 @@ class Paths:
 
 
 def _compute_coupled_speeds(
-    constraints: Sequence[Constraint], state: Kinematics, places: Sequence[int]
+    constraints: Sequence[ConstraintEquations], state: MechanismKinematics, places: Sequence[int]
 ) -> Array:
     """Return the admissible speeds that go with a speed of 1 of some coordinates.
 

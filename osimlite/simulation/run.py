@@ -24,7 +24,7 @@ from osimlite.simulation.constrained import find_consistent_state, select_constr
 from osimlite.simulation.elements import force_elements
 from osimlite.simulation.elements.controls import Controls
 from osimlite.simulation.engines import engine_factory, engine_name
-from osimlite.simulation.engines.protocol import Engine, Settings
+from osimlite.simulation.engines.protocol import Engine, EngineSettings
 from osimlite.simulation.initial_state import (
     convert_value,
     describe_suspect_value,
@@ -50,7 +50,7 @@ from osimlite.simulation.run_report import (
 )
 from osimlite.simulation.states import sort_by_component
 from osimlite.simulation.stepper import Observer, Progress, Stepper
-from osimlite.simulation.trajectory import Interrupted, Report, Trajectory
+from osimlite.simulation.trajectory import Interrupted, Trajectory, TrajectoryReports
 
 if TYPE_CHECKING:
     from osimlite.io.tables.storage import StoTable
@@ -233,7 +233,7 @@ class Simulation:
         self.engine: Engine = make(
             self.mechanism,
             self.forces,
-            Settings(route=chosen.route, show=chosen.show, visuals=visuals),
+            EngineSettings(route=chosen.route, show=chosen.show, visuals=visuals),
         )
         self.state = self.engine.state
         self.constraints = [
@@ -341,7 +341,7 @@ class Simulation:
         y = self.initial_state(initial, initial_speeds, equilibrate=chosen.equilibrate)
         self._require_inertia(y)
         runs = None if held is None else held.make_runs(self.engine, opened, to, before)
-        settings = Settings(
+        settings = EngineSettings(
             fixed_step=fixed_step,
             route=self.engine.route,
             show=chosen.show,
@@ -387,7 +387,7 @@ class Simulation:
         return trajectory
 
     def record_every_step(
-        self, start: float, y: Sequence[float], to: float, settings: Settings
+        self, start: float, y: Sequence[float], to: float, settings: EngineSettings
     ) -> tuple[list[float], list[list[float]], SimulationError | None]:
         """Integrate from any time and state, and record the end of every step.
 
@@ -445,7 +445,11 @@ class Simulation:
     # --------------------------------------------------------------------------------------------- helpers
     @any_numbers
     def _integrate(
-        self, y: list[float], settings: Settings, times: Sequence[float], progress: Progress | None
+        self,
+        y: list[float],
+        settings: EngineSettings,
+        times: Sequence[float],
+        progress: Progress | None,
     ) -> tuple[Recorder, Stepper, Sequence[Any]]:
         """Integrate from a state.
 
@@ -465,7 +469,7 @@ class Simulation:
 
     @any_numbers
     def _make_stepper(
-        self, start: float, y: Sequence[float], settings: Settings, observe: Observer
+        self, start: float, y: Sequence[float], settings: EngineSettings, observe: Observer
     ) -> Stepper:
         return self.engine.make_stepper(start, list(y), settings, observe)
 
@@ -604,7 +608,7 @@ class Simulation:
                 "versions": collect_versions(engine),
             }
 
-        report = Report(
+        report = TrajectoryReports(
             lambda: evaluate_with_controls(
                 lambda engine: (engine.columns, engine.force_table(times, states))
             ),

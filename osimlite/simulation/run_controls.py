@@ -18,10 +18,10 @@ from osimlite.mechanics.kernels.layout import ITEM, MODEL
 from osimlite.mechanics.kernels.pointers import Ints
 from osimlite.mechanics.multibody.functions import (
     Arguments,
-    Constant,
+    ConstantValue,
     Evaluated,
-    Function,
     ScaledFunction,
+    SmoothFunction,
     make_zero_derivatives,
 )
 from osimlite.mechanics.multibody.schema_functions import convert_function
@@ -37,7 +37,7 @@ PRINTED_TIME_TOLERANCE_S = 1e-6
 
 
 @dataclass(frozen=True)
-class PythonFunction(Function):
+class PythonFunction(SmoothFunction):
     """A Python function that returns a control for a time (s)."""
 
     function: Callable[[float], float]  # the function
@@ -86,7 +86,7 @@ def add_controls(
     if given is None:
         return controls
     known = {key: name for name in controls.names for key in (name.rpartition("/")[2], name)}
-    functions: dict[str, Function] = {}
+    functions: dict[str, SmoothFunction] = {}
     begin, end = -inf, inf
     for key, value in _map_by_name(given).items():
         if key not in known:
@@ -194,7 +194,7 @@ def _map_by_name(given: Mapping[str, Any] | StoTable | str | Path) -> Mapping[st
     return {label: (table.times, table.rows[:, index]) for index, label in enumerate(table.columns)}
 
 
-def _make_function(name: str, value: Any) -> Function:
+def _make_function(name: str, value: Any) -> SmoothFunction:
     """Return the control of an actuator as a function of time.
 
     Args:
@@ -204,7 +204,7 @@ def _make_function(name: str, value: Any) -> Function:
     Raises:
         SettingError: the value is of another type, or not finite.
     """
-    if isinstance(value, Function):
+    if isinstance(value, SmoothFunction):
         return value
     if isinstance(value, Object):
         return convert_function(value, 1, f"the control of '{name}'")
@@ -218,10 +218,10 @@ def _make_function(name: str, value: Any) -> Function:
         ) from None
     if not isfinite(number):
         raise SettingError(f"the control of '{name}' is {number}; give a number")
-    return Constant(number)
+    return ConstantValue(number)
 
 
-def _interpolate(name: str, times: Any, values: Any) -> tuple[Function, float, float]:
+def _interpolate(name: str, times: Any, values: Any) -> tuple[SmoothFunction, float, float]:
     """Return the linear interpolation of values at times.
 
     Args:
@@ -246,7 +246,7 @@ def _interpolate(name: str, times: Any, values: Any) -> tuple[Function, float, f
             f"the control of '{name}' has times that do not increase, or a value that is not a finite number; correct it"
         )
     # A smoothing spline of degree 1 without smoothing is the polyline through the values.
-    line = Constant(float(y[0])) if len(x) == 1 else smoothing_spline(x, y, 1, 0.0)
+    line = ConstantValue(float(y[0])) if len(x) == 1 else smoothing_spline(x, y, 1, 0.0)
     return line, float(x[0]), float(x[-1])
 
 

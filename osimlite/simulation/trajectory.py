@@ -50,7 +50,7 @@ class Trajectory(Tabular):
         times: Sequence[float],
         values: ArrayLike,
         speeds: ArrayLike,
-        report: Report,
+        report: TrajectoryReports,
         auxiliary: Mapping[str, ArrayLike] = MappingProxyType({}),
         paths: Sequence[str] = (),
         model: Model | Snapshot | None = None,
@@ -72,7 +72,7 @@ class Trajectory(Tabular):
         self.auxiliary: dict[str, Array] = {
             path: np.array(auxiliary[path], dtype=float) for path in ordered
         }
-        self._report: Report | None = report
+        self._report: TrajectoryReports | None = report
 
     @property
     def model(self) -> Model | None:
@@ -342,7 +342,7 @@ class Interrupted(KeyboardInterrupt):
         self.trajectory = trajectory
 
 
-class Report(NamedTuple):
+class TrajectoryReports(NamedTuple):
     """Functions with which a trajectory computes its reports when they are first read.
 
     Attributes:

@@ -18,13 +18,13 @@ from osimlite.base.progress import report_progress
 from osimlite.base.records import dataclass, field
 from osimlite.errors import SimulationError
 from osimlite.mechanics.kernels.layout import STAGE
-from osimlite.mechanics.multibody.functions import Function, PiecewiseConstant
+from osimlite.mechanics.multibody.functions import PiecewiseConstant, SmoothFunction
 from osimlite.mechanics.multibody.smoothing_spline import PiecewisePolynomial
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.control_sets import ControlLinear, ControlLinearNode, ControlSet
 from osimlite.schema.muscles import Muscle
 from osimlite.simulation.elements.control_sets import EXCITATION, make_node_curve
-from osimlite.simulation.engines.protocol import Settings
+from osimlite.simulation.engines.protocol import EngineSettings
 from osimlite.simulation.run import Simulation
 from osimlite.simulation.system import System
 from osimlite.tools.job import Job
@@ -127,7 +127,7 @@ class ActuatorControl:
             control.name, control.use_steps, create_bound(0), create_bound(1), default, bounds=nodes
         )
 
-    def create_function(self) -> Function:
+    def create_function(self) -> SmoothFunction:
         """Return the control as a function of time through all nodes."""
         if self.is_step:
             # A value holds up to and including its time.
@@ -141,7 +141,7 @@ class ActuatorControl:
             np.append(t[0], t), np.column_stack([np.append(v[0], v), np.append(0.0, slopes)])
         )
 
-    def create_window_function(self, start: float, end: float, value: float) -> Function:
+    def create_window_function(self, start: float, end: float, value: float) -> SmoothFunction:
         """Return the control as a function of time in one window.
 
         Args:
@@ -231,7 +231,7 @@ class ComputedControl:
         self.has_states = self.engine.state.size > self._first
 
     def follow_motion(
-        self, start: float, y: list[float], end: float, settings: Settings
+        self, start: float, y: list[float], end: float, settings: EngineSettings
     ) -> TrackedMotion:
         """Follow the motion from a state to a time.
 
@@ -366,7 +366,7 @@ class ComputedControl:
             [item.create_window_function(t, target, value) for item, value in pairs]
         )
 
-    def _drive_functions(self, functions: Sequence[Function]) -> None:
+    def _drive_functions(self, functions: Sequence[SmoothFunction]) -> None:
         """Drive the model with a function of time for each actuator."""
         controls = self.simulation.forces.controls
         # Controls of the tool are added to those of the model's own controllers.

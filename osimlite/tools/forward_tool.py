@@ -7,7 +7,7 @@ import numpy as np
 from osimlite.io.tables.storage import StoTable
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.tools.dynamics import ForwardTool
-from osimlite.simulation.engines.protocol import Settings
+from osimlite.simulation.engines.protocol import EngineSettings
 from osimlite.simulation.options import MAX_FIXED_STEPS
 from osimlite.simulation.run import Simulation
 from osimlite.tools.dynamics_setup import (
@@ -58,7 +58,7 @@ def run_forward_tool(job: Job, outcome: Outcome) -> None:
                 f"the final_time {setup.final_time:g} s is too far away for steps of {bounds[1]:g} "
                 "s"
             )
-        settings = Settings(accuracy=setup.integrator_error_tolerance, step_bounds=bounds)
+        settings = EngineSettings(accuracy=setup.integrator_error_tolerance, step_bounds=bounds)
         times, states, failure = simulation.record_every_step(start, y, setup.final_time, settings)
         outcome.done = failure is None
         if failure is not None:

@@ -11,7 +11,7 @@ from osimlite.base.records import replace
 from osimlite.base.text import join_words, suggest_name
 from osimlite.io.tables.storage import StoTable, expect_time_range
 from osimlite.mechanics.multibody import build_mechanism
-from osimlite.mechanics.multibody.kinematics import Kinematics
+from osimlite.mechanics.multibody.kinematics import MechanismKinematics
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.parts import GROUND
 from osimlite.mechanics.multibody.schema_frames import Placements
@@ -227,7 +227,7 @@ def _split_mobilizer(
 
 
 def _compute_joint_load(
-    state: Kinematics, parent: int, inner: Array, hinges: Sequence[_Hinge], forces: Array
+    state: MechanismKinematics, parent: int, inner: Array, hinges: Sequence[_Hinge], forces: Array
 ) -> Array:
     """Return force and torque (2, 3) in ground for the generalized forces (n,) of some hinges.
 

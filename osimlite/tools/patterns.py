@@ -27,14 +27,14 @@ def find_files(pattern: str) -> list[str]:
     drive, rest = os.path.splitdrive(pattern)
     rooted = rest.startswith(("/", os.sep))
     parts = [part for part in rest.replace(os.sep, "/").split("/") if part]
-    search = _Search(pattern)
+    search = _FileSearch(pattern)
     paths = [drive + os.sep if rooted else drive]
     for part in parts:
         paths = list(dict.fromkeys(search.match_part(paths, part)))
     return sorted(filter(os.path.isfile, paths))
 
 
-class _Search:
+class _FileSearch:
     """Search for files that reads a limited number of entries."""
 
     def __init__(self, pattern: str) -> None:

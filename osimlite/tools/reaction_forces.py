@@ -14,14 +14,14 @@ from osimlite.mechanics.kernels.constrained_dynamics import SLIGHT, evaluate_con
 from osimlite.mechanics.kernels.layout import LINK_WORK, MODEL
 from osimlite.mechanics.kernels.points import link_work
 from osimlite.mechanics.multibody.body_constraints import find_carrier
-from osimlite.mechanics.multibody.constraints import Constraint, Coupler
+from osimlite.mechanics.multibody.constraints import ConstraintEquations, Coupler
 from osimlite.mechanics.multibody.dynamics import mass_matrix
-from osimlite.mechanics.multibody.kinematics import Kinematics
+from osimlite.mechanics.multibody.kinematics import MechanismKinematics
 from osimlite.mechanics.multibody.linear import solve_least_norm
-from osimlite.mechanics.multibody.links import Link, Placement, Places, Tree
+from osimlite.mechanics.multibody.links import Link, LinkTree, Placement, Places
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.parts import GROUND
-from osimlite.mechanics.multibody.program import Program
+from osimlite.mechanics.multibody.program import PackedMechanism
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema import sets as schema
 from osimlite.schema.joints import Joint
@@ -37,9 +37,9 @@ from osimlite.tools.motion import Motion
 class ConstraintForces:
     """Forces of the constraints of a mechanism at one state."""
 
-    state: Kinematics  # kinematics of the state
+    state: MechanismKinematics  # kinematics of the state
     # Constraints, each with its multipliers (m,), one for each equation.
-    multipliers: list[tuple[Constraint, Array]]
+    multipliers: list[tuple[ConstraintEquations, Array]]
 
     @classmethod
     def compute_along(cls, motion: Motion) -> Iterator[ConstraintForces]:
@@ -69,7 +69,7 @@ class ConstraintForces:
             parts = np.split(result, np.cumsum([len(block) for block in blocks])[:-1])
             yield cls(state, list(zip(kept, parts, strict=True)))
 
-    def compute_wrenches(self, constraint: Constraint, multipliers: Array) -> Array:
+    def compute_wrenches(self, constraint: ConstraintEquations, multipliers: Array) -> Array:
         """Compute the wrenches of a constraint on its bodies.
 
         Args:
@@ -110,7 +110,7 @@ class ConstraintForces:
 
 
 @lru_cache
-def _build_separate_bodies(mechanism: Mechanism, constraint: Any) -> Program:
+def _build_separate_bodies(mechanism: Mechanism, constraint: Any) -> PackedMechanism:
     """Return a program for a constraint between free bodies, each a link without a joint.
 
     The six components of each body's velocity are speeds of their own, so that multipliers times
@@ -119,8 +119,9 @@ def _build_separate_bodies(mechanism: Mechanism, constraint: Any) -> Program:
     count = len(mechanism.bodies)
     links = [Link(GROUND, []) for _ in range(count)]
     places = Places(mechanism, {}, [Placement(number, np.eye(4)) for number in range(count)])
-    return Program(
-        Tree(links, [*range(0, 6 * count + 1, 6)], tuple(range(6 * count)), places), (constraint,)
+    return PackedMechanism(
+        LinkTree(links, [*range(0, 6 * count + 1, 6)], tuple(range(6 * count)), places),
+        (constraint,),
     )
 
 
@@ -186,7 +187,7 @@ def _get_body_name(mechanism: Mechanism, body: int) -> str:
     return "ground" if body == GROUND else mechanism.bodies[body].name
 
 
-def _find_mobilities(mechanism: Mechanism, constraint: Constraint) -> list[int]:
+def _find_mobilities(mechanism: Mechanism, constraint: ConstraintEquations) -> list[int]:
     """Return the indices of all coordinates of the joints of a coupler, the dependent one last."""
     assert isinstance(constraint, Coupler)
     owners = {

@@ -47,7 +47,7 @@ from osimlite.view.panels import (
 )
 from osimlite.view.recording import MeasuredMarkers, Recording, compute_forces
 from osimlite.view.shown import Shown
-from osimlite.view.table_plots import SECTIONS, Names, describe_columns
+from osimlite.view.table_plots import SECTIONS, ColumnNames, describe_columns
 
 SIDES = {"r": (COLORS[0], "right"), "l": (COLORS[1], "left"), "": ("#444444", "")}
 """Color and name of the curves of each side."""
@@ -276,7 +276,7 @@ def collect_actuators(
     for number, trial in enumerate(trials):
         evidence = trial.evidence
         assert evidence is not None
-        names = Names.of_model(evidence.model, build_mechanism(evidence.model))
+        names = ColumnNames.of_model(evidence.model, build_mechanism(evidence.model))
         for outcome in trial.outcomes:
             for table in outcome.tables.values():
                 for section, columns in _divide_actuators(table, names).items():
@@ -301,7 +301,7 @@ def collect_actuators(
     ]
 
 
-def _divide_actuators(table: StoTable, names: Names) -> dict[str, list[Column]]:
+def _divide_actuators(table: StoTable, names: ColumnNames) -> dict[str, list[Column]]:
     """Return the columns of activations, of muscle forces and of other actuators of a table."""
     result: dict[str, list[Column]] = {}
     if table.name == ACTIVATION_TITLE:

@@ -169,7 +169,7 @@ def _apply_locks(
             )
 
 
-class TrackingTask(NamedTuple):
+class CoordinateTask(NamedTuple):
     """Coordinate that follows a desired coordinate.
 
     Attributes:
@@ -197,7 +197,7 @@ class TrackingTask(NamedTuple):
 class TrackingTasks:
     """All active tasks."""
 
-    tasks: tuple[TrackingTask, ...]
+    tasks: tuple[CoordinateTask, ...]
 
     @classmethod
     def read(cls, job: Job, mechanism: Mechanism) -> TrackingTasks:
@@ -239,7 +239,7 @@ class TrackingTasks:
             )
             index = names.index(str(item.coordinate))
             wanted = names.index(item.name)
-            result.append(TrackingTask(item.name, index, wanted, weight, kp, kv, ka, item.limit))
+            result.append(CoordinateTask(item.name, index, wanted, weight, kp, kv, ka, item.limit))
         if not result:
             raise job.create_error(
                 f"no task of '{path}' is active; set the first of its 'active' to true"

@@ -18,7 +18,7 @@ from osimlite.schema.frames import Body
 from osimlite.schema.model import Model
 from osimlite.schema.tools.analyses import Actuation, Kinematics
 from osimlite.schema.tools.tracking import CMCTool, RRATool
-from osimlite.simulation.engines.protocol import Settings
+from osimlite.simulation.engines.protocol import EngineSettings
 from osimlite.simulation.run import Simulation
 from osimlite.tools.computed_control import ActuatorControl, ComputedControl, TrackedMotion
 from osimlite.tools.dynamics_setup import (
@@ -241,7 +241,7 @@ def _track_motion(
             start, y = tracker.settle_muscles(start, y, followed)
         if not followed.failure:
             bounds = setup.minimum_integrator_step_size, setup.maximum_integrator_step_size
-            settings = Settings(accuracy=setup.integrator_error_tolerance, step_bounds=bounds)
+            settings = EngineSettings(accuracy=setup.integrator_error_tolerance, step_bounds=bounds)
             before = followed.errors
             followed = tracker.follow_motion(start, y, end - window, settings)
             followed.errors = before | followed.errors

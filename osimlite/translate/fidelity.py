@@ -67,7 +67,7 @@ class Record:
 
 
 @dataclass(frozen=True, slots=True)
-class Group:
+class RecordGroup:
     """Records of one kind that say the same about several components.
 
     Attributes:
@@ -164,12 +164,12 @@ class Fidelity:
         if name != own:
             self.renamed.setdefault(component, {})[kind] = name
 
-    def groups(self) -> list[Group]:
+    def groups(self) -> list[RecordGroup]:
         """Return the records in groups that say the same, in the order of their first records."""
         result: dict[tuple[str, str, str], list[Record]] = {}
         for record in self.records:
             result.setdefault((record.kind, record.cannot_say, record.done), []).append(record)
-        return [Group(*key, tuple(records)) for key, records in result.items()]
+        return [RecordGroup(*key, tuple(records)) for key, records in result.items()]
 
     def counts(self) -> tuple[int, int, int]:
         """Count the components by outcome.

@@ -11,7 +11,7 @@ from osimlite.mechanics.multibody.motions import EllipsoidPoint
 from osimlite.mechanics.multibody.smoothing_spline import PiecewisePolynomial
 
 
-def describe_function(function: f.Function) -> dict[str, Any]:
+def describe_function(function: f.SmoothFunction) -> dict[str, Any]:
     """Convert a function to data for JSON, without loss.
 
     Args:
@@ -24,7 +24,7 @@ def describe_function(function: f.Function) -> dict[str, Any]:
         UnsupportedError: the format does not have this class of functions.
     """
     match function:
-        case f.Constant(value):
+        case f.ConstantValue(value):
             return {"type": "constant", "value": value}
         case f.Linear(rate, start):
             return {"type": "linear", "slope": rate, "start": start}
@@ -33,7 +33,7 @@ def describe_function(function: f.Function) -> dict[str, Any]:
         case f.Polynomial(coefficients):
             # OpenSim has the highest power first, the format the constant.
             return {"type": "polynomial", "coefficients": coefficients[::-1]}
-        case f.Sine(amplitude, omega, phase, offset):
+        case f.SineWave(amplitude, omega, phase, offset):
             return {
                 "type": "sine",
                 "amplitude": amplitude,
@@ -41,7 +41,7 @@ def describe_function(function: f.Function) -> dict[str, Any]:
                 "phase": phase,
                 "offset": offset,
             }
-        case f.Step():
+        case f.QuinticStep():
             return {
                 "type": "step",
                 "x": (function.start, function.end),
@@ -68,7 +68,7 @@ def describe_function(function: f.Function) -> dict[str, Any]:
                 "length": length,
                 "neutral": neutral,
             }
-        case f.SimmSpline():
+        case f.SimmCubicSpline():
             # Before the first and after the last point the spline continues linearly.
             first, *_, last = function.pieces
             return {

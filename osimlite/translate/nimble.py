@@ -350,7 +350,7 @@ def _extend_spline(spline: SimmSpline, low: float, high: float) -> None:
     third derivative at the new end, which the end condition takes from the last four points, is
     that of the cubic.
     """
-    pieces = curves.SimmSpline(spline.x, spline.y).pieces
+    pieces = curves.SimmCubicSpline(spline.x, spline.y).pieces
     margin = EXTRA_FRACTION * (high - low)
     x, y = list(spline.x), list(spline.y)
     fractions = [(k + 1) / EXTRA_POINTS for k in range(EXTRA_POINTS)]

@@ -19,14 +19,14 @@ from osimlite.schema.model import Model
 from osimlite.simulation.elements.builder import OPENSIM
 from osimlite.view.collect import build_scene
 from osimlite.view.motion import (
-    Motion,
+    ShownMotion,
     activity_color,
     at_times,
     find_moving_bodies,
     read_activations,
     values_of,
 )
-from osimlite.view.picture import FORCE, INK, SKY, Arrow, Camera, Style, draw_scene
+from osimlite.view.picture import FORCE, INK, SKY, Camera, ForceArrow, Style, draw_scene
 from osimlite.view.pushes import Pushes
 from osimlite.view.scene import STEEPEST, Scene
 
@@ -52,7 +52,7 @@ Progress = Callable[[int, int], None]
 
 def animate(
     model: Model,
-    trajectory: Motion,
+    trajectory: ShownMotion,
     path: str | Path,
     *,
     fps: int = 25,
@@ -136,7 +136,9 @@ def _encode_frames(frames: list[Any], fps: int, image: Any) -> bytes:
 class Film:
     """The motion at the moments of the film, and how much of space it takes."""
 
-    def __init__(self, scene: Scene, motion: Motion, fps: int, speed: float, plane: Plane) -> None:
+    def __init__(
+        self, scene: Scene, motion: ShownMotion, fps: int, speed: float, plane: Plane
+    ) -> None:
         if plane not in _AXES:
             raise OsimliteError(f"a picture shows the plane 'xy', 'yz' or 'xz', not '{plane}'")
         self.right, self.up = _AXES[plane]
@@ -229,7 +231,7 @@ class _Painter:
         film, pose = self.film, self.film.poses[number]
         camera = Camera(film.right, film.up, film.focus[number], self.half)
         pushes = film.pushes.at(number, pose)
-        arrows = [Arrow(point, force * self.meters_per_newton) for _, point, force in pushes]
+        arrows = [ForceArrow(point, force * self.meters_per_newton) for _, point, force in pushes]
         loaded = frozenset(push.surface for push, _, force in pushes if force.any())
         colors = {
             path: activity_color(float(levels[number])) for path, levels in film.activity.items()

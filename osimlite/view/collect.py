@@ -89,10 +89,10 @@ def build_scene(
     Raises:
         SettingError: there is no such wrapping.
     """
-    return _Collector(model, mechanism, folders or MeshFolders(), wrapping).scene()
+    return _SceneCollector(model, mechanism, folders or MeshFolders(), wrapping).scene()
 
 
-class _Collector:
+class _SceneCollector:
     def __init__(
         self, model: Model, mechanism: Mechanism, folders: MeshFolders, wrapping: str
     ) -> None:

@@ -18,7 +18,7 @@ from osimlite import __version__
 from osimlite.base.files import write_atomically
 from osimlite.io.meshes.unit_shapes import compute_normals, make_cylinder
 from osimlite.mechanics.multibody.spatial import Array, quaternion_of
-from osimlite.view.motion import Motion, at_times, values_of
+from osimlite.view.motion import ShownMotion, at_times, values_of
 from osimlite.view.picture import FORCE
 from osimlite.view.pushes import LONGEST_ARROW, Pushes
 from osimlite.view.scene import Bodies, Color, Scene
@@ -32,7 +32,7 @@ _KINDS = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}
 _ROUND = make_cylinder(8)
 
 
-def write_glb(scene: Scene, q: Array, motion: Motion | None, path: str | Path) -> Path:
+def write_glb(scene: Scene, q: Array, motion: ShownMotion | None, path: str | Path) -> Path:
     """Write what is shown of a model.
 
     Args:
@@ -51,7 +51,7 @@ def write_glb(scene: Scene, q: Array, motion: Motion | None, path: str | Path) -
         values = values_of(motion, scene.mechanism)
         rows = at_times(motion, values, times)
     poses = [scene.at(row) for row in rows]
-    written = _Writer(
+    written = _GlbWriter(
         times - times[0], _make_turns(np.cross(scene.up, (0.0, 1.0, 0.0)), scene.up[1])
     )
     names = [*(body.name for body in scene.mechanism.bodies), "ground"]
@@ -87,7 +87,7 @@ class _Track(NamedTuple):
 
 
 def _list_segments(
-    scene: Scene, motion: Motion | None, times: Array, rows: Array, poses: Sequence[Bodies]
+    scene: Scene, motion: ShownMotion | None, times: Array, rows: Array, poses: Sequence[Bodies]
 ) -> Iterator[tuple[str, Color, float, Array]]:
     """Straight pieces of paths, and forces: path of the component, colour, radius, ends (n, 2, 3) in ground.
 
@@ -141,7 +141,7 @@ def _make_continuous(quaternions: Array) -> Array:
     return result
 
 
-class _Writer:
+class _GlbWriter:
     """Puts the parts of a file together: its JSON and its one buffer."""
 
     def __init__(self, times: Array, upright: Array) -> None:

@@ -15,7 +15,7 @@ from osimlite.mechanics.kernels.layout import CONSTRAINED, ITEM, LINK_WORK, MODE
 from osimlite.mechanics.kernels.motion import move_links, place_links
 from osimlite.mechanics.kernels.paths import pull_path
 from osimlite.mechanics.kernels.projection import project_speeds
-from osimlite.mechanics.multibody.constraints import Constraint, Coupler
+from osimlite.mechanics.multibody.constraints import ConstraintEquations, Coupler
 from osimlite.simulation.elements.laws import find_function
 from osimlite.simulation.polylines import Polylines
 
@@ -26,7 +26,7 @@ FOR_ARMS, FOR_SPEEDS = (
 """What moment arms of paths are found with, and the speeds of coordinates that must move with one."""
 
 
-def program_data(paths: Polylines, constraints: Sequence[Constraint]) -> dict[str, Any]:
+def program_data(paths: Polylines, constraints: Sequence[ConstraintEquations]) -> dict[str, Any]:
     """What the kernels take, and what the page must know of its layout."""
     program, s = paths.program, paths.structure
     head = s[s[MODEL.CONSTRAINED] :]

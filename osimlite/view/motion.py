@@ -13,7 +13,7 @@ from osimlite.mechanics.multibody.spatial import Array
 from osimlite.view.scene import Bodies, Color, Scene
 
 
-class Motion(Protocol):
+class ShownMotion(Protocol):
     """A recorded motion of n moments: a Trajectory, or anything like it."""
 
     @property
@@ -54,7 +54,7 @@ class ContactForce(NamedTuple):
     torques: Array | None = None
 
 
-def contact_forces(motion: Motion) -> list[ContactForce]:
+def contact_forces(motion: ShownMotion) -> list[ContactForce]:
     """The force vectors among the columns of `motion.forces`, in their order."""
     result = []
     for label in motion.forces:
@@ -72,13 +72,13 @@ def contact_forces(motion: Motion) -> list[ContactForce]:
     return result
 
 
-def _find_columns(motion: Motion, label: str) -> Array:
+def _find_columns(motion: ShownMotion, label: str) -> Array:
     return np.column_stack(
         [np.asarray(motion.forces[f"{label}.{axis}"], dtype=float) for axis in "XYZ"]
     )
 
 
-def read_activations(scene: Scene, motion: Motion) -> dict[str, Array]:
+def read_activations(scene: Scene, motion: ShownMotion) -> dict[str, Array]:
     """Activations (n,), from 0 to 1, of the muscles that have one on record, by the component paths of their lines.
 
     Files of OpenSim 3 have them as ``soleus_r.activation``.
@@ -109,19 +109,19 @@ def find_moving_bodies(poses: Sequence[Bodies]) -> Array:
     return result
 
 
-def at_times(motion: Motion, columns: Array, times: Array) -> Array:
+def at_times(motion: ShownMotion, columns: Array, times: Array) -> Array:
     """Columns (n, k) of the motion at other times (m,), along straight lines between the moments on record."""
     recorded = np.asarray(motion.times, dtype=float)
     rows = [np.interp(times, recorded, columns[:, k]) for k in range(columns.shape[1])]
     return np.array(rows).reshape(len(rows), len(times)).T
 
 
-def values_of(motion: Motion, mechanism: Mechanism) -> Array:
+def values_of(motion: ShownMotion, mechanism: Mechanism) -> Array:
     """Coordinate values (n, c) of the motion in the order of the mechanism's coordinates."""
     return in_mechanism_order(motion, mechanism, np.asarray(motion.values, dtype=float))
 
 
-def in_mechanism_order(motion: Motion, mechanism: Mechanism, columns: Array) -> Array:
+def in_mechanism_order(motion: ShownMotion, mechanism: Mechanism, columns: Array) -> Array:
     """Columns (n, k) of the motion in the order of the mechanism's coordinates (n, c); defaults where it has none."""
     result = np.tile(mechanism.default_state()[0], (len(columns), 1))
     for k, name in enumerate(motion.coordinates):

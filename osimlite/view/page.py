@@ -25,7 +25,7 @@ from osimlite.schema.model import Model
 from osimlite.translate.sidecar import replace_non_finite
 from osimlite.view.inspect import component_tree, finding_rows, place_pins
 from osimlite.view.kernels import kernels_text, program_data, text_of
-from osimlite.view.motion import Motion, find_moving_bodies, read_activations, values_of
+from osimlite.view.motion import ShownMotion, find_moving_bodies, read_activations, values_of
 from osimlite.view.pushes import Pushes
 from osimlite.view.recording import MeasuredMarkers
 from osimlite.view.scene import LAYERS, STEEPEST, Scene
@@ -77,7 +77,7 @@ def page_text(data: Mapping[str, Any]) -> str:
 def page_data(
     model: Model,
     scene: Scene,
-    motion: Motion | None,
+    motion: ShownMotion | None,
     findings: Sequence[Finding],
     q: Array,
     *,
@@ -222,7 +222,7 @@ def _describe_coordinates(
     return rows
 
 
-def _describe_motion(scene: Scene, motion: Motion) -> dict[str, Any]:
+def _describe_motion(scene: Scene, motion: ShownMotion) -> dict[str, Any]:
     mechanism = scene.mechanism
     times = np.asarray(motion.times, dtype=float)
     values = values_of(motion, mechanism)

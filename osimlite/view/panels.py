@@ -76,7 +76,7 @@ class Column(NamedTuple):
     section: str = ""  # title of the pages on which it is drawn, "" for none
 
 
-class Curve(NamedTuple):
+class PanelCurve(NamedTuple):
     """One curve of a panel."""
 
     times: Array  # abscissa (n,), s
@@ -92,7 +92,7 @@ class Panel(NamedTuple):
 
     title: str
     unit: str
-    curves: list[Curve]
+    curves: list[PanelCurve]
     group: str = ""
     section: str = ""
 
@@ -193,7 +193,7 @@ def group_columns(
             (stem, column.unit, column.section),
             Panel(stem, column.unit, [], column.group, column.section),
         )
-        panel.curves.append(Curve(times, values, side, style, label, steps or {}))
+        panel.curves.append(PanelCurve(times, values, side, style, label, steps or {}))
     groups: dict[tuple[str, str], list[Panel]] = {}
     for panel in panels.values():
         groups.setdefault((panel.section, panel.group), []).append(panel)
@@ -267,7 +267,7 @@ def has_cycles(panels: Iterable[Panel]) -> bool:
     return bool(curves) and all(_select_cycles(curve) for curve in curves)
 
 
-def _select_cycles(curve: Curve) -> list[tuple[float, float]]:
+def _select_cycles(curve: PanelCurve) -> list[tuple[float, float]]:
     """Return the gait cycles that a curve covers; a curve without a side follows the right foot."""
     steps = curve.steps.get(curve.side or "r")
     if steps is None:
@@ -339,7 +339,7 @@ def draw_panel(place: Any, panel: Panel, abscissa: str, *, cyclic: bool = False)
     style_axes(place, abscissa)
 
 
-def _coincide(curve: Curve, other: Curve) -> bool:
+def _coincide(curve: PanelCurve, other: PanelCurve) -> bool:
     """Return whether two curves cannot be distinguished in a picture."""
     if len(curve.values) != len(other.values):
         return False
@@ -347,7 +347,7 @@ def _coincide(curve: Curve, other: Curve) -> bool:
     return bool(np.allclose(curve.values, other.values, rtol=0.0, atol=near, equal_nan=True))
 
 
-def _draw_curve(place: Any, curve: Curve, *, cyclic: bool) -> None:
+def _draw_curve(place: Any, curve: PanelCurve, *, cyclic: bool) -> None:
     """Draw a curve over time, or each gait cycle and their mean."""
     color, _ = SIDES[curve.side]
     if not cyclic:
@@ -369,7 +369,7 @@ def _draw_curve(place: Any, curve: Curve, *, cyclic: bool) -> None:
     place.plot(PERCENT, np.mean(cycles, axis=0), color=color, ls=curve.style, lw=1.8)
 
 
-def add_legend(figure: Any, curves: Sequence[Curve]) -> None:
+def add_legend(figure: Any, curves: Sequence[PanelCurve]) -> None:
     """Add a legend of sides and trials at the top of a figure."""
     from matplotlib.lines import Line2D
 

@@ -80,7 +80,7 @@ class Camera(NamedTuple):
         return cls(right, upward, middle[0] * right + middle[1] * upward + depth * back, half)
 
 
-class Arrow(NamedTuple):
+class ForceArrow(NamedTuple):
     """A force to show: where it acts (3,) in ground, and the vector (3,), already as long as it is drawn, m."""
 
     point: Array
@@ -101,7 +101,7 @@ def draw_scene(
     q: Array,
     camera: Camera,
     size: tuple[int, int],
-    arrows: Sequence[Arrow] = (),
+    arrows: Sequence[ForceArrow] = (),
     style: Style | None = None,
 ) -> Any:
     """A picture (pillow image) of a scene.
@@ -132,7 +132,7 @@ def draw_scene(
 
 
 def _fill_background(
-    heap: _Heap, scene: Scene, bodies: Bodies, arrows: Iterable[Arrow], style: Style
+    heap: _Heap, scene: Scene, bodies: Bodies, arrows: Iterable[ForceArrow], style: Style
 ) -> None:
     if style.floor is not None:
         _lay_floor(heap, scene, style.floor)

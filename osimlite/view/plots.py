@@ -17,7 +17,7 @@ from osimlite.io.tables.storage import StoTable
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.view.lettering import plain_lettering
-from osimlite.view.motion import ContactForce, Motion, contact_forces, in_mechanism_order
+from osimlite.view.motion import ContactForce, ShownMotion, contact_forces, in_mechanism_order
 from osimlite.view.panels import (
     COLORS,
     STYLES,
@@ -27,7 +27,7 @@ from osimlite.view.panels import (
     name_pages,
     render_png,
 )
-from osimlite.view.table_plots import Names, describe_columns
+from osimlite.view.table_plots import ColumnNames, describe_columns
 
 Line = TypeVar("Line")
 """Type of what is drawn as one line."""
@@ -45,7 +45,7 @@ _NEVER_MIND = 1e-9
 
 
 def plot_simulation(
-    trajectory: Motion, folder: str | Path, *, mechanism: Mechanism | None = None
+    trajectory: ShownMotion, folder: str | Path, *, mechanism: Mechanism | None = None
 ) -> list[Path]:
     """Draw the coordinates, states of muscles, forces, probes and energy of a motion over time.
 
@@ -76,7 +76,7 @@ def plot_simulation(
         ]
 
 
-def compute_energies(motion: Motion, mechanism: Mechanism) -> tuple[Array, dict[str, Array]]:
+def compute_energies(motion: ShownMotion, mechanism: Mechanism) -> tuple[Array, dict[str, Array]]:
     """Moments (m,) and, at them, kinetic energy and potential energy of gravity (J), zero at the origin of the ground.
 
     A trajectory knows what contacts and springs store besides; of another motion that cannot be
@@ -96,10 +96,10 @@ def compute_energies(motion: Motion, mechanism: Mechanism) -> tuple[Array, dict[
     return times[places], {"kinetic": kinetic, "potential of gravity": height}
 
 
-def draw_figures(motion: Motion, mechanism: Mechanism | None) -> Iterator[tuple[str, Any]]:
+def draw_figures(motion: ShownMotion, mechanism: Mechanism | None) -> Iterator[tuple[str, Any]]:
     """Yield file name and figure of each page of the plots of a motion."""
     times = np.asarray(motion.times, dtype=float)
-    names = Names.of_model(getattr(motion, "model", None), mechanism)
+    names = ColumnNames.of_model(getattr(motion, "model", None), mechanism)
     values = np.asarray(motion.values, dtype=float)
     yield from _draw_table(
         "Coordinates", times, dict(zip(motion.coordinates, values.T, strict=True)), names
@@ -121,7 +121,7 @@ def draw_figures(motion: Motion, mechanism: Mechanism | None) -> Iterator[tuple[
 
 
 def _draw_table(
-    title: str, times: Array, columns: Mapping[str, Array], names: Names, name: str = ""
+    title: str, times: Array, columns: Mapping[str, Array], names: ColumnNames, name: str = ""
 ) -> Iterator[tuple[str, Any]]:
     """Yield file name and figure of each page of columns."""
     if not columns:

@@ -14,7 +14,7 @@ from osimlite.errors import OsimliteError
 from osimlite.view.lettering import plain_lettering
 from osimlite.view.panels import draw_pages, group_columns, name_pages, render_png
 from osimlite.view.plots import draw_figures
-from osimlite.view.table_plots import Names, describe_columns, make_title
+from osimlite.view.table_plots import ColumnNames, describe_columns, make_title
 
 if TYPE_CHECKING:
     from osimlite.io.tables.storage import StoTable
@@ -72,17 +72,17 @@ def plot_movement(item: Movement) -> Pages:
     from osimlite.io.tables.storage import StoTable
 
     table = StoTable("Coordinates", item.times, item.coordinates, item.in_degrees, in_degrees=True)
-    names = Names.of_model(getattr(item, "model", None), item.mechanism)
+    names = ColumnNames.of_model(getattr(item, "model", None), item.mechanism)
     return _plot_columns(table, names)
 
 
 def plot_table(item: StoTable) -> Pages:
     """Return the pages of a table over time."""
     motion = getattr(item, "motion", None)
-    return _plot_columns(item, Names.of_model(None, getattr(motion, "mechanism", None)))
+    return _plot_columns(item, ColumnNames.of_model(None, getattr(motion, "mechanism", None)))
 
 
-def _plot_columns(table: StoTable, names: Names) -> Pages:
+def _plot_columns(table: StoTable, names: ColumnNames) -> Pages:
     _require_times(len(table.times))
     panels, note = group_columns(describe_columns(table, names), table.times)
     stem = Path(table.file).stem if table.file else table.name.lower().replace(" ", "_") or "table"

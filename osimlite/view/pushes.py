@@ -8,7 +8,7 @@ import numpy as np
 
 from osimlite.base.records import dataclass
 from osimlite.mechanics.multibody.spatial import Array
-from osimlite.view.motion import Motion, at_times, contact_forces
+from osimlite.view.motion import ShownMotion, at_times, contact_forces
 from osimlite.view.scene import Bodies, Pushed, Scene
 
 LONGEST_ARROW = 0.4
@@ -48,7 +48,7 @@ class Pushes:
     pushes: Sequence[Push]
 
     @classmethod
-    def of(cls, scene: Scene, motion: Motion, times: Array) -> Pushes:
+    def of(cls, scene: Scene, motion: ShownMotion, times: Array) -> Pushes:
         """The forces on record of a motion, at other times (n,).
 
         Surfaces of one element on one body share a record, and are shown once.

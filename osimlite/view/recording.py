@@ -30,7 +30,7 @@ class MeasuredMarkers(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """A motion from a file; the attributes are those of a :class:`osimlite.view.motion.Motion`.
+    """A motion from a file; the attributes are those of a :class:`osimlite.view.motion.ShownMotion`.
 
     `remarks` are sentences on what the files do not say, `measured` the markers that it was found
     from.

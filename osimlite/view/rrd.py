@@ -15,13 +15,13 @@ import numpy as np
 from osimlite.base.files import write_atomically
 from osimlite.base.require import require
 from osimlite.mechanics.multibody.spatial import Array
-from osimlite.view.motion import Motion, activity_color, read_activations, values_of
+from osimlite.view.motion import ShownMotion, activity_color, read_activations, values_of
 from osimlite.view.picture import FORCE
 from osimlite.view.pushes import LONGEST_ARROW, Pushes
 from osimlite.view.scene import Color, Scene
 
 
-def write_rrd(scene: Scene, q: Array, motion: Motion | None, path: str | Path) -> Path:
+def write_rrd(scene: Scene, q: Array, motion: ShownMotion | None, path: str | Path) -> Path:
     """Write what is shown of a model.
 
     Args:

@@ -20,9 +20,9 @@ from osimlite.simulation.elements.builder import OPENSIM
 from osimlite.view.collect import build_scene
 from osimlite.view.glb import write_glb
 from osimlite.view.incomplete import build_showable, describe_left_out
-from osimlite.view.motion import Motion, activity_color, at_times, read_activations, values_of
+from osimlite.view.motion import ShownMotion, activity_color, at_times, read_activations, values_of
 from osimlite.view.page import Story, page_data, page_text
-from osimlite.view.picture import Arrow, Camera, Style, draw_scene
+from osimlite.view.picture import Camera, ForceArrow, Style, draw_scene
 from osimlite.view.pushes import LONGEST_ARROW, Pushes
 from osimlite.view.recording import Recording, read_recording
 from osimlite.view.rrd import write_rrd
@@ -49,7 +49,7 @@ class Shown:
     model: Model
     scene: Scene
     q: Array
-    motion: Motion | None = None
+    motion: ShownMotion | None = None
     findings: Sequence[Finding] = ()
     remarks: tuple[str, ...] = ()
 
@@ -61,7 +61,7 @@ class Shown:
         folders: Sequence[str | Path] = (),
         *,
         file: Path | None = None,
-        motion: Motion | Path | None = None,
+        motion: ShownMotion | Path | None = None,
         forces: Path | None = None,
         values: Mapping[str, float] | None = None,
         wrapping: str = OPENSIM,
@@ -167,7 +167,7 @@ class Shown:
 
     def _moment(
         self, time: float | None
-    ) -> tuple[Array, list[Arrow], frozenset[str], dict[str, Color]]:
+    ) -> tuple[Array, list[ForceArrow], frozenset[str], dict[str, Color]]:
         """Coordinate values (n,), arrows, surfaces under load, and colours of muscles, at a time of the motion."""
         motion = self.motion
         if motion is None:
@@ -194,4 +194,4 @@ class Shown:
             path: activity_color(float(np.interp(moment[0], motion.times, level)))
             for path, level in levels
         }
-        return q, [Arrow(point, scale * force) for _, point, force in pushes], loaded, colors
+        return q, [ForceArrow(point, scale * force) for _, point, force in pushes], loaded, colors

@@ -101,7 +101,7 @@ _RATES = {
 """Order of the time derivative of tables of motion, by their first lines."""
 
 
-class Names(NamedTuple):
+class ColumnNames(NamedTuple):
     """What a model says about the columns of tables."""
 
     coordinates: Mapping[str, CoordinateInfo]  # coordinates by name
@@ -109,7 +109,7 @@ class Names(NamedTuple):
     regions: Mapping[str, str]  # bodies between which muscles run, by name
 
     @classmethod
-    def of_model(cls, model: Model | None, mechanism: Mechanism | None = None) -> Names:
+    def of_model(cls, model: Model | None, mechanism: Mechanism | None = None) -> ColumnNames:
         """Return the names of a model; none of what is not known.
 
         Args:
@@ -144,7 +144,7 @@ def _describe_region(item: PathActuator) -> str:
     return " – ".join(dict.fromkeys(stems)).replace("_", " ")
 
 
-def describe_columns(table: StoTable, names: Names) -> list[Column]:
+def describe_columns(table: StoTable, names: ColumnNames) -> list[Column]:
     """Return the columns of a table with their units and groups; angles are in degrees.
 
     Args:
@@ -172,7 +172,7 @@ def _find_kind(label: str) -> str:
     return word if word in SECTIONS or word in STATE_UNITS else ""
 
 
-def _describe_column(label: str, values: Array, table: StoTable, names: Names) -> Column:
+def _describe_column(label: str, values: Array, table: StoTable, names: ColumnNames) -> Column:
     owner, _, last = label.rpartition("/")
     if owner:
         item = owner.rpartition("/")[2]
@@ -214,7 +214,7 @@ def _describe_column(label: str, values: Array, table: StoTable, names: Names) -
     return Column(label, unit, values, names.regions.get(label, ""))
 
 
-def _describe_actuator(label: str, values: Array, table: StoTable, names: Names) -> Column:
+def _describe_actuator(label: str, values: Array, table: StoTable, names: ColumnNames) -> Column:
     """Return the column of an actuator or another force, by the name of the actuator."""
     group = names.regions.get(label, "")
     info = names.coordinates.get(re.sub(r"_reserve$|^reserve_", "", label))
@@ -230,7 +230,7 @@ def _describe_actuator(label: str, values: Array, table: StoTable, names: Names)
 
 
 def _describe_coordinate(
-    name: str, values: Array, table: StoTable, names: Names, is_speed: bool
+    name: str, values: Array, table: StoTable, names: ColumnNames, is_speed: bool
 ) -> Column:
     """Return the column of a coordinate, in degrees if it is an angle."""
     info = names.coordinates.get(name)
@@ -242,7 +242,7 @@ def _describe_coordinate(
     return Column(name, f"{unit}{end}" if unit else "", values, _find_group(name, names))
 
 
-def _find_group(name: str, names: Names) -> str:
+def _find_group(name: str, names: ColumnNames) -> str:
     """Return the joint of a coordinate, or the body of a vector."""
     info = names.coordinates.get(name)
     if info is None:
@@ -282,7 +282,7 @@ _VECTORS = [pattern for pattern, _ in _ENDINGS[2:]]
 def plot_tables(
     tables: Mapping[str, StoTable],
     folder: str | Path,
-    names: Names,
+    names: ColumnNames,
     *,
     steps: Mapping[str, StepTimes] | None = None,
     report: Callable[[int, int], None] | None = None,

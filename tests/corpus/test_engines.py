@@ -13,7 +13,7 @@ from osimlite.io.document.reader import read_text
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.mechanics.multibody.constraints import Lock
 from osimlite.simulation.elements import Forces, force_elements
-from osimlite.simulation.engines.protocol import Settings
+from osimlite.simulation.engines.protocol import EngineSettings
 
 pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
 
@@ -58,7 +58,10 @@ def test_same_accelerations(corpus_model):
     forces = force_elements(
         model, mechanism, skip_unsupported=True, folder=corpus_model.path.parent
     )
-    ours, theirs = CompiledEngine(mechanism, forces), make_engine(mechanism, forces, Settings())
+    ours, theirs = (
+        CompiledEngine(mechanism, forces),
+        make_engine(mechanism, forces, EngineSettings()),
+    )
     with theirs:
         for seed in range(2):
             q, u = (values.tolist() for values in state_near(mechanism, seed))
@@ -81,7 +84,10 @@ def test_same_accelerations_under_constraints(corpus_model):
     forces = force_elements(
         model, mechanism, skip_unsupported=True, folder=corpus_model.path.parent
     )
-    ours, theirs = CompiledEngine(mechanism, forces), make_engine(mechanism, forces, Settings())
+    ours, theirs = (
+        CompiledEngine(mechanism, forces),
+        make_engine(mechanism, forces, EngineSettings()),
+    )
     y = ours.state.pack(*state_near(mechanism, 3))
     result = ours.project_state(0.1, y, 1e-10)
     assert result is not None

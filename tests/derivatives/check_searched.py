@@ -10,7 +10,7 @@ import osimlite
 from osimlite.derivatives.curves import evaluate_curve
 from osimlite.errors import UnsupportedError
 from osimlite.mechanics.laws.bezier import curve_value, make_curve
-from osimlite.mechanics.multibody.functions import Constant
+from osimlite.mechanics.multibody.functions import ConstantValue
 from osimlite.models.jumper import jumper
 from tests.conftest import SHARED
 from tests.derivatives.machine import Beside, off
@@ -28,7 +28,7 @@ def kernel_of(model, functions):
         for place, value in zip(functions.state_indices, x.tolist(), strict=True):
             y[place] = value
         driven = {
-            name: Constant(value)
+            name: ConstantValue(value)
             for name, value in zip(functions.controls, u.tolist(), strict=True)
         }
         simulation.engine.set_controls(simulation.forces.controls.add_functions(driven))

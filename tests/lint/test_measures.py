@@ -139,10 +139,10 @@ def test_a_path_is_reported_once_with_its_greatest_jump(fixtures):
 
 def test_the_language_server_does_not_measure(jumping):
     pytest.importorskip("pygls")
-    from osimlite.cli.language_server.analysis import Analysis
+    from osimlite.cli.language_server.analysis import DocumentAnalysis
     from osimlite.cli.language_server.text import Text
 
-    report = Analysis(Text(jumping.read_text()), str(jumping)).report
+    report = DocumentAnalysis(Text(jumping.read_text()), str(jumping)).report
     assert not report.findings and not report.unmeasured
 
 
@@ -152,7 +152,7 @@ def test_the_language_server_does_not_measure(jumping):
 )
 def test_a_value_is_told_in_the_unit_of_what_the_coordinate_moves(motion, said):
     info = CoordinateInfo("q", "/jointset/j/q", "/jointset/j", motion)
-    assert str(measures.Value(info.name, 0.5, info.unit)) == f"'q' = {said}"
+    assert str(measures.CoordinateSetting(info.name, 0.5, info.unit)) == f"'q' = {said}"
 
 
 def test_without_machine_code_many_surfaces_are_not_measured(jumping, monkeypatch):

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from osimlite.lint.shapes import MARKERS, ROWS, VECTORS, Layout, compute_shapes
+from osimlite.lint.shapes import MARKERS, ROWS, VECTORS, RowLayout, compute_shapes
 
 NUMBER = re.compile(rb"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 
@@ -18,7 +18,7 @@ def told(cell: bytes) -> bytes:
     return b"".join(b"0" if NUMBER.fullmatch(word) else b"!" for word in cell.split(b" ") if word)
 
 
-def expected(line: bytes, layout: Layout) -> bytes:
+def expected(line: bytes, layout: RowLayout) -> bytes:
     if layout is MARKERS:
         return b"\t".join(map(told, line.split(b"\t")))
     words = line.replace(b"\t", b" ").split(b" ")
@@ -33,7 +33,7 @@ LONGER = {ROWS: r"^\.", VECTORS: r"^\.", MARKERS: r"^[. ]| \.|\d[eE]"}
 """Good lines that are looked at longer."""
 
 
-def check(line: bytes, look: bytes, layout: Layout) -> None:
+def check(line: bytes, look: bytes, layout: RowLayout) -> None:
     wanted = expected(line, layout)
     if b"!" in wanted:
         assert b"!" in look or look != wanted

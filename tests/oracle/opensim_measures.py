@@ -16,7 +16,7 @@ import opensim
 
 import osimlite
 from osimlite.errors import OsimliteError
-from osimlite.lint.measures import Measures, Pose
+from osimlite.lint.measures import Measures, MeasuringPose
 from osimlite.lint.measuring import measure_model
 from osimlite.lint.measuring.jumps import SIDE_OFFSET
 from osimlite.lint.measuring.muscles import REST_ACTIVATION
@@ -43,7 +43,7 @@ class Beside:
             opensim.Coordinate.safeDownCast(self.theirs.getComponent(info.path)) for info in infos
         ]
 
-    def at(self, pose: Pose, aside: float = 0.0) -> np.ndarray:
+    def at(self, pose: MeasuringPose, aside: float = 0.0) -> np.ndarray:
         """Take both to a pose; returns the values of the coordinates."""
         q = self.default.copy()
         places = [self.paths.mechanism.coordinate_index(value.coordinate) for value in pose.values]
@@ -99,7 +99,7 @@ class Beside:
             theirs = opensim.MovingPathPoint.safeDownCast(
                 self.theirs.getComponent(tree.path_of(own))
             )
-            pose, places = Pose((point.end,)), []
+            pose, places = MeasuringPose((point.end,)), []
             mechanism = self.paths.mechanism
             info = mechanism.coordinates[mechanism.coordinate_index(point.end.coordinate)]
             inward = 1.0 if point.end.value == info.range[0] else -1.0
@@ -115,7 +115,7 @@ class Beside:
     def _of_muscles(self) -> Iterator[tuple[str, str, float, float]]:
         for start in self.measures.starts:
             self.state = self.theirs.initSystem()
-            self.at(Pose())
+            self.at(MeasuringPose())
             muscle = self._muscle(start.owner)
             for length, tension in zip(start.lengths, start.tensions, strict=True):
                 if length == length:

@@ -30,7 +30,7 @@ from osimlite.schema.probe_types import (
 )
 from osimlite.simulation import Simulation
 from osimlite.simulation.elements import force_elements
-from osimlite.simulation.engines.protocol import Settings
+from osimlite.simulation.engines.protocol import EngineSettings
 from osimlite.simulation.run_report import compute_probe_rows, list_probe_labels
 from osimlite.simulation.system import System
 
@@ -270,7 +270,7 @@ def compare_motion(model, tmp_path, to=0.3, accuracy=1e-5):
         stepper = ready.engine.make_stepper(
             0.0,
             ready.initial_state({}, {}),
-            Settings(accuracy=accuracy),
+            EngineSettings(accuracy=accuracy),
             lambda t, y: steps.append((t, y)),
         )
         steps.append((stepper.time, stepper.state))

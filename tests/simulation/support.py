@@ -25,8 +25,8 @@ from osimlite.mechanics.multibody import build_mechanism
 from osimlite.mechanics.multibody import functions as f
 from osimlite.mechanics.multibody.joints import (
     MOTIONS,
+    JointAxis,
     Mobilizer,
-    TransformAxis,
     constant_curvature,
     make_custom_motions,
     make_ellipsoid_motions,
@@ -64,7 +64,6 @@ from osimlite.schema.scholz_paths import (
 from osimlite.schema.wrapping import WrapSphere
 from osimlite.simulation.elements import force_elements
 from osimlite.simulation.elements.geometries.paths.geometry_path import LAWS
-from osimlite.simulation.engines.bullet.engine import BulletEngine
 from osimlite.simulation.engines.compiled import CompiledEngine
 from tests.conftest import ROOT
 from tests.simulation.meshes import ball, block, write_obj
@@ -115,21 +114,21 @@ POINTS = (0.1, -0.3, 0.2, 0.4, -0.2)
 
 
 FUNCTIONS = {
-    "constant": f.Constant(0.3),
+    "constant": f.ConstantValue(0.3),
     "linear": f.Linear(-0.7, 0.2),
     "polynomial": f.Polynomial((0.1, -0.2, 0.3, 0.1)),
-    "sine": f.Sine(0.5, 1.3, 0.2, 0.1),
-    "step": f.Step(-2.0, 2.0, -0.3, 0.4),
-    "spline": f.SimmSpline(KNOTS, POINTS),
-    "spline of two": f.SimmSpline(KNOTS[:2], POINTS[:2]),
+    "sine": f.SineWave(0.5, 1.3, 0.2, 0.1),
+    "step": f.QuinticStep(-2.0, 2.0, -0.3, 0.4),
+    "spline": f.SimmCubicSpline(KNOTS, POINTS),
+    "spline of two": f.SimmCubicSpline(KNOTS[:2], POINTS[:2]),
     "smoothing spline": smoothing_spline(KNOTS, POINTS, 2, 0.0),
     "lines": f.PiecewiseLinear(KNOTS, POINTS),
     "stairs": f.PiecewiseConstant(KNOTS, POINTS),
-    "scaled": f.ScaledFunction(-2.0, f.ScaledFunction(0.4, f.Sine(0.5, 1.3, 0.2, 0.1))),
+    "scaled": f.ScaledFunction(-2.0, f.ScaledFunction(0.4, f.SineWave(0.5, 1.3, 0.2, 0.1))),
 }
 
 
-CONSTANT = (f.Constant, f.PiecewiseConstant)
+CONSTANT = (f.ConstantValue, f.PiecewiseConstant)
 
 
 def custom_joint(function):
@@ -137,14 +136,14 @@ def custom_joint(function):
     both = f.MultivariatePolynomial.complete((0.1, 0.2, -0.3, 0.4, 0.5, -0.2), 2, 2)
     turns = (
         # What is constant moves no mass.
-        TransformAxis((0,), AXES[0], f.Linear() if isinstance(function, CONSTANT) else function),
-        TransformAxis((1,), AXES[1], f.Linear()),
-        TransformAxis((1, 2), AXES[2], f.WeightedSum((0.4, 1.1), 0.2)),
+        JointAxis((0,), AXES[0], f.Linear() if isinstance(function, CONSTANT) else function),
+        JointAxis((1,), AXES[1], f.Linear()),
+        JointAxis((1, 2), AXES[2], f.WeightedSum((0.4, 1.1), 0.2)),
     )
     slides = (
-        TransformAxis((0,), AXES[3], function),
-        TransformAxis((1, 2), AXES[4], both),
-        TransformAxis((2,), AXES[5], f.Linear(1.0, 0.1)),
+        JointAxis((0,), AXES[3], function),
+        JointAxis((1, 2), AXES[4], both),
+        JointAxis((2,), AXES[5], f.Linear(1.0, 0.1)),
     )
     return make_custom_motions(turns, slides)
 
@@ -184,6 +183,9 @@ def tree(joints, *, parents=None, reversed=(), locked=()):
 
 
 def engines(model, **settings):
+    # Models and states of this module also serve tests in environments without PyBullet.
+    from osimlite.simulation.engines.bullet.engine import BulletEngine
+
     mechanism = build_mechanism(model)
     forces = force_elements(model, mechanism, **settings)
     return mechanism, CompiledEngine(mechanism, forces), BulletEngine(mechanism, forces)
@@ -230,12 +232,12 @@ INERTIA = (0.02, 0.03, 0.025, 0.001, -0.002, 0.003)
 def knee(*, opensim_derivatives: bool, inertia: Any = None) -> Mechanism:
     """A shank whose one coordinate drives three rotations and two translations, upside down in the tree."""
     axes = [
-        TransformAxis((0,), (0.0, 0.0, 1.0), f.IDENTITY),
-        TransformAxis((0,), (1.0, 0.1, 0.0), f.Polynomial((0.3, 0.5, 0.1))),
-        TransformAxis((0, 1), (0.0, 1.0, 0.0), f.WeightedSum((-0.7, 1.0))),
-        TransformAxis((0,), (1.0, 0.0, 0.0), f.Polynomial((0.1, -0.2, 0.0))),
-        TransformAxis((1,), (0.0, 1.0, 0.0), f.Sine(0.1, 2.0, 0.0, 0.0)),
-        TransformAxis((), (0.0, 0.0, 1.0), f.Constant(0.05)),
+        JointAxis((0,), (0.0, 0.0, 1.0), f.IDENTITY),
+        JointAxis((0,), (1.0, 0.1, 0.0), f.Polynomial((0.3, 0.5, 0.1))),
+        JointAxis((0, 1), (0.0, 1.0, 0.0), f.WeightedSum((-0.7, 1.0))),
+        JointAxis((0,), (1.0, 0.0, 0.0), f.Polynomial((0.1, -0.2, 0.0))),
+        JointAxis((1,), (0.0, 1.0, 0.0), f.SineWave(0.1, 2.0, 0.0, 0.0)),
+        JointAxis((), (0.0, 0.0, 1.0), f.ConstantValue(0.05)),
     ]
     motions = make_custom_motions(axes[:3], axes[3:], opensim_derivatives=opensim_derivatives)
     properties = MassProperties(

@@ -35,7 +35,7 @@ from osimlite.simulation import Simulation
 from osimlite.simulation.elements import Forces, force_elements
 from osimlite.simulation.engines.compiled import CompiledEngine
 from osimlite.simulation.engines.linking import PYTHON_CODE
-from osimlite.simulation.engines.protocol import Settings
+from osimlite.simulation.engines.protocol import EngineSettings
 from osimlite.simulation.system import System
 from tests.simulation.support import JOINTS, tree
 
@@ -257,7 +257,7 @@ def test_steps_one_by_one_are_those_of_a_whole_motion(fast):
     """To the last bit."""
     y = fast.initial_state({}, {})
     ours, theirs = (
-        fast.engine.make_stepper(0.0, y, Settings(accuracy=1e-5), lambda t, y: None)
+        fast.engine.make_stepper(0.0, y, EngineSettings(accuracy=1e-5), lambda t, y: None)
         for _ in range(2)
     )
     (end,), steps = ours.tabulate([2.0]).tolist(), list(theirs.iterate_steps(2.0))

@@ -25,7 +25,7 @@ from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.laws import find_function
 from osimlite.simulation.engines.compiled import CompiledEngine
 from osimlite.simulation.engines.linking import PYTHON_CODE
-from osimlite.simulation.engines.protocol import Settings
+from osimlite.simulation.engines.protocol import EngineSettings
 from osimlite.simulation.system import System
 from tests.mechanics.multibody.strategies import KINDS, Case, cases, constraint_of
 from tests.simulation.support import MODELS, four_bars, knee, patella, pins
@@ -85,9 +85,9 @@ SEVERAL = {
     "scaled spline": Coupler(
         0,
         (10,),
-        f.ScaledFunction(-1.5, f.SimmSpline((-1.5, -0.4, 0.3, 1.6), (0.1, 0.4, -0.2, 0.3))),
+        f.ScaledFunction(-1.5, f.SimmCubicSpline((-1.5, -0.4, 0.3, 1.6), (0.1, 0.4, -0.2, 0.3))),
     ),
-    "angle of a ball": PrescribedCoordinate(7, f.Sine(0.4, 3.0, 0.2, 0.1)),
+    "angle of a ball": PrescribedCoordinate(7, f.SineWave(0.4, 3.0, 0.2, 0.1)),
     "polynomial of time": PrescribedCoordinate(
         3, f.MultivariatePolynomial.complete((0.1, 0.2, -0.3), 1, 2)
     ),
@@ -343,7 +343,7 @@ def test_an_unknown_constraint_is_refused_by_name():
 
 
 def test_a_function_that_is_unknown_is_refused_by_name():
-    class Odd(f.Function):
+    class Odd(f.SmoothFunction):
         def evaluate(self, arguments: Any) -> tuple[float, Any, Any]:
             return arguments[0], np.ones(1), np.zeros((1, 1))
 
@@ -353,7 +353,7 @@ def test_a_function_that_is_unknown_is_refused_by_name():
             replace(mechanism, constraints=(Coupler(0, (1,), Odd(), "/constraintset/odd"),)),
             Forces(()),
         )
-    assert Settings().route == "auto"
+    assert EngineSettings().route == "auto"
 
 
 # ------------------------------------------------------------------------------------------- linear equations

@@ -10,7 +10,7 @@ import pytest
 import osimlite
 from osimlite import HuntCrossleyForce
 from osimlite.mechanics.multibody import build_mechanism
-from osimlite.mechanics.multibody.functions import Constant as NumericConstant
+from osimlite.mechanics.multibody.functions import ConstantValue as NumericConstant
 from osimlite.mechanics.multibody.functions import Linear as NumericLinear
 from osimlite.mechanics.multibody.mechanism import FramePlacement
 from osimlite.mechanics.multibody.smoothing_spline import smoothing_spline

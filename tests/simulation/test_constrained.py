@@ -22,7 +22,7 @@ from osimlite.schema.forces import Force
 from osimlite.schema.functions import Sine
 from osimlite.simulation import Simulation, simulate
 from osimlite.simulation.elements import Forces
-from osimlite.simulation.engines.protocol import Settings
+from osimlite.simulation.engines.protocol import EngineSettings
 from tests.mechanics.multibody.strategies import KINDS, Case, cases, constraint_of
 
 pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
@@ -228,7 +228,7 @@ def test_settings_reach_the_summary():
     summary = simulate(patella(), 0.05, opensim_derivatives=True).summary
     assert summary["settings"]["opensim_derivatives"] is True
     assert summary["constraints"] == ["/constraintset/beta"]
-    assert Settings().route == "auto"
+    assert EngineSettings().route == "auto"
 
 
 def test_the_energy_of_a_real_model_with_patellas_is_kept(corpus: Any):

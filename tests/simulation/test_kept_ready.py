@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 import osimlite
 from osimlite.simulation import run
-from osimlite.simulation.engines.batch import Batch
+from osimlite.simulation.engines.batch import BatchWorkspace
 from osimlite.simulation.engines.machine_code import has_machine_code
 from tests.suite import choose
 
@@ -164,8 +164,10 @@ def test_threads_do_not_meet_in_one_model(repo):
 )
 def test_a_model_that_has_moved_moves_in_one_call(repo, monkeypatch):
     calls = []
-    whole = Batch.run
-    monkeypatch.setattr(Batch, "run", lambda self, *rest: (calls.append(1), whole(self, *rest))[1])
+    whole = BatchWorkspace.run
+    monkeypatch.setattr(
+        BatchWorkspace, "run", lambda self, *rest: (calls.append(1), whole(self, *rest))[1]
+    )
     model = osimlite.read(repo / WALKER)
     first = osimlite.simulate(model, to=1.0, engine="compiled")
     at_first = len(calls)

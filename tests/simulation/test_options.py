@@ -10,7 +10,7 @@ import osimlite
 from osimlite.errors import DoubtfulWarning, SettingError
 from osimlite.simulation import Options, Simulation
 from osimlite.simulation.batches import BatchOptions
-from osimlite.simulation.engines.protocol import Settings
+from osimlite.simulation.engines.protocol import EngineSettings
 from osimlite.simulation.options import INTEGRATION_OPTIONS, RUN_OPTIONS, IntegrationOptions
 from osimlite.studies.gym.tasks import Task
 from osimlite.studies.sweep.plan import Plan
@@ -59,9 +59,9 @@ def test_an_accuracy_that_promises_nothing_is_told(integrator):
 def test_options_of_integration_are_declared_once_and_handed_on():
     chosen = {"accuracy": 1e-4, "integrator": "adams", "step_bounds": (1e-6, 0.1)}
     assert list(INTEGRATION_OPTIONS) == list(chosen)
-    for record in (Options, Settings, BatchOptions):
+    for record in (Options, EngineSettings, BatchOptions):
         assert record(**chosen).integration_choices() == chosen
-    for record in (Options, Settings, BatchOptions, Plan, Task):
+    for record in (Options, EngineSettings, BatchOptions, Plan, Task):
         assert {*INTEGRATION_OPTIONS} < {item.name for item in fields(record)}
     assert IntegrationOptions().summarize_choices() == {"accuracy": 1e-3, "integrator": "merson"}
     assert IntegrationOptions(**chosen).summarize_choices() == chosen

@@ -98,7 +98,7 @@ def build_tree() -> Mechanism:
     infos[9] = replace(infos[9], clamped=True, range=(-0.05, 0.05))
     couplers = (
         Coupler(6, (0, 1, 9), f.WeightedSum((0.4, -0.3, 0.2), 0.1)),
-        PrescribedCoordinate(3, f.Sine(0.4, 3.0, 0.2, 0.1)),
+        PrescribedCoordinate(3, f.SineWave(0.4, 3.0, 0.2, 0.1)),
     )
     return replace(mechanism, coordinates=tuple(infos), constraints=couplers)
 

@@ -30,7 +30,7 @@ from osimlite.errors import (
 )
 from osimlite.schema.contact_forces import ExponentialContactForce
 from osimlite.simulation import Interrupted, Simulation, read_sto
-from osimlite.simulation.engines.batch import Batch
+from osimlite.simulation.engines.batch import BatchWorkspace
 from osimlite.simulation.options import compute_report_times
 
 
@@ -238,7 +238,9 @@ def test_what_was_recorded_before_a_failure_is_kept(pendulum, engine, choices):
 def test_ctrl_c_before_the_first_step(pendulum, monkeypatch):
     """Within machine code, which is heard only when it ends."""
     with Simulation(pendulum, "compiled") as simulation:
-        monkeypatch.setattr(Batch, "run", lambda batch, room: signal.raise_signal(signal.SIGINT))
+        monkeypatch.setattr(
+            BatchWorkspace, "run", lambda batch, room: signal.raise_signal(signal.SIGINT)
+        )
         with pytest.raises(Interrupted) as stopped:
             simulation.run(1.0)
         part = stopped.value.trajectory

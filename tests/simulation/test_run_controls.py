@@ -8,7 +8,7 @@ import pytest
 import osimlite
 from osimlite import Model
 from osimlite.errors import DoubtfulWarning, OsimliteError, SimulationError
-from osimlite.mechanics.multibody.functions import Sine
+from osimlite.mechanics.multibody.functions import SineWave
 from osimlite.schema.actuators import BodyActuator, CoordinateActuator
 from osimlite.schema.controller_types import PrescribedController, SynergyController, SynergyVector
 from osimlite.schema.functions import Constant, LinearFunction
@@ -58,7 +58,7 @@ GIVEN = {
     "text": ("2.5", lambda t: 2.5 + 0.0 * t),
     "times": ((TIMES, VALUES), lambda t: at(t, VALUES)),
     "one time": (([0.1], [4.0]), lambda t: 4.0 + 0.0 * t),
-    "function": (Sine(2.0, 3.0, 0.1, 0.2), lambda t: 2.0 * np.sin(3.0 * t + 0.1) + 0.2),
+    "function": (SineWave(2.0, 3.0, 0.1, 0.2), lambda t: 2.0 * np.sin(3.0 * t + 0.1) + 0.2),
     "component": (LinearFunction(coefficients=(3.0, 1.0)), lambda t: 3.0 * t + 1.0),
     "callable": (lambda t: t * t, lambda t: t * t),
 }
@@ -119,7 +119,7 @@ def test_the_kernel_alone(model, code):
     forces = osimlite.simulation.elements.force_elements(model, mechanism)
     system = System(mechanism, forces, code=code)
     for given in (
-        {"first": Sine(2.0, 3.0, 0.1, 0.2)},
+        {"first": SineWave(2.0, 3.0, 0.1, 0.2)},
         {"first": lambda t: 2.0},
         {"second": 1.0, "push_0": 3.0},
         {},

@@ -11,7 +11,7 @@ import osimlite
 from osimlite.errors import OsimliteError
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.simulation import Simulation, read_sto, write_sto
-from osimlite.simulation.engines.protocol import Settings
+from osimlite.simulation.engines.protocol import EngineSettings
 from osimlite.simulation.states import StateLayout, StateVariable
 from tests.oracle.random_models import RandomModel
 from tests.simulation.damped import damped
@@ -43,8 +43,8 @@ def test_a_state_of_another_length_is_refused(simulations, engine, y):
         made.find_touching_contacts,
         made.force_records,
         made.compute_energies,
-        lambda t, y: made.make_stepper(t, y, Settings(), lambda t, y: None),
-        lambda t, y: made.make_stepper(t, y, Settings(fixed_step=1e-3), lambda t, y: None),
+        lambda t, y: made.make_stepper(t, y, EngineSettings(), lambda t, y: None),
+        lambda t, y: made.make_stepper(t, y, EngineSettings(fixed_step=1e-3), lambda t, y: None),
     ):
         if len(y) == size:
             ask(0.0, y)

@@ -13,7 +13,7 @@ import pytest
 
 import osimlite
 from osimlite.errors import UnsupportedError
-from osimlite.mechanics.multibody.functions import SimmSpline
+from osimlite.mechanics.multibody.functions import SimmCubicSpline
 from osimlite.translate.nimble import convert_from_nimble
 from tests.cli.command import run
 
@@ -247,9 +247,9 @@ def test_a_spline_continues_as_a_cubic_over_the_range() -> None:
     extended = model["/jointset/j"].spatial_transform.rotation1.function
     assert "extended to the range" in change.done and len(extended.x) == 10
     assert extended.x[0] < -2.0 and extended.x[-1] > 2.0
-    before, after = SimmSpline(x, y), SimmSpline(extended.x, extended.y)
+    before, after = SimmCubicSpline(x, y), SimmCubicSpline(extended.x, extended.y)
 
-    def value(function: SimmSpline, argument: float) -> float:
+    def value(function: SimmCubicSpline, argument: float) -> float:
         return float(function.evaluate(np.array([argument]))[0])
 
     for argument in np.linspace(0.0, 1.0, 30):

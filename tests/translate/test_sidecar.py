@@ -19,8 +19,8 @@ from osimlite.mechanics.multibody import build_mechanism
 from osimlite.mechanics.multibody import functions as f
 from osimlite.mechanics.multibody.arc import ArcPoint
 from osimlite.mechanics.multibody.constraints import Coupler
-from osimlite.mechanics.multibody.functions import Function, Linear, ScaledFunction
-from osimlite.mechanics.multibody.joints import TransformAxis, make_custom_motions
+from osimlite.mechanics.multibody.functions import Linear, ScaledFunction, SmoothFunction
+from osimlite.mechanics.multibody.joints import JointAxis, make_custom_motions
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.motions import AccelerationErrorAngle, EllipsoidPoint
 from osimlite.mechanics.multibody.smoothing_spline import smoothing_spline
@@ -152,21 +152,21 @@ def test_what_is_endless_is_null():
 # ------------------------------------------------------------------------------------------------------- functions
 X = (-1.0, -0.2, 0.0, 0.3, 1.1, 1.4, 2.0)
 Y = (0.3, -0.1, 0.2, 0.25, 1.0, 0.8, -0.7)
-FUNCTIONS: list[tuple[Function, int]] = [
-    (f.Constant(0.7), 1),
+FUNCTIONS: list[tuple[SmoothFunction, int]] = [
+    (f.ConstantValue(0.7), 1),
     (Linear(2.0, -0.3), 1),
     (f.WeightedSum((1.0, -2.0), 0.5), 2),
     (f.Polynomial((0.5, -1.0, 0.25, 3.0)), 1),
-    (f.Sine(0.5, 2.0, 0.1, -0.2), 1),
-    (f.Step(-0.5, 0.5, 1.0, 3.0), 1),
+    (f.SineWave(0.5, 2.0, 0.1, -0.2), 1),
+    (f.QuinticStep(-0.5, 0.5, 1.0, 3.0), 1),
     (f.MultivariatePolynomial.complete((1.0, 2.0, 3.0, -4.0, 0.5, 0.1), 2, 2), 2),
-    (ScaledFunction(-0.5, f.SimmSpline(X, Y)), 1),
+    (ScaledFunction(-0.5, f.SimmCubicSpline(X, Y)), 1),
     (f.PiecewiseLinear(X, Y), 1),
     (f.PiecewiseConstant(X, Y), 1),
-    (f.SimmSpline(X, Y), 1),
-    (f.SimmSpline(X[:3], Y[:3]), 1),
-    (f.SimmSpline(X[:2], Y[:2]), 1),
-    (f.SimmSpline((0.0, 0.0, 0.5, 1.0, 1.0), (0.0, 0.1, 0.2, 0.4, 0.3)), 1),
+    (f.SimmCubicSpline(X, Y), 1),
+    (f.SimmCubicSpline(X[:3], Y[:3]), 1),
+    (f.SimmCubicSpline(X[:2], Y[:2]), 1),
+    (f.SimmCubicSpline((0.0, 0.0, 0.5, 1.0, 1.0), (0.0, 0.1, 0.2, 0.4, 0.3)), 1),
     (smoothing_spline(X, Y, 2, 0.0), 1),
     (smoothing_spline(X, Y, 3, 0.01), 1),
     *((EllipsoidPoint(k, 0.2), 3) for k in range(3)),
@@ -189,12 +189,14 @@ def test_no_function_is_forgotten():
         return result.union(*(below(item) for item in cls.__subclasses__()))
 
     ours = {
-        cls for cls in below(Function) if cls.__module__.startswith("osimlite.mechanics.multibody")
+        cls
+        for cls in below(SmoothFunction)
+        if cls.__module__.startswith("osimlite.mechanics.multibody")
     }
     # An error of Simbody's accelerations is no part of a pose.
     assert ours - {AccelerationErrorAngle} == {type(function) for function, _ in FUNCTIONS}
 
-    class Other(Function):
+    class Other(SmoothFunction):
         def evaluate(self, arguments):
             return 0.0, arguments, np.zeros((1, 1))
 
@@ -223,10 +225,10 @@ def test_axes_along_straight_splines_are_joints_of_one_coordinate():
     """As in spine models, whose coordinates turn the first vertebra by splines through two points."""
     z, x = (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)
     axes = [
-        TransformAxis((0,), z, f.SimmSpline((-1.5, 1.5), (-1.5, 1.5))),
-        TransformAxis((0,), x, f.SimmSpline((-1.0, 3.0), (-0.5, 2.5))),
+        JointAxis((0,), z, f.SimmCubicSpline((-1.5, 1.5), (-1.5, 1.5))),
+        JointAxis((0,), x, f.SimmCubicSpline((-1.0, 3.0), (-0.5, 2.5))),
     ]
-    flat = [TransformAxis((0,), x, f.SimmSpline((0.0, 1.0, 2.0), (0.2, 0.2, 0.2)))]
+    flat = [JointAxis((0,), x, f.SimmCubicSpline((0.0, 1.0, 2.0), (0.2, 0.2, 0.2)))]
     mechanism = one_body(make_custom_motions(axes, flat), 1)
     robot = build_robot(mechanism)
     assert [joint.name for joint in robot.moving] == ["q0", "q0_rx"]

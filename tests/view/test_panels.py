@@ -17,12 +17,12 @@ from osimlite.view.panels import (
     split_sides,
     write_pages,
 )
-from osimlite.view.table_plots import Names, describe_columns, plot_tables
+from osimlite.view.table_plots import ColumnNames, describe_columns, plot_tables
 
 pytest.importorskip("matplotlib")
 
 TIMES = np.linspace(0.0, 2.0, 41)
-NO_NAMES = Names({}, {}, {})
+NO_NAMES = ColumnNames({}, {}, {})
 
 
 def wave(shift=0.0):
@@ -179,13 +179,13 @@ def table(name, columns, **options):
     ],
 )
 def test_columns_have_the_units_of_their_tables(name, label, unit, words):
-    names = Names.of_model(None, build_mechanism(dynamic_walker()))
+    names = ColumnNames.of_model(None, build_mechanism(dynamic_walker()))
     (column,) = describe_columns(table(name, {label: wave()}), names)
     assert (column.unit, column.name) == (unit, words)
 
 
 def test_angles_are_in_degrees_whatever_the_table_has():
-    names = Names.of_model(None, build_mechanism(dynamic_walker()))
+    names = ColumnNames.of_model(None, build_mechanism(dynamic_walker()))
     for in_degrees, factor in ((True, 1.0), (False, np.degrees(1.0))):
         item = table("Coordinates", {"RHip_rz": wave()}, in_degrees=in_degrees)
         (column,) = describe_columns(item, names)
@@ -195,7 +195,7 @@ def test_angles_are_in_degrees_whatever_the_table_has():
 def test_muscles_are_grouped_by_the_bodies_that_they_join():
     from osimlite.models.source import make_model
 
-    names = Names.of_model(make_model("jumper"))
+    names = ColumnNames.of_model(make_model("jumper"))
     assert names.regions["soleus_r"] == "tibia – foot" == names.regions["soleus_l"]
     assert names.units["soleus_r"] == "N"
 

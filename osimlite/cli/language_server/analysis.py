@@ -58,7 +58,7 @@ class Target(NamedTuple):
         )
 
 
-class Analysis:
+class DocumentAnalysis:
     """One version of a file; each result is computed when it is first used.
 
     Args:

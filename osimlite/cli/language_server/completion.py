@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from lsprotocol import types
 
-from osimlite.cli.language_server.analysis import Analysis
+from osimlite.cli.language_server.analysis import DocumentAnalysis
 from osimlite.cli.language_server.cursor import Cursor, Element, list_single_object_properties
 from osimlite.cli.language_server.hover import is_list_property
 from osimlite.cli.language_server.names import find_name_reference, list_names
@@ -27,7 +27,7 @@ _TOP_TAGS = (
 
 
 def list_completions(
-    analysis: Analysis, known: Analysis | None, offset: int
+    analysis: DocumentAnalysis, known: DocumentAnalysis | None, offset: int
 ) -> list[types.CompletionItem]:
     """Return the completions at an offset.
 
@@ -73,8 +73,8 @@ def list_completions(
 
 
 def _complete_names(
-    analysis: Analysis,
-    known: Analysis | None,
+    analysis: DocumentAnalysis,
+    known: DocumentAnalysis | None,
     cursor: Cursor,
     reference: Reference,
     holder: Element | None,
@@ -90,7 +90,7 @@ def _complete_names(
 
 
 def _complete_tags(
-    analysis: Analysis, cursor: Cursor, around: Element | None, bracket: str
+    analysis: DocumentAnalysis, cursor: Cursor, around: Element | None, bracket: str
 ) -> Iterator[types.CompletionItem]:
     """Yield completions for the elements that may be inside the enclosing one."""
     if around is None:
@@ -117,7 +117,7 @@ def _complete_tags(
             yield _complete_property(analysis, cursor, spec, bracket)
 
 
-def _list_written_tags(analysis: Analysis, around: Element) -> set[str]:
+def _list_written_tags(analysis: DocumentAnalysis, around: Element) -> set[str]:
     """Return the tags of properties that the text already gives to an object."""
     item = analysis.objects.get(around.number) if analysis.is_readable else None
     if item is None:
@@ -130,7 +130,7 @@ def _list_written_tags(analysis: Analysis, around: Element) -> set[str]:
 
 
 def _complete_property(
-    analysis: Analysis, cursor: Cursor, spec: FieldSpec, bracket: str
+    analysis: DocumentAnalysis, cursor: Cursor, spec: FieldSpec, bracket: str
 ) -> types.CompletionItem:
     if isinstance(spec.kind, ObjectField):
         inner = ' name="$1">\n\t$0\n' if spec.kind.form == "unnamed" else ">\n\t$0\n"
@@ -153,7 +153,7 @@ def _complete_property(
 
 
 def _complete_object(
-    analysis: Analysis, cursor: Cursor, tag: str, bracket: str, name: str
+    analysis: DocumentAnalysis, cursor: Cursor, tag: str, bracket: str, name: str
 ) -> types.CompletionItem:
     named = f'name="{name}"' if name else 'name="$1"'
     text = f"{bracket}{tag} {named}>\n\t$0\n</{tag}>"
@@ -165,7 +165,7 @@ def _complete_object(
 
 
 def _make_item(
-    analysis: Analysis,
+    analysis: DocumentAnalysis,
     cursor: Cursor,
     label: str,
     text: str,

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from lsprotocol import types
 
 from osimlite.base.text import escape_unprintable
-from osimlite.cli.language_server.analysis import Analysis
+from osimlite.cli.language_server.analysis import DocumentAnalysis
 from osimlite.io.document.source import Position
 from osimlite.lint.diagnostic import Edit, Finding, Severity
 from osimlite.lint.fixes import select_edits
@@ -25,12 +25,12 @@ _SEVERITIES = {
 }
 
 
-def list_diagnostics(analysis: Analysis) -> list[types.Diagnostic]:
+def list_diagnostics(analysis: DocumentAnalysis) -> list[types.Diagnostic]:
     """Return all findings of a file as diagnostics."""
     return [_make_diagnostic(analysis, finding) for finding in analysis.report]
 
 
-def _make_diagnostic(analysis: Analysis, finding: Finding) -> types.Diagnostic:
+def _make_diagnostic(analysis: DocumentAnalysis, finding: Finding) -> types.Diagnostic:
     hint = f"; did you mean '{finding.suggestion}'?" if finding.suggestion is not None else ""
     return types.Diagnostic(
         analysis.text.range(*_find_offsets(analysis, finding)),
@@ -41,14 +41,16 @@ def _make_diagnostic(analysis: Analysis, finding: Finding) -> types.Diagnostic:
     )
 
 
-def _find_offsets(analysis: Analysis, finding: Finding) -> tuple[int, int]:
+def _find_offsets(analysis: DocumentAnalysis, finding: Finding) -> tuple[int, int]:
     if finding.line is None or finding.column is None:
         return 0, 0
     start = analysis.compute_offset(Position(finding.line, finding.column))
     return start, min(start + finding.length, len(analysis.text.content))
 
 
-def list_code_actions(analysis: Analysis, uri: str, wanted: types.Range) -> list[types.CodeAction]:
+def list_code_actions(
+    analysis: DocumentAnalysis, uri: str, wanted: types.Range
+) -> list[types.CodeAction]:
     """Return the actions for the findings in a range: fix them, ignore them, or fix everything in the file.
 
     Args:
@@ -111,7 +113,7 @@ def _describe_fix(finding: Finding) -> str:
     return f"Fix {finding.code} ({finding.name}){caution}"
 
 
-def _convert_edits(analysis: Analysis, edits: Iterable[Edit]) -> list[types.TextEdit]:
+def _convert_edits(analysis: DocumentAnalysis, edits: Iterable[Edit]) -> list[types.TextEdit]:
     result = []
     data, is_table = analysis.source.data, analysis.is_table and not analysis.text.content.isascii()
     seen = characters = 0
@@ -125,7 +127,7 @@ def _convert_edits(analysis: Analysis, edits: Iterable[Edit]) -> list[types.Text
     return result
 
 
-def _make_ignore_edit(analysis: Analysis, finding: Finding) -> types.TextEdit | None:
+def _make_ignore_edit(analysis: DocumentAnalysis, finding: Finding) -> types.TextEdit | None:
     """Return the edit that makes the linter ignore a finding; None if there is no place for it.
 
     In XML it is a comment at the end of the line, in a table a line of the header.

@@ -7,7 +7,7 @@ import os
 from lsprotocol import types
 
 from osimlite.base.files import get_relative_path
-from osimlite.cli.language_server.analysis import Analysis
+from osimlite.cli.language_server.analysis import DocumentAnalysis
 from osimlite.cli.language_server.cursor import Element
 from osimlite.cli.language_server.names import find_marker_labels
 from osimlite.io.document.lexical import make_formatter
@@ -19,7 +19,7 @@ from osimlite.schema.specs import FieldSpec
 from osimlite.schema.tree import is_a
 
 
-def describe_cursor(analysis: Analysis, offset: int) -> types.Hover | None:
+def describe_cursor(analysis: DocumentAnalysis, offset: int) -> types.Hover | None:
     """Describe the class, the property, or the target of the reference at an offset.
 
     Args:
@@ -69,7 +69,7 @@ def _describe_default(spec: FieldSpec) -> str:
     return f"; by default `{make_formatter(spec.kind, 'shortest')(spec.default)}`"
 
 
-def _describe_target(analysis: Analysis, offset: int) -> str:
+def _describe_target(analysis: DocumentAnalysis, offset: int) -> str:
     target = analysis.find_target(offset)
     if target is None:
         return ""
@@ -94,7 +94,7 @@ def _describe_target(analysis: Analysis, offset: int) -> str:
     return f"{said} of `{file}`{also}"
 
 
-def _find_path(analysis: Analysis, element: Element) -> str:
+def _find_path(analysis: DocumentAnalysis, element: Element) -> str:
     """Return the path of the component of an element, as markup; empty if the text is malformed."""
     if analysis.tree is None:
         return ""

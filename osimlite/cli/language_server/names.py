@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from osimlite.base.files import get_relative_path
-from osimlite.cli.language_server.analysis import Analysis
+from osimlite.cli.language_server.analysis import DocumentAnalysis
 from osimlite.cli.language_server.cursor import Cursor, Element
 from osimlite.lint.beside import list_folders, read_beginning
 from osimlite.lint.setup import Setup
@@ -73,7 +73,7 @@ def find_name_reference(cursor: Cursor) -> Reference | None:
 
 
 def list_names(
-    analysis: Analysis, cursor: Cursor, reference: Reference, holder: Element | None
+    analysis: DocumentAnalysis, cursor: Cursor, reference: Reference, holder: Element | None
 ) -> Iterator[Name]:
     """Yield the candidate texts for a reference.
 
@@ -107,7 +107,7 @@ def list_names(
             yield from _list_names_in_setup(setup, analysis.tree, reference)
 
 
-def _find_owner(analysis: Analysis, tree: Tree, holder: Element | None) -> Component:
+def _find_owner(analysis: DocumentAnalysis, tree: Tree, holder: Element | None) -> Component:
     """Return the component from which relative paths of a reference start."""
     if holder is None:
         return tree.model

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from lsprotocol import types
 
-from osimlite.cli.language_server.analysis import Analysis
+from osimlite.cli.language_server.analysis import DocumentAnalysis
 from osimlite.io.document.spans import find_markup
 from osimlite.schema.base import Object
 from osimlite.schema.specs import get_object_specs
@@ -24,13 +24,13 @@ _SYMBOLS = {
 """Symbol kinds by base class, the first match counts; other classes are shown as fields."""
 
 
-def list_symbols(analysis: Analysis) -> list[types.DocumentSymbol]:
+def list_symbols(analysis: DocumentAnalysis) -> list[types.DocumentSymbol]:
     """Return the objects of a document as a tree of symbols; empty while the text is malformed."""
     top = None if analysis.document is None else analysis.document.top
     return [] if top is None else _make_symbols(analysis, top)
 
 
-def _make_symbols(analysis: Analysis, item: Object) -> list[types.DocumentSymbol]:
+def _make_symbols(analysis: DocumentAnalysis, item: Object) -> list[types.DocumentSymbol]:
     """Return the symbol of an object, or those of its parts if the object has no element."""
     inner: list[types.DocumentSymbol] = []
     if get_object_specs(type(item)):
@@ -57,7 +57,7 @@ def _make_symbols(analysis: Analysis, item: Object) -> list[types.DocumentSymbol
     ]
 
 
-def list_folding_ranges(analysis: Analysis) -> list[types.FoldingRange]:
+def list_folding_ranges(analysis: DocumentAnalysis) -> list[types.FoldingRange]:
     """Return the elements and comments that span several lines."""
     result, open_lines = [], []
     for piece in find_markup(analysis.markup):

@@ -11,7 +11,7 @@ from lsprotocol import types
 from pygls.uris import from_fs_path
 
 from osimlite.base.files import read_file, unsaved
-from osimlite.cli.language_server.analysis import Analysis, Target
+from osimlite.cli.language_server.analysis import DocumentAnalysis, Target
 from osimlite.cli.language_server.text import Text
 from osimlite.errors import ModelError, OsimliteError
 from osimlite.io.document.source import Source
@@ -31,8 +31,8 @@ class Project:
     """
 
     def __init__(self) -> None:
-        self.open: dict[str, Analysis] = {}
-        self.last_readable: dict[str, Analysis] = {}
+        self.open: dict[str, DocumentAnalysis] = {}
+        self.last_readable: dict[str, DocumentAnalysis] = {}
         self.unit: str = types.PositionEncodingKind.Utf16
 
     def find_uri(self, path: str) -> str:
@@ -43,17 +43,17 @@ class Project:
         )
         return next(opened, None) or from_fs_path(path) or path
 
-    def get_analysis(self, path: str) -> Analysis | None:
+    def get_analysis(self, path: str) -> DocumentAnalysis | None:
         """Return the analysis of a document, open or on disk; None if it cannot be read."""
         known = self.open.get(self.find_uri(path))
         if known is not None:
             return known
         try:
-            return Analysis(Text(Source.from_file(path).text, self.unit), path)
+            return DocumentAnalysis(Text(Source.from_file(path).text, self.unit), path)
         except OsimliteError:
             return None
 
-    def publish_unsaved(self, analysis: Analysis) -> bool:
+    def publish_unsaved(self, analysis: DocumentAnalysis) -> bool:
         """Make the unsaved text of a document visible to all readers of that file.
 
         Returns:
@@ -72,7 +72,7 @@ class Project:
         unsaved[path] = held
         return before != held
 
-    def close(self, uri: str) -> Analysis | None:
+    def close(self, uri: str) -> DocumentAnalysis | None:
         """Remove a file from the open ones, so that readers see it as it is on disk.
 
         Returns:
@@ -84,7 +84,7 @@ class Project:
             unsaved.pop(os.path.realpath(analysis.file), None)
         return analysis
 
-    def list_dependents(self, analysis: Analysis) -> list[str]:
+    def list_dependents(self, analysis: DocumentAnalysis) -> list[str]:
         """Return the URIs of the other open files whose findings depend on a document."""
         path = os.path.realpath(analysis.file)
         result = []
@@ -111,7 +111,7 @@ class Project:
             analysis.text.range(*analysis.find_label_range(target.number)),
         )
 
-    def find_documents_naming(self, target: Target) -> Iterator[Analysis]:
+    def find_documents_naming(self, target: Target) -> Iterator[DocumentAnalysis]:
         """Yield the documents that may refer to a target, first the one that defines it.
 
         It searches the folder of the target, its parent folder, and the folders directly in both, and
@@ -185,7 +185,7 @@ class Project:
 
 
 def _compute_model_edits(
-    analysis: Analysis, item: object, name: str
+    analysis: DocumentAnalysis, item: object, name: str
 ) -> tuple[str, list[types.TextEdit]]:
     """Compute the edits of the references in the model that contains a component.
 
@@ -199,7 +199,7 @@ def _compute_model_edits(
     """
     assert isinstance(item, Component) and item._index is not None
     # Renaming changes the model, so a second one is read from the same text.
-    twin = Analysis(analysis.text, analysis.file)
+    twin = DocumentAnalysis(analysis.text, analysis.file)
     assert twin.document is not None and twin.document.model is not None
     target, model = twin.objects[item._index], twin.document.model
     assert isinstance(target, Component)
@@ -214,7 +214,9 @@ def _compute_model_edits(
     return model.tree().path_of(target) or f"/{name}", edits
 
 
-def _compute_setup_edits(analysis: Analysis, target: Target, path: str) -> list[types.TextEdit]:
+def _compute_setup_edits(
+    analysis: DocumentAnalysis, target: Target, path: str
+) -> list[types.TextEdit]:
     """Compute the edits of the names in a setup that refer to a component or pass through it.
 
     Args:

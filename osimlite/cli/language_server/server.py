@@ -19,7 +19,7 @@ from pygls.lsp.server import LanguageServer
 from pygls.uris import to_fs_path
 
 from osimlite import __version__
-from osimlite.cli.language_server.analysis import Analysis, Target
+from osimlite.cli.language_server.analysis import DocumentAnalysis, Target
 from osimlite.cli.language_server.completion import list_completions
 from osimlite.cli.language_server.findings import list_code_actions, list_diagnostics
 from osimlite.cli.language_server.hover import describe_cursor
@@ -82,14 +82,14 @@ class Server(LanguageServer):
         else:
             super().report_server_error(error, source)
 
-    def analyse(self, uri: str, text: Text) -> Analysis:
+    def analyse(self, uri: str, text: Text) -> DocumentAnalysis:
         """Replace the analysis of an open file by one of a new text, and return it.
 
         Args:
             uri: the file.
             text: its present text.
         """
-        result = self.project.open[uri] = Analysis(
+        result = self.project.open[uri] = DocumentAnalysis(
             text, to_fs_path(uri) or uri, use_cached_measures=True
         )
         return result
@@ -147,7 +147,7 @@ class Server(LanguageServer):
         if analysis.needs_measuring:
             await self._measure(uri, analysis)
 
-    async def _measure(self, uri: str, analysis: Analysis) -> None:
+    async def _measure(self, uri: str, analysis: DocumentAnalysis) -> None:
         await asyncio.sleep(MEASURING_DELAY_S)
         try:
             report = await asyncio.to_thread(analysis.measure_report)
@@ -162,7 +162,7 @@ class Server(LanguageServer):
         version = None if document is None else document.version
         self.text_document_publish_diagnostics(types.PublishDiagnosticsParams(uri, result, version))
 
-    def get_position(self, place: DocumentPosition) -> tuple[Analysis, int]:
+    def get_position(self, place: DocumentPosition) -> tuple[DocumentAnalysis, int]:
         """Return the analysis and the character offset that a request names.
 
         Args:
@@ -177,7 +177,7 @@ class Server(LanguageServer):
         analysis = self.get_analysis(place.text_document)
         return analysis, analysis.text.offset(place.position)
 
-    def get_analysis(self, document: types.TextDocumentIdentifier) -> Analysis:
+    def get_analysis(self, document: types.TextDocumentIdentifier) -> DocumentAnalysis:
         """Return the analysis of an open document.
 
         Raises:

@@ -10,8 +10,8 @@ from osimlite.errors import UnsupportedError
 from osimlite.lint.measures import (
     LengthOnSurface,
     Measures,
+    MeasuringPose,
     NoMachineCodeError,
-    Pose,
     find_swept_coordinates,
     merge_measures,
 )
@@ -129,7 +129,7 @@ def _find_bad_surface_lengths(
     paths: Paths, start: Array, looked_at: list[Sweep]
 ) -> Iterator[LengthOnSurface]:
     """Yield the first negative or NaN length of each path on each surface."""
-    poses = [Pose(), *(sweep.pose(value) for sweep in looked_at for value in sweep.values)]
+    poses = [MeasuringPose(), *(sweep.pose(value) for sweep in looked_at for value in sweep.values)]
     every = np.concatenate([start[None], *(sweep.poses for sweep in looked_at)])
     for name, surface, lengths in paths.system.measure_all_on_surfaces(every, paths.routes):
         for k in np.flatnonzero(~(lengths >= 0.0))[:1]:
@@ -157,9 +157,9 @@ def _check_loop_count(mechanism: Mechanism) -> None:
 
 def _find_length_extremes(
     looked_at: list[Sweep], default: Array
-) -> Iterator[tuple[tuple[float, Pose], tuple[float, Pose]]]:
+) -> Iterator[tuple[tuple[float, MeasuringPose], tuple[float, MeasuringPose]]]:
     """Yield where each path is shortest and longest: in the default pose, or in the middle of the ranges."""
-    poses, rows = [Pose()], [default[None]]
+    poses, rows = [MeasuringPose()], [default[None]]
     for sweep in looked_at:
         low, high = sweep.info.range
         inside = np.flatnonzero(

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from osimlite.errors import ModelError
-from osimlite.lint.measures import FiberReach, MuscleStart, Pose
+from osimlite.lint.measures import FiberReach, MeasuringPose, MuscleStart
 from osimlite.mechanics.laws.muscles import MuscleInputs
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.schema.model import Model
@@ -162,7 +162,9 @@ def compute_start(fibers: MuscleFibers, length: float) -> MuscleStart | None:
     return MuscleStart(fibers.path, lengths, tensions)
 
 
-def compute_reach(fibers: MuscleFibers, length: float, is_active: bool, pose: Pose) -> FiberReach:
+def compute_reach(
+    fibers: MuscleFibers, length: float, is_active: bool, pose: MeasuringPose
+) -> FiberReach:
     """Compute the fibers in equilibrium.
 
     Args:

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from osimlite.lint.measures import MovingPoint, Value
+from osimlite.lint.measures import CoordinateSetting, MovingPoint
 from osimlite.mechanics.kernels.paths import MOVING
 from osimlite.mechanics.multibody.functions import ScaledFunction
 from osimlite.mechanics.multibody.spatial import Array
@@ -33,7 +33,7 @@ def measure_moving_points(paths: Paths) -> Iterator[MovingPoint]:
                 yield MovingPoint(
                     name,
                     point.name,
-                    Value(info.name, end, info.unit),
+                    CoordinateSetting(info.name, end, info.unit),
                     abs(end - inside),
                     float(np.linalg.norm(place - _evaluate_point(point, inside)[0])),
                     float(np.linalg.norm(rate)),

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from osimlite.base.records import dataclass
 from osimlite.errors import SimulationError
-from osimlite.lint.measures import Pose, Value
+from osimlite.lint.measures import CoordinateSetting, MeasuringPose
 from osimlite.mechanics.multibody.linear import stack_equations
 from osimlite.mechanics.multibody.parts import CoordinateInfo
 from osimlite.mechanics.multibody.spatial import Array
@@ -62,13 +62,13 @@ class Sweep:
         """Name, range and unit of the coordinate."""
         return self.paths.mechanism.coordinates[self.place]
 
-    def value(self, value: float) -> Value:
+    def value(self, value: float) -> CoordinateSetting:
         """Return a value of the coordinate with its name and unit."""
-        return Value(self.info.name, float(value), self.info.unit)
+        return CoordinateSetting(self.info.name, float(value), self.info.unit)
 
-    def pose(self, value: float) -> Pose:
+    def pose(self, value: float) -> MeasuringPose:
         """Return the pose at a value of the coordinate, for messages."""
-        return Pose((self.value(value),))
+        return MeasuringPose((self.value(value),))
 
     def interpolate_poses(self, values: Array, place: NDArray[np.intp]) -> Array:
         """Return all coordinates (k, n) at values of this one, by linear interpolation between the poses.

@@ -7,7 +7,7 @@ from random import Random
 
 import numpy as np
 
-from osimlite.lint.measures import Pose, WrappingError
+from osimlite.lint.measures import MeasuringPose, WrappingError
 from osimlite.lint.measuring.sweeps import Sweep
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.simulation.paths import Paths
@@ -51,21 +51,21 @@ def compare_wrappings(
             continue
         moved = [sweep for sweep in free if sweep.moved[path]]
 
-        def describe_pose(k: int, moved: Sequence[Sweep] = moved) -> tuple[Pose, Array]:
+        def describe_pose(k: int, moved: Sequence[Sweep] = moved) -> tuple[MeasuringPose, Array]:
             """Describe pose k for messages, with irrelevant coordinates at their defaults.
 
             Returns:
                 The pose in words, and the values of all coordinates (n,).
             """
             if k == 0:
-                return Pose(), start
+                return MeasuringPose(), start
             for sweep in looked_at:
                 if k <= len(sweep.poses):
                     return sweep.pose(sweep.values[k - 1]), sweep.poses[k - 1]
                 k -= len(sweep.poses)
             q, places = start.copy(), [sweep.place for sweep in moved]
             q[places] = together[k - 1][places]
-            return Pose(tuple(sweep.value(q[sweep.place]) for sweep in moved)), q
+            return MeasuringPose(tuple(sweep.value(q[sweep.place]) for sweep in moved)), q
 
         # Try the poses from the largest excess downwards until one is not a rounding error.
         order = np.argsort(-np.nan_to_num(np.abs(excess)), kind="stable").tolist()

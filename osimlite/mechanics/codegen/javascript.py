@@ -156,8 +156,8 @@ POINTERS: dict[Any, Callable[..., str]] = {
 
 
 @cache
-def _write_function(function: Function) -> _Writer:
-    writer = _Writer(function, "JavaScript")
+def _write_function(function: Function) -> _JavaScriptWriter:
+    writer = _JavaScriptWriter(function, "JavaScript")
     writer.written = writer.write()
     return writer
 
@@ -174,7 +174,7 @@ def _record_name(record: Any) -> str:
     return f"{record.__module__.rpartition('.')[2]}_{record.__name__}"
 
 
-class _Writer(Kernel):
+class _JavaScriptWriter(Kernel):
     """Writer of one function.
 
     Attributes:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from osimlite.base.records import dataclass
 from osimlite.mechanics.kernels.constant_curvature import evaluate_arc
 from osimlite.mechanics.kernels.functions import ARC
-from osimlite.mechanics.multibody.functions import Arguments, Evaluated, Function, make_floats
+from osimlite.mechanics.multibody.functions import Arguments, Evaluated, SmoothFunction, make_floats
 
 # 16 terms are exact in double precision for angles up to half a turn.
 _SERIES = [(-1.0) ** n / math.factorial(2 * n + first) for first in (1, 2) for n in range(16)]
@@ -16,7 +16,7 @@ _SERIES = [(-1.0) ** n / math.factorial(2 * n + first) for first in (1, 2) for n
 
 
 @dataclass(frozen=True)
-class ArcPoint(Function):
+class ArcPoint(SmoothFunction):
     """One component of the end of a rod with constant curvature, as a function of two angles.
 
     The unbent rod stands along Y from the origin. Its end points along the Y axis that is rotated

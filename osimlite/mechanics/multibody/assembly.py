@@ -21,7 +21,7 @@ import numpy as np
 from osimlite.base.text import join_words
 from osimlite.errors import SimulationError
 from osimlite.mechanics.multibody.constraints import Coupler
-from osimlite.mechanics.multibody.kinematics import Kinematics
+from osimlite.mechanics.multibody.kinematics import MechanismKinematics
 from osimlite.mechanics.multibody.linear import solve_with_null_space, stack_equations
 from osimlite.mechanics.multibody.spatial import Array
 
@@ -119,7 +119,7 @@ def find_unclamped(mechanism: Mechanism, q: Array) -> list[int]:
     ]
 
 
-def project_speeds(state: Kinematics, kept: Collection[int] = ()) -> Array:
+def project_speeds(state: MechanismKinematics, kept: Collection[int] = ()) -> Array:
     """Return the generalized speeds (n,) nearest to those of a state that fulfil the constraints.
 
     As in Simbody, a change of a speed that is greater than 1 counts relative to the speed.
@@ -294,10 +294,10 @@ class _Search:
             {name: error for name, error in broken.items() if not error <= self.tolerance},
         )
 
-    def _compute_state(self, q: Array) -> Kinematics:
-        return Kinematics(self.mechanism, q, np.zeros(len(q)), self.time)
+    def _compute_state(self, q: Array) -> MechanismKinematics:
+        return MechanismKinematics(self.mechanism, q, np.zeros(len(q)), self.time)
 
-    def _compute_rows(self, state: Kinematics) -> Array:
+    def _compute_rows(self, state: MechanismKinematics) -> Array:
         """Return the derivatives of the errors by the free coordinates (p, f)."""
         by_speeds = _compute_constraint_matrix(state)
         # Derivatives by speeds and coordinates differ for ball joints: G = E N⁻¹, with qdot = N u.
@@ -327,12 +327,12 @@ class _Search:
         return full
 
 
-def _compute_position_errors(state: Kinematics) -> Array:
+def _compute_position_errors(state: MechanismKinematics) -> Array:
     parts = [item.position_errors(state) for item in state.mechanism.constraints]
     return np.concatenate([np.zeros(0), *parts])
 
 
-def _compute_constraint_matrix(state: Kinematics) -> Array:
+def _compute_constraint_matrix(state: MechanismKinematics) -> Array:
     """Return the matrix (p, n) from the speeds to the rates of all position errors."""
     rows = [np.zeros((0, len(state.q)))]
     for item in state.mechanism.constraints:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Generic, TypeVar
 import numpy as np
 
 from osimlite.base.records import dataclass
-from osimlite.mechanics.multibody.constraints import Constraint
+from osimlite.mechanics.multibody.constraints import ConstraintEquations
 from osimlite.mechanics.multibody.parts import FramePlacement, StationPlacement
 from osimlite.mechanics.multibody.spatial import Array, cross
 
@@ -41,7 +41,7 @@ P = TypeVar("P", StationPlacement, FramePlacement)
 
 
 @dataclass(frozen=True, eq=False)
-class _Between(Constraint, Generic[P]):
+class _Between(ConstraintEquations, Generic[P]):
     first: P
     second: P
 
@@ -56,7 +56,7 @@ class _Between(Constraint, Generic[P]):
 
 
 @dataclass(frozen=True, eq=False)
-class PointConstraint(_Between[StationPlacement]):
+class PointEquations(_Between[StationPlacement]):
     """Holds two stations together, as a ball joint does."""
 
     name: str = "point constraint"
@@ -71,7 +71,7 @@ class DistanceConstraint(_Between[StationPlacement]):
 
 
 @dataclass(frozen=True, eq=False)
-class PointOnLineConstraint(Constraint):
+class PointOnLineEquations(ConstraintEquations):
     """Keeps a station of a follower body on a line that is fixed in another body."""
 
     line: StationPlacement  # point of the line
@@ -97,7 +97,7 @@ class PointOnLineConstraint(Constraint):
 
 
 @dataclass(frozen=True, eq=False)
-class WeldConstraint(_Between[FramePlacement]):
+class WeldEquations(_Between[FramePlacement]):
     """Holds two frames together.
 
     The equations are three scalar products that vanish, of each axis of one frame with the next
@@ -108,7 +108,7 @@ class WeldConstraint(_Between[FramePlacement]):
 
 
 @dataclass(frozen=True, eq=False)
-class RollingConstraint(Constraint):
+class RollingConstraint(ConstraintEquations):
     """OpenSim's RollingOnSurfaceConstraint: a roller on a plane, without slip and without spin.
 
     The roller's origin stays at `height` along the normal of the surface's frame, and its Z axis

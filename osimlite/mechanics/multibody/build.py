@@ -8,10 +8,10 @@ import numpy as np
 
 from osimlite.base.records import dataclass, replace
 from osimlite.errors import ModelError, UnsupportedError
-from osimlite.mechanics.multibody.body_constraints import RollingConstraint, WeldConstraint
-from osimlite.mechanics.multibody.constraints import Constraint, Coupler
+from osimlite.mechanics.multibody.body_constraints import RollingConstraint, WeldEquations
+from osimlite.mechanics.multibody.constraints import ConstraintEquations, Coupler
 from osimlite.mechanics.multibody.extremes import any_numbers
-from osimlite.mechanics.multibody.functions import Function
+from osimlite.mechanics.multibody.functions import SmoothFunction
 from osimlite.mechanics.multibody.joints import MOTIONS, Mobilizer, motion_types
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.mechanics.multibody.motions import JointMotion, SphericalMotion
@@ -117,7 +117,7 @@ class _Builder:
         self.placements = Placements(self.tree)
         self.coordinates: list[CoordinateInfo] = []
         self.bodies: dict[str, Body] = {}
-        self.constraints: list[Constraint] = []
+        self.constraints: list[ConstraintEquations] = []
 
     def build(self) -> Mechanism:
         """Return the mechanism of the model.
@@ -229,7 +229,9 @@ class _Builder:
             type(joint).__name__, path, parent, child, parent_frame, child_frame, motions, own
         )
 
-    def _convert_prescribed_function(self, coordinate: Coordinate, path: str) -> Function | None:
+    def _convert_prescribed_function(
+        self, coordinate: Coordinate, path: str
+    ) -> SmoothFunction | None:
         """Return the function of time of a prescribed coordinate, None if it moves freely.
 
         Args:
@@ -284,7 +286,7 @@ class _Builder:
             if not edge.coordinates:
                 first = FramePlacement(index[edge.parent], edge.parent_frame)
                 second = FramePlacement(index[edge.child], edge.child_frame)
-                self.constraints.append(WeldConstraint(first, second, edge.path))
+                self.constraints.append(WeldEquations(first, second, edge.path))
                 # OpenSim 4.6 carries the child's mass once more by the joint that it has turned
                 # into a constraint.
                 if self.opensim_derivatives:
@@ -350,7 +352,7 @@ class _Builder:
             inertia = whole.about_origin() / whole.mass if wrong and whole.mass else share.inertia
             bodies[part] = replace(bodies[part], mass_properties=replace(share, inertia=inertia))
         still = np.eye(4)
-        weld = WeldConstraint(
+        weld = WeldEquations(
             FramePlacement(place, still), FramePlacement(len(bodies) - 1, still), edge.path
         )
         self.constraints.append(weld)

@@ -20,9 +20,14 @@ from osimlite.mechanics.kernels.constraint_equations import (
 from osimlite.mechanics.kernels.layout import COORDINATE
 from osimlite.mechanics.kernels.linear_algebra import factor_size
 from osimlite.mechanics.multibody import body_constraints as b
-from osimlite.mechanics.multibody.constraints import Constraint, Coupler, Lock, PrescribedCoordinate
+from osimlite.mechanics.multibody.constraints import (
+    ConstraintEquations,
+    Coupler,
+    Lock,
+    PrescribedCoordinate,
+)
 from osimlite.mechanics.multibody.function_tables import function_table, table_of_one
-from osimlite.mechanics.multibody.functions import Constant
+from osimlite.mechanics.multibody.functions import ConstantValue
 from osimlite.mechanics.multibody.parts import GROUND, FramePlacement, StationPlacement
 from osimlite.mechanics.multibody.spatial import Array
 
@@ -59,7 +64,9 @@ class _Equation(NamedTuple):
     wanted: float = 0.0  # value of the scalar product (m²) or length (m)
 
 
-def constraint_record(constraint: Constraint, places: Places, balls: Balls) -> ConstraintRecord:
+def constraint_record(
+    constraint: ConstraintEquations, places: Places, balls: Balls
+) -> ConstraintRecord:
     """Return the record of a constraint.
 
     Args:
@@ -75,7 +82,7 @@ def constraint_record(constraint: Constraint, places: Places, balls: Balls) -> C
             # A lock is a prescribed speed of zero without a position equation: any value is right.
             own = _coordinate(constraint.coordinate, places, balls)
             return ConstraintRecord(
-                "prescribe", own, table_of_one(Constant(0.0), constraint.name), positions=0
+                "prescribe", own, table_of_one(ConstantValue(0.0), constraint.name), positions=0
             )
         case PrescribedCoordinate():
             table = table_of_one(constraint.function, f"the function of '{constraint.name}'")
@@ -90,16 +97,16 @@ def constraint_record(constraint: Constraint, places: Places, balls: Balls) -> C
         case b.DistanceConstraint():
             arm = _arm(places, constraint.first, constraint.second)
             return _record_between_bodies([_Equation(DISTANCE, arm, arm, constraint.distance)])
-        case b.PointConstraint():
+        case b.PointEquations():
             return _record_between_bodies(_meeting(places, constraint.first, constraint.second))
-        case b.PointOnLineConstraint():
+        case b.PointOnLineEquations():
             arm = _arm(places, constraint.line, constraint.follower)
             axes = (
                 _axis(places, constraint.line.body, axis)
                 for axis in constraint.find_normal_directions()
             )
             return _record_between_bodies([_Equation(PRODUCT, axis, arm) for axis in axes])
-        case b.WeldConstraint():
+        case b.WeldEquations():
             return _record_between_bodies(_weld(constraint, places))
     raise UnsupportedError(
         f"'{constraint.name}' ({type(constraint).__name__}) cannot be kept up; set its isEnforced to false"
@@ -229,7 +236,7 @@ def _meeting(places: Places, first: StationPlacement, second: StationPlacement) 
     return [_Equation(PRODUCT, axis, arm) for axis in axes]
 
 
-def _weld(constraint: b.WeldConstraint, places: Places) -> list[_Equation]:
+def _weld(constraint: b.WeldEquations, places: Places) -> list[_Equation]:
     """Return the six equations of a weld: three of orientation, then three of position.
 
     Args:

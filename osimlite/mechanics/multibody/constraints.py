@@ -10,11 +10,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, ClassVar, NamedTuple, Protocol
 
 from osimlite.base.records import dataclass
-from osimlite.mechanics.multibody.functions import Function
+from osimlite.mechanics.multibody.functions import SmoothFunction
 from osimlite.mechanics.multibody.spatial import Array
 
 if TYPE_CHECKING:
-    from osimlite.mechanics.multibody.kinematics import Kinematics
+    from osimlite.mechanics.multibody.kinematics import MechanismKinematics
 
 
 class Equations(NamedTuple):
@@ -29,7 +29,7 @@ class Equations(NamedTuple):
     drifts: Array  # c (m,)
 
 
-class Constraint(Protocol):
+class ConstraintEquations(Protocol):
     """Equations that coordinates, generalized speeds and their derivatives fulfil."""
 
     @property
@@ -53,11 +53,11 @@ class Constraint(Protocol):
     def name(self) -> str:
         """Name of the constraint in messages."""
 
-    def position_errors(self, state: Kinematics) -> Array:
+    def position_errors(self, state: MechanismKinematics) -> Array:
         """Return the errors of the positions (p,), which are zero where the constraint holds."""
         return state.equations(self).errors
 
-    def velocity_equations(self, state: Kinematics) -> tuple[Array, Array]:
+    def velocity_equations(self, state: MechanismKinematics) -> tuple[Array, Array]:
         """Return the equations of the speeds.
 
         Returns:
@@ -66,7 +66,7 @@ class Constraint(Protocol):
         equations = state.equations(self)
         return equations.rows, equations.rates
 
-    def acceleration_equations(self, state: Kinematics) -> tuple[Array, Array]:
+    def acceleration_equations(self, state: MechanismKinematics) -> tuple[Array, Array]:
         """Return the equations of the accelerations.
 
         Returns:
@@ -77,7 +77,7 @@ class Constraint(Protocol):
 
 
 @dataclass(frozen=True)
-class Lock(Constraint):
+class Lock(ConstraintEquations):
     """Keeps the value of one coordinate constant.
 
     It acts on the value of the coordinate, not on its speed: a locked angle of a ball joint does
@@ -100,7 +100,7 @@ class Lock(Constraint):
 
 
 @dataclass(frozen=True)
-class PrescribedCoordinate(Constraint):
+class PrescribedCoordinate(ConstraintEquations):
     """Makes one coordinate follow a function of time (s).
 
     The error is the coordinate minus the function.
@@ -108,7 +108,7 @@ class PrescribedCoordinate(Constraint):
 
     bodies: ClassVar[tuple[int, ...]] = ()
     coordinate: int
-    function: Function
+    function: SmoothFunction
     name: str = "prescribed coordinate"
 
     @property
@@ -122,7 +122,7 @@ class PrescribedCoordinate(Constraint):
 
 
 @dataclass(frozen=True)
-class Coupler(Constraint):
+class Coupler(ConstraintEquations):
     """Makes one coordinate a function of others.
 
     The error is the function minus the dependent coordinate.
@@ -131,7 +131,7 @@ class Coupler(Constraint):
     bodies: ClassVar[tuple[int, ...]] = ()
     dependent: int
     independent: tuple[int, ...]
-    function: Function
+    function: SmoothFunction
     name: str = "coupler"
 
     @property

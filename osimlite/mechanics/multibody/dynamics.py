@@ -27,7 +27,7 @@ from osimlite.mechanics.kernels.layout import LINK_WORK, MODEL, OUTCOME
 from osimlite.mechanics.kernels.pointers import Floats, at
 from osimlite.mechanics.kernels.points import link_work
 from osimlite.mechanics.multibody.functions import make_floats
-from osimlite.mechanics.multibody.kinematics import Kinematics, check_finite
+from osimlite.mechanics.multibody.kinematics import MechanismKinematics, check_finite
 from osimlite.mechanics.multibody.linear import solve_with_null_space
 from osimlite.mechanics.multibody.spatial import Array
 
@@ -53,12 +53,12 @@ class Wrench(NamedTuple):
 class MassCentres:
     """Mass centres of the b bodies of a mechanism at one state, along the axes of ground."""
 
-    state: Kinematics
+    state: MechanismKinematics
     masses: Array  # (b,), kg
     arms: Array  # from the body origins to the mass centres (b, 3), m
 
     @classmethod
-    def of(cls, state: Kinematics) -> MassCentres:
+    def of(cls, state: MechanismKinematics) -> MassCentres:
         """Return the mass centres of a state."""
         masses, centres, _ = state.mechanism.inertial
         return cls(state, masses, (state.rotations[:-1] @ centres[:, :, None])[:, :, 0])
@@ -95,7 +95,7 @@ class MassCentres:
         return (inertias @ self.state.velocities[:-1, :3, None])[:, :, 0]
 
 
-def mass_matrix(state: Kinematics) -> Array:
+def mass_matrix(state: MechanismKinematics) -> Array:
     """Return the mass matrix M (n, n) of the kinetic energy uᵀ M u / 2."""
     program, data = state.program, _load_inertias(state, np.zeros(3))
     with check_finite(data):
@@ -103,7 +103,7 @@ def mass_matrix(state: Kinematics) -> Array:
     return program.mass_matrix(data)
 
 
-def missing_forces(state: Kinematics, udot: Array, gravity: Array) -> Array:
+def missing_forces(state: MechanismKinematics, udot: Array, gravity: Array) -> Array:
     """Return the generalized forces (n,) that give the speeds the derivatives `udot`.
 
     Args:
@@ -120,7 +120,9 @@ def missing_forces(state: Kinematics, udot: Array, gravity: Array) -> Array:
     return -np.array(missing)[program.freedoms]
 
 
-def _load_inertias(state: Kinematics, gravity: Array, udot: Floats | None = None) -> Floats:
+def _load_inertias(
+    state: MechanismKinematics, gravity: Array, udot: Floats | None = None
+) -> Floats:
     """Return the work vector with inertias of the links and the inertial wrenches.
 
     Args:
@@ -145,7 +147,7 @@ def _load_inertias(state: Kinematics, gravity: Array, udot: Floats | None = None
     return data
 
 
-def accelerations(state: Kinematics, applied: Array) -> Array:
+def accelerations(state: MechanismKinematics, applied: Array) -> Array:
     """Return the derivatives of the speeds (n,) under gravity, forces and constraints.
 
     Redundant and contradictory equations are fulfilled in the least-squares sense. Where the mass

@@ -107,7 +107,7 @@ class Formula:
             ModelError: the text is no formula.
         """
         main, *definitions = re.sub(r"\s", "", text).split(";")
-        reader = _Reader(variables)
+        reader = _FormulaReader(variables)
         try:
             # A definition may use those after it, so that the last one is read first.
             for definition in reversed([item for item in definitions if item]):
@@ -130,7 +130,7 @@ class Formula:
         Args:
             variable: index of the variable.
         """
-        reader = _Reader(self.variables)
+        reader = _FormulaReader(self.variables)
         reader.append_steps(self.steps)
         first = len(self.variables)
         derivatives = {variable: reader.add("number", value=1.0)}
@@ -185,7 +185,7 @@ class _Waiting(NamedTuple):
     """Name of the function, if it is a call."""
 
 
-class _Reader:
+class _FormulaReader:
     """Reader of formulas of the same variables, with a stack of operands and one of operations.
 
     Attributes:

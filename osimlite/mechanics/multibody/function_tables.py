@@ -12,7 +12,7 @@ from osimlite.mechanics.kernels.functions import PIECES_OF_OPENSIM
 from osimlite.mechanics.multibody import functions as f
 
 
-def function_table(function: f.Function, where: str) -> list[float]:
+def function_table(function: f.SmoothFunction, where: str) -> list[float]:
     """Return the table of a function of coordinates.
 
     Args:
@@ -25,7 +25,7 @@ def function_table(function: f.Function, where: str) -> list[float]:
     return _has_table(f.table_at_knots(function), function, where)
 
 
-def _has_table(table: list[float], function: f.Function, where: str) -> list[float]:
+def _has_table(table: list[float], function: f.SmoothFunction, where: str) -> list[float]:
     """Return a table, or raise UnsupportedError if it is empty.
 
     Args:
@@ -41,7 +41,7 @@ def _has_table(table: list[float], function: f.Function, where: str) -> list[flo
     return table
 
 
-def table_of_one(function: f.Function, where: str) -> list[float]:
+def table_of_one(function: f.SmoothFunction, where: str) -> list[float]:
     """Return the table of a function of one number, for `functions.evaluate_function`.
 
     Args:
@@ -59,7 +59,7 @@ def table_of_one(function: f.Function, where: str) -> list[float]:
     return table
 
 
-def _table_of_one(function: f.Function, where: str) -> list[float]:
+def _table_of_one(function: f.SmoothFunction, where: str) -> list[float]:
     """Return the table of a function of one number, whose numbers are not checked.
 
     Args:

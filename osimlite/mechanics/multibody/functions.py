@@ -36,7 +36,7 @@ Evaluated = tuple[float, list[float], list[list[float]]]
 """Value, gradient (k,) and Hessian (k, k) of a function of k numbers."""
 
 
-class Function(ABC):
+class SmoothFunction(ABC):
     """Twice differentiable function of one or several numbers."""
 
     @abstractmethod
@@ -57,7 +57,7 @@ class Function(ABC):
         return None
 
 
-class Univariate(Function):
+class Univariate(SmoothFunction):
     """Function of one number."""
 
     @property
@@ -88,7 +88,7 @@ class Univariate(Function):
         return array("d", table_at_knots(self))
 
 
-class Multivariate(Function):
+class Multivariate(SmoothFunction):
     """Sum of products of powers of several numbers."""
 
     @property
@@ -156,7 +156,7 @@ _NOTHING = math.nan, math.nan, math.nan
 
 
 @dataclass(frozen=True)
-class Constant(Function):
+class ConstantValue(SmoothFunction):
     """Function with the same value for any number of arguments."""
 
     value: float
@@ -206,7 +206,7 @@ class Polynomial(Univariate):
 
 
 @dataclass(frozen=True)
-class Sine(Univariate):
+class SineWave(Univariate):
     """``amplitude * sin(omega * x + phase) + offset``."""
 
     amplitude: float
@@ -236,7 +236,7 @@ class WeightedSum(Multivariate):
 
 
 @dataclass(frozen=True)
-class Step(Univariate):
+class QuinticStep(Univariate):
     """Quintic step from `start_value` to `end_value`, twice differentiable.
 
     It is constant before `start` and after `end`.
@@ -316,11 +316,11 @@ class MultivariatePolynomial(Multivariate):
 
 
 @dataclass(frozen=True)
-class ScaledFunction(Function):
+class ScaledFunction(SmoothFunction):
     """Multiple of another function."""
 
     scale: float
-    function: Function
+    function: SmoothFunction
 
     def evaluate(self, arguments: Arguments) -> Evaluated:
         """Return `scale` times value, gradient and Hessian of the function."""
@@ -367,7 +367,7 @@ class PiecewiseConstant(Univariate):
         return _tabulate_pieces(self.x, [(y,) for y in self.y])
 
 
-class SimmSpline(Univariate):
+class SimmCubicSpline(Univariate):
     """Cubic spline through (`x`, `y`), continued outside by lines with the end slopes.
 
     The ends have the third derivative of the cubic through the first (last) four points (Forsythe,
@@ -426,7 +426,7 @@ def _tabulate_pieces(knots: Sequence[float], pieces: Sequence[Sequence[float]]) 
     return [PIECES, 1.0, float(len(knots)), float(width), *knots, *chain.from_iterable(rows)]
 
 
-def table_at_knots(function: Function) -> list[float]:
+def table_at_knots(function: SmoothFunction) -> list[float]:
     """Return the table of a function with OpenSim's choice of pieces at knots.
 
     Kernels evaluate the piece after a knot. Where OpenSim evaluates the piece before it, the knot
@@ -435,9 +435,9 @@ def table_at_knots(function: Function) -> list[float]:
     table, inner = [*function.table], function
     while isinstance(inner, ScaledFunction):
         inner = inner.function
-    if isinstance(inner, PiecewiseLinear | PiecewiseConstant | SimmSpline):
+    if isinstance(inner, PiecewiseLinear | PiecewiseConstant | SimmCubicSpline):
         # The table of a spline contains the first knot twice.
-        first = 5 if isinstance(inner, SimmSpline) else 4
+        first = 5 if isinstance(inner, SimmCubicSpline) else 4
         for k in range(1, len(inner.x) - 1):
             if _find_interval(inner.x, inner.x[k]) < k:
                 table[first + k] = math.nextafter(inner.x[k], math.inf)
@@ -472,7 +472,7 @@ def _spline_curvature(
 ) -> list[float]:
     """Return a sixth of the second derivative of a spline at each of n points.
 
-    Inside, the second derivative is continuous; for the ends see `SimmSpline`.
+    Inside, the second derivative is continuous; for the ends see `SimmCubicSpline`.
 
     Args:
         points: abscissae (n,).

@@ -20,7 +20,7 @@ from osimlite.base.records import dataclass, field
 from osimlite.errors import ModelError, SimulationError
 from osimlite.mechanics.laws.rotations import X, Y, Z
 from osimlite.mechanics.multibody.arc import ArcPoint
-from osimlite.mechanics.multibody.functions import Function, Linear
+from osimlite.mechanics.multibody.functions import Linear, SmoothFunction
 from osimlite.mechanics.multibody.motions import (
     AxisMotion,
     FixedTransform,
@@ -148,17 +148,17 @@ def constant_curvature(length: float, neutral: Sequence[float]) -> tuple[JointMo
     return (*slides, *turns)
 
 
-class TransformAxis(NamedTuple):
+class JointAxis(NamedTuple):
     """One axis of a CustomJoint: a function of coordinates along or about an axis."""
 
     coordinates: tuple[int, ...]  # indices among the coordinates of the joint
     axis: ArrayLike  # direction (3,) in F
-    function: Function  # amount, rad or m
+    function: SmoothFunction  # amount, rad or m
 
 
 def make_custom_motions(
-    rotations: Sequence[TransformAxis],
-    translations: Sequence[TransformAxis],
+    rotations: Sequence[JointAxis],
+    translations: Sequence[JointAxis],
     *,
     opensim_derivatives: bool = False,
 ) -> tuple[JointMotion, ...]:
@@ -187,7 +187,7 @@ def make_custom_motions(
     )
 
 
-def _make_axis_motion(kind: Literal["rotate", "translate"], axis: TransformAxis) -> AxisMotion:
+def _make_axis_motion(kind: Literal["rotate", "translate"], axis: JointAxis) -> AxisMotion:
     """Return the motion along or about an axis of a CustomJoint, with a unit vector."""
     direction = np.array(axis.axis, dtype=float)
     length = float(np.linalg.norm(direction))

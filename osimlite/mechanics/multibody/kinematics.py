@@ -19,8 +19,8 @@ from osimlite.mechanics.kernels.constrained_dynamics import evaluate_constraints
 from osimlite.mechanics.kernels.layout import LINK_WORK, MODEL, WORK
 from osimlite.mechanics.kernels.motion import move_links, place_links
 from osimlite.mechanics.kernels.pointers import Floats
-from osimlite.mechanics.multibody.constraints import Constraint, Equations
-from osimlite.mechanics.multibody.program import Program
+from osimlite.mechanics.multibody.constraints import ConstraintEquations, Equations
+from osimlite.mechanics.multibody.program import PackedMechanism
 from osimlite.mechanics.multibody.spatial import (
     Array,
     cross,
@@ -50,7 +50,7 @@ def check_finite(data: Floats) -> Iterator[None]:
         np.frombuffer(data)[WORK.SIZE :] = np.nan
 
 
-class Kinematics:
+class MechanismKinematics:
     """State of a mechanism of b bodies and n coordinates.
 
     Args:
@@ -67,10 +67,10 @@ class Kinematics:
 
     def __reduce__(self) -> tuple[Any, ...]:
         # Neither the vectors nor the program can be pickled, but both can be computed again.
-        return Kinematics, (self.mechanism, self.q, self.u, self.time)
+        return MechanismKinematics, (self.mechanism, self.q, self.u, self.time)
 
     @cached_property
-    def program(self) -> Program:
+    def program(self) -> PackedMechanism:
         """Program of the mechanism: its integers and numbers for the kernels."""
         return self.mechanism.program
 
@@ -89,7 +89,7 @@ class Kinematics:
             move_links(model, reals, data, y, f)
         return data, y, f
 
-    def equations(self, constraint: Constraint) -> Equations:
+    def equations(self, constraint: ConstraintEquations) -> Equations:
         """Return the equations of a constraint, which need not be one of the mechanism."""
         program = self.program.with_constraint(constraint)
         if program is self.program:
@@ -99,7 +99,7 @@ class Kinematics:
                 errors[first:end_position], rows[first:end], rates[first:end], drifts[first:end]
             )
         # A foreign constraint needs a program of its own, and so another evaluation.
-        other = Kinematics(self.mechanism, self.q, self.u, self.time)
+        other = MechanismKinematics(self.mechanism, self.q, self.u, self.time)
         other.program = program
         return other.equations(constraint)
 

@@ -26,7 +26,7 @@ from osimlite.mechanics.kernels.layout import (
 )
 from osimlite.mechanics.kernels.table import LAW_NUMBERS
 from osimlite.mechanics.multibody.constraint_records import constraint_record, room_for
-from osimlite.mechanics.multibody.constraints import Constraint
+from osimlite.mechanics.multibody.constraints import ConstraintEquations
 from osimlite.mechanics.multibody.function_tables import function_table
 from osimlite.mechanics.multibody.functions import IDENTITY
 from osimlite.mechanics.multibody.joints import Mobilizer
@@ -149,7 +149,7 @@ class Link:
     second: Array = field(default_factory=lambda: np.zeros((3, 3)))  # inertia about origin, kg m²
 
 
-class Tree(NamedTuple):
+class LinkTree(NamedTuple):
     """Links of a mechanism."""
 
     links: list[Link]  # links, parents first
@@ -158,7 +158,7 @@ class Tree(NamedTuple):
     places: Places  # degrees of freedom and links by coordinates and bodies
 
 
-def tree_of(mechanism: Mechanism, free: Collection[int], *, apart: bool = False) -> Tree:
+def tree_of(mechanism: Mechanism, free: Collection[int], *, apart: bool = False) -> LinkTree:
     """Return the links of a mechanism.
 
     Args:
@@ -191,7 +191,7 @@ def tree_of(mechanism: Mechanism, free: Collection[int], *, apart: bool = False)
         order += sorted(own & free)
         ends.append(len(order))
     freedoms = {place: number for number, place in enumerate(order)}
-    return Tree(links, ends, tuple(order), Places(mechanism, freedoms, placements))
+    return LinkTree(links, ends, tuple(order), Places(mechanism, freedoms, placements))
 
 
 def _list_operations(
@@ -326,7 +326,7 @@ def _move_inertia(link: Link) -> list[float]:
 class LinkPacker:
     """Packer of a mechanism into the vectors of the kernels."""
 
-    def __init__(self, tree: Tree) -> None:
+    def __init__(self, tree: LinkTree) -> None:
         self.links, self.ends, self.order, self.places = tree
         self.operations = [operation for link in self.links for operation in link.operations]
         # The head of the model, and the addresses of all laws, which are filled in later.
@@ -337,7 +337,7 @@ class LinkPacker:
         self.balls: dict[tuple[int, ...], int] = {}
         self.laws: list[str] = ["evaluate"]
 
-    def mechanism_records(self, kept: Sequence[Constraint], locks: int = 0) -> None:
+    def mechanism_records(self, kept: Sequence[ConstraintEquations], locks: int = 0) -> None:
         """Write the records of the mechanism.
 
         Args:
@@ -490,7 +490,7 @@ class LinkPacker:
                 )
             )
 
-    def constraint_records(self, kept: Sequence[Constraint], locks: int) -> None:
+    def constraint_records(self, kept: Sequence[ConstraintEquations], locks: int) -> None:
         """Write the records of constraints, if there are any.
 
         Args:

@@ -22,11 +22,11 @@ from osimlite.base.text import format_count, suggest_name
 from osimlite.errors import ModelError
 from osimlite.mechanics.multibody import dynamics
 from osimlite.mechanics.multibody.assembly import assemble_pose, project_speeds
-from osimlite.mechanics.multibody.constraints import Constraint, Lock, PrescribedCoordinate
+from osimlite.mechanics.multibody.constraints import ConstraintEquations, Lock, PrescribedCoordinate
 from osimlite.mechanics.multibody.dynamics import MassCentres, Wrench
 from osimlite.mechanics.multibody.extremes import methods_of_any_numbers
 from osimlite.mechanics.multibody.joints import Mobilizer
-from osimlite.mechanics.multibody.kinematics import Kinematics
+from osimlite.mechanics.multibody.kinematics import MechanismKinematics
 from osimlite.mechanics.multibody.links import tree_of
 from osimlite.mechanics.multibody.parts import (
     GROUND,
@@ -36,7 +36,7 @@ from osimlite.mechanics.multibody.parts import (
     MobileBody,
     StationPlacement,
 )
-from osimlite.mechanics.multibody.program import Program
+from osimlite.mechanics.multibody.program import PackedMechanism
 from osimlite.mechanics.multibody.spatial import Array
 
 __all__ = [
@@ -82,7 +82,7 @@ class Mechanism:
     coordinates: tuple[CoordinateInfo, ...]
     gravity: Array = field(default_factory=lambda: np.array((0.0, -9.80665, 0.0)))
     frames: Mapping[str, FramePlacement] = field(default_factory=dict)
-    constraints: tuple[Constraint, ...] = ()
+    constraints: tuple[ConstraintEquations, ...] = ()
     stations: Mapping[str, StationPlacement] = field(default_factory=dict)
     assembly_accuracy: float = 1e-9
 
@@ -98,7 +98,7 @@ class Mechanism:
                 f"the joints of '{self.name}' do not share out its coordinates one by one"
             )
         # Locked and prescribed coordinates are constraints like any others.
-        holds: list[Constraint] = []
+        holds: list[ConstraintEquations] = []
         for index, info in enumerate(self.coordinates):
             if info.locked:
                 holds.append(Lock(index, info.path))
@@ -232,7 +232,7 @@ class Mechanism:
         """Return generalized speeds as an array (n,)."""
         return self._array(u, "speed", self._default_speeds)
 
-    def at(self, q: Values, u: Values | None = None, time: float = 0.0) -> Kinematics:
+    def at(self, q: Values, u: Values | None = None, time: float = 0.0) -> MechanismKinematics:
         """Return the kinematics at a state, from which everything else follows.
 
         Args:
@@ -241,7 +241,7 @@ class Mechanism:
             time: time of prescribed coordinates (s).
         """
         values = self.values(q)
-        return Kinematics(
+        return MechanismKinematics(
             self, values, np.zeros(len(values)) if u is None else self.speeds(u), time
         )
 
@@ -553,9 +553,9 @@ class Mechanism:
 
     # --------------------------------------------------------------------------------------------- helpers
     @cached_property
-    def program(self) -> Program:
+    def program(self) -> PackedMechanism:
         """Program of the mechanism: its integers and numbers for the kernels."""
-        return Program(tree_of(self, range(len(self.coordinates))), self.constraints)
+        return PackedMechanism(tree_of(self, range(len(self.coordinates))), self.constraints)
 
     def __getstate__(self) -> dict[str, Any]:
         # The program contains addresses that are valid in this process only.
@@ -623,7 +623,7 @@ class Mechanism:
         return body, point
 
     def _sum_applied_forces(
-        self, state: Kinematics, forces: Values, wrenches: Mapping[str, Wrench]
+        self, state: MechanismKinematics, forces: Values, wrenches: Mapping[str, Wrench]
     ) -> Array:
         """Return the generalized forces (n,) of forces and wrenches.
 

@@ -22,9 +22,9 @@ from osimlite.mechanics.laws.rotations import X, Y, Z
 from osimlite.mechanics.multibody.functions import (
     IDENTITY,
     Arguments,
-    Constant,
+    ConstantValue,
     Evaluated,
-    Function,
+    SmoothFunction,
     make_zero_derivatives,
 )
 from osimlite.mechanics.multibody.spatial import (
@@ -100,7 +100,7 @@ class AxisMotion(JointMotion):
     kind: Literal["rotate", "translate"]
     axis: Array  # unit vector (3,) in the incoming frame
     coordinates: tuple[int, ...]  # arguments of the function
-    function: Function = IDENTITY  # amount, rad or m
+    function: SmoothFunction = IDENTITY  # amount, rad or m
 
     @property
     def coordinate(self) -> int | None:
@@ -157,7 +157,7 @@ class SimbodyAccelerationError(JointMotion):
         """
         # A constant drives nothing, whatever its arguments.
         turned = [
-            set() if isinstance(turn.function, Constant) else set(turn.coordinates)
+            set() if isinstance(turn.function, ConstantValue) else set(turn.coordinates)
             for turn in self.turns
         ]
         # No error if the second rotation is constant, or only the first coordinate drives the first
@@ -175,7 +175,7 @@ class SimbodyAccelerationError(JointMotion):
 
 
 @dataclass(frozen=True, eq=False)
-class AccelerationErrorAngle(Function):
+class AccelerationErrorAngle(SmoothFunction):
     """Angle of zero with a rate of zero, whose acceleration is a component of Simbody's error."""
 
     drift: SimbodyAccelerationError
@@ -263,7 +263,7 @@ _FIRST: Any = (0, 1, 2)
 
 
 @dataclass(frozen=True)
-class EllipsoidPoint(Function):
+class EllipsoidPoint(SmoothFunction):
     """One component of the point on the ellipsoid of a `SphericalMotion`, by its three angles."""
 
     component: int  # 0, 1 or 2

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from osimlite.base.records import dataclass, field
-from osimlite.mechanics.multibody.functions import Function
+from osimlite.mechanics.multibody.functions import SmoothFunction
 from osimlite.mechanics.multibody.joints import Mobilizer
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.joints import MotionType
@@ -48,7 +48,9 @@ class CoordinateInfo:
     range: tuple[float, float] = (-10.0, 10.0)
     clamped: bool = False
     locked: bool = False
-    prescribed: Function | None = None  # value as a function of time (s); without effect if locked
+    prescribed: SmoothFunction | None = (
+        None  # value as a function of time (s); without effect if locked
+    )
     yielding: bool = False  # whether assembly may move it freely, without counting the change
 
     @property

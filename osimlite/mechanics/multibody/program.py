@@ -17,16 +17,16 @@ from numpy.typing import NDArray
 from osimlite.mechanics.kernels.layout import CONSTRAINED, CONSTRAINT, DOF, GRAVITY_AT, MODEL
 from osimlite.mechanics.kernels.pointers import Floats, Ints, register_law
 from osimlite.mechanics.kernels.table import LAW_NUMBERS, load_kernel
-from osimlite.mechanics.multibody.constraints import Constraint, Equations
+from osimlite.mechanics.multibody.constraints import ConstraintEquations, Equations
 from osimlite.mechanics.multibody.functions import make_floats
-from osimlite.mechanics.multibody.links import LinkPacker, Tree
+from osimlite.mechanics.multibody.links import LinkPacker, LinkTree
 from osimlite.mechanics.multibody.parts import GROUND
 from osimlite.mechanics.multibody.spatial import Array
 
 _ENDS = CONSTRAINT.FIRST_EQUATION, CONSTRAINT.END_EQUATION, CONSTRAINT.END_POSITION
 
 
-class Program:
+class PackedMechanism:
     """Packed mechanism, all of whose coordinates are degrees of freedom.
 
     Attributes:
@@ -48,7 +48,7 @@ class Program:
         constraints: constraints to include.
     """
 
-    def __init__(self, tree: Tree, constraints: Sequence[Constraint]) -> None:
+    def __init__(self, tree: LinkTree, constraints: Sequence[ConstraintEquations]) -> None:
         packer = LinkPacker(tree)
         packer.mechanism_records(constraints)
         ints, order = packer.ints, tree.order
@@ -72,17 +72,17 @@ class Program:
         self.frames = np.array([item.frame for item in placements])
         # Keep a reference to each constraint, so that its identity is not given to another object.
         self._kept = [*constraints]
-        self._others: dict[int, Program] = {}
+        self._others: dict[int, PackedMechanism] = {}
 
-    def with_constraint(self, constraint: Constraint) -> Program:
+    def with_constraint(self, constraint: ConstraintEquations) -> PackedMechanism:
         """Return the program if it contains a constraint, else one with this constraint only."""
         if id(constraint) in self.constraints:
             return self
         if id(constraint) not in self._others:
-            self._others[id(constraint)] = Program(self.tree, (constraint,))
+            self._others[id(constraint)] = PackedMechanism(self.tree, (constraint,))
         return self._others[id(constraint)]
 
-    def equations_of(self, constraint: Constraint) -> tuple[int, int, int]:
+    def equations_of(self, constraint: ConstraintEquations) -> tuple[int, int, int]:
         """Return the range of the equations of a constraint of this program.
 
         Args:

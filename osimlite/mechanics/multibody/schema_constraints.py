@@ -10,7 +10,7 @@ from osimlite.base.records import dataclass
 from osimlite.base.text import join_words
 from osimlite.errors import ModelError, UnsupportedError
 from osimlite.mechanics.multibody import body_constraints as b
-from osimlite.mechanics.multibody.constraints import Constraint, Coupler
+from osimlite.mechanics.multibody.constraints import ConstraintEquations, Coupler
 from osimlite.mechanics.multibody.functions import ScaledFunction
 from osimlite.mechanics.multibody.parts import FramePlacement, StationPlacement
 from osimlite.mechanics.multibody.schema_frames import Placements
@@ -30,7 +30,7 @@ class ConstraintReader:
     coordinates: Mapping[str, int]  # index in the mechanism of every coordinate, by absolute path
     opensim_derivatives: bool  # see `build_mechanism`
 
-    def build_constraint(self, constraint: SchemaConstraint) -> Constraint:
+    def build_constraint(self, constraint: SchemaConstraint) -> ConstraintEquations:
         """Return the constraint of the mechanism for an enforced constraint of the model.
 
         Raises:
@@ -86,7 +86,9 @@ class ConstraintReader:
             )
         return self.coordinates[path]
 
-    def build_coupler(self, item: schema.CoordinateCouplerConstraint, path: str) -> Constraint:
+    def build_coupler(
+        self, item: schema.CoordinateCouplerConstraint, path: str
+    ) -> ConstraintEquations:
         """Return the constraint of one coordinate by a function of others.
 
         Args:
@@ -111,14 +113,16 @@ class ConstraintReader:
             path,
         )
 
-    def build_point_constraint(self, item: schema.PointConstraint, path: str) -> Constraint:
+    def build_point_constraint(
+        self, item: schema.PointConstraint, path: str
+    ) -> ConstraintEquations:
         """Return the constraint that holds two stations together.
 
         Args:
             item: constraint of the model.
             path: its path.
         """
-        return b.PointConstraint(
+        return b.PointEquations(
             self._find_station(item, "socket_body_1", "location_body_1"),
             self._find_station(item, "socket_body_2", "location_body_2"),
             path,
@@ -126,7 +130,7 @@ class ConstraintReader:
 
     def build_distance_constraint(
         self, item: schema.ConstantDistanceConstraint, path: str
-    ) -> Constraint:
+    ) -> ConstraintEquations:
         """Return the constraint that keeps two stations at a distance.
 
         Args:
@@ -144,14 +148,16 @@ class ConstraintReader:
             path,
         )
 
-    def build_point_on_line(self, item: schema.PointOnLineConstraint, path: str) -> Constraint:
+    def build_point_on_line(
+        self, item: schema.PointOnLineConstraint, path: str
+    ) -> ConstraintEquations:
         """Return the constraint that keeps a station on a line.
 
         Args:
             item: constraint of the model.
             path: its path.
         """
-        return b.PointOnLineConstraint(
+        return b.PointOnLineEquations(
             self._find_station(item, "socket_line_body", "point_on_line"),
             _parse_direction(item.line_direction_vec, f"the line of '{path}'"),
             self._find_station(item, "socket_follower_body", "point_on_follower"),
@@ -160,7 +166,7 @@ class ConstraintReader:
 
     def build_rolling_constraint(
         self, item: schema.RollingOnSurfaceConstraint, path: str
-    ) -> Constraint:
+    ) -> ConstraintEquations:
         """Return the constraint of a roller on a plane.
 
         Args:
@@ -175,14 +181,14 @@ class ConstraintReader:
             path,
         )
 
-    def build_weld_constraint(self, item: schema.WeldConstraint, path: str) -> Constraint:
+    def build_weld_constraint(self, item: schema.WeldConstraint, path: str) -> ConstraintEquations:
         """Return the constraint that holds two frames together.
 
         Args:
             item: constraint of the model.
             path: its path.
         """
-        return b.WeldConstraint(
+        return b.WeldEquations(
             self._find_frame(item, "socket_frame1"), self._find_frame(item, "socket_frame2"), path
         )
 
@@ -208,7 +214,7 @@ def _parse_direction(vector: tuple[float, float, float], what: str) -> Array:
     return direction / length
 
 
-_READERS: dict[type[SchemaConstraint], Callable[..., Constraint]] = {
+_READERS: dict[type[SchemaConstraint], Callable[..., ConstraintEquations]] = {
     schema.CoordinateCouplerConstraint: ConstraintReader.build_coupler,
     schema.PointConstraint: ConstraintReader.build_point_constraint,
     schema.ConstantDistanceConstraint: ConstraintReader.build_distance_constraint,

@@ -17,7 +17,7 @@ from osimlite.schema.base import Object, Unknown
 
 def convert_function(
     function: Object | None, arguments: int, where: str, *, opensim_derivatives: bool = False
-) -> f.Function:
+) -> f.SmoothFunction:
     """Return the function that a component of a model describes.
 
     Args:
@@ -52,7 +52,7 @@ def convert_function(
         if isinstance(function, schema.LinearFunction):
             return _convert_linear(function, arguments)
         if isinstance(function, schema.Constant):
-            return f.Constant(function.value)
+            return f.ConstantValue(function.value)
         if kind not in _UNIVARIATE:
             name = function.class_name if isinstance(function, Unknown) else kind.__name__
             can = [
@@ -83,7 +83,7 @@ def _converts(function: Object, wanted: int, given: int) -> None:
         )
 
 
-def _convert_linear(function: schema.LinearFunction, arguments: int) -> f.Function:
+def _convert_linear(function: schema.LinearFunction, arguments: int) -> f.SmoothFunction:
     """Return a linear function of one or several arguments.
 
     Args:
@@ -126,24 +126,24 @@ def _read_points(
     return x, y
 
 
-def _piecewise_linear(function: schema.PiecewiseLinearFunction) -> f.Function:
+def _piecewise_linear(function: schema.PiecewiseLinearFunction) -> f.SmoothFunction:
     """Return straight lines through points; one point is a constant."""
     x, y = _read_points(function, 1)
     if len(x) == 1:
-        return f.Constant(y[0])
+        return f.ConstantValue(y[0])
     if x[0] == x[1] or x[-1] == x[-2]:
         # The line that continues outside of the points would be vertical.
         raise _Impossible("its first or last two x are equal; remove one of them")
     return f.PiecewiseLinear(x, y)
 
 
-def _piecewise_constant(function: schema.PiecewiseConstantFunction) -> f.Function:
+def _piecewise_constant(function: schema.PiecewiseConstantFunction) -> f.SmoothFunction:
     """Return steps through points; one point is a constant."""
     x, y = _read_points(function, 1)
-    return f.PiecewiseConstant(x, y) if len(x) > 1 else f.Constant(y[0])
+    return f.PiecewiseConstant(x, y) if len(x) > 1 else f.ConstantValue(y[0])
 
 
-def _convert_gcv_spline(function: schema.GCVSpline) -> f.Function:
+def _convert_gcv_spline(function: schema.GCVSpline) -> f.SmoothFunction:
     """Return the smoothing spline of a GCVSpline, after checks."""
     half_order = function.half_order
     if half_order < 1:
@@ -151,19 +151,19 @@ def _convert_gcv_spline(function: schema.GCVSpline) -> f.Function:
     x, y = _read_points(function, 2 * half_order, apart=True)
     # The module is imported here, because the linter evaluates other functions without numpy.
     splines: Any = import_module("osimlite.mechanics.multibody.smoothing_spline")
-    made: f.Function = splines.smoothing_spline(x, y, half_order, function.error_variance)
+    made: f.SmoothFunction = splines.smoothing_spline(x, y, half_order, function.error_variance)
     return made
 
 
-def _convert_step(function: schema.StepFunction) -> f.Function:
+def _convert_step(function: schema.StepFunction) -> f.SmoothFunction:
     """Return a smooth step, with ascending arguments."""
     start, end = function.transition_start_time, function.transition_end_time
     if start > end:
         # OpenSim follows the same curve from its other end.
-        return f.Step(end, start, function.end_value, function.start_value)
+        return f.QuinticStep(end, start, function.end_value, function.start_value)
     if not start < end:
         raise _Impossible(f"its transition ends where it starts, at {end:g}; let it end elsewhere")
-    return f.Step(start, end, function.start_value, function.end_value)
+    return f.QuinticStep(start, end, function.start_value, function.end_value)
 
 
 def _read_floats(values: Sequence[float]) -> tuple[float, ...]:
@@ -172,12 +172,12 @@ def _read_floats(values: Sequence[float]) -> tuple[float, ...]:
     return tuple(float(value) for value in values)
 
 
-_UNIVARIATE: dict[type[Object], Callable[[Any], f.Function]] = {
+_UNIVARIATE: dict[type[Object], Callable[[Any], f.SmoothFunction]] = {
     schema.PolynomialFunction: lambda item: f.Polynomial(_read_floats(item.coefficients)),
-    schema.Sine: lambda item: f.Sine(item.amplitude, item.omega, item.phase, item.offset),
+    schema.Sine: lambda item: f.SineWave(item.amplitude, item.omega, item.phase, item.offset),
     schema.StepFunction: _convert_step,
     schema.PiecewiseConstantFunction: _piecewise_constant,
     schema.PiecewiseLinearFunction: _piecewise_linear,
-    schema.SimmSpline: lambda item: f.SimmSpline(*_read_points(item, 2)),
+    schema.SimmSpline: lambda item: f.SimmCubicSpline(*_read_points(item, 2)),
     schema.GCVSpline: _convert_gcv_spline,
 }

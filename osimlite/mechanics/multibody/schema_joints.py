@@ -10,7 +10,7 @@ from osimlite.base.text import join_words
 from osimlite.errors import ModelError, UnsupportedError
 from osimlite.mechanics.multibody.joints import (
     MOTIONS,
-    TransformAxis,
+    JointAxis,
     constant_curvature,
     make_custom_motions,
     make_ellipsoid_motions,
@@ -113,7 +113,7 @@ def _build_custom_motions(
     """
     known = {coordinate.name: coordinate for coordinate in joint.coordinates}
     order: dict[str, int] = {}
-    axes: list[TransformAxis] = []
+    axes: list[JointAxis] = []
     for name, axis in joint.spatial_transform.axes().items():
         where, words = f"{name} of '{path}'", axis.names
         for word in words:
@@ -133,7 +133,7 @@ def _build_custom_motions(
             f"the function of {where}",
             opensim_derivatives=opensim_derivatives,
         )
-        axes.append(TransformAxis(tuple(order[word] for word in words), direction, function))
+        axes.append(JointAxis(tuple(order[word] for word in words), direction, function))
     unused = [name for name in known if name not in order]
     if unused:
         raise ModelError(

@@ -9,7 +9,7 @@ from osimlite.base.text import suggest_name
 from osimlite.derivatives.symbols import casadi
 from osimlite.mechanics.multibody.mechanism import GROUND
 from osimlite.optimal.goals.contact_tracking import find_contact
-from osimlite.optimal.point import Formula, GoalTerms, Point, make_integral_terms
+from osimlite.optimal.point import Formula, GoalTerms, PointSymbols, make_integral_terms
 from osimlite.schema.moco.goals import (
     MocoStepLengthAsymmetryGoal,
     MocoStepTimeAsymmetryGoal,
@@ -40,7 +40,7 @@ def build_step_time_asymmetry_goal(goal: MocoStepTimeAsymmetryGoal, problem: Pro
     groups = goal.right_contact_group, goal.left_contact_group
     feet = [_find_foot(goal, problem, group) for group in groups]
 
-    def integrand(point: Point) -> Formula:
+    def integrand(point: PointSymbols) -> Formula:
         forces = point.output("contact_forces")
         contacts = []
         positions = []
@@ -94,7 +94,7 @@ def build_step_length_asymmetry_goal(
     half = 0.5 * goal.stride_length
     lengths = half * (1.0 + goal.target_asymmetry), half * (1.0 - goal.target_asymmetry)
 
-    def integrand(point: Point) -> Formula:
+    def integrand(point: PointSymbols) -> Formula:
         right, left = (
             get_component(goal.walking_direction, point.frame(foot).position) for foot in feet
         )

@@ -13,7 +13,7 @@ from osimlite.mechanics.multibody.spatial import Array
 from osimlite.optimal.point import (
     Formula,
     GoalTerms,
-    Point,
+    PointSymbols,
     TimeFunction,
     make_integral_terms,
     make_projection,
@@ -59,7 +59,7 @@ def build_contact_tracking_goal(goal: MocoContactTrackingGoal, problem: Problem)
     project = make_projection(goal, problem)
     groups = read_contact_groups(goal, problem)
 
-    def integrand(point: Point) -> Formula:
+    def integrand(point: PointSymbols) -> Formula:
         forces = point.output("contact_forces")
         total = casadi.SX(0.0)
         for group in groups:
@@ -97,7 +97,7 @@ def build_contact_impulse_tracking_goal(
         )
     (group,) = read_contact_groups(goal, problem)
 
-    def integrand(point: Point) -> Formula:
+    def integrand(point: PointSymbols) -> Formula:
         forces = point.output("contact_forces")
         force = sum(forces[f"{path}|force_{'xyz'[axis]}"] for path in group.paths)
         return force - point.evaluate(group.measured[axis])

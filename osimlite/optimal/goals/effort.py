@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from osimlite.derivatives.symbols import casadi
-from osimlite.optimal.point import Formula, GoalTerms, Point, make_integral_terms
+from osimlite.optimal.point import Formula, GoalTerms, PointSymbols, make_integral_terms
 from osimlite.schema.joints import Joint
 from osimlite.schema.moco.goals import (
     MEASURES,
@@ -31,7 +31,7 @@ def build_control_goal(goal: MocoControlGoal, problem: Problem) -> GoalTerms:
     )
     power = goal.exponent
 
-    def integrand(point: Point) -> Formula:
+    def integrand(point: PointSymbols) -> Formula:
         values = casadi.vertcat(*map(point.control, controls))
         # An even power needs no absolute value, whose derivative jumps at zero.
         sizes = values if power % 2 == 0 else casadi.fabs(values)
@@ -85,7 +85,7 @@ def build_joint_reaction_goal(goal: MocoJointReactionGoal, problem: Problem) -> 
     weight_by_measure = dict(zip(MEASURES, weights, strict=True))
     load = problem.dynamics.make_joint_load(path, side, frame)
 
-    def integrand(point: Point) -> Formula:
+    def integrand(point: PointSymbols) -> Formula:
         values = load(point)
         return sum(weight_by_measure[name] * values[MEASURES.index(name)] ** 2 for name in measures)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from osimlite.derivatives.symbolic import make_symbolic
-from osimlite.derivatives.symbols import Vector, casadi
+from osimlite.derivatives.symbols import RecordedVector, casadi
 from osimlite.errors import ModelError, SettingError
 from osimlite.mechanics.kernels.programs import run_program
 from osimlite.mechanics.multibody import formula as expressions
@@ -197,9 +197,13 @@ def build_expression_based_parameter_goal(
         arguments = [
             numbers[path] if path in numbers else ends.start.p[known.index(path)] for path in paths
         ]
-        registers = Vector([*arguments, *[0.0] * len(formula.steps)])
+        registers = RecordedVector([*arguments, *[0.0] * len(formula.steps)])
         return make_symbolic(run_program)(
-            Vector(steps), len(formula.steps), Vector(constants), registers, len(arguments)
+            RecordedVector(steps),
+            len(formula.steps),
+            RecordedVector(constants),
+            registers,
+            len(arguments),
         )
 
     return GoalTerms(value, modes=COST_FIRST)

@@ -13,7 +13,13 @@ from osimlite.errors import DocumentError
 from osimlite.io.tables.headers import list_suffixes
 from osimlite.io.tables.storage import StoTable, read_sto
 from osimlite.mechanics.multibody.spatial import Array, quaternion_of
-from osimlite.optimal.point import Formula, Frame, GoalTerms, Point, make_integral_terms
+from osimlite.optimal.point import (
+    Formula,
+    FrameSymbols,
+    GoalTerms,
+    PointSymbols,
+    make_integral_terms,
+)
 from osimlite.optimal.tables import fit_splines, read_reference
 from osimlite.schema.base import Component
 from osimlite.schema.moco.goals import MocoGoal
@@ -113,7 +119,7 @@ def build_acceleration_tracking_goal(
     """
     gravity = casadi.DM(problem.functions.mechanism.gravity)
 
-    def error(point: Point, frame: Frame, target: Formula) -> Formula:
+    def error(point: PointSymbols, frame: FrameSymbols, target: Formula) -> Formula:
         acceleration = point.acceleration(frame)
         if goal.gravity_offset:
             acceleration -= gravity
@@ -132,7 +138,7 @@ def build_acceleration_tracking_goal(
     return reference.build_terms(problem, error)
 
 
-def compute_squared_angle(point: Point, frame: Frame, quaternion: Formula) -> Formula:
+def compute_squared_angle(point: PointSymbols, frame: FrameSymbols, quaternion: Formula) -> Formula:
     """Return the squared angle, rad², between a frame and an orientation.
 
     The angle of the relative rotation R follows from its trace, ``1 + 2 cos``, and its skew part,
@@ -189,7 +195,7 @@ class FrameReference:
     part: str = ""
 
     def build_terms(
-        self, problem: Problem, error: Callable[[Point, Frame, Formula], Formula]
+        self, problem: Problem, error: Callable[[PointSymbols, FrameSymbols, Formula], Formula]
     ) -> GoalTerms:
         """Return the integral of the weighted sum of errors of the frames.
 
@@ -213,7 +219,7 @@ class FrameReference:
         series = fit_splines(problem, table, [f"{path}{end}" for path in paths for end in endings])
         weight_by_path = {weight.name: weight.weight for weight in self.weights.objects}
 
-        def integrand(point: Point) -> Formula:
+        def integrand(point: PointSymbols) -> Formula:
             total = casadi.SX(0.0)
             for number, path in enumerate(paths):
                 first = size * number

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from osimlite.base.text import suggest_name
 from osimlite.derivatives.symbols import casadi
-from osimlite.optimal.point import COST_FIRST, Formula, GoalTerms, Point, make_integral_terms
+from osimlite.optimal.point import COST_FIRST, Formula, GoalTerms, PointSymbols, make_integral_terms
 from osimlite.schema.coordinates import Coordinate
 from osimlite.schema.frames import Frame
 from osimlite.schema.markers import Station
@@ -67,7 +67,7 @@ def build_final_output_goal(goal: MocoFinalOutputGoal, problem: Problem) -> Goal
     return GoalTerms(lambda ends: value(ends.end), modes=COST_FIRST)
 
 
-def _differentiate(point: Point, column: Formula) -> Formula:
+def _differentiate(point: PointSymbols, column: Formula) -> Formula:
     """Return the time derivative of a formula that depends on the state alone.
 
     Args:
@@ -77,23 +77,23 @@ def _differentiate(point: Point, column: Formula) -> Formula:
     return casadi.jtimes(column, point.x, point.rates)
 
 
-def _stack_vector(point: Point, group: str, path: str) -> Formula:
+def _stack_vector(point: PointSymbols, group: str, path: str) -> Formula:
     """Return the vector (3, 1) of a component in a group of outputs."""
     values = point.output(group)
     return casadi.vertcat(*(values[f"{path}|{axis}"] for axis in "xyz"))
 
 
-def _stack_mass_center_velocity(point: Point, path: str) -> Formula:
+def _stack_mass_center_velocity(point: PointSymbols, path: str) -> Formula:
     """Return the velocity of the model's mass centre in ground (3, 1), m/s."""
     return casadi.vertcat(*point.output("mass_center_velocity").values())
 
 
-def _get_acceleration(point: Point, path: str) -> Formula:
+def _get_acceleration(point: PointSymbols, path: str) -> Formula:
     """Return the acceleration of a coordinate, m/s² or rad/s²."""
     return point.accelerations[point.problem.functions.coordinates.index(path)]
 
 
-OUTPUT_FORMULAS: dict[type[Any], dict[str, Callable[[Point, str], Formula]]] = {
+OUTPUT_FORMULAS: dict[type[Any], dict[str, Callable[[PointSymbols, str], Formula]]] = {
     Model: {
         "com_position": lambda point, path: point.mass_center(),
         "com_velocity": _stack_mass_center_velocity,
@@ -130,7 +130,7 @@ OUTPUT_FORMULAS: dict[type[Any], dict[str, Callable[[Point, str], Formula]]] = {
 
 def build_output_formula(
     part: MocoOutputBase | MocoOutputBoundConstraint, problem: Problem
-) -> Callable[[Point], Formula]:
+) -> Callable[[PointSymbols], Formula]:
     """Build the formula that a goal or a constraint makes of one or two outputs.
 
     Args:
@@ -164,7 +164,7 @@ def build_output_formula(
     if not -1 <= index < max(sizes) or (index >= 0 and max(sizes) == 1):
         raise problem.invalid_error(part, f"the output has no component output_index {index}")
 
-    def value(point: Point) -> Formula:
+    def value(point: PointSymbols) -> Formula:
         values = [formula(point, path) for _, (formula, path) in outputs]
         if index >= 0:
             values = [column[index] for column in values]
@@ -185,7 +185,7 @@ def build_output_formula(
 
 def _find_output(
     part: Any, problem: Problem, text: str
-) -> tuple[int, tuple[Callable[[Point, str], Formula], str]]:
+) -> tuple[int, tuple[Callable[[PointSymbols, str], Formula], str]]:
     """Find the formula of an output by its path.
 
     Args:

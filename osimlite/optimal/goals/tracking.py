@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from osimlite.derivatives.symbols import casadi
-from osimlite.optimal.point import Formula, GoalTerms, Point, make_integral_terms
+from osimlite.optimal.point import Formula, GoalTerms, PointSymbols, make_integral_terms
 from osimlite.optimal.tables import fit_splines, read_reference, read_table
 from osimlite.schema.constraint_types import CoordinateCouplerConstraint
 from osimlite.schema.coordinates import Coordinate
@@ -52,7 +52,7 @@ def build_state_tracking_goal(goal: MocoStateTrackingGoal, problem: Problem) -> 
         weights |= {name: weights[name] / float(np.ptp(table[name])) for name in tracked}
     pairs = [*zip(tracked, fit_splines(problem, table, tracked), strict=True)]
 
-    def integrand(point: Point) -> Formula:
+    def integrand(point: PointSymbols) -> Formula:
         return sum(
             weights[name] * (point.state(name) - point.evaluate(series)) ** 2
             for name, series in pairs
@@ -90,7 +90,7 @@ def build_control_tracking_goal(goal: MocoControlTrackingGoal, problem: Problem)
     weights = dict(zip(controls, control_weights, strict=True))
     pairs = [*zip(columns, fit_splines(problem, table, [*columns.values()]), strict=True)]
 
-    def integrand(point: Point) -> Formula:
+    def integrand(point: PointSymbols) -> Formula:
         return sum(
             weights[name] * (point.control(name) - point.evaluate(series)) ** 2
             for name, series in pairs
@@ -130,7 +130,7 @@ def build_marker_tracking_goal(goal: MocoMarkerTrackingGoal, problem: Problem) -
     labels = [f"{name}_{k}" for name in tracked for k in (1, 2, 3)]
     series = fit_splines(problem, table, labels)
 
-    def integrand(point: Point) -> Formula:
+    def integrand(point: PointSymbols) -> Formula:
         positions = point.output("stations")
         total = casadi.SX(0.0)
         for number, (name, weight) in enumerate(zip(tracked, weights, strict=True)):
@@ -193,7 +193,7 @@ def build_generalized_force_tracking_goal(
         applied_forces, [paths[name] for name in tracked]
     )
 
-    def integrand(point: Point) -> Formula:
+    def integrand(point: PointSymbols) -> Formula:
         values = needed_forces(point)
         return sum(
             weight * (values[k] - point.evaluate(series)) ** 2

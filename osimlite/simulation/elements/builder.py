@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from osimlite.base.text import suggest_or_list
 from osimlite.errors import ModelError, SettingError, UnsupportedError
-from osimlite.mechanics.multibody.functions import Function
+from osimlite.mechanics.multibody.functions import SmoothFunction
 from osimlite.mechanics.multibody.mechanism import FramePlacement, Mechanism
 from osimlite.mechanics.multibody.schema_functions import convert_function
 from osimlite.schema.base import Unknown
@@ -184,7 +184,7 @@ class ElementBuilder:
         """Return the body of a frame and the frame's placement in it."""
         return self.mechanism.placement(self.path(frame))
 
-    def read_function(self, force: Any, function: Any, what: str) -> Function:
+    def read_function(self, force: Any, function: Any, what: str) -> SmoothFunction:
         """Return a function of one argument that belongs to a force.
 
         Args:

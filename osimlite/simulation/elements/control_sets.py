@@ -13,7 +13,7 @@ from osimlite.base.text import suggest_name
 from osimlite.errors import ModelError
 from osimlite.io.document.cache import read_object
 from osimlite.io.tables.storage import find_named_file
-from osimlite.mechanics.multibody.functions import Constant, Function, PiecewiseConstant
+from osimlite.mechanics.multibody.functions import ConstantValue, PiecewiseConstant, SmoothFunction
 from osimlite.mechanics.multibody.smoothing_spline import PiecewisePolynomial
 from osimlite.schema.control_sets import (
     Control,
@@ -38,7 +38,7 @@ class ControlCurves:
         of_model: names of the controls that the model must have.
     """
 
-    curves: Mapping[str, Function]
+    curves: Mapping[str, SmoothFunction]
     of_model: Sequence[str]
 
     @classmethod
@@ -55,7 +55,7 @@ class ControlCurves:
             DocumentError: the file is neither.
             ModelError: a control has no nodes, or their times go back.
         """
-        curves: dict[str, Function] = {}
+        curves: dict[str, SmoothFunction] = {}
         if ".sto" in path.name:
             table = read_controls(path)
             for label, values in zip(table.columns, table.rows.T.tolist(), strict=True):
@@ -73,7 +73,7 @@ class ControlCurves:
         """Names of the actuators that the model must have."""
         return [name.removesuffix(EXCITATION) for name in self.of_model]
 
-    def find_curve(self, actuator: str) -> Function | None:
+    def find_curve(self, actuator: str) -> SmoothFunction | None:
         """Return the control of an actuator.
 
         Args:
@@ -89,9 +89,9 @@ EXCITATION = ".excitation"
 """Suffix of the names of controls of muscles."""
 
 
-def _make_curve(control: Control, file: str) -> Function:
+def _make_curve(control: Control, file: str) -> SmoothFunction:
     if isinstance(control, ControlConstant):
-        return Constant(control.value)
+        return ConstantValue(control.value)
     assert isinstance(control, ControlLinear)
     if not control.x_nodes:
         raise ModelError(
@@ -102,7 +102,7 @@ def _make_curve(control: Control, file: str) -> Function:
 
 def make_node_curve(
     control: ControlLinear, nodes: Sequence[ControlLinearNode], file: str | None = None
-) -> Function:
+) -> SmoothFunction:
     """Return lines or steps through nodes of a control, such as its x_nodes.
 
     Args:
@@ -133,7 +133,7 @@ def make_node_curve(
 
 def _connect_points(
     times: Sequence[float], values: Sequence[float], *, extrapolate: bool
-) -> Function:
+) -> SmoothFunction:
     """Return straight lines between points; two points at one time make a jump.
 
     Args:
@@ -145,7 +145,7 @@ def _connect_points(
         The function of time.
     """
     if len(times) == 1:
-        return Constant(values[0])
+        return ConstantValue(values[0])
     widths = np.diff(times)
     # Two points at one time make a step, without a slope between them.
     slopes = np.where(widths > 0.0, np.diff(values) / np.where(widths > 0.0, widths, 1.0), 0.0)

@@ -10,7 +10,7 @@ import numpy as np
 from osimlite.errors import ModelError
 from osimlite.io.tables.storage import StoTable
 from osimlite.io.tables.table_stream import TableStream, find_word_start
-from osimlite.mechanics.multibody.functions import Function, PiecewiseConstant
+from osimlite.mechanics.multibody.functions import PiecewiseConstant, SmoothFunction
 from osimlite.mechanics.multibody.smoothing_spline import smoothing_spline
 
 
@@ -61,7 +61,7 @@ def read_controls(path: str | Path) -> StoTable:
         )
 
 
-def make_column_function(table: StoTable, index: int, degree: int, what: str) -> Function:
+def make_column_function(table: StoTable, index: int, degree: int, what: str) -> SmoothFunction:
     """Return a column as a function of time, as OpenSim does: steps, or a spline through its values.
 
     Outside the table, steps and lines have the end values; other splines are extrapolated by

@@ -13,7 +13,7 @@ from osimlite.base.records import dataclass, replace
 from osimlite.errors import ModelError, UnsupportedError
 from osimlite.mechanics.kernels.layout import ITEM, WORK
 from osimlite.mechanics.multibody.function_tables import table_of_one
-from osimlite.mechanics.multibody.functions import Function
+from osimlite.mechanics.multibody.functions import SmoothFunction
 from osimlite.schema.actuators import Actuator
 from osimlite.schema.base import Unknown
 from osimlite.schema.controller_types import (
@@ -40,9 +40,9 @@ class Controls:
     """
 
     names: tuple[str, ...] = ()
-    functions: tuple[tuple[Function, ...], ...] = ()
+    functions: tuple[tuple[SmoothFunction, ...], ...] = ()
 
-    def add_functions(self, more: Mapping[str, Function]) -> Controls:
+    def add_functions(self, more: Mapping[str, SmoothFunction]) -> Controls:
         """Return these controls with one more term for some of them.
 
         Args:
@@ -109,7 +109,7 @@ class Drive(NamedTuple):
     """
 
     actuator: Any
-    signal: Function | Reflex | UnsupportedError
+    signal: SmoothFunction | Reflex | UnsupportedError
     number: int | None = None
 
 
@@ -134,7 +134,7 @@ class ModelControls:
             path, count = builder.path(actuator), actuator.control_count
             self._first[path] = len(names)
             names += [path] if count == 1 else [f"{path}_{number}" for number in range(count)]
-        functions: list[list[Function]] = [[] for _ in names]
+        functions: list[list[SmoothFunction]] = [[] for _ in names]
         self.reflexes: dict[str, float] = {}
         self._refused: dict[str, UnsupportedError] = {}
         for controller, (actuator, signal, number) in _iterate_drives(builder):

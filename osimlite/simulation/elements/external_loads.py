@@ -24,7 +24,7 @@ from osimlite.io.tables.storage import (
     find_named_file,
     read_sto,
 )
-from osimlite.mechanics.multibody.functions import Constant, Function, PiecewiseLinear
+from osimlite.mechanics.multibody.functions import ConstantValue, PiecewiseLinear, SmoothFunction
 from osimlite.mechanics.multibody.mechanism import FramePlacement, Mechanism
 from osimlite.mechanics.multibody.smoothing_spline import natural_splines
 from osimlite.mechanics.multibody.spatial import Array
@@ -36,7 +36,7 @@ from osimlite.simulation.elements.registry import register_force_type
 if TYPE_CHECKING:
     from osimlite.simulation.elements.builder import ElementBuilder
 
-Functions = tuple[Function, Function, Function]
+Functions = tuple[SmoothFunction, SmoothFunction, SmoothFunction]
 """Functions of time of three components."""
 TABLES = (".mot", ".sto", ENDING)
 """Suffixes of files of forces over time."""
@@ -262,7 +262,7 @@ class _Columns:
             raise DocumentError("the table has no rows", file=table.file)
 
     @cached_property
-    def _functions(self) -> dict[int, Function]:
+    def _functions(self) -> dict[int, SmoothFunction]:
         """Functions of all named columns by index; their splines are solved together."""
         # Only columns of some force are fitted: tables of a laboratory hold many more.
         starts = tuple(
@@ -322,7 +322,7 @@ class _Columns:
         return f"no column of '{file}' begins with it{hint}"
 
 
-def make_column_functions(times: Array, columns: Array) -> list[Function]:
+def make_column_functions(times: Array, columns: Array) -> list[SmoothFunction]:
     """Return columns of a table as functions of time.
 
     Args:
@@ -333,7 +333,7 @@ def make_column_functions(times: Array, columns: Array) -> list[Function]:
         One function for each column.
     """
     if len(times) == 1:
-        return [Constant(float(value)) for value in columns[0]]
+        return [ConstantValue(float(value)) for value in columns[0]]
     # A cubic spline needs four points.
     if len(times) < 4:
         return [

@@ -30,7 +30,7 @@ from osimlite.schema.states import list_states
 from osimlite.schema.tree import is_a
 from osimlite.simulation.elements.builder import ElementBuilder
 from osimlite.simulation.elements.force_records import ForceRecord, Response, Silent
-from osimlite.simulation.elements.geometries.geometry import Geometry
+from osimlite.simulation.elements.geometries.geometry import ForceGeometry
 from osimlite.simulation.elements.kernel_text import SOLVED, BatchedLaw, KernelText
 from osimlite.simulation.elements.laws import BATCHED, EQUILIBRIUM, OFF, RESPONSE, RIGID
 from osimlite.simulation.elements.parameters import (
@@ -122,7 +122,7 @@ class ForceType:
     """
 
     component: type
-    geometry: Geometry
+    geometry: ForceGeometry
     law: Callable[..., Any] | None = None
     outputs: tuple[str, ...] = ()
     parameters: Sequence[str | Parameter] = ()

@@ -6,16 +6,16 @@ from itertools import pairwise
 
 import numpy as np
 
-from osimlite.mechanics.multibody.functions import Function
+from osimlite.mechanics.multibody.functions import SmoothFunction
 
 
-def evaluate_function(function: Function, argument: float) -> float:
+def evaluate_function(function: SmoothFunction, argument: float) -> float:
     """Return the value of a function of one argument."""
     value, _, _ = function.evaluate(np.array((argument,)))
     return float(value)
 
 
-def integrate_function(function: Function, start: float, end: float) -> float:
+def integrate_function(function: SmoothFunction, start: float, end: float) -> float:
     """Return the integral of a function of one argument.
 
     Gauss-Legendre quadrature with five nodes from knot to knot, or in sixteen intervals for

@@ -19,9 +19,9 @@ from osimlite.schema.probe_types import (
 from osimlite.simulation.elements.builder import ElementBuilder
 from osimlite.simulation.elements.probe_type import (
     DeclaredProbe,
+    ProbeSubject,
     ProbeType,
     Reading,
-    Subject,
     find_members,
 )
 from osimlite.simulation.elements.registry import register_probe_type
@@ -69,14 +69,14 @@ def compute_actuator_force(actuation: float, n: Power) -> float:
 
 def _read_forces(builder: ElementBuilder, probe: ActuatorForceProbe) -> Reading:
     actuators = find_members(builder, probe, probe.actuator_names, "/forceset", "Actuator")
-    subjects = tuple(Subject(actuator, Power(1.0, probe.exponent)) for actuator in actuators)
+    subjects = tuple(ProbeSubject(actuator, Power(1.0, probe.exponent)) for actuator in actuators)
     return define_reading(
         probe.name, [item.name for item in actuators], subjects, is_sum=probe.sum_forces_together
     )
 
 
 def define_reading(
-    name: str, subjects: list[str], read: tuple[Subject, ...], *, is_sum: bool
+    name: str, subjects: list[str], read: tuple[ProbeSubject, ...], *, is_sum: bool
 ) -> Reading:
     """Return the reading of a probe whose results are those of its subjects, or their sum.
 
@@ -118,7 +118,7 @@ def _read_powers(builder: ElementBuilder, probe: ActuatorPowerProbe) -> Reading:
     # A tension acts against the lengthening speed.
     factors = [-1.0 if isinstance(item, PathActuator) else 1.0 for item in actuators]
     subjects = tuple(
-        Subject(item, Power(factor, probe.exponent))
+        ProbeSubject(item, Power(factor, probe.exponent))
         for item, factor in zip(actuators, factors, strict=True)
     )
     return define_reading(

@@ -16,14 +16,14 @@ from osimlite.mechanics.laws.metabolics import (
     bhargava2004_smoothed,
     umberger2010,
 )
-from osimlite.mechanics.multibody.functions import Function, PiecewiseLinear
+from osimlite.mechanics.multibody.functions import PiecewiseLinear, SmoothFunction
 from osimlite.schema.probe_types import (
     Bhargava2004MuscleMetabolicsProbe,
     Bhargava2004SmoothedMuscleMetabolics,
     Umberger2010MuscleMetabolicsProbe,
 )
 from osimlite.simulation.elements.builder import ElementBuilder
-from osimlite.simulation.elements.probe_type import DeclaredProbe, ProbeType, Reading, Subject
+from osimlite.simulation.elements.probe_type import DeclaredProbe, ProbeSubject, ProbeType, Reading
 from osimlite.simulation.elements.registry import register_probe_type
 
 
@@ -31,7 +31,7 @@ def read_metabolic_probe(
     builder: ElementBuilder,
     probe: Any,
     numbers: Callable[[Any, Any, float], Any],
-    curve: Function | None = None,
+    curve: SmoothFunction | None = None,
 ) -> Reading:
     """Return the reading of a metabolic probe.
 
@@ -62,7 +62,9 @@ def read_metabolic_probe(
                 probe, f" of the muscle '{item.name}', which the model does not have"
             )
         subjects.append(
-            Subject(muscle, numbers(item, muscle, find_muscle_mass(builder, probe, item, muscle)))
+            ProbeSubject(
+                muscle, numbers(item, muscle, find_muscle_mass(builder, probe, item, muscle))
+            )
         )
     basal = (
         probe.basal_coefficient * builder.mechanism.total_mass**probe.basal_exponent
@@ -229,7 +231,7 @@ def _read_smoothed(
         numbers = define_bhargava(
             component, item, muscle, find_muscle_mass(builder, component, item, muscle)
         )
-        subjects.append(Subject(muscle, (*numbers, *smoothed)))
+        subjects.append(ProbeSubject(muscle, (*numbers, *smoothed)))
         labels.append(f"{path}|muscle_metabolic_rate:{builder.path(muscle)}")
     basal = component.basal_coefficient * builder.mechanism.total_mass**component.basal_exponent
     return Reading(tuple(labels), tuple(subjects), constant=basal)

@@ -11,7 +11,7 @@ from osimlite.errors import ModelError
 from osimlite.mechanics.kernels.functions import add_reflex
 from osimlite.mechanics.multibody.formula import Formula, program
 from osimlite.mechanics.multibody.function_tables import table_of_one
-from osimlite.mechanics.multibody.functions import Function
+from osimlite.mechanics.multibody.functions import SmoothFunction
 from osimlite.simulation.elements.builder import ElementBuilder
 from osimlite.simulation.elements.kernel_text import write_arguments
 
@@ -276,7 +276,7 @@ class Curve(Parameter):
     name: str
     int_count = 1
 
-    def read(self, builder: ElementBuilder, force: Any) -> Function:
+    def read(self, builder: ElementBuilder, force: Any) -> SmoothFunction:
         """Return the function that the property holds."""
         return builder.read_function(force, getattr(force, self.name), self.name)
 
@@ -285,7 +285,7 @@ class Curve(Parameter):
         return [f"at(p, i[{head}])"]
 
     def pack(
-        self, value: Function, tail: Tail, where: str
+        self, value: SmoothFunction, tail: Tail, where: str
     ) -> tuple[Sequence[int], Sequence[float]]:
         """Return the offset of the table, which goes into the tail.
 

@@ -24,7 +24,7 @@ from osimlite.errors import ModelError, UnsupportedError
 from osimlite.mechanics.kernels.layout import ITEM
 from osimlite.mechanics.kernels.table import PARAMETERS, compile_text
 from osimlite.mechanics.multibody.function_tables import table_of_one
-from osimlite.mechanics.multibody.functions import Function
+from osimlite.mechanics.multibody.functions import SmoothFunction
 from osimlite.mechanics.multibody.links import Places
 from osimlite.simulation.elements.builder import ElementBuilder
 from osimlite.simulation.elements.force_records import CONTROLS, ForceElement, ForceRecord, Silent
@@ -39,7 +39,7 @@ INTEGRATE = "integrate"
 """Operation of a probe that reports an integral over time."""
 
 
-class Subject(NamedTuple):
+class ProbeSubject(NamedTuple):
     """Actuator for which a law is called.
 
     Attributes:
@@ -65,10 +65,10 @@ class Reading(NamedTuple):
     """
 
     labels: tuple[str, ...]
-    subjects: tuple[Subject, ...] = ()
+    subjects: tuple[ProbeSubject, ...] = ()
     first: int = -1
     constant: float = 0.0
-    curve: Function | None = None
+    curve: SmoothFunction | None = None
     details: Any = ()
 
 
@@ -275,7 +275,7 @@ def _locate_inputs(
     probe_type: ProbeType,
     builder: ElementBuilder,
     probe: Any,
-    subject: Subject,
+    subject: ProbeSubject,
     elements: Mapping[str, ForceElement],
 ) -> tuple[tuple[tuple[str, int], ...], tuple[float, ...]]:
     """Return where the inputs of a law are recorded.

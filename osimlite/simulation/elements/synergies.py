@@ -9,7 +9,7 @@ from osimlite.base.records import dataclass
 from osimlite.base.text import suggest_name
 from osimlite.errors import ModelError, UnsupportedError
 from osimlite.io.tables.storage import find_named_file
-from osimlite.mechanics.multibody.functions import Function, PiecewiseLinear, ScaledFunction
+from osimlite.mechanics.multibody.functions import PiecewiseLinear, ScaledFunction, SmoothFunction
 from osimlite.schema.controller_types import SynergyController
 from osimlite.schema.reporters import SignalGenerator, TableSource__double_
 from osimlite.simulation.elements.builder import ElementBuilder
@@ -25,7 +25,7 @@ class TableColumn(PiecewiseLinear):
     source: str = ""  # path of the component that has the table
 
 
-def read_signal(builder: ElementBuilder, controller: Any, text: str) -> Function | None:
+def read_signal(builder: ElementBuilder, controller: Any, text: str) -> SmoothFunction | None:
     """Return the output that an input of a controller names, as a function of time.
 
     Args:

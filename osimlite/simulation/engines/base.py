@@ -8,7 +8,7 @@ from typing import Self
 
 from osimlite.mechanics.kernels.layout import MODEL, OUTCOME, STAGE, WORK
 from osimlite.simulation.engines.controlled_steps import ControlledSteps
-from osimlite.simulation.engines.protocol import Settings
+from osimlite.simulation.engines.protocol import EngineSettings
 from osimlite.simulation.euler import SemiImplicitEuler
 from osimlite.simulation.options import MERSON
 from osimlite.simulation.stepper import Observer, Stepper
@@ -84,7 +84,7 @@ class KernelEngine(System):
 
     # ---------------------------------------------------------------------------------------------- motion
     def make_stepper(
-        self, t: float, y: Sequence[float], settings: Settings, observe: Observer
+        self, t: float, y: Sequence[float], settings: EngineSettings, observe: Observer
     ) -> Stepper:
         """Return a stepper that continues from a state.
 

@@ -29,7 +29,7 @@ NO_WATCH_LEVELS = np.zeros((0, 7))
 """Levels of an empty list of watches."""
 
 
-class Batch:
+class BatchWorkspace:
     """Workspace of runs that differ in their initial states or in their numbers.
 
     Args:

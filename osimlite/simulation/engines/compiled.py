@@ -27,15 +27,15 @@ from osimlite.simulation.batches import BatchEngine, BatchOptions, Runs, Watch
 from osimlite.simulation.elements import Forces
 from osimlite.simulation.elements.builder import OPENSIM
 from osimlite.simulation.engines.base import KernelEngine
-from osimlite.simulation.engines.batch import Batch
+from osimlite.simulation.engines.batch import BatchWorkspace
 from osimlite.simulation.engines.linking import describe_version
-from osimlite.simulation.engines.protocol import Settings
+from osimlite.simulation.engines.protocol import EngineSettings
 
 if TYPE_CHECKING:
     from osimlite.simulation.engines.model_update import NumberUpdater
 
 
-def make_engine(mechanism: Mechanism, forces: Forces, settings: Settings) -> BatchEngine:
+def make_engine(mechanism: Mechanism, forces: Forces, settings: EngineSettings) -> BatchEngine:
     """Return a compiled engine.
 
     Raises:
@@ -91,7 +91,9 @@ def run_many(
         held = first.make_runs(engine, engine.forces.controls, others=others)
         # Each run writes its held controls into its own numbers.
         vectors = vectors if len(vectors) == count else np.tile(vectors, (count, 1))
-    batch = Batch(engine, starts, options, vectors=vectors, kinds=kinds, levels=levels, held=held)
+    batch = BatchWorkspace(
+        engine, starts, options, vectors=vectors, kinds=kinds, levels=levels, held=held
+    )
 
     def work(first: int) -> None:
         # Each task has a workspace of its own, as threads run at the same time.

@@ -15,7 +15,7 @@ from osimlite.mechanics.kernels.error_control import error_weight, shortest_step
 from osimlite.mechanics.kernels.layout import MODEL
 from osimlite.mechanics.kernels.pointers import Floats, interpolate_cubic
 from osimlite.simulation.batches import BatchOptions
-from osimlite.simulation.engines.batch import Batch
+from osimlite.simulation.engines.batch import BatchWorkspace
 from osimlite.simulation.options import (
     DEFAULT_ACCURACY,
     INITIAL_STEP_S,
@@ -175,7 +175,7 @@ class ControlledSteps(Stepper):
         self.time, self.state = now, end
 
     # --------------------------------------------------------------------------------------------- helpers
-    def _make_batch(self, times: Sequence[float], to: float) -> Batch:
+    def _make_batch(self, times: Sequence[float], to: float) -> BatchWorkspace:
         """Return a batch of one run that continues from the present state.
 
         Args:
@@ -184,7 +184,7 @@ class ControlledSteps(Stepper):
         """
         if times and times[0] < self.time:
             raise ValueError(f"t = {times[0]:.9g} s is before the present {self.time:.9g} s")
-        batch = Batch(
+        batch = BatchWorkspace(
             self._engine,
             [self.state],
             BatchOptions(to=to, report_times=times, **self._options.integration_choices()),
@@ -198,7 +198,7 @@ class ControlledSteps(Stepper):
         batch.reports[0, : bisect_right(times, self.time)] = self.state
         return batch
 
-    def _call_repeatedly(self, batch: Batch, steps: int) -> Iterator[float]:
+    def _call_repeatedly(self, batch: BatchWorkspace, steps: int) -> Iterator[float]:
         """Take steps until the last report.
 
         Args:
@@ -219,7 +219,7 @@ class ControlledSteps(Stepper):
             steps = _steps_per_call[self._engine] = min(max(1, int(more)), LOGGED_STEPS)
             yield (self.time - before) / max(self.taken - taken, 1)
 
-    def _call_kernels(self, batch: Batch, steps: int) -> int:
+    def _call_kernels(self, batch: BatchWorkspace, steps: int) -> int:
         """Take some steps in one call of the kernels.
 
         Args:

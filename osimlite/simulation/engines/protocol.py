@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Settings(IntegrationOptions):
+class EngineSettings(IntegrationOptions):
     """Settings of an engine and of one motion that it computes.
 
     Attributes:
@@ -137,7 +137,7 @@ class Engine(Protocol):
         """
 
     def make_stepper(
-        self, t: float, y: list[float], settings: Settings, observe: Observer
+        self, t: float, y: list[float], settings: EngineSettings, observe: Observer
     ) -> Stepper:
         """Return a stepper that continues from a state.
 
@@ -162,5 +162,5 @@ class Engine(Protocol):
         """Free the resources of the engine; may be called repeatedly."""
 
 
-EngineFactory = Callable[[Mechanism, Forces, Settings], Engine]
+EngineFactory = Callable[[Mechanism, Forces, EngineSettings], Engine]
 """Function that makes an engine of a mechanism; it uses `route`, `show` and `visuals` of the settings."""

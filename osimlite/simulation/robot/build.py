@@ -14,17 +14,17 @@ from osimlite.base.records import replace
 from osimlite.base.text import make_unique_name
 from osimlite.mechanics.multibody.functions import (
     IDENTITY,
-    Constant,
-    Function,
+    ConstantValue,
     Linear,
     ScaledFunction,
+    SmoothFunction,
 )
 from osimlite.mechanics.multibody.joints import Mobilizer
 from osimlite.mechanics.multibody.mechanism import Mechanism, Values
 from osimlite.mechanics.multibody.motions import AxisMotion, FixedTransform
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.simulation.robot.couplings import find_line
-from osimlite.simulation.robot.robot import WORLD, Link, Robot, RobotJoint, Visual
+from osimlite.simulation.robot.robot import WORLD, Robot, RobotJoint, RobotLink, Visual
 
 _ALONG = 1e-14
 """Largest distance of a vector from an axis, relative to the length of the vector, at which it counts as parallel."""
@@ -61,10 +61,12 @@ def build_robot(
         locked = [
             k for k, info in enumerate(mechanism.coordinates) if info.locked and locked == "fixed"
         ]
-    return _Builder(mechanism, locked, body_frames, values).robot(visuals or {}, collisions or {})
+    return _RobotBuilder(mechanism, locked, body_frames, values).robot(
+        visuals or {}, collisions or {}
+    )
 
 
-class _Builder:
+class _RobotBuilder:
     """Builder of one robot; for the arguments see :func:`build_robot`.
 
     Attributes:
@@ -89,7 +91,7 @@ class _Builder:
             None if k in self.still else self._unique(info.name)
             for k, info in enumerate(mechanism.coordinates)
         ]
-        self.links: list[Link] = []
+        self.links: list[RobotLink] = []
         self.joints: list[RobotJoint] = []
 
     def robot(
@@ -103,7 +105,7 @@ class _Builder:
         """
         ground = "/ground"
         self.links.append(
-            Link(
+            RobotLink(
                 WORLD,
                 visuals=tuple(visuals.get(ground, ())),
                 collisions=tuple(collisions.get(ground, ())),
@@ -150,7 +152,7 @@ class _Builder:
                 motion, mobilizer, origin, parent, "" if carries_body else None, name
             )
             if not carries_body:
-                self.links.append(Link(joint.child))
+                self.links.append(RobotLink(joint.child))
             self.joints.append(joint)
             parent = joint.child
         if not motions or off_axis:
@@ -162,7 +164,7 @@ class _Builder:
             last = np.eye(4)
         properties = body.mass_properties
         self.links.append(
-            Link(
+            RobotLink(
                 name,
                 properties.mass,
                 last[:3, :3] @ properties.center + last[:3, 3],
@@ -255,7 +257,7 @@ class _Builder:
             yield part
         else:
             slope = line.slope
-            first = AxisMotion(part.kind, part.axis, (0,), Constant(line.start))
+            first = AxisMotion(part.kind, part.axis, (0,), ConstantValue(line.start))
             yield FixedTransform(first.transform(np.zeros(1)))
             unit = abs(slope) == 1.0
             yield AxisMotion(
@@ -297,11 +299,11 @@ def _place_link(shapes: Sequence[Visual], frame: Array) -> tuple[Visual, ...]:
     return tuple(replace(shape, origin=frame @ shape.origin) for shape in shapes)
 
 
-def _is_constant(function: Function) -> bool:
+def _is_constant(function: SmoothFunction) -> bool:
     if isinstance(function, ScaledFunction):
         return function.scale == 0.0 or _is_constant(function.function)
     line = find_line(function)
-    return isinstance(function, Constant) or (line is not None and line.slope == 0.0)
+    return isinstance(function, ConstantValue) or (line is not None and line.slope == 0.0)
 
 
 def _letter(motion: AxisMotion) -> str:

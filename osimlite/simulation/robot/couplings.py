@@ -17,7 +17,7 @@ from osimlite.mechanics.multibody.smoothing_spline import PiecewisePolynomial
 from osimlite.simulation.robot.robot import Robot, RobotJoint
 
 
-class Line(NamedTuple):
+class StraightLine(NamedTuple):
     """Straight line ``slope * x + start``.
 
     Attributes:
@@ -28,21 +28,23 @@ class Line(NamedTuple):
     slope: float
     start: float
 
-    def compose(self, inner: Line) -> Line:
+    def compose(self, inner: StraightLine) -> StraightLine:
         """Return the composition of this line with an inner one.
 
         Args:
             inner: line whose value is the argument of this one.
         """
-        return Line(self.slope * inner.slope, self.slope * inner.start + self.start)
+        return StraightLine(self.slope * inner.slope, self.slope * inner.start + self.start)
 
-    def inverse(self) -> Line:
+    def inverse(self) -> StraightLine:
         """Return the line that gives x for its value; the slope must not be zero."""
         # The identity keeps its exact numbers: -0.0 would be written as an offset.
-        return self if self == (1.0, 0.0) else Line(1.0 / self.slope, -self.start / self.slope)
+        return (
+            self if self == (1.0, 0.0) else StraightLine(1.0 / self.slope, -self.start / self.slope)
+        )
 
 
-def find_line(function: f.Function) -> Line | None:
+def find_line(function: f.SmoothFunction) -> StraightLine | None:
     """Return the straight line that a function of one argument is.
 
     Splines count if they are straight to the last digit, as one through two points is, or one
@@ -56,12 +58,12 @@ def find_line(function: f.Function) -> Line | None:
     """
     match function:
         case f.Linear(rate, start):
-            return Line(rate, start)
+            return StraightLine(rate, start)
         case f.WeightedSum((weight,), start):
-            return Line(weight, start)
+            return StraightLine(weight, start)
         # The highest power comes first, as in OpenSim.
         case f.Polynomial((*high, slope, start)) if not any(high):
-            return Line(slope, start)
+            return StraightLine(slope, start)
         case f.MultivariatePolynomial(coefficients, powers) if all(
             len(item) == 1 for item in powers
         ):
@@ -70,18 +72,18 @@ def find_line(function: f.Function) -> Line | None:
                 for coefficient, (power,) in zip(coefficients, powers, strict=True)
             }
             if not any(factor for power, factor in factors.items() if power > 1):
-                return Line(factors.get(1, 0.0), factors.get(0, 0.0))
+                return StraightLine(factors.get(1, 0.0), factors.get(0, 0.0))
         case f.ScaledFunction(scale, inner):
             line = find_line(inner)
-            return None if line is None else Line(scale, 0.0).compose(line)
-        case f.PiecewiseLinear((_, _)) | f.SimmSpline() if _is_straight(function):
+            return None if line is None else StraightLine(scale, 0.0).compose(line)
+        case f.PiecewiseLinear((_, _)) | f.SimmCubicSpline() if _is_straight(function):
             start, slopes, _ = function.evaluate(np.zeros(1))
-            return Line(float(slopes[0]), start)
+            return StraightLine(float(slopes[0]), start)
     return None
 
 
-def _is_straight(function: f.Function) -> bool:
-    if not isinstance(function, f.SimmSpline):
+def _is_straight(function: f.SmoothFunction) -> bool:
+    if not isinstance(function, f.SimmCubicSpline):
         return True
     # Where points lie on each other, the curve may jump.
     if any(right - left <= 1e-7 for left, right in pairwise(function.x)):
@@ -101,7 +103,7 @@ class Mimic(NamedTuple):
     """
 
     leader: str
-    line: Line
+    line: StraightLine
 
 
 def couplers(robot: Robot) -> list[Coupler]:
@@ -125,14 +127,14 @@ def mimics(robot: Robot) -> dict[str, Mimic]:
         Leader and line by the name of the joint.
     """
     leads = leaders(robot)
-    follows: dict[int, tuple[int, Line]] = {}
+    follows: dict[int, tuple[int, StraightLine]] = {}
     for coupler in couplers(robot):
         line = find_line(coupler.function)
         if len(coupler.independent) == 1 and line is not None:
             # Of two couplers of a coordinate the first one counts; both must agree anyway.
             follows.setdefault(coupler.dependent, (coupler.independent[0], line))
 
-    def find_origin(place: int) -> tuple[int, Line]:
+    def find_origin(place: int) -> tuple[int, StraightLine]:
         """Return the most remote coordinate that has a leader, and the line from it to this one.
 
         Args:
@@ -141,13 +143,13 @@ def mimics(robot: Robot) -> dict[str, Mimic]:
         Returns:
             Index of that coordinate, and this coordinate as a line of it.
         """
-        results = place, Line(1.0, 0.0)
+        results = place, StraightLine(1.0, 0.0)
         line, seen = results[1], {place}
         while place in follows:
             place, step = follows[place]
             if place in seen:
                 # Couplers in a circle: each coordinate keeps its own joint.
-                return min(seen), Line(1.0, 0.0)
+                return min(seen), StraightLine(1.0, 0.0)
             seen.add(place)
             line = line.compose(step)
             # Only a coordinate that a joint follows as a line can lead others in the file.
@@ -169,7 +171,7 @@ def mimics(robot: Robot) -> dict[str, Mimic]:
     return result
 
 
-def leaders(robot: Robot) -> dict[int, tuple[RobotJoint, Line]]:
+def leaders(robot: Robot) -> dict[int, tuple[RobotJoint, StraightLine]]:
     """Return the joint that others follow for each coordinate.
 
     It is the joint that equals the coordinate, else the first one that is a line of it.
@@ -180,17 +182,19 @@ def leaders(robot: Robot) -> dict[int, tuple[RobotJoint, Line]]:
     Returns:
         The joint, and its value as a line of the coordinate, by index of the coordinate.
     """
-    result: dict[int, tuple[RobotJoint, Line]] = {}
+    result: dict[int, tuple[RobotJoint, StraightLine]] = {}
     for joint in robot.moving:
         line = find_line(joint.function)
         if len(joint.coordinates) == 1 and line is not None and line.slope:
             # A joint whose value is the coordinate itself is the better leader: it replaces these
             # below.
             result.setdefault(joint.coordinates[0], (joint, line))
-    return result | {place: (joint, Line(1.0, 0.0)) for place, joint in robot.joint_of.items()}
+    return result | {
+        place: (joint, StraightLine(1.0, 0.0)) for place, joint in robot.joint_of.items()
+    }
 
 
-class Driver(NamedTuple):
+class CouplingDriver(NamedTuple):
     """Value as a function of a coordinate that moves freely.
 
     Attributes:
@@ -199,11 +203,11 @@ class Driver(NamedTuple):
     """
 
     coordinate: int | None
-    function: f.Function
+    function: f.SmoothFunction
 
 
 @dataclass(frozen=True)
-class Composition(f.Function):
+class Composition(f.SmoothFunction):
     """Composition of two functions.
 
     Attributes:
@@ -211,8 +215,8 @@ class Composition(f.Function):
         inner: inner function.
     """
 
-    outer: f.Function
-    inner: f.Function
+    outer: f.SmoothFunction
+    inner: f.SmoothFunction
 
     def evaluate(self, arguments: f.Arguments) -> f.Evaluated:
         """Return value, gradient and Hessian, by the chain rule.
@@ -233,7 +237,7 @@ class Composition(f.Function):
         return value, [first * slope for slope in gradient], bends
 
 
-def coordinate_drivers(robot: Robot) -> dict[int, Driver]:
+def coordinate_drivers(robot: Robot) -> dict[int, CouplingDriver]:
     """Return what determines the coordinates that do not move freely.
 
     A lock makes a coordinate constant, and a coupler of one coordinate makes it a function of that
@@ -249,19 +253,19 @@ def coordinate_drivers(robot: Robot) -> dict[int, Driver]:
     infos = robot.mechanism.coordinates
     values = robot.mechanism.values({})
     result = {
-        place: Driver(None, f.Constant(float(values[place])))
+        place: CouplingDriver(None, f.ConstantValue(float(values[place])))
         for place, info in enumerate(infos)
         if info.locked
     }
     steps = {item.dependent: item for item in couplers(robot) if len(item.independent) == 1}
 
-    def drive(place: int, above: frozenset[int]) -> Driver:
+    def drive(place: int, above: frozenset[int]) -> CouplingDriver:
         if place in result:
             return result[place]
         step = steps.get(place)
         # Couplers in a circle: the coordinate at which it closes moves freely.
         if step is None or step.independent[0] in above | {place}:
-            return Driver(place, f.IDENTITY)
+            return CouplingDriver(place, f.IDENTITY)
         return _substitute(step.function, drive(step.independent[0], above | {place}))
 
     for place in steps:
@@ -270,7 +274,7 @@ def coordinate_drivers(robot: Robot) -> dict[int, Driver]:
     return result
 
 
-def joint_driver(joint: RobotJoint, drivers: dict[int, Driver]) -> Driver | None:
+def joint_driver(joint: RobotJoint, drivers: dict[int, CouplingDriver]) -> CouplingDriver | None:
     """Return what determines the value of a moving joint.
 
     Args:
@@ -283,10 +287,10 @@ def joint_driver(joint: RobotJoint, drivers: dict[int, Driver]) -> Driver | None
     if len(joint.coordinates) != 1:
         return None
     (place,) = joint.coordinates
-    return _substitute(joint.function, drivers.get(place, Driver(place, f.IDENTITY)))
+    return _substitute(joint.function, drivers.get(place, CouplingDriver(place, f.IDENTITY)))
 
 
-def knots(function: f.Function) -> tuple[float, ...]:
+def knots(function: f.SmoothFunction) -> tuple[float, ...]:
     """Return the arguments at which the pieces of a function meet.
 
     Args:
@@ -296,7 +300,7 @@ def knots(function: f.Function) -> tuple[float, ...]:
         Increasing arguments; empty for a function of one piece.
     """
     match function:
-        case f.SimmSpline() | f.PiecewiseLinear() | f.PiecewiseConstant():
+        case f.SimmCubicSpline() | f.PiecewiseLinear() | f.PiecewiseConstant():
             # Between these points such functions are smooth, so that samples go there.
             return tuple(function.x)
         case PiecewisePolynomial():
@@ -310,15 +314,17 @@ def knots(function: f.Function) -> tuple[float, ...]:
     return ()
 
 
-def _substitute(outer: f.Function, driver: Driver) -> Driver:
+def _substitute(outer: f.SmoothFunction, driver: CouplingDriver) -> CouplingDriver:
     if driver.coordinate is None:
-        return Driver(None, f.Constant(outer.evaluate((driver.function.evaluate((0.0,))[0],))[0]))
+        return CouplingDriver(
+            None, f.ConstantValue(outer.evaluate((driver.function.evaluate((0.0,))[0],))[0])
+        )
     first, second = find_line(driver.function), find_line(outer)
     if first == (1.0, 0.0):
-        return Driver(driver.coordinate, outer)
+        return CouplingDriver(driver.coordinate, outer)
     if first is not None and second is not None:
-        return Driver(driver.coordinate, f.Linear(*second.compose(first)))
-    return Driver(driver.coordinate, Composition(outer, driver.function))
+        return CouplingDriver(driver.coordinate, f.Linear(*second.compose(first)))
+    return CouplingDriver(driver.coordinate, Composition(outer, driver.function))
 
 
 def range_limits(robot: Robot) -> Robot:

@@ -6,7 +6,7 @@ import numpy as np
 
 from osimlite.base.records import replace
 from osimlite.mechanics.multibody.spatial import Array, skew_matrix
-from osimlite.simulation.robot.robot import Link, Robot
+from osimlite.simulation.robot.robot import Robot, RobotLink
 
 
 def merge_fixed(robot: Robot) -> Robot:
@@ -45,7 +45,7 @@ def merge_fixed(robot: Robot) -> Robot:
     )
 
 
-def _weld_links(link: Link, other: Link, placed: Array, *, massless: bool) -> Link:
+def _weld_links(link: RobotLink, other: RobotLink, placed: Array, *, massless: bool) -> RobotLink:
     """Return a link with another one welded to it.
 
     Args:

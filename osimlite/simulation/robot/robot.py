@@ -25,7 +25,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from osimlite.base.records import dataclass, field
-from osimlite.mechanics.multibody.functions import IDENTITY, Function
+from osimlite.mechanics.multibody.functions import IDENTITY, SmoothFunction
 from osimlite.mechanics.multibody.mechanism import Mechanism, Values
 from osimlite.mechanics.multibody.spatial import Array, make_transform, rotation_about
 
@@ -37,7 +37,7 @@ JointKind = Literal["fixed", "revolute", "prismatic"]
 
 
 @dataclass(frozen=True, eq=False)
-class Link:
+class RobotLink:
     """Rigid body of the robot.
 
     Attributes:
@@ -89,7 +89,7 @@ class RobotJoint:
     origin: Array
     axis: Array = field(default_factory=lambda: np.array((0.0, 0.0, 1.0)))
     coordinates: tuple[int, ...] = ()
-    function: Function = IDENTITY
+    function: SmoothFunction = IDENTITY
     limits: tuple[float, float] | None = None
     effort: float | None = None
     velocity: float | None = None
@@ -139,7 +139,7 @@ class Robot:
     """
 
     name: str
-    links: tuple[Link, ...]
+    links: tuple[RobotLink, ...]
     joints: tuple[RobotJoint, ...]
     mechanism: Mechanism
 
@@ -153,7 +153,7 @@ class Robot:
         return tuple(joint for joint in self.joints if joint.kind != "fixed")
 
     @cached_property
-    def link_of(self) -> dict[str, tuple[Link, Array]]:
+    def link_of(self) -> dict[str, tuple[RobotLink, Array]]:
         """Link of each body (and ground) and the body's frame (4, 4) in it, by the body's absolute path.
 
         Returns:

@@ -37,10 +37,10 @@ from osimlite.simulation.robot.names import UniqueNames
 from osimlite.simulation.robot.robot import (
     Ball,
     Box,
-    Link,
     MeshFile,
     Robot,
     RobotJoint,
+    RobotLink,
     Tube,
     Visual,
     principal_axes,
@@ -69,7 +69,7 @@ def urdf_text(robot: Robot, *, visuals: bool = True) -> str:
     Returns:
         The text of the file.
     """
-    out, unique = _Writer(), UniqueNames()
+    out, unique = _XmlWriter(), UniqueNames()
     with_visuals = [visual for link in robot.links for visual in link.visuals] if visuals else []
     materials = {
         color: _material_name(color) for color in sorted({visual.color for visual in with_visuals})
@@ -133,7 +133,7 @@ def roll_pitch_yaw(rotation: Array) -> tuple[float, float, float]:
     return roll, pitch, yaw
 
 
-def _write_inertial(out: _Writer, link: Link) -> None:
+def _write_inertial(out: _XmlWriter, link: RobotLink) -> None:
     moments, axes = principal_axes(link.inertia)
     ixx, iyy, izz = (number(moment) for moment in moments)
     with out.element("inertial"):
@@ -144,7 +144,7 @@ def _write_inertial(out: _Writer, link: Link) -> None:
         )
 
 
-def _write_shape(out: _Writer, shape: Visual) -> None:
+def _write_shape(out: _XmlWriter, shape: Visual) -> None:
     _write_origin(out, shape.origin)
     with out.element("geometry"):
         match shape.shape:
@@ -158,7 +158,7 @@ def _write_shape(out: _Writer, shape: Visual) -> None:
                 out.empty("mesh", {"filename": file, "scale": numbers(scale)})
 
 
-def _write_joint(out: _Writer, joint: RobotJoint, mimic: Mimic | None) -> None:
+def _write_joint(out: _XmlWriter, joint: RobotJoint, mimic: Mimic | None) -> None:
     # URDF requires limits of a revolute joint, and has no prismatic joint without them.
     kind = "continuous" if joint.kind == "revolute" and joint.limits is None else joint.kind
     with out.element("joint", {"name": joint.name, "type": kind}):
@@ -184,7 +184,7 @@ def _write_joint(out: _Writer, joint: RobotJoint, mimic: Mimic | None) -> None:
             )
 
 
-def _write_origin(out: _Writer, matrix: Array) -> None:
+def _write_origin(out: _XmlWriter, matrix: Array) -> None:
     out.empty(
         "origin", {"xyz": numbers(matrix[:3, 3]), "rpy": numbers(roll_pitch_yaw(matrix[:3, :3]))}
     )
@@ -194,7 +194,7 @@ def _material_name(color: tuple[float, float, float, float]) -> str:
     return "rgba_" + "_".join(number(part).replace(".", "p").replace("-", "m") for part in color)
 
 
-class _Writer:
+class _XmlWriter:
     """Writer of indented XML, one element a line."""
 
     def __init__(self) -> None:

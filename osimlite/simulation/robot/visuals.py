@@ -36,7 +36,7 @@ GREATEST = 3e38
 """Largest size, m: programs draw in numbers of single precision."""
 
 
-class Note(Protocol):
+class NoteWriter(Protocol):
     """Function that records what a shape cannot express.
 
     `osimlite.translate.fidelity.Fidelity.add` is one.
@@ -76,7 +76,7 @@ class Visuals:
 def collect_visuals(
     model: Model,
     mechanism: Mechanism,
-    note: Note = _ignore_note,
+    note: NoteWriter = _ignore_note,
     mesh_files: MeshFiles | None = None,
 ) -> Visuals:
     """Collect the shapes of a model, each placed in the frame of the body that carries it.
@@ -97,7 +97,7 @@ class _Collector:
     """Collector of the shapes of one model; for the arguments see :func:`collect_visuals`."""
 
     def __init__(
-        self, model: Model, mechanism: Mechanism, note: Note, mesh_files: MeshFiles
+        self, model: Model, mechanism: Mechanism, note: NoteWriter, mesh_files: MeshFiles
     ) -> None:
         self.tree = model.tree()
         self.mechanism = mechanism
@@ -253,7 +253,7 @@ def mesh_shape(
     name: str,
     path: str,
     mesh_files: MeshFiles,
-    note: Note,
+    note: NoteWriter,
     scale: tuple[float, float, float] = (1.0, 1.0, 1.0),
 ) -> MeshFile | None:
     """Return a mesh file of the model as a shape.

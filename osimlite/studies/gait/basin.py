@@ -13,7 +13,7 @@ from osimlite.simulation.batches import BatchEngine, Floats, Ints
 from osimlite.studies.gait.cycle import Cycle
 from osimlite.studies.gait.starts import lift_to_depth
 from osimlite.studies.gait.stepmap import StepMap
-from osimlite.studies.gait.steps import Walk, measure_along_slope, walk_many
+from osimlite.studies.gait.steps import WalkerSteps, measure_along_slope, walk_many
 
 SWEEP_ACCURACY = 1e-5
 """Accuracy of the integrator where many walkers make many steps; cycles need a tighter one."""
@@ -103,7 +103,7 @@ def simulate_walks(
     *,
     accuracy: float = SWEEP_ACCURACY,
     progress: Progress | None = None,
-) -> list[Walk]:
+) -> list[WalkerSteps]:
     """Simulate walkers for one and a half times the duration of a number of steps on the cycle.
 
     Args:
@@ -117,7 +117,7 @@ def simulate_walks(
     Returns:
         The walk of each walker.
     """
-    result: list[Walk] = []
+    result: list[WalkerSteps] = []
     for first in range(0, len(states), WALKERS_PER_REPORT):
         result += walk_many(
             step_map.engine,

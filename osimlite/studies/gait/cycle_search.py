@@ -38,7 +38,7 @@ from osimlite.studies.gait.cycle import (
 from osimlite.studies.gait.foot_contacts import FootContacts, find_footing
 from osimlite.studies.gait.starts import move_along_neutral_directions, plant_feet
 from osimlite.studies.gait.stepmap import TIGHT_ACCURACY, StepMap
-from osimlite.studies.gait.steps import Walk, walk_many
+from osimlite.studies.gait.steps import WalkerSteps, walk_many
 from osimlite.studies.sweep.plan import Plan
 from osimlite.studies.sweep.variables import Floats, Start, refuse_counts
 from osimlite.studies.sweep.variants import Variant, Variants
@@ -339,7 +339,7 @@ class CycleSearch:
         )
         return [pair for pair in pairs if pair is not None]
 
-    def _find_similar_strikes(self, walk: Walk, fractions: Floats) -> Candidate | None:
+    def _find_similar_strikes(self, walk: WalkerSteps, fractions: Floats) -> Candidate | None:
         """Find the most similar touch-downs of a walk, one step or one stride apart.
 
         They are a stride apart if the legs differ.

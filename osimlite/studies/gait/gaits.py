@@ -23,7 +23,7 @@ from osimlite.studies.gait.cycle_search import (
 )
 from osimlite.studies.gait.stability import StabilityOptimization, get_cost
 from osimlite.studies.gait.stepmap import TIGHT_ACCURACY, refuse_constraints
-from osimlite.studies.gait.steps import Walk, walk_many
+from osimlite.studies.gait.steps import WalkerSteps, walk_many
 from osimlite.studies.sweep.plan import Plan
 from osimlite.studies.sweep.results import refuse_other_settings, refuse_overwrite
 from osimlite.studies.sweep.variables import Floats
@@ -69,7 +69,7 @@ class Gait:
 
     found: ModelCycle
     start: dict[str, tuple[float, float]]
-    walk: Walk
+    walk: WalkerSteps
     candidates: int
     cycles: int
     files: tuple[Path, ...]
@@ -262,7 +262,7 @@ def round_cycle(search: CycleSearch, found: ModelCycle, digits: int) -> ModelCyc
 
 def choose_start(
     search: CycleSearch, found: ModelCycle, digits: int | None
-) -> tuple[dict[str, tuple[float, float]], Walk]:
+) -> tuple[dict[str, tuple[float, float]], WalkerSteps]:
     """Choose an initial state within a step of a cycle, and simulate the walk from it.
 
     It is at the first of several phases of the step from which, after rounding, the walker walks

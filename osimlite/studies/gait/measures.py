@@ -18,7 +18,7 @@ from osimlite.studies.gait.starts import lift_to_depth
 from osimlite.studies.gait.starts import plant_feet as at_rest
 from osimlite.studies.gait.steps import (
     MIN_STEP_LENGTH_M,
-    Walk,
+    WalkerSteps,
     estimate_event_count,
     extract_walks,
     make_fall_watches,
@@ -122,7 +122,7 @@ def planted(engine: Any, feet: Sequence[str] | None) -> registry.Place:
     return place
 
 
-def _compute_progress(walk: Walk, places: Sequence[float]) -> float:
+def _compute_progress(walk: WalkerSteps, places: Sequence[float]) -> float:
     """Return the progress of a walk with feet at some positions along the slope at its end (m)."""
     if walk.scuffs:
         until = walk.scuffs[0].time
@@ -138,7 +138,7 @@ def _compute_progress(walk: Walk, places: Sequence[float]) -> float:
 
 
 def _make_walk_measure(
-    name: str, engine: Any, feet: Sequence[str] | None, number: Callable[[Walk], float]
+    name: str, engine: Any, feet: Sequence[str] | None, number: Callable[[WalkerSteps], float]
 ) -> RunMeasure:
     """Return a measure that is a number of a walk."""
     footing = _find_footing(name, engine, feet)
@@ -163,9 +163,9 @@ def _make_measure(
     return RunMeasure(name, numbers, tuple(make_fall_watches(footing)), estimate_event_count, True)
 
 
-def _list_walks(footing: FootContacts, batch: Batch) -> list[Walk]:
+def _list_walks(footing: FootContacts, batch: Batch) -> list[WalkerSteps]:
     """Return the walks of a batch; they are shared by all measures of the batch."""
-    walks: list[Walk] | None = batch.memory.get("walks")
+    walks: list[WalkerSteps] | None = batch.memory.get("walks")
     if walks is None:
         walks = extract_walks(
             batch.engine, batch.starts, batch.runs, footing, numbers=batch.numbers

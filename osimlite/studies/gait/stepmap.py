@@ -20,7 +20,7 @@ from osimlite.simulation.batches import BatchEngine, Floats, Ints, Watch, run_ma
 from osimlite.simulation.run import list_constraints
 from osimlite.studies.gait.foot_contacts import FootContacts, find_footing
 from osimlite.studies.gait.steps import (
-    Step,
+    GaitStep,
     estimate_event_count,
     extract_walks,
     make_fall_watches,
@@ -158,7 +158,7 @@ class StepMap:
         other.basis = left @ right
         return other
 
-    def _simulate_first_step(self, near: Floats) -> tuple[Step, Floats]:
+    def _simulate_first_step(self, near: Floats) -> tuple[GaitStep, Floats]:
         """Return the first step from a state, and states during this step (k, y)."""
         runs = run_many(
             self.engine,

@@ -39,7 +39,7 @@ EVENTS_PER_SECOND = 60
 """Memory for contact events per second; a walk with more rattles on the ground."""
 
 
-class Step(NamedTuple):
+class GaitStep(NamedTuple):
     """Touch-down that counts as a step.
 
     Attributes:
@@ -74,7 +74,7 @@ class Scuff(NamedTuple):
 
 
 @dataclass
-class Walk:
+class WalkerSteps:
     """Walk of one walker.
 
     Attributes:
@@ -89,7 +89,7 @@ class Walk:
     end: float = 0.0
     ending: str = "walking"
     fell_on: str = ""
-    steps: list[Step] = field(default_factory=list)
+    steps: list[GaitStep] = field(default_factory=list)
     scuffs: list[Scuff] = field(default_factory=list)
     distance: float = 0.0
 
@@ -125,7 +125,7 @@ def walk_many(
     accuracy: float = DEFAULT_ACCURACY,
     most_tries: int = UNLIMITED_TRIES,
     threads: int | None = None,
-) -> list[Walk]:
+) -> list[WalkerSteps]:
     """Simulate many walkers at once, and find their steps and falls.
 
     Args:
@@ -169,7 +169,7 @@ def extract_walks(
     *,
     numbers: ArrayLike | None = None,
     room: int | None = None,
-) -> list[Walk]:
+) -> list[WalkerSteps]:
     """Find the steps and the falls of runs that recorded the states at their events.
 
     Args:
@@ -202,7 +202,7 @@ def extract_walks(
         # A contact that begins before the start raises no event.
         if (depths[k, fatal] > 0.0).any():
             contact = footing.falls[int(np.argmax(depths[k, fatal]))]
-            result.append(Walk(0.0, "fell", contact))
+            result.append(WalkerSteps(0.0, "fell", contact))
             continue
         walk = follow_events(
             footing, engine.contacts, events, runs.event_states[k], reached[part], depths[k] > 0.0
@@ -225,7 +225,7 @@ def follow_events(
     states: Floats,
     reached: Floats,
     touching: NDArray[np.bool_],
-) -> Walk:
+) -> WalkerSteps:
     """Find the steps and the fall in the events of one run, which may come from any simulator.
 
     Args:
@@ -238,7 +238,7 @@ def follow_events(
     """
     places = {name: index for index, name in enumerate(contacts)}
     feet = [np.array([places[contact] for contact in foot]) for foot in footing.feet]
-    walk, foot_of = Walk(), footing.foot_of
+    walk, foot_of = WalkerSteps(), footing.foot_of
     down = [{name for name in foot if touching[places[name]]} for foot in footing.feet]
     lifted = [0.0] * len(feet)
     last, first_place = -1, None
@@ -279,7 +279,7 @@ def follow_events(
         if first_place is None:
             first_place = here
         if number != last and length >= MIN_STEP_LENGTH_M and air >= MIN_AIR_TIME_S:
-            walk.steps.append(Step(time, number, length, air, state))
+            walk.steps.append(GaitStep(time, number, length, air, state))
             walk.distance = here - first_place
             last = number
         else:

@@ -20,7 +20,7 @@ from osimlite.mechanics.kernels.reflexes import FREE, LIMITS, OF_RESULT, OF_SENS
 from osimlite.mechanics.kernels.walks import LEGS
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.studies.reflexes.parameters import Parameters
-from osimlite.studies.reflexes.settings import Node, matches_pattern
+from osimlite.studies.reflexes.settings import SettingNode, matches_pattern
 from osimlite.studies.reflexes.sources import (
     REFLEX_TYPES,
     SPEED_SOURCE,
@@ -78,7 +78,7 @@ PowerTerms = Iterable[tuple[int, Array, Array]]
 """Terms whose sum is a function of time: power, and per candidate start (w,) (s) and gain (w,)."""
 
 
-def _read_integer(node: Node, key: str, least: int) -> int:
+def _read_integer(node: SettingNode, key: str, least: int) -> int:
     """Return a setting that is a whole number from `least` to `MAX_CONTROL_POINTS`."""
     number = node.number(key)
     if number not in range(least, MAX_CONTROL_POINTS + 1):
@@ -88,7 +88,9 @@ def _read_integer(node: Node, key: str, least: int) -> int:
     return int(number)
 
 
-def _read_control_points(node: Node, parameters: Parameters, before: str) -> tuple[Array, Array]:
+def _read_control_points(
+    node: SettingNode, parameters: Parameters, before: str
+) -> tuple[Array, Array]:
     """Return times (n, w) (s) and values (n, w) of the control points of a function."""
     count = _read_integer(node, "control_points", 1)
     # The value is required, although `get_number` would accept a default.
@@ -108,14 +110,14 @@ def _read_control_points(node: Node, parameters: Parameters, before: str) -> tup
     return np.cumsum([np.zeros_like(values[0]), *spans], axis=0), np.array(values)
 
 
-def _read_piecewise_constant(node: Node, parameters: Parameters, before: str) -> PowerTerms:
+def _read_piecewise_constant(node: SettingNode, parameters: Parameters, before: str) -> PowerTerms:
     """Return the terms of a function that keeps each value until the next time."""
     times, values = _read_control_points(node, parameters, before)
     # Steps of constants: each point adds the difference to the previous value from its time on.
     return [(0, *each) for each in zip(times, np.diff(values, axis=0, prepend=0.0), strict=True)]
 
 
-def _read_piecewise_linear(node: Node, parameters: Parameters, before: str) -> PowerTerms:
+def _read_piecewise_linear(node: SettingNode, parameters: Parameters, before: str) -> PowerTerms:
     """Return a broken line as a constant and changes of slope.
 
     After the last point the last slope continues, unless `flat_extrapolation` is set.
@@ -129,7 +131,7 @@ def _read_piecewise_linear(node: Node, parameters: Parameters, before: str) -> P
     return [(0, times[0], values[0]), *((1, *each) for each in zip(times, bends, strict=False))]
 
 
-def _read_polynomial(node: Node, parameters: Parameters, before: str) -> PowerTerms:
+def _read_polynomial(node: SettingNode, parameters: Parameters, before: str) -> PowerTerms:
     """Return the terms of a polynomial of time; each coefficient is a parameter."""
     degree = _read_integer(node, "degree" if node.get("order") is None else "order", 0)
     for k in range(degree + 1):
@@ -143,7 +145,7 @@ def _read_polynomial(node: Node, parameters: Parameters, before: str) -> PowerTe
 
 MAX_CONTROL_POINTS = 99
 """Most control points of a function, and highest degree of a polynomial."""
-TIME_FUNCTIONS: dict[str, Callable[[Node, Parameters, str], PowerTerms]] = {
+TIME_FUNCTIONS: dict[str, Callable[[SettingNode, Parameters, str], PowerTerms]] = {
     "PieceWiseConstant": _read_piecewise_constant,
     "PieceWiseLinear": _read_piecewise_linear,
     "Polynomial": _read_polynomial,
@@ -169,7 +171,9 @@ class Reflexes:
             line.
     """
 
-    def __init__(self, node: Node, kind: str, walkers: SensedModel, parameters: Parameters) -> None:
+    def __init__(
+        self, node: SettingNode, kind: str, walkers: SensedModel, parameters: Parameters
+    ) -> None:
         self.walkers = walkers
         self.terms: list[TermOrGate] = []
         self.sources: dict[Source, int] = {}
@@ -209,7 +213,7 @@ class Reflexes:
                 self._has_states = self._is_sided = True
                 self._read_states(part, parameters)
 
-    def _read_noise(self, node: Node) -> None:
+    def _read_noise(self, node: SettingNode) -> None:
         """Read the noise of controls, as in SCONE, and of sensors, which is an addition of ours."""
         if self._is_noisy:
             raise node.error(f"there is a {NOISE} already")
@@ -235,7 +239,7 @@ class Reflexes:
                 "noise is as large as SCONE's, but not the same: its numbers depend on the compiler of SCONE"
             )
 
-    def _read_functions(self, node: Node, parameters: Parameters) -> None:
+    def _read_functions(self, node: SettingNode, parameters: Parameters) -> None:
         """Read a function of time for some actuators.
 
         A symmetric function has the same parameters on both sides.
@@ -268,7 +272,7 @@ class Reflexes:
                 )
         function.refuse_unread_parts(f"a {kind}")
 
-    def _read_states(self, node: Node, parameters: Parameters) -> None:
+    def _read_states(self, node: SettingNode, parameters: Parameters) -> None:
         """Read the thresholds of a GaitStateController and its conditional reflexes."""
         parameters.auto_std_factor = node.number("auto_std_factor", parameters.auto_std_factor)
         self.symmetric = node.flag("symmetric", True)
@@ -316,7 +320,7 @@ class Reflexes:
         node.refuse_unread_parts("a GaitStateController")
 
     # ---------------------------------------------------------------------------------------------- reading
-    def _add_conditional(self, node: Node, parameters: Parameters) -> None:
+    def _add_conditional(self, node: SettingNode, parameters: Parameters) -> None:
         """Add the reflexes that act in some states of a leg."""
         side = node.text("legs", "")
         for mask in node.text("states").replace(";", ",").split(","):
@@ -339,7 +343,7 @@ class Reflexes:
         node.refuse_unread_parts("a ConditionalController")
 
     def _add_reflexes(
-        self, node: Node, parameters: Parameters, prefix: str, leg: int, states: int
+        self, node: SettingNode, parameters: Parameters, prefix: str, leg: int, states: int
     ) -> None:
         """Add the reflexes of a controller for one leg and some of its states, a bit each."""
         symmetric = node.flag("symmetric", self.symmetric)
@@ -351,7 +355,7 @@ class Reflexes:
         if not any(kind in REFLEX_TYPES for block in blocks for kind, _ in block.parts):
             raise node.error("a ReflexController needs reflexes")
 
-    def _find_index(self, node: Node, name: str, names: list[str], leg: int) -> int:
+    def _find_index(self, node: SettingNode, name: str, names: list[str], leg: int) -> int:
         """Return the index of a name with or without the side of a leg.
 
         The ending `_o` means the opposite leg.
@@ -375,7 +379,7 @@ class Reflexes:
         raise node.error(f"the model has no '{own}'{beside}{suggest_or_list(own, names)}")
 
     def _resolve_target_and_source(
-        self, node: Node, prefix: str, leg: int, symmetric: bool, kind: ReflexType
+        self, node: SettingNode, prefix: str, leg: int, symmetric: bool, kind: ReflexType
     ) -> tuple[int, int, str]:
         """Find target and source of a reflex, and the prefix of its parameters.
 
@@ -424,7 +428,7 @@ class Reflexes:
         )
 
     @staticmethod
-    def _read_delay(node: Node, parameters: Parameters, before: str) -> Array:
+    def _read_delay(node: SettingNode, parameters: Parameters, before: str) -> Array:
         """Return the delay (s) of a reflex for each candidate."""
         delay = parameters.get_number(node, "delay", 0.0, before + "delay")
         if np.any(delay < 0.0):
@@ -443,7 +447,7 @@ class Reflexes:
     def _add_reflex(
         self,
         name: str,
-        node: Node,
+        node: SettingNode,
         parameters: Parameters,
         prefix: str,
         leg: int,
@@ -491,7 +495,7 @@ class Reflexes:
             self.terms.append(TermOrGate((target, -1, FREE, leg, states, -1), zero, constant, zero))
         node.refuse_unread_parts(f"a {name}")
 
-    def _add_gate(self, node: Node, parameters: Parameters, before: str, leg: int) -> int:
+    def _add_gate(self, node: SettingNode, parameters: Parameters, before: str, leg: int) -> int:
         """Add the range of a ConditionalMuscleReflex; return its index, or -1 without a range."""
         if node.get("dof") is None:
             return -1

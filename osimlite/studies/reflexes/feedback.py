@@ -31,7 +31,7 @@ from osimlite.studies.reflexes.scenario import (
     read_initial_parameters,
     read_leg_names,
 )
-from osimlite.studies.reflexes.settings import Node, make_node, read_settings
+from osimlite.studies.reflexes.settings import SettingNode, make_node, read_settings
 from osimlite.studies.reflexes.walkers import SensedModel
 
 
@@ -76,7 +76,7 @@ class Feedback:
         holder, model = top, top
         if objective is not None:
             holder = objective
-            model = objective.get("ModelOpenSim4") or Node()
+            model = objective.get("ModelOpenSim4") or SettingNode()
         found = holder.select_one(*CONTROLLERS)
         if found is None:
             raise holder.error(f"a controller is needed: {join_words(list(CONTROLLERS))}")

@@ -32,7 +32,7 @@ from osimlite.mechanics.kernels.criteria import (
 from osimlite.mechanics.kernels.pointers import Ints
 from osimlite.mechanics.kernels.sensors import SENSES
 from osimlite.mechanics.multibody.spatial import Array
-from osimlite.studies.reflexes.settings import Node
+from osimlite.studies.reflexes.settings import SettingNode
 from osimlite.studies.reflexes.walkers import SIDES, Walkers
 
 SPEED_OF_LIGHT_M_S = 299792458.0
@@ -116,7 +116,7 @@ class Measure(ABC):
 
     def __init__(
         self,
-        node: Node,
+        node: SettingNode,
         walkers: Walkers,
         criteria: Criteria,
         above: Measure | None = None,
@@ -155,7 +155,7 @@ class Measure(ABC):
         return type(self).__name__
 
     @abstractmethod
-    def read(self, node: Node) -> None:
+    def read(self, node: SettingNode) -> None:
         """Read the settings of the class and request criteria."""
 
     @abstractmethod
@@ -219,7 +219,7 @@ class GaitMeasure(Measure):
     A walker whose mass centre sinks below a part of its initial height has fallen.
     """
 
-    def read(self, node: Node) -> None:
+    def read(self, node: SettingNode) -> None:
         """Read the speed range and what counts as a step and a fall."""
         self.low = node.number("min_velocity", 0.0)
         self.high = node.number("max_velocity", SPEED_OF_LIGHT_M_S)
@@ -288,7 +288,7 @@ class JumpMeasure(Measure):
 
     minimize = False
 
-    def read(self, node: Node) -> None:
+    def read(self, node: SettingNode) -> None:
         """Read when a jump starts and ends."""
         for key in ("jump_type", "jump_angle", "body", "target_body", "offset", "recover_time"):
             if node.get(key) is not None:
@@ -328,7 +328,7 @@ class JumpMeasure(Measure):
 class EffortMeasure(Measure):
     """Effort of the muscles: metabolic power, total force, or a sum of powers of activations."""
 
-    def read(self, node: Node) -> None:
+    def read(self, node: SettingNode) -> None:
         """Read the type of effort, and compute the masses of the muscles.
 
         The mass is F_max / specific tension * density * optimal fiber length.
@@ -389,7 +389,7 @@ class Penalty(Measure):
     _statistics: tuple[tuple[str, int], ...] = ()
     """Per criterion its mode (average, highest, lowest or sum) and its offset in the workspace."""
 
-    def penalize(self, node: Node, kind: int, place: int = 0, factor: float = 1.0) -> None:
+    def penalize(self, node: SettingNode, kind: int, place: int = 0, factor: float = 1.0) -> None:
         """Request a criterion for the excess of a number beyond a range.
 
         Args:
@@ -436,7 +436,7 @@ class Penalty(Measure):
 class DofMeasure(Penalty):
     """Penalty of a coordinate, its speed, or the force of its limit outside a range."""
 
-    def read(self, node: Node) -> None:
+    def read(self, node: SettingNode) -> None:
         """Read the coordinate and the ranges; rotations are in degrees unless `in_degrees` is false."""
         name = node.text("dof")
         senses = self.walkers.sensor_plan
@@ -468,7 +468,7 @@ class DofMeasure(Penalty):
 class ReactionForceMeasure(Penalty):
     """Penalty of ground reaction forces over the body weight outside a range."""
 
-    def read(self, node: Node) -> None:
+    def read(self, node: SettingNode) -> None:
         """Read the range, and whether it is for the more loaded leg or for the total."""
         self.walkers.expect_legs()
         self.penalize(node, LARGEST_LOAD if node.flag("use_force_per_leg", False) else WHOLE_LOAD)
@@ -477,7 +477,7 @@ class ReactionForceMeasure(Penalty):
 class CompositeMeasure(Measure):
     """Sum of measures."""
 
-    def read(self, node: Node) -> None:
+    def read(self, node: SettingNode) -> None:
         """Read the parts; with `dual_sided` or `symmetric` there is one of each part for either side."""
         if node.flag("use_first_non_zero_result", False):
             raise node.error("use_first_non_zero_result is not done here")

@@ -12,7 +12,7 @@ import numpy as np
 from osimlite.base.files import read_file
 from osimlite.errors import DocumentError
 from osimlite.mechanics.multibody.spatial import Array
-from osimlite.studies.reflexes.settings import Node, parse_finite
+from osimlite.studies.reflexes.settings import SettingNode, parse_finite
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 """Pattern of a decimal number without names such as inf and nan."""
@@ -64,7 +64,7 @@ class Parameters:
         self.auto_std_factor = AUTO_STD_FACTOR
         self.values_used: dict[str, float] = {}
 
-    def get_number(self, node: Node, key: str, default: float, name: str = "") -> Array:
+    def get_number(self, node: SettingNode, key: str, default: float, name: str = "") -> Array:
         """Return a number of each candidate (w,), literal or the value of a parameter.
 
         Args:
@@ -83,7 +83,7 @@ class Parameters:
         self.values_used[name or key] = float(found[0])
         return found
 
-    def parse_number(self, part: Node, name: str) -> Array:
+    def parse_number(self, part: SettingNode, name: str) -> Array:
         """Return a number of each candidate (w,) from its own node.
 
         Values of parameters are clipped to their bounds.
@@ -125,7 +125,7 @@ class Parameters:
         )
 
     def _request_parameter(
-        self, part: Node, name: str, mean: float, std: float, low: float, high: float
+        self, part: SettingNode, name: str, mean: float, std: float, low: float, high: float
     ) -> Array:
         """Return the values (count,) of a parameter, and note its definition."""
         if not low <= mean <= high:

@@ -21,7 +21,7 @@ from osimlite.studies.reflexes.controllers import CONTROLLERS, Reflexes
 from osimlite.studies.reflexes.measures import MEASURES, Criteria, Measure
 from osimlite.studies.reflexes.parameters import Parameter, Parameters, read_par
 from osimlite.studies.reflexes.settings import (
-    Node,
+    SettingNode,
     find_file,
     make_node,
     matches_pattern,
@@ -144,7 +144,7 @@ class Scenario:
             raise objective.error(
                 f"of models only ModelOpenSim4 is done here, and this has {other}"
             )
-        self.settings: Node = settings
+        self.settings: SettingNode = settings
         if model is None:
             model = read(find_file(settings.text("model_file"), self.folder))
         settings.get("model_file")
@@ -443,7 +443,9 @@ class Candidates:
         )
 
 
-def read_initial_parameters(optimizer: Node, folder: Path) -> dict[str, tuple[float, float, float]]:
+def read_initial_parameters(
+    optimizer: SettingNode, folder: Path
+) -> dict[str, tuple[float, float, float]]:
     """Read the .par files with which a search starts.
 
     Args:
@@ -464,7 +466,7 @@ def read_initial_parameters(optimizer: Node, folder: Path) -> dict[str, tuple[fl
     return result
 
 
-def read_control_step(node: Node) -> float:
+def read_control_step(node: SettingNode) -> float:
     """Return the duration of a control step (s)."""
     step = node.number("fixed_control_step_size", 0.005)
     if not MIN_CONTROL_STEP_S <= step < np.inf:
@@ -474,7 +476,7 @@ def read_control_step(node: Node) -> float:
     return step
 
 
-def read_leg_names(node: Node) -> dict[str, str]:
+def read_leg_names(node: SettingNode) -> dict[str, str]:
     """Return the names of the bodies and contact forces of legs.
 
     Returns:

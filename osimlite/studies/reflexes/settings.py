@@ -51,7 +51,7 @@ IGNORED_KEYS = "name", "signature", "signature_prefix", "signature_postfix"
 
 
 @dataclass
-class Node:
+class SettingNode:
     """Value with its parts, and its position in a file.
 
     Attributes:
@@ -63,12 +63,12 @@ class Node:
     """
 
     value: str = ""
-    parts: list[tuple[str, Node]] = field(default_factory=list)
+    parts: list[tuple[str, SettingNode]] = field(default_factory=list)
     file: str = ""
     line: int = 0
     read_keys: set[str] = field(default_factory=set)
 
-    def get(self, key: str) -> Node | None:
+    def get(self, key: str) -> SettingNode | None:
         """Return the only part with a key, or None; the key counts as read.
 
         Raises:
@@ -175,7 +175,7 @@ class Node:
             ) from None
         return np.array([x, y, z])
 
-    def select_all(self, *names: str) -> Iterator[tuple[str, Node]]:
+    def select_all(self, *names: str) -> Iterator[tuple[str, SettingNode]]:
         """Return an iterator over the parts with any of some keys, as (key, node).
 
         They have the order of the file.
@@ -183,7 +183,7 @@ class Node:
         self.read_keys.update(names)
         return ((name, node) for name, node in self.parts if name in names)
 
-    def select_one(self, *names: str) -> tuple[str, Node] | None:
+    def select_one(self, *names: str) -> tuple[str, SettingNode] | None:
         """Return the only part with any of some keys.
 
         Returns:
@@ -243,7 +243,7 @@ class _Budget:
                 file=str(path),
             )
 
-    def take_part(self, node: Node) -> None:
+    def take_part(self, node: SettingNode) -> None:
         """Count a part of a scenario, and raise an error if there are too many."""
         self.parts -= 1
         if self.parts < 0:
@@ -252,7 +252,7 @@ class _Budget:
             )
 
 
-def read_settings(path: str | Path) -> Node:
+def read_settings(path: str | Path) -> SettingNode:
     """Read a scenario file and the files that it includes.
 
     Included files are searched in the folder of the file that includes them, in that of the
@@ -267,12 +267,14 @@ def read_settings(path: str | Path) -> Node:
     return _read_source(Path(path), Path(path).parent, constants, 0, _Budget())
 
 
-def make_node(data: Mapping[str, Any]) -> Node:
+def make_node(data: Mapping[str, Any]) -> SettingNode:
     """Return the tree of a mapping of Python data, which has the same keys as a file."""
-    return Node(parts=[part for key, value in data.items() for part in _list_parts(key, value)])
+    return SettingNode(
+        parts=[part for key, value in data.items() for part in _list_parts(key, value)]
+    )
 
 
-def _list_parts(key: str, value: Any) -> Iterator[tuple[str, Node]]:
+def _list_parts(key: str, value: Any) -> Iterator[tuple[str, SettingNode]]:
     """Yield the parts that a value of YAML means: one, or one for each mapping of a list."""
     if isinstance(value, Mapping):
         yield key, make_node(value)
@@ -282,13 +284,15 @@ def _list_parts(key: str, value: Any) -> Iterator[tuple[str, Node]]:
     else:
         yield (
             key,
-            Node(" ".join(map(str, value)) if isinstance(value, list | tuple) else str(value)),
+            SettingNode(
+                " ".join(map(str, value)) if isinstance(value, list | tuple) else str(value)
+            ),
         )
 
 
 def _read_source(
     path: Path, base: Path, constants: dict[str, str], depth: int, budget: _Budget
-) -> Node:
+) -> SettingNode:
     """Read a file of any supported format, with all files that it includes."""
     budget.take_file(path)
     try:
@@ -301,7 +305,7 @@ def _read_source(
     if depth > MAX_INCLUDE_DEPTH:
         raise DocumentError("the files include one another without end", file=str(path))
     if path.suffix in SUFFIXES:
-        top = Node(file=str(path), line=1)
+        top = SettingNode(file=str(path), line=1)
         found = parse_yaml(text, str(path), with_lines=True)
         if found is not None:
             _fill_from_yaml(top, found, path, base, depth, 0, budget)
@@ -323,7 +327,7 @@ def _read_source(
         line += found.group().count("\n")
         offset = found.end()
     reader = _TokenReader(tokens, path, base, constants, depth, budget)
-    top = Node(file=str(path), line=1)
+    top = SettingNode(file=str(path), line=1)
     reader.fill(top, 0)
     if reader.index < len(tokens):
         raise top.error(f"line {tokens[reader.index][1]}: a '}}' without its '{{'")
@@ -331,7 +335,7 @@ def _read_source(
 
 
 def _fill_from_yaml(
-    node: Node, found: Any, path: Path, base: Path, depth: int, level: int, budget: _Budget
+    node: SettingNode, found: Any, path: Path, base: Path, depth: int, level: int, budget: _Budget
 ) -> None:
     """Add the parts of a YAML mapping to a node.
 
@@ -367,12 +371,12 @@ def _fill_from_yaml(
             # A list of plain values is one value of several words, such as a vector.
             words = " ".join(item.value for item in several)
             node.parts.append(
-                (key.value, Node(words, file=node.file, line=value.start_mark.line + 1))
+                (key.value, SettingNode(words, file=node.file, line=value.start_mark.line + 1))
             )
             continue
         for item in several:
             budget.take_part(node)
-            part = Node(file=node.file, line=item.start_mark.line + 1)
+            part = SettingNode(file=node.file, line=item.start_mark.line + 1)
             node.parts.append((key.value, part))
             if item.id == "scalar":
                 part.value = item.value
@@ -413,7 +417,7 @@ class _TokenReader:
         """Return the number of the line of the latest token."""
         return self.tokens[min(self.index, len(self.tokens)) - 1][1] if self.tokens else 1
 
-    def fill(self, node: Node, level: int) -> None:
+    def fill(self, node: SettingNode, level: int) -> None:
         """Read the parts of a node up to its closing brace."""
         if level > MAX_NESTING:
             raise node.error(f"the braces nest more than {MAX_NESTING} levels deep")
@@ -426,7 +430,7 @@ class _TokenReader:
                 node.parts += self._read_included(" ".join(words)).parts
                 continue
             self.budget.take_part(node)
-            part = Node(file=str(self.path), line=self.line())
+            part = SettingNode(file=str(self.path), line=self.line())
             what = self.next() if self.index < len(self.tokens) else ""
             # A part is `key = value`, `key { ... }`, or `key = value { ... }`.
             if what == "=":
@@ -466,7 +470,7 @@ class _TokenReader:
             return self.constants[value]
         return value.strip('"')
 
-    def _read_included(self, name: str) -> Node:
+    def _read_included(self, name: str) -> SettingNode:
         """Return the contents of an included file."""
         included = _resolve_include(name, self.path, self.base)
         return _read_source(included, self.base, self.constants, self.depth + 1, self.budget)

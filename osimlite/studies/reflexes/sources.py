@@ -20,7 +20,7 @@ from osimlite.mechanics.kernels.sensors import (
     VELOCITY,
 )
 from osimlite.mechanics.multibody.spatial import Array
-from osimlite.studies.reflexes.settings import Node
+from osimlite.studies.reflexes.settings import SettingNode
 from osimlite.studies.reflexes.walkers import SIDES, SensedModel
 
 
@@ -43,7 +43,7 @@ class Source(NamedTuple):
     numbers: tuple[float, ...] = ()
 
 
-SourceFactory = Callable[[SensedModel, Node, int, str], Source]
+SourceFactory = Callable[[SensedModel, SettingNode, int, str], Source]
 """Function that makes the sensor of a reflex.
 
 Its arguments are the model, the node of the reflex, the index of the muscle, coordinate or body
@@ -112,7 +112,7 @@ def _select_muscle_factory(what: str, first: int) -> SourceFactory:
         first: index in `SENSES` of the offset of this quantity in the sensor row.
     """
 
-    def feel(sensed: SensedModel, node: Node, number: int, side: str) -> Source:
+    def feel(sensed: SensedModel, node: SettingNode, number: int, side: str) -> Source:
         return Source(
             f"{sensed.paths[number].removeprefix('/')}.{what}",
             IN_ROW,
@@ -122,7 +122,7 @@ def _select_muscle_factory(what: str, first: int) -> SourceFactory:
     return feel
 
 
-def _make_spindle_source(sensed: SensedModel, node: Node, number: int, side: str) -> Source:
+def _make_spindle_source(sensed: SensedModel, node: SettingNode, number: int, side: str) -> Source:
     """Return the sensor of the firing rate of a muscle's spindles, from fiber length and velocity."""
     length, speed = (
         int(sensed.sensor_plan[first]) + number for first in (SENSES.LENGTHS, SENSES.VELOCITIES)
@@ -138,7 +138,7 @@ def select_coordinate_factory(what: str, first: int) -> SourceFactory:
         first: index in `SENSES` of the offset of this quantity in the sensor row.
     """
 
-    def feel(sensed: SensedModel, node: Node, number: int, side: str) -> Source:
+    def feel(sensed: SensedModel, node: SettingNode, number: int, side: str) -> Source:
         return Source(
             f"{sensed.coordinates[number]}.{what}", IN_ROW, int(sensed.sensor_plan[first]) + number
         )
@@ -177,7 +177,7 @@ def _select_point_factory(what: str, kind: int) -> SourceFactory:
         kind: kind of sensor, `POSITION` or `VELOCITY`.
     """
 
-    def feel(sensed: SensedModel, node: Node, number: int, side: str) -> Source:
+    def feel(sensed: SensedModel, node: SettingNode, number: int, side: str) -> Source:
         offset = node.vector("offset", "0 0 0")
         direction = node.vector("direction")
         if not direction.any():
@@ -196,7 +196,7 @@ def _select_point_factory(what: str, kind: int) -> SourceFactory:
     return feel
 
 
-def _read_axis(sensed: SensedModel, node: Node, number: int, side: str) -> Array:
+def _read_axis(sensed: SensedModel, node: SettingNode, number: int, side: str) -> Array:
     """Return the unit vector (3,) of a reflex on the rotation of a body.
 
     On the left side x and y change sign, so that one setting serves both sides: a mirror image in
@@ -212,7 +212,7 @@ def _read_axis(sensed: SensedModel, node: Node, number: int, side: str) -> Array
     return axis / np.linalg.norm(axis) * ((-1.0, -1.0, 1.0) if own == SIDES[0] else (1.0, 1.0, 1.0))
 
 
-def _make_angle_source(sensed: SensedModel, node: Node, number: int, side: str) -> Source:
+def _make_angle_source(sensed: SensedModel, node: SettingNode, number: int, side: str) -> Source:
     """Return the sensor of the rotation of a body about one of the axes x, y and z of ground."""
     axis, (link, frame) = _read_axis(sensed, node, number, side), sensed.engine.placements[number]
     # A rotation about a general axis has no angle that is a function of the orientation alone.
@@ -225,7 +225,7 @@ def _make_angle_source(sensed: SensedModel, node: Node, number: int, side: str) 
 
 
 def _make_angular_velocity_source(
-    sensed: SensedModel, node: Node, number: int, side: str
+    sensed: SensedModel, node: SettingNode, number: int, side: str
 ) -> Source:
     """Return the sensor of the angular velocity of a body about an axis."""
     axis, (link, frame) = _read_axis(sensed, node, number, side), sensed.engine.placements[number]

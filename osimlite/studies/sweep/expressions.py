@@ -66,7 +66,7 @@ OPERATORS: dict[type[ast.AST], Callable[..., Any]] = {
 """Operators by the nodes of Python's syntax tree."""
 
 
-class Expression:
+class ExpressionMeasure:
     """Measure that is an expression.
 
     Args:

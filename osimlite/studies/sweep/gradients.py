@@ -18,7 +18,7 @@ from osimlite.derivatives.tangents import TangentSteps
 from osimlite.errors import SettingError, SimulationError, UnsupportedError
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.simulation.batches import Runs, run_many
-from osimlite.simulation.engines.protocol import Settings
+from osimlite.simulation.engines.protocol import EngineSettings
 from osimlite.simulation.options import MERSON, compute_report_times
 from osimlite.simulation.pack import pack
 from osimlite.studies.sweep.measures import Batch, make_measure
@@ -209,7 +209,7 @@ class Gradients:
             states.append(y)
 
         stepper = here.variant.engine.make_stepper(
-            0.0, here.start.tolist(), Settings(**self._plan.integration_choices()), note
+            0.0, here.start.tolist(), EngineSettings(**self._plan.integration_choices()), note
         )
         stepper.tabulate([self._plan.to])
         stepper.catch_up()

@@ -26,7 +26,7 @@ from osimlite.base.text import suggest_name, suggest_or_list
 from osimlite.errors import ModelError, SettingError
 from osimlite.simulation.batches import Runs, Watch
 from osimlite.studies.sweep import registry
-from osimlite.studies.sweep.expressions import Expression, Quantity, list_quantities
+from osimlite.studies.sweep.expressions import ExpressionMeasure, Quantity, list_quantities
 from osimlite.studies.sweep.variables import Floats
 
 
@@ -189,7 +189,7 @@ def make_measure(spec: Any, engine: Any, feet: Sequence[str] | None = None) -> R
             event_count=_estimate_event_count,
         )
     if is_expression(name):
-        return RunMeasure(name, partial(_measure_expression, Expression(name, engine)))
+        return RunMeasure(name, partial(_measure_expression, ExpressionMeasure(name, engine)))
     if "/" in name:
         try:
             place, locked = _find_state(engine, name)
@@ -288,7 +288,7 @@ def _read_end_states(place: int | None, locked: float, batch: Batch) -> Floats:
     return np.full(len(batch.starts), locked) if place is None else batch.runs.states[:, place]
 
 
-def _measure_expression(expression: Expression, batch: Batch) -> list[float]:
+def _measure_expression(expression: ExpressionMeasure, batch: Batch) -> list[float]:
     """Return the value of an expression for each run, from its saved states and its last one."""
     result = []
     runs, times = batch.runs, batch.report_times

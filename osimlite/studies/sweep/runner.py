@@ -12,7 +12,7 @@ from osimlite.base.records import dataclass, replace
 from osimlite.errors import OsimliteError, SettingError
 from osimlite.simulation.batches import Runs, Watch
 from osimlite.simulation.options import compute_report_times
-from osimlite.studies.sweep.expressions import Expression, list_driven_names
+from osimlite.studies.sweep.expressions import ExpressionMeasure, list_driven_names
 from osimlite.studies.sweep.measures import (
     Batch,
     RunMeasure,
@@ -104,7 +104,7 @@ class _Observers:
             spec for spec in plan.measures if plan.controller is not None and is_expression(spec)
         ]
         for spec in expressions:
-            for name in sorted(Expression(spec, engine).names & list_driven_names(engine)):
+            for name in sorted(ExpressionMeasure(spec, engine).names & list_driven_names(engine)):
                 raise SettingError(
                     f"the measure '{spec}' looks at '{name}', which the controller has a part in; of runs with a "
                     "controller a sweep keeps states alone"

@@ -31,7 +31,7 @@ MIN_WEIGHT_FRACTION = 0.05
 """Fraction of the weight above which a foot stands on a plate."""
 
 
-class MeasuredLoad(NamedTuple):
+class TrialLoad(NamedTuple):
     """Force that was measured."""
 
     item: ExternalForce  # force of the document
@@ -50,7 +50,7 @@ class LoadScale(NamedTuple):
     moment: float = float("nan")
 
 
-def read_loads(tool: TrialTool) -> tuple[Path, StoTable, list[MeasuredLoad]]:
+def read_loads(tool: TrialTool) -> tuple[Path, StoTable, list[TrialLoad]]:
     """Read the loads of a tool that are on.
 
     Returns:
@@ -64,12 +64,12 @@ def read_loads(tool: TrialTool) -> tuple[Path, StoTable, list[MeasuredLoad]]:
     return file, table, list(_select_loads(select_members(document, "ExternalForce"), table))
 
 
-def _select_loads(items: Sequence[ExternalForce], table: StoTable) -> Iterator[MeasuredLoad]:
+def _select_loads(items: Sequence[ExternalForce], table: StoTable) -> Iterator[TrialLoad]:
     """Yield the loads that are on and have data."""
     for item in items:
         force = _read_vectors(table, item.force_identifier)
         if item.appliesForce and force is not None:
-            yield MeasuredLoad(item, force, _read_vectors(table, item.point_identifier))
+            yield TrialLoad(item, force, _read_vectors(table, item.point_identifier))
 
 
 def _read_vectors(table: StoTable, identifier: str | None) -> Array | None:
@@ -158,7 +158,7 @@ def _mirror_name(name: str) -> str:
 
 
 def _measure_distances(
-    motion: RecordedMotion, table: StoTable, load: MeasuredLoad, bodies: Sequence[str]
+    motion: RecordedMotion, table: StoTable, load: TrialLoad, bodies: Sequence[str]
 ) -> Array | None:
     """Return the distances of a load from the mass centres of bodies at times at which it is large.
 

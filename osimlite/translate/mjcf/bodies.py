@@ -13,9 +13,14 @@ from lxml.etree import _Element
 from osimlite.mechanics.multibody.spatial import Array, invert_transform, quaternion_of
 from osimlite.schema.frames import PhysicalFrame
 from osimlite.schema.joints import Joint
-from osimlite.simulation.robot.robot import Link, RobotJoint, breaks_triangle_rule, principal_axes
+from osimlite.simulation.robot.robot import (
+    RobotJoint,
+    RobotLink,
+    breaks_triangle_rule,
+    principal_axes,
+)
 from osimlite.translate.fidelity import Error
-from osimlite.translate.mjcf.draft import Draft, add_element, clear_rounding, format_pose
+from osimlite.translate.mjcf.draft import MjcfDraft, add_element, clear_rounding, format_pose
 from osimlite.translate.mjcf.scenery import FRAME_GROUP
 
 MIN_MASS = 1e-14
@@ -27,7 +32,7 @@ MAX_JOINTS_PER_BODY = 6
 """Most joints that MuJoCo allows in one body."""
 
 
-def add_bodies(draft: Draft) -> None:
+def add_bodies(draft: MjcfDraft) -> None:
     """Add all bodies with their inertias and joints."""
     robot = draft.robot
     carriers = {joint.child: joint for joint in robot.joints}
@@ -62,7 +67,7 @@ def add_bodies(draft: Draft) -> None:
             draft.fidelity.translated[draft.tree.path_of(frame) or ""] = "anchors of joints"
 
 
-def add_frames(draft: Draft) -> None:
+def add_frames(draft: MjcfDraft) -> None:
     """Add a site for every frame that is not a body, so that programs can read its pose."""
     for _, path in draft.iterate_components(PhysicalFrame):
         if path in draft.mechanism.frames:
@@ -71,7 +76,7 @@ def add_frames(draft: Draft) -> None:
             )
 
 
-def _add_chain(draft: Draft, chain: list[RobotJoint], name: str) -> _Element:
+def _add_chain(draft: MjcfDraft, chain: list[RobotJoint], name: str) -> _Element:
     """Add the element of the body at the end of a chain of joints to the body that carries it."""
     parent, start = draft.frames[chain[0].parent]
     moving = [place for place, joint in enumerate(chain) if joint.kind != "fixed"]
@@ -115,7 +120,9 @@ def _add_chain(draft: Draft, chain: list[RobotJoint], name: str) -> _Element:
     return element
 
 
-def _add_inertia(draft: Draft, element: _Element, link: Link, path: str, *, moves: bool) -> None:
+def _add_inertia(
+    draft: MjcfDraft, element: _Element, link: RobotLink, path: str, *, moves: bool
+) -> None:
     """Add mass and inertia of a body, repaired where MuJoCo rejects them."""
     moments, axes = principal_axes(link.inertia)
     mass = link.mass

@@ -10,11 +10,11 @@ import numpy as np
 
 from osimlite.mechanics.multibody import body_constraints as b
 from osimlite.translate.fidelity import LEFT_OUT
-from osimlite.translate.mjcf.draft import SPECK_MASS_KG, Draft, add_element
+from osimlite.translate.mjcf.draft import SPECK_MASS_KG, MjcfDraft, add_element
 from osimlite.translate.mjcf.frame_forces import add_straight_tendon
 
 
-def add_constraints(draft: Draft) -> None:
+def add_constraints(draft: MjcfDraft) -> None:
     """Add every constraint between bodies.
 
     Constraints between coordinates are equalities of joints, see `couplings`.
@@ -31,7 +31,9 @@ def add_constraints(draft: Draft) -> None:
                 draft.fidelity.translated[constraint.name] = make(draft, constraint)
 
 
-def _add_site_equality(kind: str, draft: Draft, item: b.WeldConstraint | b.PointConstraint) -> str:
+def _add_site_equality(
+    kind: str, draft: MjcfDraft, item: b.WeldEquations | b.PointEquations
+) -> str:
     """Add an equality of a kind ("weld" or "connect") between two sites."""
     name = draft.make_name("equality", item.name)
     sites = [draft.add_site(item.name, *end) for end in (item.first, item.second)]
@@ -39,7 +41,7 @@ def _add_site_equality(kind: str, draft: Draft, item: b.WeldConstraint | b.Point
     return f"equality {name}"
 
 
-def _add_distance(draft: Draft, item: b.DistanceConstraint) -> str:
+def _add_distance(draft: MjcfDraft, item: b.DistanceConstraint) -> str:
     """Add a tendon of constant length; MuJoCo measures from its length with all joints at zero."""
     name = add_straight_tendon(
         draft, item.name, [draft.add_site(item.name, *end) for end in (item.first, item.second)]
@@ -58,7 +60,7 @@ def _add_distance(draft: Draft, item: b.DistanceConstraint) -> str:
     return f"equality {name}"
 
 
-def _add_point_on_line(draft: Draft, item: b.PointOnLineConstraint) -> str:
+def _add_point_on_line(draft: MjcfDraft, item: b.PointOnLineEquations) -> str:
     """Add a light body that slides along the line, and connect it to the follower.
 
     MuJoCo has no constraint of a point to a line.
@@ -92,10 +94,10 @@ def _add_point_on_line(draft: Draft, item: b.PointOnLineConstraint) -> str:
     return f"equality {equality}"
 
 
-_MAKERS: Mapping[type, Callable[[Draft, Any], str]] = {
-    b.WeldConstraint: partial(_add_site_equality, "weld"),
-    b.PointConstraint: partial(_add_site_equality, "connect"),
+_MAKERS: Mapping[type, Callable[[MjcfDraft, Any], str]] = {
+    b.WeldEquations: partial(_add_site_equality, "weld"),
+    b.PointEquations: partial(_add_site_equality, "connect"),
     b.DistanceConstraint: _add_distance,
-    b.PointOnLineConstraint: _add_point_on_line,
+    b.PointOnLineEquations: _add_point_on_line,
 }
 """Functions that add a constraint, by its class."""

@@ -22,7 +22,7 @@ from osimlite.schema.tree import Use
 from osimlite.simulation.robot.visuals import mesh_shape
 from osimlite.translate.collisions import HALF_SPACE_BOX_M
 from osimlite.translate.fidelity import LEFT_OUT
-from osimlite.translate.mjcf.draft import Draft, Untranslatable, Value, add_element, format_pose
+from osimlite.translate.mjcf.draft import MjcfDraft, Untranslatable, Value, add_element, format_pose
 from osimlite.translate.mjcf.scenery import CONTACT_GROUP
 
 _PLANE = np.array(
@@ -36,7 +36,7 @@ ContactForce = HuntCrossleyForce | ElasticFoundationForce | SmoothSphereHalfSpac
 """Contact forces that become pairs of geoms."""
 
 
-def add_contacts(draft: Draft) -> None:
+def add_contacts(draft: MjcfDraft) -> None:
     """Add contact surfaces, and a pair for any two surfaces that a contact force connects."""
     surfaces = list(draft.iterate_components(ContactGeometry))
     if draft.options.contact == "none" or not surfaces:
@@ -70,7 +70,7 @@ def add_contacts(draft: Draft) -> None:
         draft.fidelity.add("contact", path, what, done, f"pairs {pairs}")
 
 
-def _add_surface(draft: Draft, geometry: ContactGeometry, path: str) -> None:
+def _add_surface(draft: MjcfDraft, geometry: ContactGeometry, path: str) -> None:
     """Add the geom of a contact geometry, if MuJoCo has one for it."""
     body, placed = draft.find_placement(geometry, "socket_frame")
     made = _make_geom(
@@ -88,7 +88,7 @@ def _add_surface(draft: Draft, geometry: ContactGeometry, path: str) -> None:
 
 
 def _make_geom(
-    draft: Draft, geometry: ContactGeometry, path: str, *, still: bool
+    draft: MjcfDraft, geometry: ContactGeometry, path: str, *, still: bool
 ) -> tuple[dict[str, Value], Array] | None:
     """Return the attributes of a geom and its frame (4, 4) in that of the geometry.
 
@@ -119,7 +119,7 @@ def _make_geom(
     raise Untranslatable("MuJoCo has no such surface")
 
 
-def _add_pairs(draft: Draft, force: ContactForce) -> Iterator[str]:
+def _add_pairs(draft: MjcfDraft, force: ContactForce) -> Iterator[str]:
     """Add a pair for any two surfaces of a force that are on different bodies; yield their names."""
     for (one, first), (two, second) in combinations(_iterate_surfaces(draft, force), 2):
         became = [
@@ -147,7 +147,9 @@ def _add_pairs(draft: Draft, force: ContactForce) -> Iterator[str]:
         yield name
 
 
-def _iterate_surfaces(draft: Draft, force: ContactForce) -> Iterator[tuple[ContactGeometry, float]]:
+def _iterate_surfaces(
+    draft: MjcfDraft, force: ContactForce
+) -> Iterator[tuple[ContactGeometry, float]]:
     """Yield the surfaces of a force with the dynamic friction coefficient of each."""
     if isinstance(force, SmoothSphereHalfSpaceForce):
         for socket in ("socket_sphere", "socket_half_space"):

@@ -18,13 +18,13 @@ from osimlite.schema.muscles import PathActuator
 from osimlite.schema.springs import SpringGeneralizedForce
 from osimlite.simulation.elements.force_types.coordinate_forces import read_limit_constants
 from osimlite.translate.fidelity import Error
-from osimlite.translate.mjcf.draft import Draft, Lead, Untranslatable, Value, add_element
+from osimlite.translate.mjcf.draft import Lead, MjcfDraft, Untranslatable, Value, add_element
 
 UNREACHABLE_VALUE = 1e6
 """Value (rad or m) that no coordinate reaches, for the side on which a one-sided spring is slack."""
 
 
-def add_actuator(draft: Draft, force: CoordinateActuator, path: str, **dynamics: Value) -> str:
+def add_actuator(draft: MjcfDraft, force: CoordinateActuator, path: str, **dynamics: Value) -> str:
     """Add an actuator on a joint, whose force is proportional to its control.
 
     Args:
@@ -43,7 +43,7 @@ def add_actuator(draft: Draft, force: CoordinateActuator, path: str, **dynamics:
 
 
 def add_scaled_actuator(
-    draft: Draft, force: CoordinateActuator | PathActuator, path: str, **on: Value
+    draft: MjcfDraft, force: CoordinateActuator | PathActuator, path: str, **on: Value
 ) -> str:
     """Add an actuator whose force is its control times its gear.
 
@@ -65,7 +65,7 @@ def add_scaled_actuator(
     return f"actuator {name}"
 
 
-def add_lagging_actuator(draft: Draft, force: ActivationCoordinateActuator, path: str) -> str:
+def add_lagging_actuator(draft: MjcfDraft, force: ActivationCoordinateActuator, path: str) -> str:
     """Add an actuator whose activation follows its control by first-order dynamics.
 
     Args:
@@ -83,7 +83,7 @@ def add_lagging_actuator(draft: Draft, force: ActivationCoordinateActuator, path
     return made
 
 
-def add_spring(draft: Draft, force: SpringGeneralizedForce, path: str) -> str:
+def add_spring(draft: MjcfDraft, force: SpringGeneralizedForce, path: str) -> str:
     """Add a spring and damper on the tendon of a coordinate.
 
     Args:
@@ -101,7 +101,7 @@ def add_spring(draft: Draft, force: SpringGeneralizedForce, path: str) -> str:
     )
 
 
-def add_limit(draft: Draft, force: CoordinateLimitForce, path: str) -> str:
+def add_limit(draft: MjcfDraft, force: CoordinateLimitForce, path: str) -> str:
     """Add a spring beyond each limit: a tendon that is slack between them.
 
     Args:
@@ -145,7 +145,7 @@ def add_limit(draft: Draft, force: CoordinateLimitForce, path: str) -> str:
 
 
 def _add_tendon(
-    draft: Draft, lead: Lead, path: str, slack: tuple[float, float], **law: Value
+    draft: MjcfDraft, lead: Lead, path: str, slack: tuple[float, float], **law: Value
 ) -> str:
     """Add a tendon whose length is the coordinate plus a constant.
 
@@ -161,7 +161,7 @@ def _add_tendon(
 
 
 def _find_lead(
-    draft: Draft, force: CoordinateActuator | SpringGeneralizedForce | CoordinateLimitForce
+    draft: MjcfDraft, force: CoordinateActuator | SpringGeneralizedForce | CoordinateLimitForce
 ) -> tuple[Lead, int]:
     """Return the joint of the coordinate of a force, and the index of the coordinate."""
     if not force.coordinate:

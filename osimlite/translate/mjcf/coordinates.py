@@ -9,10 +9,10 @@ import numpy as np
 from osimlite.mechanics.multibody.functions import Linear
 from osimlite.schema.joints import Joint
 from osimlite.simulation.robot.couplings import Composition
-from osimlite.translate.mjcf.draft import Draft, Follower
+from osimlite.translate.mjcf.draft import Follower, MjcfDraft
 
 
-def add_coordinates(draft: Draft) -> None:
+def add_coordinates(draft: MjcfDraft) -> None:
     """Add ranges of coordinates to their joints, without limits, and hold prescribed coordinates."""
     elements = {joint.get("name"): joint for joint in draft.get_section("worldbody").iter("joint")}
     note = draft.fidelity.add

@@ -12,8 +12,8 @@ from osimlite.mechanics.multibody.mechanism import GROUND
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.simulation.robot.couplings import (
     Composition,
-    Driver,
-    Line,
+    CouplingDriver,
+    StraightLine,
     coordinate_drivers,
     couplers,
     joint_driver,
@@ -23,10 +23,15 @@ from osimlite.simulation.robot.names import joint_names
 from osimlite.simulation.robot.robot import RobotJoint
 from osimlite.translate.fidelity import Error
 from osimlite.translate.mjcf.bodies import MIN_MASS
-from osimlite.translate.mjcf.draft import SPECK_MASS_KG, Draft, Follower, Lead, add_element
+from osimlite.translate.mjcf.draft import SPECK_MASS_KG, Follower, Lead, MjcfDraft, add_element
 from osimlite.translate.mjcf.ellipsoids import add_ellipsoids
 from osimlite.translate.mjcf.moving import fit_composition
-from osimlite.translate.mjcf.polynomials import Fit, fit_quartic, sample_function, select_span
+from osimlite.translate.mjcf.polynomials import (
+    PolynomialFit,
+    fit_quartic,
+    sample_function,
+    select_span,
+)
 
 HELPER_INERTIA = 0.1
 """Mass (kg) and inertia (kg·m²) of helper bodies.
@@ -42,7 +47,7 @@ follow the joint.
 """
 
 
-def add_couplings(draft: Draft) -> None:
+def add_couplings(draft: MjcfDraft) -> None:
     """Add an equality for every joint that follows a function or a coupler."""
     robot = draft.robot
     draft.leads |= {
@@ -79,7 +84,7 @@ def add_couplings(draft: Draft) -> None:
             draft.fidelity.add("coupler", item.name, several, "left out: the coordinate is free")
 
 
-def _add_follower(draft: Draft, joint: RobotJoint, driver: Driver, whose: str) -> None:
+def _add_follower(draft: MjcfDraft, joint: RobotJoint, driver: CouplingDriver, whose: str) -> None:
     """Let a joint follow the coordinate that drives it, exactly or by a fitted polynomial."""
     unit = "rad" if joint.kind == "revolute" else "m"
     if driver.coordinate is None:
@@ -103,7 +108,7 @@ def _add_follower(draft: Draft, joint: RobotJoint, driver: Driver, whose: str) -
         done = "a quartic of a quartic, fitted"
         # The error is measured between the points of the fit as well.
         x = np.linspace(low, high, 400)
-        fit = Fit(
+        fit = PolynomialFit(
             (),
             Error.measure(
                 Polynomial(outer)(Polynomial(drive)(x)) - sample_function(function, x), unit
@@ -123,7 +128,7 @@ def _add_follower(draft: Draft, joint: RobotJoint, driver: Driver, whose: str) -
     draft.add_follower(joint.name, follower)
 
 
-def _add_argument_joint(draft: Draft, place: int) -> Lead:
+def _add_argument_joint(draft: MjcfDraft, place: int) -> Lead:
     """Add a joint for a coordinate that is only the argument of functions.
 
     It turns a small body about its centre.
@@ -147,11 +152,11 @@ def _add_argument_joint(draft: Draft, place: int) -> Lead:
         "a joint of its own, which turns a small body",
         f"joint {name}, {inertia:.3g} kg m^2",
     )
-    draft.leads[place] = Lead(name, Line(1.0, 0.0))
+    draft.leads[place] = Lead(name, StraightLine(1.0, 0.0))
     return draft.leads[place]
 
 
-def _compute_inertia(draft: Draft, place: int) -> float:
+def _compute_inertia(draft: MjcfDraft, place: int) -> float:
     """Return the inertia that a coordinate moves in the default pose (kg·m²).
 
     Coordinates that couplers move along are included.
@@ -167,7 +172,7 @@ def _compute_inertia(draft: Draft, place: int) -> float:
     return float(speeds @ draft.mechanism.mass_matrix(q) @ speeds)
 
 
-def add_helper(draft: Draft, place: int, drive: Array) -> Lead | None:
+def add_helper(draft: MjcfDraft, place: int, drive: Array) -> Lead | None:
     """Add a joint whose value is a polynomial of a coordinate, or return an existing one.
 
     Args:
@@ -210,10 +215,10 @@ def add_helper(draft: Draft, place: int, drive: Array) -> Lead | None:
         )
         add_element(speck, "joint", name=name, type="hinge", axis=(1.0, 0.0, 0.0))
         draft.add_follower(name, follower)
-    return Lead(name, Line(1.0, 0.0))
+    return Lead(name, StraightLine(1.0, 0.0))
 
 
-def compose_with_line(line: Line, polynomial: Array) -> tuple[float, ...]:
+def compose_with_line(line: StraightLine, polynomial: Array) -> tuple[float, ...]:
     """Compose a polynomial with a line.
 
     Args:
@@ -227,7 +232,7 @@ def compose_with_line(line: Line, polynomial: Array) -> tuple[float, ...]:
     return tuple(whole.coef.tolist())
 
 
-def _hold_joint(draft: Draft, joint: RobotJoint) -> None:
+def _hold_joint(draft: MjcfDraft, joint: RobotJoint) -> None:
     """Hold a joint that is a function of several coordinates at its default value.
 
     The driver moves it exactly.

@@ -13,7 +13,7 @@ from lxml.etree import Element, SubElement, _Element
 from osimlite.base.records import dataclass, field
 from osimlite.base.text import make_unique_name
 from osimlite.errors import ModelError, SimulationError, UnsupportedError
-from osimlite.mechanics.multibody.functions import Function
+from osimlite.mechanics.multibody.functions import SmoothFunction
 from osimlite.mechanics.multibody.mechanism import (
     GROUND,
     FramePlacement,
@@ -24,10 +24,10 @@ from osimlite.mechanics.multibody.spatial import Array, quaternion_of
 from osimlite.schema.base import Component
 from osimlite.schema.model import Model
 from osimlite.schema.tree import Tree
-from osimlite.simulation.robot.couplings import Line
+from osimlite.simulation.robot.couplings import StraightLine
 from osimlite.simulation.robot.mesh_files import MeshFiles
 from osimlite.simulation.robot.names import joint_names, to_dotted_name, xml_name
-from osimlite.simulation.robot.robot import Link, Robot
+from osimlite.simulation.robot.robot import Robot, RobotLink
 from osimlite.simulation.robot.urdf import number, numbers
 from osimlite.translate.fidelity import Fidelity
 
@@ -56,7 +56,7 @@ class Untranslatable(Exception):
 
 
 @dataclass(frozen=True)
-class Options:
+class MjcfOptions:
     """Options of a translation.
 
     Attributes:
@@ -88,7 +88,7 @@ class Lead(NamedTuple):
     """
 
     joint: str
-    line: Line
+    line: StraightLine
 
 
 class Follower(NamedTuple):
@@ -104,7 +104,7 @@ class Follower(NamedTuple):
 
     leader: str | None
     polynomial: tuple[float, ...]
-    function: Function | None = None
+    function: SmoothFunction | None = None
     arguments: tuple[str, ...] = ()
 
 
@@ -155,7 +155,7 @@ def add_element(parent: _Element, tag: str, **attributes: Value) -> _Element:
 
 
 @dataclass
-class Draft:
+class MjcfDraft:
     """MJCF under construction.
 
     Attributes:
@@ -183,7 +183,7 @@ class Draft:
     model: Model
     robot: Robot
     fidelity: Fidelity
-    options: Options
+    options: MjcfOptions
     folder: Path | None
     mesh_files: MeshFiles
     root: _Element = field(default_factory=lambda: Element("mujoco"))
@@ -420,7 +420,7 @@ class Draft:
             )
         return self._meshes[key]
 
-    def iterate_links(self) -> Iterator[tuple[Link, _Element]]:
+    def iterate_links(self) -> Iterator[tuple[RobotLink, _Element]]:
         """Yield the links that are bodies or ground, with their elements."""
         for index, path in enumerate(
             ["/ground", *(body.path for body in self.mechanism.bodies)], GROUND

@@ -8,7 +8,7 @@ from osimlite.schema.sets import Controller
 from osimlite.schema.wrapping import WrapObject
 from osimlite.simulation.elements import force_elements
 from osimlite.translate.fidelity import LEFT_OUT
-from osimlite.translate.mjcf.draft import Draft, add_element
+from osimlite.translate.mjcf.draft import MjcfDraft, add_element
 
 STATES_ACTUATOR = "osimlite.states"
 """Name of the actuator whose activations are the auxiliary states of all forces."""
@@ -17,7 +17,7 @@ COMPUTED_NOTE = "computed by osimlite.mjcf.Driver"
 """Entry of the account for components that the driver computes."""
 
 
-def add_driven(draft: Draft) -> None:
+def add_driven(draft: MjcfDraft) -> None:
     """Add actuators without force: one for each control, and one that stores the auxiliary states."""
     forces = force_elements(
         draft.model, draft.mechanism, skip_unsupported=True, folder=draft.folder

@@ -20,7 +20,7 @@ import numpy as np
 
 from osimlite.base.require import require
 from osimlite.mechanics.kernels.layout import ITEM, MODEL
-from osimlite.mechanics.multibody.functions import Constant, Function, Polynomial
+from osimlite.mechanics.multibody.functions import ConstantValue, Polynomial, SmoothFunction
 from osimlite.mechanics.multibody.mechanism import Values
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.model import Model
@@ -53,7 +53,7 @@ class _FollowerJoint(NamedTuple):
     dof: int
     addresses: list[int]
     leaders: list[int]
-    function: Function
+    function: SmoothFunction
     fitted: bool
 
     def evaluate(self, data: Any) -> tuple[float, Array, float, float]:
@@ -415,7 +415,7 @@ class Driver:
         controls = self.system.forces.controls
         # Two sets of controls with different values reveal where the values are stored.
         none, one = (
-            controls.add_functions(dict.fromkeys(controls.names, Constant(value)))
+            controls.add_functions(dict.fromkeys(controls.names, ConstantValue(value)))
             for value in (0.0, 1.0)
         )
         self.system.set_controls(none)

@@ -14,10 +14,16 @@ import numpy as np
 
 from osimlite.mechanics.multibody.motions import EllipsoidPoint
 from osimlite.simulation.robot.robot import RobotJoint
-from osimlite.translate.mjcf.draft import SPECK_MASS_KG, Draft, Follower, add_element, format_pose
+from osimlite.translate.mjcf.draft import (
+    SPECK_MASS_KG,
+    Follower,
+    MjcfDraft,
+    add_element,
+    format_pose,
+)
 
 
-def add_ellipsoids(draft: Draft) -> None:
+def add_ellipsoids(draft: MjcfDraft) -> None:
     """Add the mechanism for every joint whose body stays on an ellipsoid."""
     joints = draft.robot.joints
     slides = [
@@ -30,7 +36,9 @@ def add_ellipsoids(draft: Draft) -> None:
         )
 
 
-def _add_mechanism(draft: Draft, slides: list[RobotJoint], turns: tuple[RobotJoint, ...]) -> None:
+def _add_mechanism(
+    draft: MjcfDraft, slides: list[RobotJoint], turns: tuple[RobotJoint, ...]
+) -> None:
     """Add the body on slides, its connection and the couplings of one joint.
 
     A joint of another structure is left alone.

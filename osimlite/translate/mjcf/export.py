@@ -32,11 +32,11 @@ from osimlite.translate.mjcf.coordinates import add_coordinates
 from osimlite.translate.mjcf.couplings import add_couplings
 from osimlite.translate.mjcf.draft import (
     Contact,
-    Draft,
     Fit,
     Follower,
     Lead,
-    Options,
+    MjcfDraft,
+    MjcfOptions,
     Spline,
     Version,
     add_element,
@@ -49,7 +49,7 @@ from osimlite.translate.mjcf.scenery import add_camera, add_markers, add_shapes
 from osimlite.translate.mjcf.time_step import DEFAULT_STEP_S, choose_step
 from osimlite.translate.survey import account_for_rest
 
-Pass = Callable[[Draft], None]
+Pass = Callable[[MjcfDraft], None]
 """Function that adds the elements of one kind of component to a draft."""
 
 MECHANISM_PASSES: tuple[Pass, ...] = (add_bodies, add_couplings, add_coordinates, add_constraints)
@@ -189,11 +189,11 @@ def to_mjcf(
     mesh_files = MeshFiles(MeshFolders(place, geometry))
     shapes = collect_visuals(model, mechanism, fidelity.add, mesh_files) if visuals else Visuals()
     robot = coordinate_names(build_robot(mechanism, visuals=shapes.by_body))
-    draft = Draft(
+    draft = MjcfDraft(
         model,
         robot,
         fidelity,
-        Options(mujoco, visuals, contact, fit, spline, driver),
+        MjcfOptions(mujoco, visuals, contact, fit, spline, driver),
         place,
         mesh_files,
     )
@@ -221,7 +221,7 @@ def to_mjcf(
     )
 
 
-def _add_settings(draft: Draft) -> None:
+def _add_settings(draft: MjcfDraft) -> None:
     """Write the options of the simulation, and the sections of the file in their order."""
     root = draft.root
     root.set("model", xml_name(draft.mechanism.name))

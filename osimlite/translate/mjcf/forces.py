@@ -13,10 +13,10 @@ from osimlite.translate.fidelity import LEFT_OUT
 from osimlite.translate.mjcf import coordinate_forces as on_coordinates
 from osimlite.translate.mjcf import frame_forces as on_frames
 from osimlite.translate.mjcf import path_forces as on_paths
-from osimlite.translate.mjcf.draft import Draft, Untranslatable
+from osimlite.translate.mjcf.draft import MjcfDraft, Untranslatable
 from osimlite.translate.mjcf.muscles import add_muscle
 
-MAKERS: Mapping[str, Callable[[Draft, Any, str], str]] = {
+MAKERS: Mapping[str, Callable[[MjcfDraft, Any, str], str]] = {
     "CoordinateActuator": on_coordinates.add_actuator,
     "ActivationCoordinateActuator": on_coordinates.add_lagging_actuator,
     "SpringGeneralizedForce": on_coordinates.add_spring,
@@ -38,7 +38,7 @@ They raise `Untranslatable` if MuJoCo cannot express it.
 """
 
 
-def add_forces(draft: Draft) -> None:
+def add_forces(draft: MjcfDraft) -> None:
     """Add every active force whose law MuJoCo has."""
     for force, path in draft.iterate_components(Force):
         what = type(force).__name__

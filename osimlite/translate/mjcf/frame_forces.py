@@ -15,7 +15,7 @@ from osimlite.schema.actuators import (
 from osimlite.schema.base import Component
 from osimlite.schema.fields import Vec3
 from osimlite.schema.springs import BushingForce, PointToPointSpring
-from osimlite.translate.mjcf.draft import SPECK_MASS_KG, Draft, Untranslatable, add_element
+from osimlite.translate.mjcf.draft import SPECK_MASS_KG, MjcfDraft, Untranslatable, add_element
 
 GROUND_FRAME = FramePlacement(GROUND, np.eye(4))
 """Frame of ground."""
@@ -23,7 +23,7 @@ AXIS_NAMES = ("rx", "ry", "rz", "tx", "ty", "tz")
 """Names of rotations and translations, in the order of OpenSim's six numbers."""
 
 
-def add_point_spring(draft: Draft, force: PointToPointSpring, path: str) -> str:
+def add_point_spring(draft: MjcfDraft, force: PointToPointSpring, path: str) -> str:
     """Add a tendon with a spring between two sites.
 
     Args:
@@ -41,7 +41,7 @@ def add_point_spring(draft: Draft, force: PointToPointSpring, path: str) -> str:
     return f"tendon {add_straight_tendon(draft, path, ends, stiffness=force.stiffness, springlength=force.rest_length)}"
 
 
-def add_point_to_point_actuator(draft: Draft, force: PointToPointActuator, path: str) -> str:
+def add_point_to_point_actuator(draft: MjcfDraft, force: PointToPointActuator, path: str) -> str:
     """Add an actuator on a tendon between two sites; in MuJoCo, too, a positive force lengthens it.
 
     Args:
@@ -74,7 +74,7 @@ def add_point_to_point_actuator(draft: Draft, force: PointToPointActuator, path:
     return f"actuator {name}"
 
 
-def add_torque_actuator(draft: Draft, force: TorqueActuator, path: str) -> str:
+def add_torque_actuator(draft: MjcfDraft, force: TorqueActuator, path: str) -> str:
     """Add a torque on a site, with axes of a second site, whose body takes the reaction.
 
     Args:
@@ -100,7 +100,7 @@ def add_torque_actuator(draft: Draft, force: TorqueActuator, path: str) -> str:
     return _add_site_motor(draft, path, gear, one, draft.add_site(path, *GROUND_FRAME))
 
 
-def add_point_actuator(draft: Draft, force: PointActuator, path: str) -> str:
+def add_point_actuator(draft: MjcfDraft, force: PointActuator, path: str) -> str:
     """Add a force on a site, with the axes of its body or of a site in ground.
 
     Args:
@@ -127,7 +127,7 @@ def add_point_actuator(draft: Draft, force: PointActuator, path: str) -> str:
     )
 
 
-def add_straight_tendon(draft: Draft, path: str, sites: list[str], **law: float) -> str:
+def add_straight_tendon(draft: MjcfDraft, path: str, sites: list[str], **law: float) -> str:
     """Add a tendon through sites.
 
     Args:
@@ -147,7 +147,7 @@ def add_straight_tendon(draft: Draft, path: str, sites: list[str], **law: float)
 
 
 def _add_site_motor(
-    draft: Draft, path: str, gear: Array, site: str, axes: str | None = None
+    draft: MjcfDraft, path: str, gear: Array, site: str, axes: str | None = None
 ) -> str:
     """Add a motor at a site with a gear (6,), along the axes of another site if one is named."""
     name = draft.make_name("actuator", path)
@@ -157,7 +157,7 @@ def _add_site_motor(
     return f"actuator {name}"
 
 
-def _add_point_site(draft: Draft, owner: Component, path: str, socket: str, point: Vec3) -> str:
+def _add_point_site(draft: MjcfDraft, owner: Component, path: str, socket: str, point: Vec3) -> str:
     """Add a site at a point of a body.
 
     OpenSim uses the body even where the socket names a frame on it.
@@ -173,7 +173,7 @@ def _normalize_axis(axis: tuple[float, float, float]) -> Array:
     return np.array(axis) / length
 
 
-def add_body_actuator(draft: Draft, force: BodyActuator, path: str) -> str:
+def add_body_actuator(draft: MjcfDraft, force: BodyActuator, path: str) -> str:
     """Add six actuators in the order of the controls: torques, then forces.
 
     Args:
@@ -200,7 +200,7 @@ def add_body_actuator(draft: Draft, force: BodyActuator, path: str) -> str:
     return " ".join(made)
 
 
-def add_bushing(draft: Draft, force: BushingForce, path: str) -> str:
+def add_bushing(draft: MjcfDraft, force: BushingForce, path: str) -> str:
     """Add a small body on six springs in the first frame, welded to the second.
 
     The joints are the six deviations of OpenSim's law, so that it is exact except for the

@@ -6,10 +6,10 @@ from lxml.etree import Comment
 from numpy.polynomial.polynomial import polyder, polyval
 
 from osimlite.errors import SimulationError
-from osimlite.translate.mjcf.draft import Draft, add_element
+from osimlite.translate.mjcf.draft import MjcfDraft, add_element
 
 
-def add_keyframe(draft: Draft) -> None:
+def add_keyframe(draft: MjcfDraft) -> None:
     """Add the default pose and speeds, which fulfil the constraints.
 
     Followers are where their leaders put them.

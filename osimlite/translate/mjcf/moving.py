@@ -13,7 +13,7 @@ import numpy as np
 from numpy.polynomial import Chebyshev, Polynomial
 
 from osimlite.base.require import require
-from osimlite.mechanics.multibody.functions import Function
+from osimlite.mechanics.multibody.functions import SmoothFunction
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.translate.mjcf.polynomials import DEGREE, find_polynomial, sample_function
 
@@ -32,7 +32,7 @@ INITIAL_BENDS = ((0.0, 0.0, 0.0), (0.5, 0.0, 0.0), (-0.5, 0.0, 0.0), (0.0, -0.3,
 
 
 def fit_composition(
-    functions: Sequence[Function], span: tuple[float, float]
+    functions: Sequence[SmoothFunction], span: tuple[float, float]
 ) -> tuple[Array, Array]:
     """Fit quartics of a common quartic to functions of a coordinate.
 

@@ -30,7 +30,7 @@ from osimlite.schema.muscles import Muscle
 from osimlite.schema.old_muscles import Delp1990Muscle_Deprecated, Schutte1993Muscle_Deprecated
 from osimlite.schema.states import list_states
 from osimlite.translate.fidelity import Error
-from osimlite.translate.mjcf.draft import Draft, Untranslatable, add_element, clear_rounding
+from osimlite.translate.mjcf.draft import MjcfDraft, Untranslatable, add_element, clear_rounding
 from osimlite.translate.mjcf.isometric import compute_isometric_tension
 
 COMPARED_ACTIVATIONS = (0.01, 0.5, 1.0)
@@ -157,7 +157,7 @@ class Curves(NamedTuple):
         return clear_rounding(gain), clear_rounding(bias)
 
 
-def add_muscle(draft: Draft, force: Muscle, path: str) -> str:
+def add_muscle(draft: MjcfDraft, force: Muscle, path: str) -> str:
     """Add a muscle on the tendon of its path.
 
     Args:

@@ -11,11 +11,11 @@ from osimlite.schema.muscles import PathActuator
 from osimlite.schema.path_forces import Blankevoort1991Ligament, Ligament, PathSpring
 from osimlite.translate.fidelity import Error
 from osimlite.translate.mjcf.coordinate_forces import add_scaled_actuator
-from osimlite.translate.mjcf.draft import Draft, PathTendon, Untranslatable, format_value
+from osimlite.translate.mjcf.draft import MjcfDraft, PathTendon, Untranslatable, format_value
 from osimlite.translate.mjcf.isometric import compute_isometric_tension
 
 
-def add_actuator(draft: Draft, force: PathActuator, path: str) -> str:
+def add_actuator(draft: MjcfDraft, force: PathActuator, path: str) -> str:
     """Add an actuator whose tension is proportional to its control.
 
     Args:
@@ -38,7 +38,7 @@ def add_actuator(draft: Draft, force: PathActuator, path: str) -> str:
     return made
 
 
-def add_spring(draft: Draft, force: PathSpring, path: str) -> str:
+def add_spring(draft: MjcfDraft, force: PathSpring, path: str) -> str:
     """Make the tendon a spring whose tension is proportional to its stretch.
 
     Args:
@@ -65,7 +65,7 @@ def add_spring(draft: Draft, force: PathSpring, path: str) -> str:
     return f"tendon {tied.name}"
 
 
-def add_ligament(draft: Draft, force: Ligament | Blankevoort1991Ligament, path: str) -> str:
+def add_ligament(draft: MjcfDraft, force: Ligament | Blankevoort1991Ligament, path: str) -> str:
     """Make the tendon the spring that is nearest to the tension of the taut ligament.
 
     Args:
@@ -113,7 +113,7 @@ def _fit_spring(lengths: Array, tension: Array) -> tuple[float, float]:
     return float(slope), float(-start / slope)
 
 
-def _find_tendon_element(draft: Draft, path: str) -> tuple[PathTendon, _Element]:
+def _find_tendon_element(draft: MjcfDraft, path: str) -> tuple[PathTendon, _Element]:
     """Return the tendon of the path of a force, and its element."""
     tied = draft.find_tendon(path)
     return tied, next(item for item in draft.get_section("tendon") if item.get("name") == tied.name)

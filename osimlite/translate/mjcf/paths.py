@@ -20,8 +20,8 @@ from osimlite.translate.fidelity import LEFT_OUT, Error
 from osimlite.translate.mjcf.bodies import MIN_MASS
 from osimlite.translate.mjcf.couplings import HELPER_INERTIA, add_helper, compose_with_line
 from osimlite.translate.mjcf.draft import (
-    Draft,
     Follower,
+    MjcfDraft,
     PathTendon,
     Value,
     add_element,
@@ -51,7 +51,7 @@ WRAP_GROUP = 4
 """Group of wrap geoms and their sites, which MuJoCo's viewer shows or hides together."""
 
 
-def add_paths(draft: Draft) -> None:
+def add_paths(draft: MjcfDraft) -> None:
     """Add a tendon for every path through points."""
     owners: dict[str, AbstractGeometryPath] = {
         path: owner.geometry_path
@@ -68,7 +68,7 @@ def add_paths(draft: Draft) -> None:
     held, held_truth = draw_poses(exact, TEST_POSES, 1)
     others, other_truth = draw_poses(exact, VALIDATION_POSES, 2) if fits else (poses, truth)
     default = exact.lengths(draft.default_state[0])
-    writer = _Writer(draft)
+    writer = _TendonWriter(draft)
     for path, given in owners.items():
         route = exact.routes[path]
         own = draft.tree.path_of(given) or ""
@@ -104,7 +104,7 @@ def add_paths(draft: Draft) -> None:
 
 
 def _measure_errors(
-    draft: Draft, tendon: Tendon, poses: Poses, truth: PathSamples
+    draft: MjcfDraft, tendon: Tendon, poses: Poses, truth: PathSamples
 ) -> dict[str, Error]:
     """Measure the errors of a tendon in poses by which it was not selected.
 
@@ -151,14 +151,14 @@ _SURFACE_NAMES = {
 
 
 @dataclass
-class _Writer:
+class _TendonWriter:
     """Writer of tendons, which writes each wrap geom once.
 
     Attributes:
         draft: MJCF under construction.
     """
 
-    draft: Draft
+    draft: MjcfDraft
     _geoms: dict[tuple[Any, ...], str] = field(default_factory=dict)
 
     def write_tendon(self, path: str, tendon: Tendon) -> str:

@@ -23,7 +23,7 @@ _MAX_RANGE = 4.0 * np.pi
 """Largest range (rad or m) of a coordinate that is taken seriously; two turns."""
 
 
-class Fit(NamedTuple):
+class PolynomialFit(NamedTuple):
     """Polynomial for a function.
 
     Attributes:
@@ -35,13 +35,13 @@ class Fit(NamedTuple):
     error: Error | None = None
 
 
-def find_polynomial(function: f.Function) -> Polynomial | None:
+def find_polynomial(function: f.SmoothFunction) -> Polynomial | None:
     """Return the polynomial that a function of one argument is, or None."""
     line = find_line(function)
     if line is not None:
         return Polynomial((line.start, line.slope))
     match function:
-        case f.Constant(value):
+        case f.ConstantValue(value):
             return Polynomial((value,))
         case f.Polynomial(coefficients):
             # OpenSim lists the coefficient of the highest power first.
@@ -65,7 +65,7 @@ def find_polynomial(function: f.Function) -> Polynomial | None:
     return None
 
 
-def fit_quartic(function: f.Function, span: tuple[float, float], unit: str) -> Fit:
+def fit_quartic(function: f.SmoothFunction, span: tuple[float, float], unit: str) -> PolynomialFit:
     """Return the polynomial of degree 4 that is, or is nearest to, a function.
 
     The nearest one has the smallest maximum error.
@@ -80,7 +80,7 @@ def fit_quartic(function: f.Function, span: tuple[float, float], unit: str) -> F
     """
     exact = find_polynomial(function)
     if exact is not None and exact.degree() <= DEGREE:
-        return Fit(tuple(exact.coef.tolist()))
+        return PolynomialFit(tuple(exact.coef.tolist()))
     low, high = span
     middle, half = 0.5 * (high + low), 0.5 * (high - low)
     # Chebyshev points are dense at the ends, where the error of a fit is largest.
@@ -104,13 +104,13 @@ def fit_quartic(function: f.Function, span: tuple[float, float], unit: str) -> F
     fitted = Chebyshev(best, domain=[low, high]).convert(kind=Polynomial)
     # The reported error is from other points than those of the fit.
     even = np.linspace(low, high, _SAMPLE_COUNT)
-    return Fit(
+    return PolynomialFit(
         tuple(fitted.coef.tolist()),
         Error.measure(fitted(even) - sample_function(function, even), unit),
     )
 
 
-def sample_function(function: f.Function, x: Array) -> Array:
+def sample_function(function: f.SmoothFunction, x: Array) -> Array:
     """Evaluate a function of one argument at many values (k,).
 
     Args:
@@ -127,7 +127,7 @@ def sample_function(function: f.Function, x: Array) -> Array:
 
 
 def select_span(
-    function: f.Function, limits: tuple[float, float], start: float
+    function: f.SmoothFunction, limits: tuple[float, float], start: float
 ) -> tuple[float, float]:
     """Return the range in which a function of a coordinate is fitted.
 

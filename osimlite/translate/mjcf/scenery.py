@@ -6,7 +6,7 @@ import numpy as np
 
 from osimlite.mechanics.multibody.spatial import cross
 from osimlite.simulation.robot.robot import Ball, Box, MeshFile, Tube, Visual
-from osimlite.translate.mjcf.draft import Draft, Value, add_element, format_pose
+from osimlite.translate.mjcf.draft import MjcfDraft, Value, add_element, format_pose
 
 SHAPE_GROUP = 2
 """Group of shapes; MuJoCo's viewer shows or hides a group at a time, and shows 0 to 2 at first."""
@@ -18,7 +18,7 @@ FRAME_GROUP = 5
 """Group of frames."""
 
 
-def add_shapes(draft: Draft) -> None:
+def add_shapes(draft: MjcfDraft) -> None:
     """Add the shapes with which bodies are drawn."""
     if not any(link.visuals for link in draft.robot.links):
         return
@@ -39,7 +39,7 @@ def add_shapes(draft: Draft) -> None:
             draft.fidelity.translated[visual.source] = f"geom {name}"
 
 
-def add_camera(draft: Draft) -> None:
+def add_camera(draft: MjcfDraft) -> None:
     """Add a camera that shows the default pose upright.
 
     Up is z in MuJoCo, and y in models of OpenSim.
@@ -72,7 +72,7 @@ def add_camera(draft: Draft) -> None:
     )
 
 
-def add_markers(draft: Draft) -> None:
+def add_markers(draft: MjcfDraft) -> None:
     """Add a site for every marker and other station."""
     for path, (body, location) in draft.mechanism.stations.items():
         draft.fidelity.translated[path] = (
@@ -80,7 +80,7 @@ def add_markers(draft: Draft) -> None:
         )
 
 
-def format_shape(draft: Draft, visual: Visual) -> dict[str, Value]:
+def format_shape(draft: MjcfDraft, visual: Visual) -> dict[str, Value]:
     """Return the attributes of a geom with a shape.
 
     A mesh is an asset, one for each file and scale.

@@ -26,7 +26,7 @@ from osimlite.schema.springs import BushingForce, PointToPointSpring, SpringGene
 from osimlite.simulation.elements import ElementBuilder, Forces
 from osimlite.simulation.elements.force_records import ForceElement
 from osimlite.simulation.system import System
-from osimlite.translate.mjcf.draft import Draft, format_value
+from osimlite.translate.mjcf.draft import MjcfDraft, format_value
 from osimlite.translate.mjcf.isometric import compute_isometric_tension
 
 SPRING_TYPES = (
@@ -45,7 +45,7 @@ DIFFERENCE_STEP = 1e-7
 """Change of coordinates (rad or m) or speeds in central differences."""
 
 
-def choose_step(draft: Draft) -> None:
+def choose_step(draft: MjcfDraft) -> None:
     """Reduce the time step where springs are stiff, and warn about overstretched muscles."""
     try:
         rate = _compute_fastest_rate(draft)
@@ -80,7 +80,7 @@ def choose_step(draft: Draft) -> None:
                 draft.fidelity.add("overstretched", path, cannot, done, detail)
 
 
-def _compute_fastest_rate(draft: Draft) -> float:
+def _compute_fastest_rate(draft: MjcfDraft) -> float:
     """Return the largest rate (1/s) of the springs about the default pose.
 
     It is the largest magnitude of the eigenvalues of the linearized motion in directions that the
@@ -118,7 +118,7 @@ def _compute_fastest_rate(draft: Draft) -> float:
 
 
 def _differentiate_forces(
-    draft: Draft, elements: Sequence[ForceElement], along: Array, at: Array
+    draft: MjcfDraft, elements: Sequence[ForceElement], along: Array, at: Array
 ) -> Array:
     """Differentiate generalized forces by changes of coordinates and speeds.
 

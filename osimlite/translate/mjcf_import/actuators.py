@@ -21,7 +21,12 @@ from osimlite.schema.path_forces import ExpressionBasedPathForce, PathSpring
 from osimlite.schema.paths import FunctionBasedPath
 from osimlite.schema.springs import ExpressionBasedCoordinateForce, SpringGeneralizedForce
 from osimlite.translate.fidelity import LEFT_OUT
-from osimlite.translate.mjcf_import.draft import Draft, TendonPath, quaternion_matrix, vector
+from osimlite.translate.mjcf_import.draft import (
+    ConversionDraft,
+    TendonPath,
+    quaternion_matrix,
+    vector,
+)
 from osimlite.translate.mjcf_import.joints import BALL, FREE
 from osimlite.translate.mjcf_import.muscles import make_muscle
 from osimlite.translate.mjcf_import.poses import place, sample_qpos
@@ -31,7 +36,7 @@ LENGTH_POSES = 60
 """Number of poses in which forces of muscles are compared."""
 
 
-def add_actuators(draft: Draft) -> None:
+def add_actuators(draft: ConversionDraft) -> None:
     """Add all actuators, and the springs of tendons."""
     model, mujoco = draft.mj, draft.source.mujoco
     lengths = _sample_lengths(draft)
@@ -68,7 +73,7 @@ def add_actuators(draft: Draft) -> None:
     _add_tendon_springs(draft)
 
 
-def _sample_lengths(draft: Draft) -> Array:
+def _sample_lengths(draft: ConversionDraft) -> Array:
     """Return lengths (T, P) of all tendons in sampled poses, m."""
     source = draft.source
     tendons = [read_tendon(source, index) for index in range(draft.mj.ntendon)]
@@ -81,7 +86,9 @@ def _copy(path: TendonPath) -> TendonPath:
     return TendonPath(path.path.copy_deep(), path.shift)
 
 
-def _read_gain(draft: Draft, actuator: int) -> tuple[float, tuple[float, float, float]] | None:
+def _read_gain(
+    draft: ConversionDraft, actuator: int
+) -> tuple[float, tuple[float, float, float]] | None:
     """Return gain and bias of an actuator; None if the force is no linear function of the control."""
     model, mujoco = draft.mj, draft.source.mujoco
     gain, bias = int(model.actuator_gaintype[actuator]), int(model.actuator_biastype[actuator])
@@ -98,7 +105,7 @@ def _read_gain(draft: Draft, actuator: int) -> tuple[float, tuple[float, float, 
     return numbers[0], (constant, by_length, by_speed)
 
 
-def _read_dynamics(draft: Draft, actuator: int) -> float | None:
+def _read_dynamics(draft: ConversionDraft, actuator: int) -> float | None:
     """Return the time constant (s) of an actuator, 0 without dynamics; None if it has others."""
     model, kinds = draft.mj, draft.source.mujoco.mjtDyn
     kind = int(model.actuator_dyntype[actuator])
@@ -110,7 +117,7 @@ def _read_dynamics(draft: Draft, actuator: int) -> float | None:
 
 
 def _set_limits(
-    draft: Draft, actuator: int, made: ScalarActuator, gain: float, biased: bool
+    draft: ConversionDraft, actuator: int, made: ScalarActuator, gain: float, biased: bool
 ) -> None:
     """Set the range of the control, and record what a limit of the force becomes."""
     model = draft.mj
@@ -133,7 +140,7 @@ def _set_limits(
     made.min_control, made.max_control = low, high
 
 
-def _add_joint_actuator(draft: Draft, actuator: int, joint: int) -> None:
+def _add_joint_actuator(draft: ConversionDraft, actuator: int, joint: int) -> None:
     model = draft.mj
     read, delay = _read_gain(draft, actuator), _read_dynamics(draft, actuator)
     gear = float(model.actuator_gear[actuator, 0])
@@ -188,7 +195,7 @@ def _add_joint_actuator(draft: Draft, actuator: int, joint: int) -> None:
     draft.translated("actuator", actuator, became)
 
 
-def _add_joint_muscle(draft: Draft, actuator: int, joint: int) -> None:
+def _add_joint_muscle(draft: ConversionDraft, actuator: int, joint: int) -> None:
     """Add a muscle whose length is a multiple of a joint position."""
     model = draft.mj
     gear = float(model.actuator_gear[actuator, 0])
@@ -212,7 +219,9 @@ def _add_joint_muscle(draft: Draft, actuator: int, joint: int) -> None:
         )
 
 
-def _add_path_actuator(draft: Draft, actuator: int, path: TendonPath, gear: float) -> None:
+def _add_path_actuator(
+    draft: ConversionDraft, actuator: int, path: TendonPath, gear: float
+) -> None:
     """Add an actuator of a tendon; a positive force of MuJoCo lengthens it, OpenSim's shortens it."""
     read, delay = _read_gain(draft, actuator), _read_dynamics(draft, actuator)
     if read is None or delay is None or not gear:
@@ -251,7 +260,7 @@ def _add_path_actuator(draft: Draft, actuator: int, path: TendonPath, gear: floa
     draft.translated("actuator", actuator, became)
 
 
-def _add_site_actuator(draft: Draft, actuator: int, site: int) -> None:
+def _add_site_actuator(draft: ConversionDraft, actuator: int, site: int) -> None:
     """Add a force or a torque at a site."""
     model = draft.mj
     read, delay = _read_gain(draft, actuator), _read_dynamics(draft, actuator)
@@ -300,7 +309,7 @@ def _add_site_actuator(draft: Draft, actuator: int, site: int) -> None:
     draft.translated("actuator", actuator, f"{type(made).__name__} {name}")
 
 
-def _add_tendon_springs(draft: Draft) -> None:
+def _add_tendon_springs(draft: ConversionDraft) -> None:
     """Add the springs and dampers of tendons; a tendon without any force keeps its path."""
     model = draft.mj
     driven = {

@@ -8,11 +8,11 @@ from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.frames import Body
 from osimlite.schema.markers import Marker
 from osimlite.translate.fidelity import LEFT_OUT
-from osimlite.translate.mjcf_import.draft import Draft, quaternion_matrix, vector
+from osimlite.translate.mjcf_import.draft import ConversionDraft, quaternion_matrix, vector
 from osimlite.translate.mjcf_import.joints import add_joints
 
 
-def add_bodies(draft: Draft) -> None:
+def add_bodies(draft: ConversionDraft) -> None:
     """Add all bodies and joints, parents first."""
     model = draft.mj
     draft.frames = [draft.world]
@@ -46,7 +46,7 @@ def add_bodies(draft: Draft) -> None:
             )
 
 
-def _make_body(draft: Draft, body: int) -> Body:
+def _make_body(draft: ConversionDraft, body: int) -> Body:
     model = draft.mj
     axes = quaternion_matrix(model.body_iquat[body])
     inertia: Array = axes @ np.diag(model.body_inertia[body]) @ axes.T
@@ -63,7 +63,7 @@ def _make_body(draft: Draft, body: int) -> Body:
     )
 
 
-def add_markers(draft: Draft) -> None:
+def add_markers(draft: ConversionDraft) -> None:
     """Add the sites that no tendon runs through as markers."""
     model = draft.mj
     for site in range(model.nsite):

@@ -21,7 +21,12 @@ from osimlite.schema.contact import (
     ContactSphere,
 )
 from osimlite.schema.forces import HuntCrossleyForce
-from osimlite.translate.mjcf_import.draft import Draft, angles_of, quaternion_matrix, vector
+from osimlite.translate.mjcf_import.draft import (
+    ConversionDraft,
+    angles_of,
+    quaternion_matrix,
+    vector,
+)
 from osimlite.translate.mjcf_import.joints import compute_softness
 from osimlite.translate.mjcf_import.shapes import (
     BOX,
@@ -43,7 +48,7 @@ TRANSITION_M_S = 0.1
 """Transition velocity of all contact forces."""
 
 
-def add_contacts(draft: Draft) -> None:
+def add_contacts(draft: ConversionDraft) -> None:
     """Add the surfaces that can touch, and forces between planes and what moves above them."""
     if draft.options.contact == "none":
         _record_all(draft)
@@ -59,12 +64,12 @@ def add_contacts(draft: Draft) -> None:
         _add_forces(draft, surfaces)
 
 
-def _record_all(draft: Draft) -> None:
+def _record_all(draft: ConversionDraft) -> None:
     for geom in sorted(_find_colliding_geoms(draft)):
         draft.record("geom", geom, "contact", "left out, as requested")
 
 
-def _find_colliding_geoms(draft: Draft) -> set[int]:
+def _find_colliding_geoms(draft: ConversionDraft) -> set[int]:
     """Return the geoms that can touch another."""
     model = draft.mj
     result = {int(geom) for pair in range(model.npair) for geom in _pair(model, pair)}
@@ -80,7 +85,7 @@ def _pair(model: object, pair: int) -> tuple[int, int]:
     return int(model.pair_geom1[pair]), int(model.pair_geom2[pair])  # type: ignore[attr-defined]
 
 
-def _make_surfaces(draft: Draft, geom: int) -> list[ContactGeometry]:
+def _make_surfaces(draft: ConversionDraft, geom: int) -> list[ContactGeometry]:
     model = draft.mj
     name = draft.source.name_of("geom", geom)
     frame = draft.frames[int(model.geom_bodyid[geom])]
@@ -156,7 +161,7 @@ def _make_surfaces(draft: Draft, geom: int) -> list[ContactGeometry]:
     return []
 
 
-def _add_forces(draft: Draft, surfaces: dict[int, list[ContactGeometry]]) -> None:
+def _add_forces(draft: ConversionDraft, surfaces: dict[int, list[ContactGeometry]]) -> None:
     """Add a force for each plane and what can touch it; record what else can touch."""
     model = draft.mj
     others: dict[int, int] = {}
@@ -189,7 +194,7 @@ def _add_forces(draft: Draft, surfaces: dict[int, list[ContactGeometry]]) -> Non
         )
 
 
-def _can_touch(draft: Draft, one: int, two: int) -> bool:
+def _can_touch(draft: ConversionDraft, one: int, two: int) -> bool:
     """Whether MuJoCo tests two geoms for contact, pairs in the file not regarded."""
     model = draft.mj
     types, affinities = model.geom_contype, model.geom_conaffinity
@@ -210,7 +215,7 @@ def _can_touch(draft: Draft, one: int, two: int) -> bool:
 
 
 def _add_force(
-    draft: Draft,
+    draft: ConversionDraft,
     surfaces: dict[int, list[ContactGeometry]],
     plane: int,
     geom: int,

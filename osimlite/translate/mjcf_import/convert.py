@@ -22,10 +22,10 @@ from osimlite.translate.mjcf_import.coordinate_map import CoordinateMap
 from osimlite.translate.mjcf_import.draft import (
     Armature,
     ContactOption,
-    Draft,
+    ConversionDraft,
+    ImportOptions,
     Limits,
     MuscleType,
-    Options,
     Up,
     vector,
 )
@@ -93,7 +93,7 @@ class Osim:
         )
 
 
-PASSES: tuple[Callable[[Draft], None], ...] = (
+PASSES: tuple[Callable[[ConversionDraft], None], ...] = (
     add_bodies,
     add_joint_forces,
     add_equalities,
@@ -162,7 +162,7 @@ def from_mjcf(
         if value not in known:
             words = " or ".join(f"'{item}'" for item in known if item is not None)
             raise SettingError(f"--{word} is {words}, not '{value}'")
-    options = Options(
+    options = ImportOptions(
         written_for=None if written_for is None else max(written_for, 3),
         muscle=muscle_class,
         armature=armature,
@@ -183,7 +183,7 @@ def from_mjcf(
     )
 
 
-def start_draft(path: Path, options: Options) -> Draft:
+def start_draft(path: Path, options: ImportOptions) -> ConversionDraft:
     """Compile a file, and return a draft without components."""
     source = load_mjcf(path)
     compiled: Any = source.model
@@ -208,4 +208,4 @@ def start_draft(path: Path, options: Options) -> Draft:
     fidelity = Fidelity(source.name, "osim")
     for text in source.warnings:
         fidelity.add("warning", "/model", "a model that MuJoCo warns of", "used as it is", text)
-    return Draft(source, options, model, fidelity, world)
+    return ConversionDraft(source, options, model, fidelity, world)

@@ -16,7 +16,7 @@ from osimlite.schema.model import Model
 from osimlite.schema.paths import AbstractGeometryPath
 from osimlite.simulation.robot.names import UniqueNames
 from osimlite.translate.fidelity import LEFT_OUT, Error, Fidelity
-from osimlite.translate.mjcf_import.source import Source
+from osimlite.translate.mjcf_import.source import MjcfSource
 
 Armature = Literal["rotors", "none"]
 Limits = Literal["forces", "range"]
@@ -26,7 +26,7 @@ ContactOption = Literal["forces", "geometry", "none"]
 
 
 @dataclass(frozen=True)
-class Options:
+class ImportOptions:
     """Options of a conversion; see :func:`osimlite.from_mjcf`."""
 
     written_for: int | None = None
@@ -48,7 +48,7 @@ class TendonPath(NamedTuple):
 
 
 @dataclass(eq=False)
-class Draft:
+class ConversionDraft:
     """State of a conversion.
 
     Attributes:
@@ -71,8 +71,8 @@ class Draft:
         names: unique names by kind of component.
     """
 
-    source: Source
-    options: Options
+    source: MjcfSource
+    options: ImportOptions
     model: Model
     fidelity: Fidelity
     world: PhysicalFrame

@@ -16,12 +16,17 @@ from osimlite.schema.constraint_types import (
 )
 from osimlite.schema.frames import PhysicalFrame, PhysicalOffsetFrame
 from osimlite.schema.functions import LinearFunction, PolynomialFunction
-from osimlite.translate.mjcf_import.draft import Draft, angles_of, quaternion_matrix, vector
+from osimlite.translate.mjcf_import.draft import (
+    ConversionDraft,
+    angles_of,
+    quaternion_matrix,
+    vector,
+)
 
 SOFT = "a soft constraint, which a load opens"
 
 
-def add_equalities(draft: Draft) -> None:
+def add_equalities(draft: ConversionDraft) -> None:
     """Add all equality constraints that OpenSim has."""
     model, kinds = draft.mj, draft.source.mujoco.mjtEq
     for number in range(model.neq):
@@ -36,7 +41,7 @@ def add_equalities(draft: Draft) -> None:
             draft.drop("equality", number, "an equality of tendons, flexes or distances")
 
 
-def shifted_polynomial(draft: Draft, number: int) -> Polynomial:
+def shifted_polynomial(draft: ConversionDraft, number: int) -> Polynomial:
     """Return the polynomial of a joint equality in the values of the coordinates.
 
     MuJoCo's is q1 - ref1 = sum of c_k (q2 - ref2)^k; this one gives q1 from q2.
@@ -51,7 +56,7 @@ def shifted_polynomial(draft: Draft, number: int) -> Polynomial:
     return Polynomial(coefficients)(Polynomial([-second, 1.0])) + first
 
 
-def _couple_joints(draft: Draft, number: int) -> None:
+def _couple_joints(draft: ConversionDraft, number: int) -> None:
     model = draft.mj
     one, other = int(model.eq_obj1id[number]), int(model.eq_obj2id[number])
     dependent = draft.coordinates[one][0]
@@ -89,14 +94,14 @@ def _couple_joints(draft: Draft, number: int) -> None:
     draft.record("equality", number, SOFT, "an exact coupler of coordinates", f"constraint {name}")
 
 
-def _frames_of(draft: Draft, number: int) -> tuple[int, int, bool]:
+def _frames_of(draft: ConversionDraft, number: int) -> tuple[int, int, bool]:
     """Return the objects of an equality, and whether they are sites."""
     model = draft.mj
     sites = int(model.eq_objtype[number]) == int(draft.source.mujoco.mjtObj.mjOBJ_SITE)
     return int(model.eq_obj1id[number]), int(model.eq_obj2id[number]), sites
 
 
-def _connect(draft: Draft, number: int) -> None:
+def _connect(draft: ConversionDraft, number: int) -> None:
     model = draft.mj
     one, two, sites = _frames_of(draft, number)
     if sites:
@@ -118,7 +123,7 @@ def _connect(draft: Draft, number: int) -> None:
     draft.record("equality", number, SOFT, "an exact PointConstraint", f"constraint {name}")
 
 
-def _weld(draft: Draft, number: int) -> None:
+def _weld(draft: ConversionDraft, number: int) -> None:
     model = draft.mj
     one, two, sites = _frames_of(draft, number)
     here, straight = np.zeros(3), np.eye(3)

@@ -22,7 +22,12 @@ from osimlite.schema.functions import LinearFunction
 from osimlite.schema.joints import WeldJoint
 from osimlite.schema.springs import ExpressionBasedCoordinateForce, SpringGeneralizedForce
 from osimlite.translate.fidelity import LEFT_OUT
-from osimlite.translate.mjcf_import.draft import Draft, angles_of, quaternion_matrix, vector
+from osimlite.translate.mjcf_import.draft import (
+    ConversionDraft,
+    angles_of,
+    quaternion_matrix,
+    vector,
+)
 
 FREE, BALL, SLIDE, HINGE = 0, 1, 2, 3
 """MuJoCo's joint types (``mjtJoint``)."""
@@ -38,7 +43,7 @@ LIMIT_TRANSITION = {"rotational": 0.1, "translational": 1e-4}
 """Distance (deg, m) over which a CoordinateLimitForce reaches its full stiffness."""
 
 
-class Group(NamedTuple):
+class JointGroup(NamedTuple):
     """Joints of MuJoCo that become one joint of OpenSim."""
 
     slides: tuple[int, ...]
@@ -46,10 +51,10 @@ class Group(NamedTuple):
     special: int = -1  # a ball or free joint
 
 
-def group_joints(draft: Draft, body: int) -> list[Group]:
+def group_joints(draft: ConversionDraft, body: int) -> list[JointGroup]:
     """Divide the joints of a body into groups of one OpenSim joint each."""
     model = draft.mj
-    groups: list[Group] = []
+    groups: list[JointGroup] = []
     slides: list[int] = []
     hinges: list[int] = []
     first = int(model.body_jntadr[body])
@@ -57,9 +62,9 @@ def group_joints(draft: Draft, body: int) -> list[Group]:
         kind = int(model.jnt_type[joint])
         if kind in (FREE, BALL):
             if slides or hinges:
-                groups.append(Group(tuple(slides), tuple(hinges)))
+                groups.append(JointGroup(tuple(slides), tuple(hinges)))
                 slides, hinges = [], []
-            groups.append(Group((), (), joint))
+            groups.append(JointGroup((), (), joint))
             continue
         fits = (
             not hinges and len(slides) < 3 and _is_independent(model, joint, slides)
@@ -69,15 +74,15 @@ def group_joints(draft: Draft, body: int) -> list[Group]:
             and (not hinges or _same_anchor(model, joint, hinges[0]))
         )
         if not fits:
-            groups.append(Group(tuple(slides), tuple(hinges)))
+            groups.append(JointGroup(tuple(slides), tuple(hinges)))
             slides, hinges = [], []
         (slides if kind == SLIDE else hinges).append(joint)
     if slides or hinges:
-        groups.append(Group(tuple(slides), tuple(hinges)))
+        groups.append(JointGroup(tuple(slides), tuple(hinges)))
     return groups
 
 
-def add_joints(draft: Draft, body: int, frame: Body, parent: PhysicalFrame) -> None:
+def add_joints(draft: ConversionDraft, body: int, frame: Body, parent: PhysicalFrame) -> None:
     """Connect a body to its parent.
 
     Args:
@@ -141,7 +146,7 @@ def add_joints(draft: Draft, body: int, frame: Body, parent: PhysicalFrame) -> N
         )
 
 
-def _make_custom_joint(draft: Draft, group: Group, name: str) -> CustomJoint:
+def _make_custom_joint(draft: ConversionDraft, group: JointGroup, name: str) -> CustomJoint:
     model = draft.mj
     axes: dict[str, TransformAxis] = {}
     coordinates = []
@@ -160,7 +165,7 @@ def _make_custom_joint(draft: Draft, group: Group, name: str) -> CustomJoint:
     return _make_joint(name, coordinates, axes)
 
 
-def _make_coordinate(draft: Draft, joint: int, value: float) -> Coordinate:
+def _make_coordinate(draft: ConversionDraft, joint: int, value: float) -> Coordinate:
     """Make the coordinate of a hinge or slide."""
     model = draft.mj
     name = draft.unique("coordinate", draft.source.name_of("joint", joint))
@@ -188,7 +193,7 @@ def _make_coordinate(draft: Draft, joint: int, value: float) -> Coordinate:
 
 
 def _make_special_joint(
-    draft: Draft, joint: int, name: str, position: Array, rotation: Array
+    draft: ConversionDraft, joint: int, name: str, position: Array, rotation: Array
 ) -> CustomJoint:
     """Make a ball or free joint as a CustomJoint of body-fixed X-Y-Z angles."""
     model = draft.mj
@@ -245,7 +250,7 @@ def _make_joint(
     return CustomJoint(name=name, coordinates=coordinates, spatial_transform=transform)
 
 
-def add_joint_forces(draft: Draft) -> None:
+def add_joint_forces(draft: ConversionDraft) -> None:
     """Add springs, dampers, limits and armature of joints, and record friction."""
     model = draft.mj
     dependent = _find_dependent_joints(draft)
@@ -279,7 +284,7 @@ def add_joint_forces(draft: Draft) -> None:
             )
 
 
-def _add_spring(draft: Draft, joint: int, name: str) -> None:
+def _add_spring(draft: ConversionDraft, joint: int, name: str) -> None:
     model = draft.mj
     address, dof = int(model.jnt_qposadr[joint]), int(model.jnt_dofadr[joint])
     stiffness, rest = float(model.jnt_stiffness[joint]), float(model.qpos_spring[address])
@@ -328,7 +333,7 @@ def _force_expression(first: float, higher: tuple[float, ...], x: str) -> str:
     return text
 
 
-def _add_armature(draft: Draft, joint: int, name: str) -> None:
+def _add_armature(draft: ConversionDraft, joint: int, name: str) -> None:
     """Add a rotor that has the armature as its inertia and turns as the coordinate does."""
     from osimlite.schema.constraint_types import CoordinateCouplerConstraint
     from osimlite.schema.joints import PinJoint
@@ -379,7 +384,7 @@ def _add_armature(draft: Draft, joint: int, name: str) -> None:
     )
 
 
-def _add_limit(draft: Draft, joint: int, name: str) -> None:
+def _add_limit(draft: ConversionDraft, joint: int, name: str) -> None:
     """Add a stiff spring beyond the range of a joint."""
     model = draft.mj
     low, high = map(float, model.jnt_range[joint])
@@ -447,7 +452,7 @@ def compute_softness(
     return max(factor * k, 1e-9), max(factor * b, 0.0)
 
 
-def _record_special_forces(draft: Draft, joint: int) -> None:
+def _record_special_forces(draft: ConversionDraft, joint: int) -> None:
     """Record what a ball or free joint has besides its motion."""
     model = draft.mj
     first = int(model.jnt_dofadr[joint])
@@ -469,7 +474,7 @@ def _record_special_forces(draft: Draft, joint: int) -> None:
             )
 
 
-def _find_dependent_joints(draft: Draft) -> set[int]:
+def _find_dependent_joints(draft: ConversionDraft) -> set[int]:
     """Return the joints that an active equality determines."""
     model, kinds = draft.mj, draft.source.mujoco.mjtEq
     return {

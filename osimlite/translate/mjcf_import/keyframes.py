@@ -7,10 +7,10 @@ import numpy as np
 from osimlite.base.text import suggest_name
 from osimlite.errors import SettingError
 from osimlite.translate.mjcf_import.coordinate_map import CoordinateMap
-from osimlite.translate.mjcf_import.draft import Draft
+from osimlite.translate.mjcf_import.draft import ConversionDraft
 
 
-def add_keyframes(draft: Draft) -> None:
+def add_keyframes(draft: ConversionDraft) -> None:
     """Write all keyframes into a table, and set the default pose by the one that is asked for."""
     model = draft.mj
     names = [draft.source.name_of("key", key) for key in range(model.nkey)]
@@ -60,7 +60,7 @@ def add_keyframes(draft: Draft) -> None:
         set_default_pose(draft, rows[names.index(wanted)])
 
 
-def set_default_pose(draft: Draft, values: dict[str, float]) -> None:
+def set_default_pose(draft: ConversionDraft, values: dict[str, float]) -> None:
     """Set the default values of coordinates; ranges are widened to contain them."""
     for name, value in values.items():
         coordinate = draft.made[name]

@@ -10,7 +10,7 @@ from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.functions import ExpressionBasedFunction
 from osimlite.schema.muscles import Millard2012EquilibriumMuscle, Muscle, RigidTendonMuscle
 from osimlite.translate.fidelity import Error
-from osimlite.translate.mjcf_import.draft import Draft, TendonPath
+from osimlite.translate.mjcf_import.draft import ConversionDraft, TendonPath
 from osimlite.translate.mjcf_import.muscle_fits import FittedCurves, Shape, fit_curves
 
 LEAST_SLACK_M = 1e-4
@@ -61,7 +61,7 @@ class MuscleData(NamedTuple):
         return self.force * (activation * self.shape.active(x) * factor + self.shape.passive(x))
 
 
-def read_muscle(draft: Draft, actuator: int, gear: float, shift: float) -> MuscleData:
+def read_muscle(draft: ConversionDraft, actuator: int, gear: float, shift: float) -> MuscleData:
     """Return the numbers of a muscle, with lengths of the path.
 
     Args:
@@ -99,7 +99,7 @@ def read_muscle(draft: Draft, actuator: int, gear: float, shift: float) -> Muscl
 
 
 def make_muscle(
-    draft: Draft, actuator: int, path: TendonPath, gear: float, lengths: Array
+    draft: ConversionDraft, actuator: int, path: TendonPath, gear: float, lengths: Array
 ) -> Muscle | None:
     """Make a muscle, and record how near it is.
 
@@ -208,7 +208,7 @@ def _compare(data: MuscleData, curves: FittedCurves, lengths: Array) -> Array:
 
 
 def _make_exact(
-    draft: Draft,
+    draft: ConversionDraft,
     actuator: int,
     name: str,
     path: TendonPath,
@@ -261,12 +261,12 @@ def _make_exact(
     return muscle
 
 
-def model_times(draft: Draft, actuator: int) -> Array:
+def model_times(draft: ConversionDraft, actuator: int) -> Array:
     """Return the time constants (2,) of the activation of a muscle, s."""
     return np.array(draft.mj.actuator_dynprm[actuator, :2])
 
 
-def _record_dynamics(draft: Draft, actuator: int, lags: bool) -> None:
+def _record_dynamics(draft: ConversionDraft, actuator: int, lags: bool) -> None:
     model = draft.mj
     if lags and model.actuator_dynprm[actuator, 2]:
         draft.record(

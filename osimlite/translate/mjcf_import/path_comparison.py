@@ -14,7 +14,7 @@ from osimlite.schema.muscles import PathActuator
 from osimlite.schema.paths import AbstractGeometryPath
 from osimlite.simulation.paths import Paths
 from osimlite.translate.mjcf_import.coordinate_map import CoordinateMap
-from osimlite.translate.mjcf_import.draft import Draft
+from osimlite.translate.mjcf_import.draft import ConversionDraft
 
 
 class Bench:
@@ -24,7 +24,7 @@ class Bench:
         draft: the conversion; its bodies and joints are complete.
     """
 
-    def __init__(self, draft: Draft) -> None:
+    def __init__(self, draft: ConversionDraft) -> None:
         self._draft = draft
         self.coordinates = CoordinateMap.of(draft.mj, draft.coordinates, draft.rotors)
         self.model = read_text(to_text(draft.model))

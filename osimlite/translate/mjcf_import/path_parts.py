@@ -17,8 +17,13 @@ from osimlite.schema.paths import (
     PathWrapSet,
 )
 from osimlite.schema.wrapping import WrapCylinder, WrapObject, WrapSphere
-from osimlite.translate.mjcf_import.draft import Draft, angles_of, quaternion_matrix, vector
-from osimlite.translate.mjcf_import.tendon_lengths import Segment
+from osimlite.translate.mjcf_import.draft import (
+    ConversionDraft,
+    angles_of,
+    quaternion_matrix,
+    vector,
+)
+from osimlite.translate.mjcf_import.tendon_lengths import TendonSegment
 
 Quadrant = Literal["all", "+x"]
 
@@ -42,7 +47,9 @@ class Surfaces:
         reach: largest distance (m) along the axis of each cylinder at which a tendon ends.
     """
 
-    def __init__(self, draft: Draft, frames: list[PhysicalFrame], reach: dict[int, float]) -> None:
+    def __init__(
+        self, draft: ConversionDraft, frames: list[PhysicalFrame], reach: dict[int, float]
+    ) -> None:
         self._draft, self._frames, self._reach = draft, frames, reach
         self._made: dict[WrapKey, str] = {}
         self._names: set[str] = set()
@@ -79,7 +86,7 @@ class Surfaces:
         return name
 
 
-def turn_to_side(draft: Draft, key: WrapKey) -> Array:
+def turn_to_side(draft: ConversionDraft, key: WrapKey) -> Array:
     """Return the rotation (3, 3) in the frame of a geom whose x axis points to the side site.
 
     The z axis stays that of a cylinder. The site may be on another body; then its place in the
@@ -105,10 +112,10 @@ def turn_to_side(draft: Draft, key: WrapKey) -> Array:
 
 
 def make_geometry_path(
-    draft: Draft,
+    draft: ConversionDraft,
     frames: list[PhysicalFrame],
     surfaces: Surfaces,
-    segments: tuple[Segment, ...],
+    segments: tuple[TendonSegment, ...],
     quadrants: tuple[Quadrant | None, ...],
 ) -> GeometryPath:
     """Make a path through the sites of a tendon.

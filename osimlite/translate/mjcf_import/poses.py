@@ -7,7 +7,7 @@ import numpy as np
 from osimlite.base.records import dataclass
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.translate.mjcf_import.joints import BALL, FREE, HINGE
-from osimlite.translate.mjcf_import.source import Source
+from osimlite.translate.mjcf_import.source import MjcfSource
 
 UNLIMITED = {"hinge": 1.5, "slide": 0.1}
 """Distance from the default (rad, m) within which joints without a range are sampled."""
@@ -16,7 +16,7 @@ EQUALITY_ROUNDS = 4
 
 
 @dataclass(frozen=True, eq=False)
-class Poses:
+class SampledPoses:
     """P poses of a compiled model.
 
     Attributes:
@@ -32,7 +32,7 @@ class Poses:
     turns: Array
 
 
-def sample_qpos(source: Source, count: int, seed: int) -> Array:
+def sample_qpos(source: MjcfSource, count: int, seed: int) -> Array:
     """Return positions (P, nq) that are spread evenly over the joint ranges and obey equalities.
 
     Free joints keep their default pose, because no tendon depends on it unless it is tied to the
@@ -60,7 +60,7 @@ def sample_qpos(source: Source, count: int, seed: int) -> Array:
     return qpos
 
 
-def satisfy_equalities(source: Source, qpos: Array) -> None:
+def satisfy_equalities(source: MjcfSource, qpos: Array) -> None:
     """Set the joints that active equalities determine, in positions (P, nq)."""
     model, kinds = source.model, source.mujoco.mjtEq
     followers = [
@@ -80,7 +80,7 @@ def satisfy_equalities(source: Source, qpos: Array) -> None:
             qpos[:, address] = model.qpos0[address] + value
 
 
-def place(source: Source, qpos: Array) -> Poses:
+def place(source: MjcfSource, qpos: Array) -> SampledPoses:
     """Return the poses of positions (P, nq)."""
     model, mujoco = source.model, source.mujoco
     data = mujoco.MjData(model)
@@ -93,4 +93,4 @@ def place(source: Source, qpos: Array) -> Poses:
         mujoco.mj_kinematics(model, data)
         sites[row], geoms[row] = data.site_xpos, data.geom_xpos
         turns[row] = data.geom_xmat.reshape(-1, 3, 3)
-    return Poses(qpos, sites, geoms, turns)
+    return SampledPoses(qpos, sites, geoms, turns)

@@ -10,7 +10,7 @@ from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.frames import PhysicalFrame
 from osimlite.schema.geometry import Appearance, Brick, Cylinder, Ellipsoid, Geometry, Mesh, Sphere
 from osimlite.translate.fidelity import LEFT_OUT
-from osimlite.translate.mjcf_import.draft import Draft, quaternion_matrix
+from osimlite.translate.mjcf_import.draft import ConversionDraft, quaternion_matrix
 
 PLANE, HFIELD, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX, MESH, SDF = range(9)
 """MuJoCo's geom types (``mjtGeom``)."""
@@ -27,7 +27,7 @@ class _Part(NamedTuple):
     rotation: Array
 
 
-def add_shapes(draft: Draft) -> None:
+def add_shapes(draft: ConversionDraft) -> None:
     """Add geoms as shapes of their bodies, but for those that tendons wrap around."""
     model = draft.mj
     for geom in range(model.ngeom):
@@ -50,7 +50,9 @@ def add_shapes(draft: Draft) -> None:
         draft.translated("geom", geom, f"shape {name}")
 
 
-def _draw(draft: Draft, geom: int, frame: PhysicalFrame, shape: Geometry, name: str) -> None:
+def _draw(
+    draft: ConversionDraft, geom: int, frame: PhysicalFrame, shape: Geometry, name: str
+) -> None:
     model = draft.mj
     rgba = model.geom_rgba[geom]
     material = int(model.geom_matid[geom])
@@ -68,7 +70,7 @@ def _draw(draft: Draft, geom: int, frame: PhysicalFrame, shape: Geometry, name: 
     frame.attach(shape)
 
 
-def _make_parts(draft: Draft, geom: int) -> list[_Part] | None:
+def _make_parts(draft: ConversionDraft, geom: int) -> list[_Part] | None:
     """Make the shapes of a geom; None if it has none, which is recorded."""
     model = draft.mj
     size = [float(value) for value in model.geom_size[geom]]
@@ -96,7 +98,7 @@ def _make_parts(draft: Draft, geom: int) -> list[_Part] | None:
     return None
 
 
-def write_mesh(draft: Draft, mesh: int) -> str:
+def write_mesh(draft: ConversionDraft, mesh: int) -> str:
     """Add the file of a mesh to the draft, once.
 
     MuJoCo moves a mesh to its mass centre and principal axes when it compiles; the file has the
@@ -120,7 +122,7 @@ def write_mesh(draft: Draft, mesh: int) -> str:
     return draft.meshes[mesh]
 
 
-def record_unseen(draft: Draft) -> None:
+def record_unseen(draft: ConversionDraft) -> None:
     """Record what a viewer of MuJoCo shows, or a program reads, and OpenSim does not have."""
     model = draft.mj
     for kind, count, what in (

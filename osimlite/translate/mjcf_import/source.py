@@ -34,7 +34,7 @@ TRIAL_SECONDS = 600
 
 
 @dataclass(frozen=True, eq=False)
-class Source:
+class MjcfSource:
     """A compiled MJCF file.
 
     Attributes:
@@ -74,7 +74,7 @@ class Source:
         return f"/{kind}/{self.name_of(kind, index)}"
 
 
-def load_mjcf(path: Path) -> Source:
+def load_mjcf(path: Path) -> MjcfSource:
     """Compile an MJCF file.
 
     MuJoCo's parser can end the process on a damaged file, so the file is first compiled in another
@@ -115,7 +115,7 @@ def load_mjcf(path: Path) -> Source:
         )
     _require_plausible_numbers(path, model)
     major = int(mujoco.__version__.split(".")[0])
-    return Source(path, mujoco, model, major, tuple(dict.fromkeys(warnings)))
+    return MjcfSource(path, mujoco, model, major, tuple(dict.fromkeys(warnings)))
 
 
 def _require_plausible_numbers(path: Path, model: Any) -> None:

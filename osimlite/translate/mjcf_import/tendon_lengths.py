@@ -12,14 +12,14 @@ import numpy as np
 
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.translate.mjcf.wrapping import bend_tendon, norm
-from osimlite.translate.mjcf_import.poses import Poses
-from osimlite.translate.mjcf_import.source import Source
+from osimlite.translate.mjcf_import.poses import SampledPoses
+from osimlite.translate.mjcf_import.source import MjcfSource
 
 JOINT, PULLEY, SITE, SPHERE, CYLINDER = 1, 2, 3, 4, 5
 """MuJoCo's types of the parts of a tendon (``mjtWrap``)."""
 
 
-class Segment(NamedTuple):
+class TendonSegment(NamedTuple):
     """The part of a tendon between two sites."""
 
     first: int  # site
@@ -33,7 +33,7 @@ class Tendon(NamedTuple):
     """A tendon of the compiled model."""
 
     number: int  # in the compiled model
-    segments: tuple[Segment, ...]
+    segments: tuple[TendonSegment, ...]
     joints: tuple[tuple[int, float], ...]  # joints and coefficients of a fixed tendon
     has_pulley: bool
 
@@ -43,12 +43,12 @@ class Tendon(NamedTuple):
         return bool(self.joints)
 
 
-def read_tendon(source: Source, index: int) -> Tendon:
+def read_tendon(source: MjcfSource, index: int) -> Tendon:
     """Return a tendon of the compiled model."""
     model = source.model
     first = int(model.tendon_adr[index])
     parts = range(first, first + int(model.tendon_num[index]))
-    segments: list[Segment] = []
+    segments: list[TendonSegment] = []
     joints: list[tuple[int, float]] = []
     divisor, has_pulley = 1.0, False
     last, geom, side = -1, -1, -1
@@ -61,7 +61,7 @@ def read_tendon(source: Source, index: int) -> Tendon:
             divisor, last, geom, has_pulley = value, -1, -1, True
         elif kind == SITE:
             if last >= 0:
-                segments.append(Segment(last, number, geom, side, divisor))
+                segments.append(TendonSegment(last, number, geom, side, divisor))
             last, geom, side = number, -1, -1
         else:
             geom, side = number, round(value)
@@ -69,7 +69,7 @@ def read_tendon(source: Source, index: int) -> Tendon:
 
 
 def segment_lengths(
-    source: Source, segments: list[Segment], poses: Poses, version: int
+    source: MjcfSource, segments: list[TendonSegment], poses: SampledPoses, version: int
 ) -> tuple[Array, Array]:
     """Return the lengths (S, P) of segments, and how much of them is on a surface (S, P), m.
 
@@ -119,7 +119,9 @@ def segment_lengths(
     return lengths, touching
 
 
-def tendon_lengths(source: Source, tendons: list[Tendon], poses: Poses, version: int) -> Array:
+def tendon_lengths(
+    source: MjcfSource, tendons: list[Tendon], poses: SampledPoses, version: int
+) -> Array:
     """Return the lengths (T, P) of spatial and fixed tendons, m or rad.
 
     Args:

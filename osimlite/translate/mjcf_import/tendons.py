@@ -17,15 +17,20 @@ from osimlite.schema.functions import LinearFunction
 from osimlite.schema.paths import FunctionBasedPath
 from osimlite.translate.fidelity import Error
 from osimlite.translate.mjcf.wrapping import norm
-from osimlite.translate.mjcf_import.draft import Draft, TendonPath
+from osimlite.translate.mjcf_import.draft import ConversionDraft, TendonPath
 from osimlite.translate.mjcf_import.joints import BALL, FREE
 from osimlite.translate.mjcf_import.path_comparison import Bench
 from osimlite.translate.mjcf_import.path_parts import Quadrant, Surfaces, make_geometry_path
 from osimlite.translate.mjcf_import.polynomials import fit_polynomial, samples_for
-from osimlite.translate.mjcf_import.poses import Poses, place, sample_qpos, satisfy_equalities
+from osimlite.translate.mjcf_import.poses import (
+    SampledPoses,
+    place,
+    sample_qpos,
+    satisfy_equalities,
+)
 from osimlite.translate.mjcf_import.tendon_lengths import (
-    Segment,
     Tendon,
+    TendonSegment,
     read_tendon,
     segment_lengths,
     tendon_lengths,
@@ -45,7 +50,7 @@ STEP = 1e-6
 """Step of the joint position (rad, m) for derivatives of tendon lengths."""
 
 
-def find_version(draft: Draft, tendons: list[Tendon], poses: Poses) -> int:
+def find_version(draft: ConversionDraft, tendons: list[Tendon], poses: SampledPoses) -> int:
     """Return the version of MuJoCo whose rules the tendons follow.
 
     Raises:
@@ -66,7 +71,7 @@ def find_version(draft: Draft, tendons: list[Tendon], poses: Poses) -> int:
     )
 
 
-def add_tendon_paths(draft: Draft) -> None:
+def add_tendon_paths(draft: ConversionDraft) -> None:
     """Make the path of each tendon, and measure it."""
     source, model = draft.source, draft.mj
     tendons = [read_tendon(source, index) for index in range(model.ntendon)]
@@ -94,7 +99,9 @@ def add_tendon_paths(draft: Draft) -> None:
 class _Selection:
     """Selection of the path of each spatial tendon."""
 
-    def __init__(self, draft: Draft, tendons: list[Tendon], poses: Poses, version: int) -> None:
+    def __init__(
+        self, draft: ConversionDraft, tendons: list[Tendon], poses: SampledPoses, version: int
+    ) -> None:
         self.draft, self.source = draft, draft.source
         self.tendons, self.poses, self.version = tendons, poses, version
         self.reach = _find_reach(draft, tendons, poses)
@@ -139,7 +146,7 @@ class _Selection:
                     make_geometry_path(draft, draft.frames, surfaces, tendon.segments, routes[row])
                 )
 
-    def _select_quadrants(self) -> tuple[dict[Segment, Quadrant | None], set[Segment]]:
+    def _select_quadrants(self) -> tuple[dict[TendonSegment, Quadrant | None], set[TendonSegment]]:
         """Return how each wrapped segment wraps, and those that only a polynomial follows."""
         segments = sorted(
             {_key(item) for tendon in self.tendons for item in tendon.segments if item.geom >= 0}
@@ -158,7 +165,7 @@ class _Selection:
             for option in options:
                 path = make_geometry_path(self.draft, bench.frames, surfaces, (item,), (option,))
                 candidates.append((number, option, bench.add(path)))
-        result: dict[Segment, Quadrant | None] = {}
+        result: dict[TendonSegment, Quadrant | None] = {}
         if candidates:
             lengths, _, _ = bench.measure(self.poses.qpos)
             best: dict[int, float] = {}
@@ -169,7 +176,7 @@ class _Selection:
                     best[number], result[segments[number]] = off, option
         return result, bad
 
-    def _is_inside(self, item: Segment) -> bool:
+    def _is_inside(self, item: TendonSegment) -> bool:
         """Whether the side site is inside of the geom, so that the tendon passes through it."""
         model = self.draft.mj
         apart = self.poses.sites[:, item.side] - self.poses.geoms[:, item.geom]
@@ -292,7 +299,7 @@ class _Selection:
                 draft.translated("tendon", tendon.number, "path")
 
 
-def _key(item: Segment) -> Segment:
+def _key(item: TendonSegment) -> TendonSegment:
     return item._replace(divisor=1.0)
 
 
@@ -300,7 +307,7 @@ def _rms(off: Array) -> float:
     return float(np.sqrt(np.mean(np.square(off))))
 
 
-def _dependent(draft: Draft) -> set[int]:
+def _dependent(draft: ConversionDraft) -> set[int]:
     model, kinds = draft.mj, draft.source.mujoco.mjtEq
     return {
         int(model.eq_obj1id[number])
@@ -309,7 +316,9 @@ def _dependent(draft: Draft) -> set[int]:
     }
 
 
-def _find_reach(draft: Draft, tendons: list[Tendon], poses: Poses) -> dict[int, float]:
+def _find_reach(
+    draft: ConversionDraft, tendons: list[Tendon], poses: SampledPoses
+) -> dict[int, float]:
     """Return the largest height (m) over the middle of each cylinder at which a segment ends."""
     result: dict[int, float] = {}
     for tendon in tendons:
@@ -324,7 +333,7 @@ def _find_reach(draft: Draft, tendons: list[Tendon], poses: Poses) -> dict[int, 
     return result
 
 
-def _make_linear_path(draft: Draft, tendon: Tendon) -> TendonPath:
+def _make_linear_path(draft: ConversionDraft, tendon: Tendon) -> TendonPath:
     """Make the path of a fixed tendon, which is a linear function of joint positions."""
     names, coefficients, least = [], [], 0.0
     for joint, coefficient in tendon.joints:

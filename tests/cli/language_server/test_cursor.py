@@ -11,7 +11,7 @@ pytest.importorskip("pygls", reason="needs pygls (extra 'lsp')")
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from osimlite.cli.language_server.analysis import Analysis
+from osimlite.cli.language_server.analysis import DocumentAnalysis
 from osimlite.cli.language_server.completion import list_completions
 from osimlite.cli.language_server.cursor import find_cursor
 from osimlite.cli.language_server.findings import list_diagnostics
@@ -88,7 +88,7 @@ def test_no_question_about_a_damaged_setup_or_table_fails(
 
 
 def _ask(file: str, text: str, place: int) -> None:
-    analysis = Analysis(Text(text), file)
+    analysis = DocumentAnalysis(Text(text), file)
     place = min(place, len(text))
     describe_cursor(analysis, place)
     list_completions(analysis, analysis if analysis.is_readable else None, place)

@@ -9,7 +9,7 @@ from shutil import copy
 import pytest
 from lsprotocol import types
 
-from osimlite.cli.language_server.analysis import Analysis
+from osimlite.cli.language_server.analysis import DocumentAnalysis
 from osimlite.cli.language_server.project import Project
 from osimlite.cli.language_server.text import Text
 from osimlite.io.document.reader import read
@@ -130,7 +130,7 @@ def test_what_is_held_needs_no_encoding(tmp_path: Path) -> None:
     text = f'{head}<OpenSimDocument Version="40600"><Model name="é"/></OpenSimDocument>'
     file.write_text(text, encoding="iso-8859-1")
     project = Project()
-    project.open["m"] = Analysis(Text(text.replace("é", "öß")), str(file))
+    project.open["m"] = DocumentAnalysis(Text(text.replace("é", "öß")), str(file))
     assert project.publish_unsaved(project.open["m"]) and not project.publish_unsaved(
         project.open["m"]
     )

@@ -15,8 +15,8 @@ from osimlite.mechanics.multibody import build_mechanism
 from osimlite.mechanics.multibody import functions as f
 from osimlite.mechanics.multibody.joints import (
     MOTIONS,
+    JointAxis,
     Mobilizer,
-    TransformAxis,
     make_custom_motions,
     make_ellipsoid_motions,
     make_scapulothoracic_motions,
@@ -45,7 +45,7 @@ def load(name: str) -> Any:
     return json.loads((FIXTURES / name).read_text())
 
 
-def function(spec: dict[str, Any]) -> f.Function:
+def function(spec: dict[str, Any]) -> f.SmoothFunction:
     """The function that a case describes."""
     return convert_function(_component(spec), 1, "the function of a case")
 
@@ -75,7 +75,7 @@ def motions(joint_type: str, properties: dict[str, Any]) -> tuple[JointMotion, .
         case "CustomJoint":
             names = properties["coordinate_order"]
             axes = [
-                TransformAxis(
+                JointAxis(
                     tuple(names.index(name) for name in axis["coordinates"]),
                     axis["axis"],
                     function(axis["function"]),

@@ -9,11 +9,15 @@ from hypothesis import strategies as st
 
 from osimlite.mechanics.multibody import body_constraints as b
 from osimlite.mechanics.multibody import functions as f
-from osimlite.mechanics.multibody.constraints import Constraint, Coupler, PrescribedCoordinate
+from osimlite.mechanics.multibody.constraints import (
+    ConstraintEquations,
+    Coupler,
+    PrescribedCoordinate,
+)
 from osimlite.mechanics.multibody.joints import (
     MOTIONS,
+    JointAxis,
     Mobilizer,
-    TransformAxis,
     constant_curvature,
     make_custom_motions,
     make_ellipsoid_motions,
@@ -68,14 +72,14 @@ def motions_of(joint_type: str, rng: np.random.Generator) -> tuple[JointMotion, 
             _radii(rng), rng.uniform(-0.1, 0.1, 2), rng.uniform(-1.0, 1.0)
         )
     if joint_type == "CustomJoint":
-        spline = f.SimmSpline((-1.5, -0.4, 0.3, 1.6), rng.uniform(-0.5, 0.5, 4))
+        spline = f.SimmCubicSpline((-1.5, -0.4, 0.3, 1.6), rng.uniform(-0.5, 0.5, 4))
         axes = [
-            TransformAxis((0,), rng.normal(size=3), f.Linear(-1.0, 0.2)),
-            TransformAxis((1,), rng.normal(size=3), spline),
-            TransformAxis((0,), rng.normal(size=3), f.Sine(0.4, 1.3, 0.2, 0.1)),
-            TransformAxis((0,), rng.normal(size=3), f.Polynomial((0.3, -0.2, 0.5, 0.1))),
-            TransformAxis((1,), rng.normal(size=3), f.ScaledFunction(-0.7, spline)),
-            TransformAxis((), rng.normal(size=3), f.Constant(0.07)),
+            JointAxis((0,), rng.normal(size=3), f.Linear(-1.0, 0.2)),
+            JointAxis((1,), rng.normal(size=3), spline),
+            JointAxis((0,), rng.normal(size=3), f.SineWave(0.4, 1.3, 0.2, 0.1)),
+            JointAxis((0,), rng.normal(size=3), f.Polynomial((0.3, -0.2, 0.5, 0.1))),
+            JointAxis((1,), rng.normal(size=3), f.ScaledFunction(-0.7, spline)),
+            JointAxis((), rng.normal(size=3), f.ConstantValue(0.07)),
         ]
         return make_custom_motions(axes[:3], axes[3:])
     return MOTIONS[joint_type]
@@ -139,22 +143,22 @@ def cases(draw: st.DrawFn, *, max_bodies: int = 5) -> Case:
     )
 
 
-def constraint_of(kind: str, mechanism: Mechanism, rng: np.random.Generator) -> Constraint:
+def constraint_of(kind: str, mechanism: Mechanism, rng: np.random.Generator) -> ConstraintEquations:
     """A random constraint of a kind."""
     one, two = rng.choice(range(-1, len(mechanism.bodies)), 2, replace=False).tolist()
     first, second = (StationPlacement(body, rng.uniform(-0.3, 0.3, 3)) for body in (one, two))
     match kind:
         case "point":
-            return b.PointConstraint(first, second)
+            return b.PointEquations(first, second)
         case "distance":
             return b.DistanceConstraint(first, second, 0.5)
         case "line":
-            return b.PointOnLineConstraint(first, rng.normal(size=3), second)
+            return b.PointOnLineEquations(first, rng.normal(size=3), second)
         case "weld":
             inner, outer = (
                 make_offset(rng.uniform(-0.3, 0.3, 3), rng.uniform(-1.0, 1.0, 3)) for _ in range(2)
             )
-            return b.WeldConstraint(FramePlacement(one, inner), FramePlacement(two, outer))
+            return b.WeldEquations(FramePlacement(one, inner), FramePlacement(two, outer))
         case "rolling":
             return b.RollingConstraint(one, two, rng.normal(size=3), 0.3)
         case "coupler":
@@ -162,8 +166,8 @@ def constraint_of(kind: str, mechanism: Mechanism, rng: np.random.Generator) -> 
             return Coupler(
                 places[0],
                 tuple(places[1:]),
-                f.Polynomial((0.3, -0.2, 0.1)) if places[1:] else f.Constant(0.2),
+                f.Polynomial((0.3, -0.2, 0.1)) if places[1:] else f.ConstantValue(0.2),
             )
     return PrescribedCoordinate(
-        int(rng.integers(len(mechanism.coordinates))), f.Sine(0.4, 3.0, 0.2, 0.1)
+        int(rng.integers(len(mechanism.coordinates))), f.SineWave(0.4, 3.0, 0.2, 0.1)
     )

@@ -10,7 +10,7 @@ import pytest
 from osimlite.io.document.reader import read_text
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.mechanics.multibody import functions as f
-from osimlite.mechanics.multibody.joints import Mobilizer, TransformAxis, make_custom_motions
+from osimlite.mechanics.multibody.joints import JointAxis, Mobilizer, make_custom_motions
 from osimlite.mechanics.multibody.mechanism import (
     CoordinateInfo,
     MassProperties,
@@ -23,12 +23,12 @@ from tests.mechanics.multibody.cases import alone
 def _knee(*, opensim_derivatives: bool) -> Mechanism:
     """A shank on a joint whose first coordinate drives all three rotations, and two translations."""
     axes = [
-        TransformAxis((0,), (0.0, 0.0, 1.0), f.IDENTITY),
-        TransformAxis((0,), (1.0, 0.0, 0.0), f.Polynomial((0.3, 0.5, 0.1))),
-        TransformAxis((0, 1), (0.0, 1.0, 0.0), f.WeightedSum((-0.7, 1.0))),
-        TransformAxis((0,), (1.0, 0.0, 0.0), f.Polynomial((0.1, -0.2, 0.0))),
-        TransformAxis((1,), (0.0, 1.0, 0.0), f.Sine(0.1, 2.0, 0.0, 0.0)),
-        TransformAxis((), (0.0, 0.0, 1.0), f.Constant(0.05)),
+        JointAxis((0,), (0.0, 0.0, 1.0), f.IDENTITY),
+        JointAxis((0,), (1.0, 0.0, 0.0), f.Polynomial((0.3, 0.5, 0.1))),
+        JointAxis((0, 1), (0.0, 1.0, 0.0), f.WeightedSum((-0.7, 1.0))),
+        JointAxis((0,), (1.0, 0.0, 0.0), f.Polynomial((0.1, -0.2, 0.0))),
+        JointAxis((1,), (0.0, 1.0, 0.0), f.SineWave(0.1, 2.0, 0.0, 0.0)),
+        JointAxis((), (0.0, 0.0, 1.0), f.ConstantValue(0.05)),
     ]
     motions = make_custom_motions(axes[:3], axes[3:], opensim_derivatives=opensim_derivatives)
     properties = MassProperties(2.0, np.array((0.1, -0.3, 0.05)), np.diag((0.03, 0.02, 0.04)))
@@ -91,8 +91,8 @@ def test_the_two_agree_on_everything_but_accelerations():
 
 
 def test_where_each_coordinate_has_its_rotation_the_two_agree():
-    axes = [TransformAxis((k,), np.eye(3)[k], f.IDENTITY) for k in range(3)]
-    still = [TransformAxis((), np.eye(3)[k], f.Constant(0.1)) for k in range(3)]
+    axes = [JointAxis((k,), np.eye(3)[k], f.IDENTITY) for k in range(3)]
+    still = [JointAxis((), np.eye(3)[k], f.ConstantValue(0.1)) for k in range(3)]
     q, u = np.array((0.4, -0.3, 0.2)), np.array((2.0, -1.0, 0.5))
     built = []
     for switch in (False, True):

@@ -13,7 +13,7 @@ import pytest
 import osimlite
 from osimlite.errors import ModelError, OsimliteError
 from osimlite.mechanics.multibody.extremes import any_numbers, find_extreme_number
-from osimlite.mechanics.multibody.functions import PiecewiseLinear, SimmSpline
+from osimlite.mechanics.multibody.functions import PiecewiseLinear, SimmCubicSpline
 from osimlite.schema.custom_joint import CustomJoint
 from osimlite.schema.frames import StationDefinedFrame
 from osimlite.schema.functions import LinearFunction, PolynomialFunction
@@ -138,7 +138,10 @@ def test_splines_far_outside(value: float) -> None:
     joint.coordinates[0].default_value = value
     used(model)
     if not np.isfinite(value):
-        for function in (SimmSpline((0, 1, 2), (0, 1, 0)), PiecewiseLinear((0.0, 1.0), (0.0, 1.0))):
+        for function in (
+            SimmCubicSpline((0, 1, 2), (0, 1, 0)),
+            PiecewiseLinear((0.0, 1.0), (0.0, 1.0)),
+        ):
             assert np.isnan(function.derivatives(value)).all()
 
 

@@ -54,7 +54,7 @@ def test_at_a_knot_the_neighbour_is_the_one_opensim_takes(count, values, slopes)
 def test_only_linear_functions_have_a_slope():
     assert f.Linear(-1.0, 0.3).slope == -1.0
     assert f.IDENTITY.slope == 1.0
-    assert f.Constant(2.0).slope is None
+    assert f.ConstantValue(2.0).slope is None
     assert f.ScaledFunction(1.0, f.IDENTITY).slope is None
 
 
@@ -66,7 +66,7 @@ def test_only_linear_functions_have_a_slope():
 def test_a_spline_meets_its_points_and_is_twice_smooth(knots, seed, x):
     knots = sorted(round(value, 2) for value in knots)
     heights = np.random.default_rng(seed).uniform(-1.0, 1.0, len(knots))
-    spline = f.SimmSpline(knots, heights)
+    spline = f.SimmCubicSpline(knots, heights)
     for knot, height in zip(knots, heights, strict=True):
         assert spline.evaluate(np.array((knot,)))[0] == pytest.approx(height, abs=1e-9)
     if len(knots) > 2:
@@ -92,12 +92,12 @@ def test_the_point_of_an_ellipsoid_has_the_derivatives_of_its_values(component, 
 
 
 def test_a_sine_is_a_sine():
-    wave = f.Sine(2.0, 3.0, 0.5, 1.0)
+    wave = f.SineWave(2.0, 3.0, 0.5, 1.0)
     assert wave.evaluate(np.array((0.1,)))[0] == pytest.approx(2.0 * math.sin(0.8) + 1.0, abs=1e-15)
 
 
 def _slopes(
-    function: f.Function, at: np.ndarray, step: float = 1e-5
+    function: f.SmoothFunction, at: np.ndarray, step: float = 1e-5
 ) -> tuple[np.ndarray, np.ndarray]:
     """Gradient and Hessian by central differences."""
     pairs = [
@@ -139,7 +139,7 @@ def test_the_monomials_come_in_opensims_order():
 
 @given(st.floats(-1.0, 2.0))
 def test_a_step_has_the_derivatives_of_its_values(x):
-    step = f.Step(0.2, 0.9, -1.0, 2.5)
+    step = f.QuinticStep(0.2, 0.9, -1.0, 2.5)
     _, gradient, hessian = step.evaluate(np.array((x,)))
     slopes, bends = _slopes(step, np.array((x,)))
     assert gradient == pytest.approx(slopes, abs=1e-6)

@@ -9,8 +9,8 @@ from osimlite.errors import ModelError, SimulationError
 from osimlite.mechanics.multibody.functions import IDENTITY
 from osimlite.mechanics.multibody.joints import (
     MOTIONS,
+    JointAxis,
     Mobilizer,
-    TransformAxis,
     constant_curvature,
     make_custom_motions,
     motion_types,
@@ -142,9 +142,9 @@ def test_rates_are_refused_where_they_are_not_defined(joint_type):
 
 
 def test_an_axis_needs_a_direction():
-    axes = [TransformAxis((0,), axis, IDENTITY) for axis in np.eye(3)]
+    axes = [JointAxis((0,), axis, IDENTITY) for axis in np.eye(3)]
     with pytest.raises(ModelError, match="no direction"):
-        make_custom_motions(axes, [TransformAxis((1,), (0.0, 0.0, 0.0), IDENTITY)])
+        make_custom_motions(axes, [JointAxis((1,), (0.0, 0.0, 0.0), IDENTITY)])
 
 
 @given(st.sampled_from(JOINT_TYPES), st.integers(0, 2**32 - 1), st.booleans())

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from osimlite.mechanics.multibody.spatial import Array, make_transform
-from osimlite.simulation.robot.robot import Link, Robot, principal_axes
+from osimlite.simulation.robot.robot import Robot, RobotLink, principal_axes
 
 
 class Bullet:
@@ -106,7 +106,7 @@ def written(text: str, files: dict[str, bytes] | None = None) -> Iterator[Path]:
         yield path
 
 
-def inertial_frame(link: Link) -> Array:
+def inertial_frame(link: RobotLink) -> Array:
     """What Bullet calls the frame of a link, in the link frame."""
     return make_transform(principal_axes(link.inertia)[1], link.center)
 

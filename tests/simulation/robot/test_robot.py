@@ -8,7 +8,7 @@ from hypothesis import given
 
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.mechanics.multibody.functions import IDENTITY, Linear
-from osimlite.mechanics.multibody.joints import TransformAxis, make_custom_motions
+from osimlite.mechanics.multibody.joints import JointAxis, make_custom_motions
 from osimlite.mechanics.multibody.mechanism import (
     Mechanism,
 )
@@ -155,7 +155,7 @@ def test_a_locked_coordinate_is_fixed_at_the_value_asked_for():
 def test_a_turned_child_frame_takes_no_extra_link():
     turned = make_offset((0.0, 0.0, 0.3), (0.4, 0.1, -0.7))
     for kind in ("rotations", "translations"):
-        axes = [TransformAxis((0,), turned[:3, :3].T @ turned[:3, 3], IDENTITY)]
+        axes = [JointAxis((0,), turned[:3, :3].T @ turned[:3, 3], IDENTITY)]
         # The child frame lies on the axis of the joint, or the joint only translates.
         motions = (
             make_custom_motions(axes, ()) if kind == "rotations" else make_custom_motions((), axes)
@@ -169,7 +169,7 @@ def test_a_turned_child_frame_takes_no_extra_link():
 
 def test_what_is_constant_in_a_function_goes_into_the_origin():
     x, y = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
-    axes = [TransformAxis((0,), x, Linear(-1.0, 0.3)), TransformAxis((0,), y, Linear(0.5, 0.2))]
+    axes = [JointAxis((0,), x, Linear(-1.0, 0.3)), JointAxis((0,), y, Linear(0.5, 0.2))]
     robot = build_robot(one_body(make_custom_motions(axes, ()), 1))
     first, second = robot.moving
     assert (first.name, first.coordinate, first.axis.tolist()) == ("q0", 0, [-1.0, 0.0, 0.0])
@@ -181,8 +181,8 @@ def test_what_is_constant_in_a_function_goes_into_the_origin():
 
 def test_ranges_become_limits_on_demand():
     axes = [
-        TransformAxis((0,), (1.0, 0.0, 0.0), Linear(1.0)),
-        TransformAxis((0,), (0.0, 1.0, 0.0), Linear(-0.5)),
+        JointAxis((0,), (1.0, 0.0, 0.0), Linear(1.0)),
+        JointAxis((0,), (0.0, 1.0, 0.0), Linear(-0.5)),
     ]
     robot = build_robot(one_body(make_custom_motions(axes, ()), 1))
     assert [joint.limits for joint in robot.moving] == [None, None]
@@ -199,7 +199,7 @@ def test_names_are_made_legal(name, fit):
 
 def test_legal_names_stay_and_others_step_aside():
     x = (1.0, 0.0, 0.0)
-    motions = make_custom_motions([TransformAxis((k,), x, IDENTITY) for k in range(3)], ())
+    motions = make_custom_motions([JointAxis((k,), x, IDENTITY) for k in range(3)], ())
     mechanism = one_body(motions, 3, names=["knee angle", "knee_angle", "B"])
     robot = legal_names(build_robot(mechanism))
     assert [joint.name for joint in robot.moving] == ["knee_angle_1", "knee_angle", "B_1"]
@@ -211,9 +211,7 @@ def test_legal_names_stay_and_others_step_aside():
 
 
 def test_a_body_called_world_is_not_mistaken_for_ground():
-    mechanism = one_body(
-        make_custom_motions([TransformAxis((0,), (1.0, 0.0, 0.0), IDENTITY)], ()), 1
-    )
+    mechanism = one_body(make_custom_motions([JointAxis((0,), (1.0, 0.0, 0.0), IDENTITY)], ()), 1)
     (body,) = mechanism.bodies
     mechanism = Mechanism("one", (dataclasses.replace(body, name=WORLD),), mechanism.coordinates)
     robot = build_robot(mechanism)

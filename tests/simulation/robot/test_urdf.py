@@ -12,7 +12,7 @@ from hypothesis import given, settings
 
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.mechanics.multibody.functions import Linear
-from osimlite.mechanics.multibody.joints import TransformAxis, make_custom_motions
+from osimlite.mechanics.multibody.joints import JointAxis, make_custom_motions
 from osimlite.mechanics.multibody.mechanism import Mechanism
 from osimlite.models.dynamic_walker import dynamic_walker
 from osimlite.simulation.robot.build import build_robot
@@ -232,8 +232,8 @@ def test_no_collision_shapes_are_written():
 
 def test_a_joint_that_follows_another_says_so():
     x, y, z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
-    axes = [TransformAxis((0,), x, Linear(1.0)), TransformAxis((0,), y, Linear(-0.5, 0.3))]
-    mechanism = one_body(make_custom_motions(axes, [TransformAxis((0,), z, Linear(0.1))]), 1)
+    axes = [JointAxis((0,), x, Linear(1.0)), JointAxis((0,), y, Linear(-0.5, 0.3))]
+    mechanism = one_body(make_custom_motions(axes, [JointAxis((0,), z, Linear(0.1))]), 1)
     robot = build_robot(mechanism)
     text = urdf_text(robot)
     assert re.findall(r"<mimic .*/>", text) == [

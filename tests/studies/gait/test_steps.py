@@ -13,7 +13,7 @@ from osimlite.simulation import Simulation
 from osimlite.simulation.run import simulate
 from osimlite.studies.gait import steps
 from osimlite.studies.gait.foot_contacts import FootContacts, find_footing
-from osimlite.studies.gait.steps import Walk, measure_along_slope, walk_many
+from osimlite.studies.gait.steps import WalkerSteps, measure_along_slope, walk_many
 
 FEET = (("RFootForce",), ("LFootForce",))
 
@@ -97,7 +97,7 @@ def test_places_along_the_slope(engine):
     assert depth[0, :2] == pytest.approx([hip, hip], abs=1e-12)
 
 
-def follow(events, along, touching=(False, False)) -> Walk:
+def follow(events, along, touching=(False, False)) -> WalkerSteps:
     contacts = ["RFootForce", "LFootForce", "RHipForce"]
     states = np.arange(len(events), dtype=float)[:, None]
     return steps.follow_events(

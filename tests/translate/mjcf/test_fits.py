@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import osimlite
-from osimlite.mechanics.multibody.functions import Polynomial, Sine
+from osimlite.mechanics.multibody.functions import Polynomial, SineWave
 from osimlite.schema.frames import Body
 from osimlite.schema.joints import PinJoint
 from osimlite.schema.model import Model
@@ -87,7 +87,7 @@ def test_what_mujoco_has_not_is_near_and_nearer_if_fitted(surface, chosen, after
 
 
 def test_a_quartic_of_a_quartic():
-    functions = (Sine(0.03, 1.5, 0.2, 0.1), Polynomial((0.1, 0.0, 0.2)))
+    functions = (SineWave(0.03, 1.5, 0.2, 0.1), Polynomial((0.1, 0.0, 0.2)))
     drive, slides = fit_composition(functions, (-2.0, 0.2))
     x = np.linspace(-2.0, 0.2, 50)
     helper = np.polynomial.polynomial.polyval(x, drive)

@@ -6,7 +6,7 @@ import numpy as np
 
 import osimlite
 from osimlite import Body, Coordinate, CoordinateCouplerConstraint, Model, PinJoint
-from osimlite.mechanics.multibody.functions import ScaledFunction, SimmSpline
+from osimlite.mechanics.multibody.functions import ScaledFunction, SimmCubicSpline
 from osimlite.schema.functions import LinearFunction
 from osimlite.schema.path_forces import PathSpring
 from osimlite.schema.paths import PathPoint
@@ -15,7 +15,7 @@ from osimlite.translate.mjcf.poses import draw_poses
 
 
 def test_the_other_side_of_a_body_takes_no_second_fit() -> None:
-    right = SimmSpline((0.0, 0.4, 0.9, 1.3, 2.0), (0.1, 0.3, -0.2, 0.25, 0.2))
+    right = SimmCubicSpline((0.0, 0.4, 0.9, 1.3, 2.0), (0.1, 0.3, -0.2, 0.25, 0.2))
     first, slides = moving.fit_composition((right, right), (0.0, 2.0))
     fits = moving.fit_quartics.cache_info().misses
     other, mirrored = moving.fit_composition((right, ScaledFunction(-1.0, right)), (0.0, 2.0))

@@ -20,8 +20,8 @@ from osimlite.io.document.upgrade.draft import (
     Draft,
     Element,
     Refusal,
-    Step,
     UpgradeError,
+    UpgradeStep,
 )
 from osimlite.schema.model import CURRENT_VERSION
 
@@ -29,9 +29,9 @@ __all__ = [
     "STEP_TABLE",
     "Change",
     "Refusal",
-    "Step",
     "UpgradeError",
     "UpgradeResult",
+    "UpgradeStep",
     "list_steps",
     "rename_old_classes",
     "upgrade",
@@ -100,7 +100,7 @@ A module is imported when a document needs one of its steps.
 """
 
 
-def list_steps(version: int = 0) -> list[Step]:
+def list_steps(version: int = 0) -> list[UpgradeStep]:
     """Return the steps that a document of this version needs, in the order in which they run."""
     return [
         _load_step(below, name, function) for below, name, function in STEP_TABLE if version < below
@@ -108,10 +108,10 @@ def list_steps(version: int = 0) -> list[Step]:
 
 
 @cache
-def _load_step(below: int, name: str, function: str) -> Step:
+def _load_step(below: int, name: str, function: str) -> UpgradeStep:
     """Return the step of a row of `STEP_TABLE`."""
     module, _, attribute = function.partition(".")
-    return Step(below, name, getattr(import_module(f"{__name__}.{module}"), attribute))
+    return UpgradeStep(below, name, getattr(import_module(f"{__name__}.{module}"), attribute))
 
 
 class UpgradeResult:

@@ -76,7 +76,7 @@ class UpgradeError(Exception):
         self.number = number
 
 
-class Step(NamedTuple):
+class UpgradeStep(NamedTuple):
     """One step of the upgrade.
 
     Attributes:
@@ -117,9 +117,9 @@ class Draft:
         self.root = root
         self.version = version
         self.touched: dict[Element, None] = {}
-        self.step: Step | None = None
+        self.step: UpgradeStep | None = None
         self.refusals: list[Refusal] = []
-        self._changes: list[tuple[Step, Element, Element, str | None]] = []
+        self._changes: list[tuple[UpgradeStep, Element, Element, str | None]] = []
         if self.moves_elements:
             # Number the elements now, because steps move them later.
             assert self.numbers

@@ -94,7 +94,7 @@ RESERVED = frozenset((
 """Names that a kernel may use, but that mean something else in C++ or in the header."""
 
 
-class Code(NamedTuple):
+class ExpressionText(NamedTuple):
     """Text of an expression, and the precedence of its outermost operator."""
 
     text: str
@@ -330,7 +330,7 @@ class ExpressionWriter:
         return self.convert(self.text(node, least), have, want)
 
     # ----------------------------------------------------------------------------------------------- conditions
-    def condition(self, node: ast.expr) -> Code:
+    def condition(self, node: ast.expr) -> ExpressionText:
         """Return the text of an expression as a truth value."""
         match node:
             case ast.BoolOp(op=op, values=values):
@@ -341,17 +341,17 @@ class ExpressionWriter:
                     self.guard_expression(self._condition_part, value, precedence)
                     for value in others
                 ]
-                return Code(f" {sign} ".join(texts), precedence)
+                return ExpressionText(f" {sign} ".join(texts), precedence)
             case ast.UnaryOp(op=ast.Not(), operand=operand):
                 code = self.condition(operand)
-                return Code(
+                return ExpressionText(
                     f"!{code.text}" if code.precedence == PRIMARY else f"!({code.text})", UNARY
                 )
         code = self.code(node)
         if self.function.require_type(node) is BOOLEAN:
             return code
         text = code.text if code.precedence > EQUALITY else f"({code.text})"
-        return Code(f"{text} != 0", EQUALITY)
+        return ExpressionText(f"{text} != 0", EQUALITY)
 
     def _condition_part(self, node: ast.expr, outer: int) -> str:
         code = self.condition(node)
@@ -359,13 +359,13 @@ class ExpressionWriter:
         return code.text if code.precedence > AND or code.precedence == outer else f"({code.text})"
 
     # ---------------------------------------------------------------------------------------------- expressions
-    def code(self, node: ast.expr) -> Code:
+    def code(self, node: ast.expr) -> ExpressionText:
         """Return the text of an expression with its precedence."""
         match node:
             case ast.Constant(value=value):
                 return self.number(value)
             case ast.Name(id=name) if name in self.function.variables:
-                return Code(self.local(name))
+                return ExpressionText(self.local(name))
             case ast.Name(id=name):
                 return self.constant(name, self.function.value(node))
             case ast.Attribute(value=owner, attr=name):
@@ -373,7 +373,7 @@ class ExpressionWriter:
                     return self.constant(ast.unparse(node).replace(".", "_"), value)
                 kind = self.function.require_type(owner)
                 assert isinstance(kind, Tuple)
-                return Code(
+                return ExpressionText(
                     self.item(self.text(owner, PRIMARY), kind, kind.record._fields.index(name))
                 )
             case ast.Tuple():
@@ -384,7 +384,7 @@ class ExpressionWriter:
                 return self.condition(node)
             case ast.UnaryOp(op=op, operand=operand):
                 sign = {ast.USub: "-", ast.UAdd: "+", ast.Invert: "~"}[type(op)]
-                return Code(f"{sign}{self.text(operand, PRIMARY)}", UNARY)
+                return ExpressionText(f"{sign}{self.text(operand, PRIMARY)}", UNARY)
             case ast.BinOp(left=left, op=op, right=right):
                 texts = self.order_operands(
                     [left, right], lambda part: self._operand(part, op, part is right)
@@ -403,12 +403,12 @@ class ExpressionWriter:
         raise self.function.refuse(node)
 
     @staticmethod
-    def number(value: Any) -> Code:
+    def number(value: Any) -> ExpressionText:
         """Return the text of a constant."""
         text = write_number(value)
-        return Code(text, UNARY if text.startswith("-") else PRIMARY)
+        return ExpressionText(text, UNARY if text.startswith("-") else PRIMARY)
 
-    def constant(self, name: str, value: Any) -> Code:
+    def constant(self, name: str, value: Any) -> ExpressionText:
         """Return the text of a value of a module.
 
         Args:
@@ -416,19 +416,19 @@ class ExpressionWriter:
             value: the value.
         """
         if isinstance(value, tuple):
-            return Code(self.names.name_constant(name, value))
+            return ExpressionText(self.names.name_constant(name, value))
         # A function that is passed on is a part of the specialisation that is called, and no
         # argument.
-        return Code("") if isinstance(value, FunctionType) else self.number(value)
+        return ExpressionText("") if isinstance(value, FunctionType) else self.number(value)
 
-    def new_tuple(self, node: ast.Tuple) -> Code:
+    def new_tuple(self, node: ast.Tuple) -> ExpressionText:
         """Return the text of a new tuple."""
         kind = self.function.require_type(node)
         assert isinstance(kind, Tuple)
         texts, kinds = self.arguments(node.elts)
-        return Code(self.build(kind, texts, kinds))
+        return ExpressionText(self.build(kind, texts, kinds))
 
-    def subscript(self, owner: ast.expr, index: ast.expr) -> Code:
+    def subscript(self, owner: ast.expr, index: ast.expr) -> ExpressionText:
         """Return the text of an item of a vector or a tuple.
 
         Args:
@@ -440,17 +440,17 @@ class ExpressionWriter:
             texts = self.order_operands(
                 [owner, index], lambda part: self.text(part, PRIMARY if part is owner else CHOICE)
             )
-            return Code(f"{texts[0]}[{texts[1]}]")
+            return ExpressionText(f"{texts[0]}[{texts[1]}]")
         assert isinstance(kind, Tuple)
         constant = self.function.constant_index(index)
         if constant is not None:
-            return Code(self.item(self.text(owner, PRIMARY), kind, constant))
+            return ExpressionText(self.item(self.text(owner, PRIMARY), kind, constant))
         texts = self.order_operands(
             [owner, index], lambda part: self.text(part, PRIMARY if part is owner else CHOICE)
         )
         # A variable index counts from the start: a test whether it is negative costs more than the
         # laws' curves may.
-        return Code(f"{texts[0]}.items[{texts[1]}]")
+        return ExpressionText(f"{texts[0]}.items[{texts[1]}]")
 
     def _operand(self, node: ast.expr, op: ast.operator, is_right: bool) -> str:
         if type(op) in FUNCTIONS:
@@ -463,7 +463,7 @@ class ExpressionWriter:
 
     def operation(
         self, texts: Sequence[str], op: ast.operator, kinds: Sequence[Type], node: ast.AST
-    ) -> Code:
+    ) -> ExpressionText:
         """Return the text of an operation.
 
         Args:
@@ -484,18 +484,18 @@ class ExpressionWriter:
             if is_integral(kinds[1]):
                 # A power by an integer is a product of factors, whatever the base is.
                 two = f"static_cast<{'int64_t' if is_whole or isinstance(op, ast.Pow) else 'double'}>({two})"
-            return Code(f"py::{FUNCTIONS[type(op)]}({one}, {two})")
+            return ExpressionText(f"py::{FUNCTIONS[type(op)]}({one}, {two})")
         # C++ leaves the behaviour of signed overflow undefined: generators of random numbers
         # multiply by a function of the header.
         if type(op) not in OPERATORS:
             raise self.function.refuse(node)
         sign, precedence = OPERATORS[type(op)]
         if isinstance(op, ast.Mult) and are_integers and self._may_overflow(node):
-            return Code(f"py::multiply({one}, {two})")
+            return ExpressionText(f"py::multiply({one}, {two})")
         # Division of integers gives a float in Python.
         if isinstance(op, ast.Div) and are_integers:
             one = f"static_cast<double>({one})"
-        return Code(f"{one} {sign} {two}", precedence)
+        return ExpressionText(f"{one} {sign} {two}", precedence)
 
     def _may_overflow(self, node: ast.AST) -> bool:
         """Return whether a product may overflow, judged by the size of a constant factor.
@@ -509,12 +509,12 @@ class ExpressionWriter:
             if part is not None
         )
 
-    def either(self, node: ast.BoolOp) -> Code:
+    def either(self, node: ast.BoolOp) -> ExpressionText:
         """Return the text of `and` or `or`; of numbers it is the one that decides."""
         kind = self.function.require_type(node)
         if kind is BOOLEAN:
             return self.condition(node)
-        return Code(self._decide(node.op, node.values, kind))
+        return ExpressionText(self._decide(node.op, node.values, kind))
 
     def _decide(self, op: ast.boolop, values: Sequence[ast.expr], kind: Type) -> str:
         first, *others = values
@@ -534,7 +534,7 @@ class ExpressionWriter:
             else f"({test} ? {own} : {rest})"
         )
 
-    def compare(self, node: ast.Compare) -> Code:
+    def compare(self, node: ast.Compare) -> ExpressionText:
         """Return the text of a chain of comparisons."""
         if any(isinstance(op, ast.In | ast.NotIn) for op in node.ops):
             return self._contains(node)
@@ -551,7 +551,7 @@ class ExpressionWriter:
             texts.append(self.guard_expression(self._comparand, operand))
         signs = [COMPARISONS[type(op)][0] for op in node.ops]
         parts = [f"{a} {sign} {b}" for a, sign, b in zip(texts[:-1], signs, texts[1:], strict=True)]
-        return Code(
+        return ExpressionText(
             " && ".join(parts), COMPARISONS[type(node.ops[0])][1] if len(parts) == 1 else AND
         )
 
@@ -559,7 +559,7 @@ class ExpressionWriter:
         # Compilers warn where one comparison stands in another without parentheses.
         return self.text(node, SHIFT)
 
-    def _contains(self, node: ast.Compare) -> Code:
+    def _contains(self, node: ast.Compare) -> ExpressionText:
         """Return the text of a question whether a number is among others."""
         if len(node.ops) > 1 or not isinstance(node.comparators[0], ast.Tuple):
             raise self.function.refuse(node)
@@ -571,9 +571,13 @@ class ExpressionWriter:
             for item in node.comparators[0].elts
         ]
         inner = f"({' || '.join(tests) or 'false'})"
-        return Code(inner) if isinstance(node.ops[0], ast.In) else Code(f"!{inner}", UNARY)
+        return (
+            ExpressionText(inner)
+            if isinstance(node.ops[0], ast.In)
+            else ExpressionText(f"!{inner}", UNARY)
+        )
 
-    def choose(self, node: ast.IfExp, kind: Type) -> Code:
+    def choose(self, node: ast.IfExp, kind: Type) -> ExpressionText:
         """Return the text of a conditional expression.
 
         Args:
@@ -585,7 +589,7 @@ class ExpressionWriter:
         first, second = (
             self.guard_expression(self._chosen, part, kind) for part in (node.body, node.orelse)
         )
-        return Code(f"{question} ? {first} : {second}", CHOICE)
+        return ExpressionText(f"{question} ? {first} : {second}", CHOICE)
 
     def _chosen(self, node: ast.expr, kind: Type) -> str:
         have = self.function.require_type(node)
@@ -624,7 +628,7 @@ class ExpressionWriter:
                 kinds.append(self.function.require_type(node))
         return texts, kinds
 
-    def call(self, node: ast.Call, function: Any, nodes: Sequence[ast.expr]) -> Code:
+    def call(self, node: ast.Call, function: Any, nodes: Sequence[ast.expr]) -> ExpressionText:
         """Return the text of a call.
 
         Args:
@@ -636,7 +640,7 @@ class ExpressionWriter:
         if (intrinsic := self.function.intrinsic(function)) is not None:
             result = self.function.require_type(node)
             text = intrinsic.write(texts, kinds, result)
-            return Code(text)
+            return ExpressionText(text)
         if is_record_class(function):
             kind = self.function.require_type(node)
             assert isinstance(kind, Tuple)
@@ -644,7 +648,7 @@ class ExpressionWriter:
                 default = function._field_defaults[name]
                 texts.append(self.constant(f"{function.__name__}_{name}", default).text)
                 kinds.append(self._constant_type(default))
-            return Code(self.build(kind, texts, kinds))
+            return ExpressionText(self.build(kind, texts, kinds))
         if isinstance(function, FunctionType):
             complete = self.function.complete_arguments(function, tuple(kinds))
             # Defaults are values of the Python function; C++ functions have none.
@@ -663,7 +667,7 @@ class ExpressionWriter:
                 for text, kind in zip(texts, complete, strict=True)
                 if not isinstance(kind, Callee)
             ]
-            return Code(f"{self.names.name_function(called)}({', '.join(given)})")
+            return ExpressionText(f"{self.names.name_function(called)}({', '.join(given)})")
         raise self.function.refuse(node)
 
     @staticmethod

@@ -13,7 +13,7 @@ from osimlite.schema.muscles import McKibbenActuator, PathActuator
 from osimlite.simulation.elements.force_type import ForceType, State
 from osimlite.simulation.elements.geometries.body import AXIS, BODY, POINT, POINTS
 from osimlite.simulation.elements.geometries.coordinate import COORDINATE
-from osimlite.simulation.elements.geometries.geometry import Geometry
+from osimlite.simulation.elements.geometries.geometry import ForceGeometry
 from osimlite.simulation.elements.geometries.path import PATH
 from osimlite.simulation.elements.parameters import Number, require_positive
 from osimlite.simulation.elements.registry import register_force_type
@@ -32,7 +32,7 @@ def scale_control(control: float, optimal_force: float) -> float:
     return optimal_force * control
 
 
-def define_actuator(component: type, geometry: Geometry, output: str) -> ForceType:
+def define_actuator(component: type, geometry: ForceGeometry, output: str) -> ForceType:
     """Return the force type of an actuator whose output is its control times its optimal force.
 
     Args:

@@ -30,7 +30,7 @@ from osimlite.mechanics.laws.vectors import (
 from osimlite.mechanics.multibody.links import Places
 from osimlite.mechanics.multibody.mechanism import GROUND
 from osimlite.simulation.elements.builder import ElementBuilder, Triple, to_triple
-from osimlite.simulation.elements.geometries.geometry import Geometry
+from osimlite.simulation.elements.geometries.geometry import ForceGeometry
 
 
 def turn_bodies(model: Ints, data: Floats, g: Ints, gp: Floats, torque: float) -> None:
@@ -213,7 +213,7 @@ class Anchors(NamedTuple):
     directions: tuple[tuple[int, Triple], ...] = ()
 
 
-class OnBodies(Geometry):
+class OnBodies(ForceGeometry):
     """Base of geometries with bodies, and points and directions fixed to them or to ground."""
 
     def pack(self, location: Anchors, places: Places) -> tuple[Sequence[int], Sequence[float]]:
@@ -340,7 +340,7 @@ class NamedStation(NamedTuple):
     point: Triple
 
 
-class AtStation(Geometry):
+class AtStation(ForceGeometry):
     """Station: its height y (m) and velocity in ground; the outputs fx, fy, fz (N) push it."""
 
     inputs = ("height", "vx", "vy", "vz")

@@ -10,7 +10,7 @@ from osimlite.mechanics.kernels.layout import MODEL
 from osimlite.mechanics.kernels.pointers import Floats, Ints
 from osimlite.mechanics.multibody.links import Places
 from osimlite.simulation.elements.builder import ElementBuilder
-from osimlite.simulation.elements.geometries.geometry import Geometry
+from osimlite.simulation.elements.geometries.geometry import ForceGeometry
 
 
 def get_coordinate(model: Ints, y: Floats, g: Ints, gp: Floats) -> tuple[float, float]:
@@ -31,7 +31,7 @@ def get_coordinate(model: Ints, y: Floats, g: Ints, gp: Floats) -> tuple[float, 
 
 
 @dataclass(frozen=True)
-class OnCoordinate(Geometry):
+class OnCoordinate(ForceGeometry):
     """Coordinate, with value q (rad, m) and speed u as inputs of the law.
 
     The output `force` (N.m, N) is conjugate to the speed.

@@ -22,7 +22,7 @@ from osimlite.mechanics.laws.vectors import minus, rotate, rotate_back, store_ve
 from osimlite.mechanics.multibody.links import Places
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.simulation.elements.builder import ElementBuilder
-from osimlite.simulation.elements.geometries.geometry import Geometry
+from osimlite.simulation.elements.geometries.geometry import ForceGeometry
 
 # Offsets in the record. Force and moment on the second frame (0 to 5) and the origins of both frames
 # (6 to 11) come first.
@@ -133,7 +133,7 @@ class Frame(NamedTuple):
 
 
 @dataclass(frozen=True)
-class BetweenFrames(Geometry):
+class BetweenFrames(ForceGeometry):
     """Two frames, with the deviations of the second from the first as inputs of the law.
 
     The deviations are three angles (rad) and a translation (m). The law fills `loads`: moments

@@ -10,7 +10,7 @@ from osimlite.simulation.elements.builder import ElementBuilder
 from osimlite.simulation.elements.force_records import ForceRecord
 
 
-class Geometry:
+class ForceGeometry:
     """Base class of the places where forces act: it computes inputs of the law, and applies its outputs.
 
     In the code of a kernel, `g` are the geometry's integers, `gp` its numbers and `work` its part
@@ -109,5 +109,5 @@ class Geometry:
         return list(record[: self.record_size(force.location)])
 
 
-NOTHING = Geometry()
+NOTHING = ForceGeometry()
 """Geometry of forces that act on nothing, and have only states or outputs."""

@@ -11,7 +11,7 @@ from osimlite.mechanics.kernels.points import apply_force, station, velocity
 from osimlite.mechanics.laws.vectors import dot, minus, norm, store_vector, times, vector
 from osimlite.mechanics.multibody.links import Places
 from osimlite.simulation.elements.builder import ElementBuilder, Triple, to_triple
-from osimlite.simulation.elements.geometries.geometry import Geometry
+from osimlite.simulation.elements.geometries.geometry import ForceGeometry
 
 
 def measure_line(
@@ -83,7 +83,7 @@ class Ends(NamedTuple):
 
 
 @dataclass(frozen=True)
-class BetweenPoints(Geometry):
+class BetweenPoints(ForceGeometry):
     """Line between two points, with length (m) and rate (m/s) as inputs of the law.
 
     The output `tension` (N) pulls the ends together.

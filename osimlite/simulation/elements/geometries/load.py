@@ -10,10 +10,10 @@ from osimlite.mechanics.kernels.pointers import Floats, Ints, at
 from osimlite.mechanics.kernels.points import apply_force, apply_torque, direction, station
 from osimlite.mechanics.laws.vectors import dot, minus, plus, rotate_back, store_vector, vector
 from osimlite.mechanics.multibody.function_tables import table_of_one
-from osimlite.mechanics.multibody.functions import Function
+from osimlite.mechanics.multibody.functions import SmoothFunction
 from osimlite.mechanics.multibody.links import Places
 from osimlite.mechanics.multibody.mechanism import FramePlacement
-from osimlite.simulation.elements.geometries.geometry import Geometry
+from osimlite.simulation.elements.geometries.geometry import ForceGeometry
 
 FRAME = 12
 """Number of values of a frame: rotation by columns, and origin in its link."""
@@ -97,12 +97,14 @@ class Load(NamedTuple):
     frame: FramePlacement
     force_frame: FramePlacement
     point_frame: FramePlacement
-    force: Sequence[Function]
-    point: Sequence[Function]
-    torque: Sequence[Function]
+    force: Sequence[SmoothFunction]
+    point: Sequence[SmoothFunction]
+    torque: Sequence[SmoothFunction]
 
     @property
-    def groups(self) -> tuple[Sequence[Function], Sequence[Function], Sequence[Function]]:
+    def groups(
+        self,
+    ) -> tuple[Sequence[SmoothFunction], Sequence[SmoothFunction], Sequence[SmoothFunction]]:
         """Functions of force, point and torque; a point without a force is ignored.
 
         Returns:
@@ -111,7 +113,7 @@ class Load(NamedTuple):
         return self.force, self.point if self.force else (), self.torque
 
 
-class GivenLoad(Geometry):
+class GivenLoad(ForceGeometry):
     """Place of a prescribed load, which has functions of time in place of a law."""
 
     apply_code = ("apply_load(model, data, g, gp, work, data[WORK.TIME])",)

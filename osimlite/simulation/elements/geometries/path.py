@@ -8,7 +8,7 @@ from osimlite.mechanics.kernels.paths import last_length, path_length, pull_path
 from osimlite.mechanics.multibody.links import Places
 from osimlite.simulation.elements.builder import ElementBuilder, get_class_name
 from osimlite.simulation.elements.force_records import ForceRecord
-from osimlite.simulation.elements.geometries.geometry import Geometry
+from osimlite.simulation.elements.geometries.geometry import ForceGeometry
 from osimlite.simulation.elements.registry import PATHS
 
 
@@ -30,7 +30,7 @@ class Path(Protocol):
         """
 
 
-class AlongPath(Geometry):
+class AlongPath(ForceGeometry):
     """Path: length (m) and lengthening speed (m/s); the output `tension` (N) acts along it."""
 
     inputs = ("length", "rate")

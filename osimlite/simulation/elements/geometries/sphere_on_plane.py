@@ -23,7 +23,7 @@ from osimlite.mechanics.multibody.links import Places
 from osimlite.schema.contact import ContactHalfSpace, ContactSphere
 from osimlite.simulation.elements.builder import ElementBuilder, get_class_name
 from osimlite.simulation.elements.contact import ContactSurface, read_surface
-from osimlite.simulation.elements.geometries.geometry import Geometry
+from osimlite.simulation.elements.geometries.geometry import ForceGeometry
 
 NO_MATERIAL = (0.0, 0.0, 0.0, 0.0, 0.0)
 """Material of surfaces whose law has its own parameters."""
@@ -88,7 +88,7 @@ def push_both(model: Ints, data: Floats, g: Ints, work: Floats, force: Vector) -
     apply_force(model, data, g[0], vector(work, 3), times(-1.0, force))
 
 
-class SphereOnPlane(Geometry):
+class SphereOnPlane(ForceGeometry):
     """Half space and sphere, at any distance.
 
     Inputs of the law are depth and radius (m), normal, and velocity of the half space relative to

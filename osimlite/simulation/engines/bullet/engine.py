@@ -31,7 +31,7 @@ from osimlite.simulation.engines.bullet.world import (
     compute_inertia_excess,
     require_masses,
 )
-from osimlite.simulation.engines.protocol import Settings
+from osimlite.simulation.engines.protocol import EngineSettings
 from osimlite.simulation.euler import SemiImplicitEuler, make_divergence_error
 from osimlite.simulation.pack_chain import Chain
 from osimlite.simulation.robot.build import build_robot
@@ -55,7 +55,7 @@ ROUTES = ("auto", MASS_MATRIX, ARTICULATED_BODY)
 """Accepted routes; "auto" selects one of the others."""
 
 
-def make_engine(mechanism: Mechanism, forces: Forces, settings: Settings) -> BulletEngine:
+def make_engine(mechanism: Mechanism, forces: Forces, settings: EngineSettings) -> BulletEngine:
     """Return a Bullet engine.
 
     Args:
@@ -211,7 +211,7 @@ class BulletEngine(KernelEngine):
 
     # ---------------------------------------------------------------------------------------------- motion
     def make_stepper(
-        self, t: float, y: Sequence[float], settings: Settings, observe: Observer
+        self, t: float, y: Sequence[float], settings: EngineSettings, observe: Observer
     ) -> Stepper:
         """Return a stepper that continues from a state.
 

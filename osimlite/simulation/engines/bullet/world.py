@@ -20,7 +20,7 @@ import numpy as np
 from osimlite.base.records import replace
 from osimlite.base.require import require
 from osimlite.errors import SimulationError
-from osimlite.simulation.robot.robot import Link, Robot, RobotJoint, principal_axes
+from osimlite.simulation.robot.robot import Robot, RobotJoint, RobotLink, principal_axes
 from osimlite.simulation.robot.urdf import urdf_text
 
 __all__ = ["World", "bullet", "mute_output"]
@@ -260,7 +260,7 @@ def write_robot(robot: Robot) -> str:
     return urdf_text(replace(robot, links=tuple(links)), visuals=True)
 
 
-def compute_inertia_excess(link: Link) -> float:
+def compute_inertia_excess(link: RobotLink) -> float:
     """Return what to add to the moments of inertia so that Bullet accepts them.
 
     Bullet replaces moments by zero that violate the triangle inequality or are negative.

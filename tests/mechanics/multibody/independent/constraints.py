@@ -8,7 +8,12 @@ import numpy as np
 
 from osimlite.mechanics.multibody import body_constraints as b
 from osimlite.mechanics.multibody.body_constraints import find_carrier
-from osimlite.mechanics.multibody.constraints import Constraint, Coupler, Lock, PrescribedCoordinate
+from osimlite.mechanics.multibody.constraints import (
+    ConstraintEquations,
+    Coupler,
+    Lock,
+    PrescribedCoordinate,
+)
 from osimlite.mechanics.multibody.parts import StationPlacement
 from osimlite.mechanics.multibody.spatial import Array, cross, skew_matrix
 from tests.mechanics.multibody.independent.motion import Moved
@@ -23,7 +28,7 @@ class Bond(NamedTuple):
     drifts: Array
 
 
-def bond(constraint: Constraint, state: Moved) -> Bond:
+def bond(constraint: ConstraintEquations, state: Moved) -> Bond:
     """The equations of a constraint."""
     mechanism, q, u = state.mechanism, state.q, state.u
     match constraint:
@@ -55,7 +60,7 @@ def bond(constraint: Constraint, state: Moved) -> Bond:
                 np.zeros(1),
                 drift,
             )
-        case b.PointConstraint():
+        case b.PointEquations():
             return meeting(state, constraint.first, constraint.second).bond()
         case b.DistanceConstraint():
             arm = station(state, constraint.second).minus(station(state, constraint.first))
@@ -67,14 +72,14 @@ def bond(constraint: Constraint, state: Moved) -> Bond:
                 -np.array((along @ arm.bias + stretch,)),
             )
             return Bond(errors, (along @ arm.jacobian)[None], np.zeros(1), drift)
-        case b.PointOnLineConstraint():
+        case b.PointOnLineEquations():
             arm = station(state, constraint.follower).minus(station(state, constraint.line))
             axes = (
                 direction(state, constraint.line.body, axis)
                 for axis in constraint.find_normal_directions()
             )
             return joined(*(product(axis, arm) for axis in axes))
-        case b.WeldConstraint():
+        case b.WeldEquations():
             (one, inner), (two, outer) = constraint.first, constraint.second
             arm = meeting(
                 state, StationPlacement(one, inner[:3, 3]), StationPlacement(two, outer[:3, 3])

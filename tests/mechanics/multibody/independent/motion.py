@@ -29,7 +29,7 @@ from osimlite.mechanics.multibody.spatial import (
 
 @dataclass(frozen=True, eq=False)
 class Moved:
-    """A mechanism of b bodies and n coordinates at one state, as :class:`osimlite.mechanics.multibody.kinematics.Kinematics`."""
+    """A mechanism of b bodies and n coordinates at one state, as `MechanismKinematics` has it."""
 
     mechanism: Mechanism
     q: Array

@@ -17,7 +17,7 @@ from osimlite.errors import OsimliteError
 from osimlite.mechanics.multibody import build_mechanism
 from osimlite.simulation import pack_chain
 from osimlite.simulation.elements import Forces, force_elements
-from osimlite.simulation.engines.protocol import Settings
+from osimlite.simulation.engines.protocol import EngineSettings
 from osimlite.simulation.euler import SemiImplicitEuler
 
 bullet = pytest.importorskip("pybullet", reason="needs pybullet (extra 'bullet')")
@@ -136,7 +136,7 @@ def steps(walker, h=1e-3, to=0.3):
         y = engine.state.pack(Q, U)
         euler = SemiImplicitEuler(engine.compute_derivative, 0.0, y, len(y) // 2, h)
         expected = [state for _, state in euler.iterate_steps(to)]
-        own = engine.make_stepper(0.0, y, Settings(fixed_step=h), lambda t, state: None)
+        own = engine.make_stepper(0.0, y, EngineSettings(fixed_step=h), lambda t, state: None)
         return np.array([state for _, state in own.iterate_steps(to)]), np.array(expected)
 
 

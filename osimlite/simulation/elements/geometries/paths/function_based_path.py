@@ -12,9 +12,9 @@ from osimlite.mechanics.kernels.layout import ITEM
 from osimlite.mechanics.multibody.formula import Formula, program
 from osimlite.mechanics.multibody.function_tables import table_of_one
 from osimlite.mechanics.multibody.functions import (
-    Function,
     MultivariatePolynomial,
     ScaledFunction,
+    SmoothFunction,
     WeightedSum,
 )
 from osimlite.mechanics.multibody.links import Places
@@ -42,9 +42,9 @@ class CoordinatePath:
 
     path: str
     coordinates: tuple[int, ...]
-    length: Function | Formula
-    arms: tuple[Function | Formula, ...] = ()
-    speed: Function | Formula | None = None
+    length: SmoothFunction | Formula
+    arms: tuple[SmoothFunction | Formula, ...] = ()
+    speed: SmoothFunction | Formula | None = None
 
     coupled: ClassVar[bool] = False
 
@@ -85,7 +85,7 @@ class CoordinatePath:
         ]
 
     def _make_function_record(
-        self, function: Function | Formula, arguments: Sequence[int], values: Sequence[float]
+        self, function: SmoothFunction | Formula, arguments: Sequence[int], values: Sequence[float]
     ) -> ForceRecord:
         """Return the record of a function of states.
 
@@ -184,7 +184,7 @@ def read_function_path(builder: ElementBuilder, owner: Any) -> CoordinatePath:
     )
 
 
-def _read_function(function: Any, arguments: int, where: str) -> Function | Formula:
+def _read_function(function: Any, arguments: int, where: str) -> SmoothFunction | Formula:
     inner = function
     while isinstance(inner, MultiplierFunction):
         inner = inner.function

@@ -30,7 +30,7 @@ from osimlite.mechanics.kernels.paths import (
 from osimlite.mechanics.kernels.wrap_curves import MOST
 from osimlite.mechanics.kernels.wrapping import AXIAL, HYBRID, MIDPOINT
 from osimlite.mechanics.multibody.function_tables import table_of_one
-from osimlite.mechanics.multibody.functions import Function
+from osimlite.mechanics.multibody.functions import SmoothFunction
 from osimlite.mechanics.multibody.links import Places
 from osimlite.mechanics.multibody.spatial import Array, make_offset
 from osimlite.schema.frames import PhysicalFrame
@@ -71,7 +71,7 @@ class Node:
     kind: int = FIXED
     coordinate: int = -1
     range: tuple[float, float] = (-inf, inf)
-    functions: tuple[Function, ...] = ()
+    functions: tuple[SmoothFunction, ...] = ()
     name: str = ""
 
     def pack(

@@ -65,7 +65,7 @@ FIRST_STEP = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
-class Point:
+class CablePoint:
     """Point of a cable.
 
     Attributes:
@@ -96,7 +96,7 @@ class Point:
 
 
 @dataclass(frozen=True, eq=False)
-class Obstacle:
+class CableObstacle:
     """Surface that a cable may touch.
 
     Attributes:
@@ -141,7 +141,7 @@ class Cable:
         elements: points and obstacles in the order of the path.
     """
 
-    elements: tuple[Point | Obstacle, ...]
+    elements: tuple[CablePoint | CableObstacle, ...]
 
     coupled: ClassVar[bool] = True
     trace: ClassVar[str] = "trace_cable"
@@ -160,7 +160,7 @@ class Cable:
             The body of the first point, and the point's position in it (3,), m.
         """
         first = self.elements[0]
-        assert isinstance(first, Point)
+        assert isinstance(first, CablePoint)
         return first.body, first.runs
 
     def make_records(self, places: Places) -> list[ForceRecord]:
@@ -218,7 +218,7 @@ class Cable:
         return Cable(
             tuple(
                 replace(element, begin=work[place : place + TOUCH_NUMBERS].copy())
-                if isinstance(element, Obstacle)
+                if isinstance(element, CableObstacle)
                 else element
                 for element, place in zip(self.elements, kept, strict=True)
             )
@@ -322,17 +322,17 @@ def _is_enclosed(builder: ElementBuilder, point_item: Any, geometry: ContactGeom
     return False
 
 
-def _read_point(builder: ElementBuilder, item: Any) -> Point:
+def _read_point(builder: ElementBuilder, item: Any) -> CablePoint:
     point = item.path_point
     builder.check_finite(point, point.location)
     body, frame = builder.find_placement(
         builder.resolve_target(point, "socket_parent_frame", point.socket_parent_frame)
     )
     runs = np.array(point.location)
-    return Point(body, runs, frame[:3, :3] @ runs + frame[:3, 3])
+    return CablePoint(body, runs, frame[:3, :3] @ runs + frame[:3, 3])
 
 
-def _read_obstacle(builder: ElementBuilder, owner: Any, item: Any) -> Obstacle:
+def _read_obstacle(builder: ElementBuilder, owner: Any, item: Any) -> CableObstacle:
     geometry = builder.resolve_target(item, "socket_contact_geometry", item.socket_contact_geometry)
     surface = _list_surface_numbers(geometry)
     if surface is None:
@@ -368,7 +368,7 @@ def _read_obstacle(builder: ElementBuilder, owner: Any, item: Any) -> Obstacle:
         for end in (START, END):
             begin[GEODESIC + end + POINT : GEODESIC + end + POINT + 3] = near
     begin[GEODESIC + STEP] = FIRST_STEP
-    return Obstacle(body, make_offset(geometry.location, geometry.orientation), surface, begin)
+    return CableObstacle(body, make_offset(geometry.location, geometry.orientation), surface, begin)
 
 
 def _list_surface_numbers(geometry: ContactGeometry) -> tuple[float, ...] | None:
