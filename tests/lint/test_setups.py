@@ -8,7 +8,7 @@ from shutil import copy
 
 import pytest
 
-from osimlite.cli._validating import validate_paths as validate_paths
+from osimlite.cli._validating import validate_paths
 from osimlite.lint import Config, validate
 from osimlite.lint.engine import load_subject, run_rules
 from osimlite.lint.many import check_files
@@ -404,3 +404,14 @@ def test_a_marker_of_an_old_file_needs_a_body(tmp_path, body, version):
     is_rejected = version < 30501 and "<!--" not in body
     codes = {"OSIM112"} if "<a/>" not in body else {"OSIM107"}
     assert bool(codes & {*validate(path).codes}) == is_rejected
+
+
+@pytest.mark.parametrize("start", ["trolSet name='c'>", "ls>"])
+def test_a_text_whose_root_tag_is_damaged_gets_a_syntax_error(tmp_path, start):
+    """The reader sees that the root is another one before it sees that the text is damaged."""
+    path = tmp_path / "controls.xml"
+    path.write_text(
+        f"<?xml version='1.0'?>{start}<objects><ControlLinear name='a'/></objects></ControlSet>"
+        "</OpenSimDocument>"
+    )
+    assert "OSIM001" in {finding.code for finding in run_rules(load_subject(str(path)))}

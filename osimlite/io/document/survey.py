@@ -63,7 +63,11 @@ def survey_source(source: Source, *, of: type[Object] = Model) -> Survey:
         result = Survey(source, None, [fault])
         if fault.meant != ROOT:
             return result
-        root = parse_source(source)
+        try:
+            root = parse_source(source)
+        except NotWellFormedError as damage:
+            # The root was read before the place where the text is damaged.
+            return _survey_damaged(source, damage, of)
         # The root is probably a misspelt <OpenSimDocument>: read on as if it were not.
         root.tag = ROOT
         return _add_document(result, root, of)

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import mujoco
 import numpy as np
+
+# OpenSim's wheel brings a CasADi of its own: it cannot be loaded into a process after another one.
+# Imported here, it is loaded while tests are collected, before any of them runs.
+with contextlib.suppress(ImportError):
+    import opensim  # noqa: F401
 
 import osimlite
 from osimlite.mechanics.multibody.spatial import Array
