@@ -121,7 +121,13 @@ class Request:
         is_file = output is not None and output.suffix.lower() == _get_suffix(goal) != ""
         folder = output.parent if output is not None and is_file else output
         name = output.stem if output is not None and is_file else file.stem
-        return cls(file, found, goal, options.choose_output_folder(file, folder), name)
+        folder = options.choose_output_folder(file, folder)
+        written = folder / f"{name}{_get_suffix(goal)}"
+        if written.exists() and file.exists() and written.samefile(file):
+            raise SettingError(
+                f"'{file}' would be replaced by its conversion; name another file with -o"
+            )
+        return cls(file, found, goal, folder, name)
 
     def carry_out(
         self, motion: Path | None, geometry: Sequence[Path] | None, chosen: Mapping[str, Any]

@@ -68,6 +68,8 @@ def test_formats_are_listed() -> None:
         (("walker.osim", "--from", "x"), "--from: unknown format 'x'"),
         (("notes.txt",), "the format of 'notes.txt' is unknown; name it with --from"),
         (("gone.b3d",), "no such file"),
+        (("gone.xml", "--from", "osim", "-o", "walker.osim"), "osimlite upgrade"),
+        (("gone.osim", "--from", "osim", "-o", "notes.xml"), "no such file"),
         (("walker.osim", "-o", "new.osim"), "'osimlite upgrade'"),
         (("walker.osim", "--to", "project"), "cannot be written as 'project'"),
         (("walker.osim", "-o", "x.urdf", "--to", "mjcf"), "-o names a file of the format 'urdf'"),
@@ -79,7 +81,8 @@ def test_formats_are_listed() -> None:
 def test_what_cannot_be_converted_is_said_in_one_line(
     walker: Path, words: tuple[str, ...], message: str
 ) -> None:
-    (walker / "notes.txt").write_text("nothing")
+    for name in ("notes.txt", "notes.xml"):
+        (walker / name).write_text("nothing")
     code, out, error = run("convert", *words, folder=walker)
     assert code == 2 and out == "" and len(error.splitlines()) == 1 and message in error
 
@@ -134,6 +137,16 @@ def test_summaries_of_other_commands_are_not_replaced(walker: Path) -> None:
     # A conversion replaces the summary of an earlier one.
     for _ in range(2):
         assert run(*words, "new/w.glb", folder=walker).code == 0
+
+
+@pytest.mark.parametrize("words", [("-o", "m.xml"), ("-o", ".", "--to", "mjcf"), ("-o", "l.xml")])
+def test_the_input_is_not_replaced(walker: Path, words: tuple[str, ...]) -> None:
+    text = (walker / "walker.osim").read_bytes()
+    (walker / "m.xml").write_bytes(text)
+    (walker / "l.xml").hardlink_to(walker / "m.xml")
+    done = run("convert", "m.xml", *words, folder=walker)
+    assert done.code == 2 and "would be replaced" in done.err
+    assert (walker / "m.xml").read_bytes() == text
 
 
 def test_folders_can_have_dots(walker: Path) -> None:
