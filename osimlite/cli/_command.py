@@ -69,7 +69,11 @@ class _BoundParameter(NamedTuple):
 
     @property
     def spellings(self) -> dict[str, Any]:
-        """Spellings on the command line, each with the value that it gives to a switch."""
+        """Spellings of the option on the command line.
+
+        Returns:
+            Value that a switch has, by its spelling.
+        """
         names = self.declared.names
         if not any(name.startswith("--") for name in names):
             names = (*names, f"--{self.name.replace('_', '-')}")

@@ -49,7 +49,7 @@ class BvhJoint:
 
     @property
     def has_position(self) -> bool:
-        """Whether the joint has position channels."""
+        """True if the joint has position channels."""
         return any(channel in POSITIONS for channel in self.channels)
 
 
@@ -75,9 +75,11 @@ class BvhMotion:
         return np.asarray(self.frame_time * np.arange(len(self.values)), dtype=float)
 
     def compute_poses(self) -> tuple[Array, Array]:
-        """Return rotation matrices (frames, joints, 3, 3) and positions (frames, joints, 3) of all joints.
+        """Compute the poses of all joints in the axes of the file.
 
-        Both are in the axes of the file, positions in its unit.
+        Returns:
+            Rotation matrices (frames, joints, 3, 3), and positions (frames, joints, 3) in the unit
+            of the file.
         """
         count = len(self.values)
         rotations = np.empty((count, len(self.joints), 3, 3))

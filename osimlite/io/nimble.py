@@ -82,7 +82,11 @@ DOF_COUNTS = {
 
 
 def unwrap_function(axis: TransformAxis) -> tuple[Function | None, float]:
-    """Return the function of an axis without its factor, and the factor."""
+    """Separate the function of an axis from its factor.
+
+    Returns:
+        The function without its MultiplierFunction, and the factor (1 without one).
+    """
     function = axis.function
     if isinstance(function, MultiplierFunction):
         return function.function, float(function.scale)

@@ -106,7 +106,11 @@ class Table(CheckTarget):
 
     @property
     def span(self) -> tuple[float, float] | None:
-        """First and last time, s; None without rows."""
+        """Time span of the rows.
+
+        Returns:
+            First and last time, s; None without rows.
+        """
         times = self.rows.times
         return (times[0], times[-1]) if times else None
 

@@ -170,7 +170,11 @@ class Muscle(PathActuator, abstract=True):
 
     @property
     def overwritten(self) -> dict[str, float]:
-        """Properties of the curves in whose place OpenSim computes with other numbers, with these numbers."""
+        """Properties of the curves that OpenSim overrides.
+
+        Returns:
+            Values that OpenSim uses instead, by the name of the property.
+        """
         return {}
 
 
@@ -314,7 +318,11 @@ class Millard2012EquilibriumMuscle(Muscle):
 
     @property
     def overwritten(self) -> dict[str, float]:
-        """Values of the curves that OpenSim sets itself to avoid singular equations, or if they cannot be singular."""
+        """Properties of the curves that OpenSim overrides, depending on whether equations can be singular.
+
+        Returns:
+            Values that OpenSim uses instead, by the name of the property.
+        """
         if self.is_classic:
             return {"minimum_value": max(self.active_force_length_curve.minimum_value, 0.1)}
         return dict.fromkeys(

@@ -148,7 +148,11 @@ class BvhMarkers:
 
     @property
     def summary(self) -> dict[str, object]:
-        """Facts for ``summary.json``."""
+        """Numbers of joints and frames, frame time (s) and scale, for ``summary.json``.
+
+        Returns:
+            Plain data by name.
+        """
         return {
             "joints": len(self.markers),
             "frames": len(self.motion.values),

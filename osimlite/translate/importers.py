@@ -68,7 +68,7 @@ class Importer:
     target: str  # OSIM, MARKERS or PROJECT
     carries: str  # what is carried over
     read: Callable[..., Imported]
-    # Texts of which one occurs in the first BEGINNING_BYTES; empty if the suffix is enough.
+    # One of these texts occurs in the first BEGINNING_BYTES; empty if the suffix is enough.
     marks: tuple[bytes, ...] = ()
     choices: tuple[OptionSpec, ...] = ()
 
@@ -199,7 +199,11 @@ IMPORTERS: list[Importer] = [
 
 
 def list_importers() -> dict[str, Importer]:
-    """Return the importers by name."""
+    """Collect all importers.
+
+    Returns:
+        Importers by the name of their format.
+    """
     return {importer.name: importer for importer in IMPORTERS}
 
 

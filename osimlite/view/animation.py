@@ -163,7 +163,10 @@ class Film:
         return np.column_stack((points @ self.right, points @ self.up))
 
     def _focus(self) -> Array:
-        """What the camera looks at (m, 3): the mass centre of what moves, or the middle of everything."""
+        """Return the point (m, 3) that the camera follows: the mass centre of the moving bodies.
+
+        Without a moving mass it is the mean of the body origins in the first pose.
+        """
         masses = np.array([body.mass_properties.mass for body in self.mechanism.bodies])
         masses = np.where(self.moving[:-1], masses, 0.0)
         if not masses.any():
@@ -178,10 +181,10 @@ class Film:
         return np.array(path)
 
     def _reach(self) -> Array:
-        """How far (2,) from the focus things get, to the side and up or down.
+        """Return the largest distances (2,) from the focus in the picture, sideways and vertical, m.
 
-        Everything that moves counts, and of what stands still only what is not much larger: a
-        walker's floor is not.
+        Static objects count only if they are not much larger than the moving ones: a walker's
+        floor would make the walker tiny.
         """
         moving = still = np.full(2, 0.05)
         for number, focus in enumerate(self.flat(self.focus)):
@@ -194,7 +197,10 @@ class Film:
         return np.maximum(moving, still) if (still <= SCENERY * moving.max()).all() else moving
 
     def _corners(self, number: int) -> Iterator[tuple[bool, Array]]:
-        """Whether it moves, and points (k, 2), of everything that is drawn; of ground, what is below the focus."""
+        """Yield for each drawn object whether it moves and its points (k, 2) in the picture.
+
+        A half space yields only its point below the focus, because it has no extent of its own.
+        """
         pose, focus = self.poses[number], self.focus[number]
         for body, points in self.scene.extent(pose):
             if len(points):

@@ -142,12 +142,22 @@ class _Spans(NamedTuple):
     changes: Array  # of the weights from one pixel to the next (s, 3)
 
     def pixels(self) -> tuple[Indices, Indices, Indices]:
-        """All pixels (k,), the span of each, and its place in the span."""
+        """Return all pixels of the spans.
+
+        Returns:
+            Pixel numbers (k,), index of the span of each, and its offset in the span.
+        """
         which, steps = _enumerate_ranges(np.zeros_like(self.lengths), self.lengths)
         return self.starts[which] + steps, which, steps
 
     def values(self, corners: Array, which: Indices, steps: Indices) -> Array:
-        """What has these values (t, 3, ...) at the corners, at pixels."""
+        """Interpolate values (t, 3, ...) at the corners of triangles linearly at pixels.
+
+        Args:
+            corners: values at the corners of all triangles.
+            which: index of the span of each pixel.
+            steps: offset of each pixel in its span.
+        """
         own = corners[self.triangles]
         first, change = (
             np.einsum("sc,sc...->s...", part, own) for part in (self.weights, self.changes)
@@ -157,12 +167,12 @@ class _Spans(NamedTuple):
 
 
 def _pixel_centres(numbers: Indices) -> Array:
-    """Where the middles of pixels are."""
+    """Return the coordinates of the centres of pixels."""
     return numbers.astype(np.float64) + 0.5
 
 
 def _enumerate_ranges(starts: Indices, counts: Indices) -> tuple[Indices, Indices]:
-    """For ranges of whole numbers, given their starts and lengths (r,): for every number its range, and the number."""
+    """Return for every integer of some ranges (starts and lengths (r,)) the index of its range, and the integer."""
     counts = counts.clip(0)
     which = np.repeat(np.arange(len(counts)), counts)
     before = np.cumsum(counts) - counts

@@ -47,8 +47,15 @@ from osimlite.view.scene import (
 WIDTH_OF_HALF_SPACE = 2.5
 """How much of a half space is drawn: edges of the square as a multiple of the model's size."""
 
-CONTACT_OPACITY, HALF_SPACE_OPACITY, WRAP_OPACITY = 0.5, 0.2, 0.3
-"""How much of their opacity contact and wrap surfaces keep, which files show as wireframes: bodies shine through."""
+# Files show these surfaces as wireframes; a translucent surface also leaves the bodies visible.
+CONTACT_OPACITY = 0.5
+"""Factor of the opacity of contact surfaces."""
+
+HALF_SPACE_OPACITY = 0.2
+"""Factor of the opacity of contact half spaces."""
+
+WRAP_OPACITY = 0.3
+"""Factor of the opacity of wrap surfaces."""
 
 SPRING: Color = (0.0, 0.62, 0.45)
 """Colour of springs between points, which a file gives none."""
@@ -403,7 +410,7 @@ class _SceneCollector:
         return self.mechanism.coordinate_index(self.tree.path_of(result) or "")
 
     def _widen_half_spaces(self, scene: Scene) -> Scene:
-        """The same scene with its half spaces made as wide as the model asks for."""
+        """Scale the half spaces of a scene to the size of the model, in place, and return the scene."""
         if self.half_spaces:
             low, high = scene.box(scene.mechanism.values({}))
             width = max(1.0, WIDTH_OF_HALF_SPACE * float(np.linalg.norm(high - low)))
@@ -417,7 +424,7 @@ class _SceneCollector:
 
 
 def _measure_fibers(muscle: Muscle) -> tuple[float, float]:
-    """How thick the fibers are drawn in their middle, and the slack length of the tendon, m."""
+    """Return the drawn radius of the fibers in their middle and the tendon slack length, both in m."""
     force, tendon = abs(float(muscle.max_isometric_force)), abs(float(muscle.tendon_slack_length))
     radius = SLENDER * math.sqrt(force / (math.pi * STRESS)) if math.isfinite(force) else THICKEST
     return min(max(radius, 0.0035), THICKEST), tendon if math.isfinite(tendon) else 0.0

@@ -134,7 +134,10 @@ def _make_turns(axis: Array, cosine: float) -> Array:
 
 
 def _make_continuous(quaternions: Array) -> Array:
-    """The same turns, each with the sign that is nearer to the one before: players go the straight way between them."""
+    """Return the same rotations with signs that make neighbouring quaternions close.
+
+    q and -q are the same rotation, but a player that interpolates components would make a detour.
+    """
     turned = np.sum(quaternions[1:] * quaternions[:-1], axis=1) < 0.0
     signs = np.where(np.cumsum(np.concatenate(((False,), turned))) % 2 == 1, -1.0, 1.0)
     result: Array = quaternions * signs[:, None]
@@ -234,7 +237,7 @@ class _GlbWriter:
         self.nodes.append({"name": name, "mesh": mesh, "matrix": matrix.T.ravel().tolist()})
 
     def data(self, name: str) -> bytes:
-        """The file."""
+        """Return the bytes of the complete GLB file."""
         self.nodes[0]["name"] = name
         parts = {
             "asset": {"version": "2.0", "generator": f"osimlite {__version__}"},

@@ -26,12 +26,15 @@ LONGEST = 400
 
 
 def component_tree(model: Model) -> tuple[list[dict[str, Any]], dict[str, list[str]]]:
-    """The components a file has, each after the one that holds it, and the names of the properties by class.
+    """Describe the components of a model file for the page, each after its owner.
 
     A component has `path`, `name`, `kind`, `parent` (a place in the list, -1 for none), `values` of
     its properties as text, and `given`: which of them are in the file or were assigned, and are no
     mere defaults. Where a component has other properties than the first of its class, it has `tags`
     of its own.
+
+    Returns:
+        The components, and the names of the properties by class.
     """
     tree = model.tree()
     places: dict[int, int] = {}
@@ -111,7 +114,7 @@ def finding_rows(findings: Sequence[Finding]) -> list[dict[str, Any]]:
 
 
 def place_pins(model: Model, scene: Scene, findings: Sequence[Finding]) -> list[dict[str, Any]]:
-    """Where in space findings are pinned: for every component that is anywhere, its codes and the worst severity."""
+    """Return one pin for each component with findings and a position: body, point, codes and worst severity."""
     tree, mechanism = model.tree(), scene.mechanism
     results: dict[str, list[Finding]] = {}
     for item in findings:

@@ -19,15 +19,19 @@ from osimlite.mechanics.multibody.constraints import ConstraintEquations, Couple
 from osimlite.simulation.elements.laws import find_function
 from osimlite.simulation.polylines import Polylines
 
-FOR_ARMS, FOR_SPEEDS = (
-    (move_links, clear_wrenches, pull_path, add_generalized_forces),
-    (evaluate_constraints, project_speeds),
-)
-"""What moment arms of paths are found with, and the speeds of coordinates that must move with one."""
+FOR_ARMS = (move_links, clear_wrenches, pull_path, add_generalized_forces)
+"""Kernels that compute the moment arms of paths."""
+
+FOR_SPEEDS = (evaluate_constraints, project_speeds)
+"""Kernels that compute the speeds of coordinates that are coupled to another."""
 
 
 def program_data(paths: Polylines, constraints: Sequence[ConstraintEquations]) -> dict[str, Any]:
-    """What the kernels take, and what the page must know of its layout."""
+    """Return the input of the JavaScript kernels and the layout of their vectors.
+
+    Returns:
+        Plain data for JSON; arrays of numbers are base64 text in little-endian order.
+    """
     program, s = paths.program, paths.structure
     head = s[s[MODEL.CONSTRAINED] :]
     records, errors = s[head[CONSTRAINED.CONSTRAINT_AT] :], head[CONSTRAINED.WORK_ERRORS]
@@ -70,7 +74,7 @@ def program_data(paths: Polylines, constraints: Sequence[ConstraintEquations]) -
 
 
 def kernels_text(program: Mapping[str, Any]) -> str:
-    """What the page computes with."""
+    """Return the JavaScript source of the kernels that the page needs."""
     laws = [find_function(name) for name in program["laws"]]
     others = [
         place_links,

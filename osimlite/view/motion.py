@@ -79,9 +79,12 @@ def _find_columns(motion: ShownMotion, label: str) -> Array:
 
 
 def read_activations(scene: Scene, motion: ShownMotion) -> dict[str, Array]:
-    """Activations (n,), from 0 to 1, of the muscles that have one on record, by the component paths of their lines.
+    """Read the recorded activations of muscles from the columns of a motion.
 
     Files of OpenSim 3 have them as ``soleus_r.activation``.
+
+    Returns:
+        Activations (n,), from 0 to 1, by component path; muscles without a column are missing.
     """
     known = {}
     for label, column in motion.auxiliary.items():
@@ -97,7 +100,7 @@ def activity_color(activation: float) -> Color:
 
 
 def find_moving_bodies(poses: Sequence[Bodies]) -> Array:
-    """Which bodies (b + 1,) change place from pose to pose; all but ground if none does."""
+    """Return which bodies (b + 1,) move between poses; all but ground if none does."""
     rotations, origins = (
         np.array([p.rotations for p in poses]),
         np.array([p.origins for p in poses]),

@@ -30,8 +30,14 @@ if TYPE_CHECKING:
     from osimlite.studies.sweep.optimize import Optimum
     from osimlite.studies.sweep.run import Outcome
 
-MOST_ROWS, MOST_COMPONENTS, MOST_BYTES = 200, 3000, 12_000_000
-"""What a notebook is burdened with at most: rows of a table, components of a tree, characters of a page."""
+MOST_ROWS = 200
+"""Largest number of rows of a table."""
+
+MOST_COMPONENTS = 3000
+"""Largest number of components of a tree."""
+
+MOST_BYTES = 12_000_000
+"""Largest size of an embedded page, compressed and in base64."""
 
 FIRST_ROWS = 10
 """Rows of results that are shown."""
@@ -72,7 +78,7 @@ def model(item: Model) -> str:
 
 
 def trajectory(item: Trajectory) -> str:
-    """What it is in a line, and the motion, to be played."""
+    """Return a one-line summary and, if the model is known, a player of the motion as HTML."""
     return f"<div>{escape(repr(item))}</div>" + (
         "" if item.model is None else _embed_viewer(item.model, item)
     )
@@ -120,7 +126,7 @@ def paths(item: Paths) -> str:
 
 
 def muscle_curves(item: MuscleCurves) -> str:
-    """What is least and greatest of each muscle."""
+    """Return a table of the least and greatest values of each muscle as HTML."""
     from osimlite.simulation.muscle_curves import QUANTITIES
 
     spans = (
@@ -156,7 +162,7 @@ def optimum(item: Optimum) -> str:
 
 
 def _embed_viewer(item: Model, motion: Trajectory | None = None) -> str:
-    """The page of the viewer, or why there is none."""
+    """Return an iframe with the viewer, or a sentence with the reason why it cannot be shown."""
     file = None if item.layout is None else item.layout.file
     folders = [] if file is None else [Path(file).parent, Path(file).parent / "Geometry"]
     try:
@@ -182,7 +188,7 @@ def _embed_viewer(item: Model, motion: Trajectory | None = None) -> str:
 def _make_table(
     headings: Sequence[str], rows: Iterable[Sequence[str]], count: int, most: int = MOST_ROWS
 ) -> str:
-    """A table of cells in HTML, of which the first rows are shown."""
+    """Return an HTML table of the first `most` rows, followed by the number of omitted ones."""
 
     def line(tag: str, cells: Sequence[str]) -> str:
         return (

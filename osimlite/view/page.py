@@ -84,7 +84,7 @@ def page_data(
     server: bool = False,
     story: Story | None = None,
 ) -> dict[str, Any]:
-    """Everything the page shows, as data for JSON.
+    """Collect the data of the page.
 
     Args:
         model: what to show.
@@ -94,7 +94,10 @@ def page_data(
         q: coordinate values (n,) at first.
         server: whether a program answers the page, which then asks it for poses that fulfil the
             constraints.
-        story: what it tells of the motion.
+        story: text about the motion, or None.
+
+    Returns:
+        Plain data for JSON, without NaN and infinite numbers.
     """
     mechanism = scene.mechanism
     recorded = None if motion is None else _describe_motion(scene, motion)
@@ -254,7 +257,7 @@ def _describe_motion(scene: Scene, motion: ShownMotion) -> dict[str, Any]:
 
 
 def _describe_measured_markers(markers: MeasuredMarkers | None) -> dict[str, Any] | None:
-    """Where markers were measured, and what they belong to."""
+    """Return the measured positions of markers and the body and point of each; None without markers."""
     if markers is None:
         return None
     pairs = zip(markers.names, markers.stations, strict=True)
@@ -267,7 +270,10 @@ def _describe_measured_markers(markers: MeasuredMarkers | None) -> dict[str, Any
 
 
 def _choose_view(scene: Scene, values: Array) -> dict[str, Any]:
-    """What the camera follows, if it does, and the room that the motion takes: around that, if it is followed."""
+    """Return what the camera follows and the bounding box of the motion.
+
+    If the model travels, the box is relative to the moving bodies, because the camera follows them.
+    """
     rows = values[np.unique(np.linspace(0, len(values) - 1, MOMENTS).astype(int))]
     poses = [scene.at(row) for row in rows]
     moves = find_moving_bodies(poses)[:-1]
@@ -297,7 +303,7 @@ def _choose_directions(up: Array) -> tuple[Array, Array]:
 
 
 def _place_floor(scene: Scene, q: Array) -> dict[str, Any]:
-    """Where the grid lies, in X and Z of a frame: on the model's own ground, or on a level floor."""
+    """Return the frame whose X-Z plane is the grid: the model's contact half space, or a level floor."""
     bodies = scene.at(q)
     for item in scene.drawn():
         outward = -bodies.matrix(item.body, item.matrix)[:3, 0]
@@ -313,7 +319,7 @@ def _place_floor(scene: Scene, q: Array) -> dict[str, Any]:
 
 
 def _directions(up: Array) -> dict[str, list[float]]:
-    """From where to look: towards the viewer, in ground."""
+    """Return the named view directions, from the model towards the viewer, in ground."""
     front, side = _choose_directions(up)
     home = front + 0.35 * up + 1.3 * side
     # Straight from above, up is no direction in the picture.

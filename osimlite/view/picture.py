@@ -17,20 +17,30 @@ from osimlite.mechanics.multibody.spatial import Array
 from osimlite.view.canvas import Canvas
 from osimlite.view.scene import Bodies, Color, Scene
 
-SKY, INK, FLOOR, EARTH, FORCE, TOUCHING = (
-    (0.965, 0.973, 0.984),
-    (0.149, 0.196, 0.247),
-    (0.80, 0.83, 0.87),
-    (0.91, 0.89, 0.85),
-    (0.835, 0.369, 0.0),
-    (0.969, 0.71, 0.22),
-)
-"""Colours of background, words, floor lines, what is below ground, force arrows (Okabe and Ito's
-vermilion), and loaded contact surfaces.
-"""
+SKY = (0.965, 0.973, 0.984)
+"""Colour of the background."""
 
-_KEY, _FILL = (np.array(v) / np.linalg.norm(v) for v in ((-0.45, 0.75, 0.6), (0.7, 0.1, 0.7)))
-"""Where light comes from, as seen by the viewer: to the right, up, towards the viewer."""
+INK = (0.149, 0.196, 0.247)
+"""Colour of text."""
+
+FLOOR = (0.80, 0.83, 0.87)
+"""Colour of floor lines."""
+
+EARTH = (0.91, 0.89, 0.85)
+"""Colour of the region below ground."""
+
+FORCE = (0.835, 0.369, 0.0)
+"""Colour of force arrows: vermilion of Okabe and Ito, which colour-blind people distinguish."""
+
+TOUCHING = (0.969, 0.71, 0.22)
+"""Colour of loaded contact surfaces."""
+
+# Axes of both: to the right, up, and towards the viewer.
+_KEY = np.array((-0.45, 0.75, 0.6)) / np.linalg.norm((-0.45, 0.75, 0.6))
+"""Unit vector towards the key light, as seen by the viewer."""
+
+_FILL = np.array((0.7, 0.1, 0.7)) / np.linalg.norm((0.7, 0.1, 0.7))
+"""Unit vector towards the fill light, as seen by the viewer."""
 
 _AMBIENT, _FROM_KEY, _FROM_FILL = 0.42, 0.46, 0.22
 
@@ -279,7 +289,7 @@ class _Heap:
             self._glassy.append((corners, colors, np.full(len(corners), opacity)))
 
     def onto(self, canvas: Canvas) -> None:
-        """Draw everything."""
+        """Draw all triangles on a canvas: the translucent ones last, over the opaque ones."""
         if self._solid:
             canvas.solid(*(np.concatenate(column) for column in zip(*self._solid, strict=True)))
         if self._glassy:

@@ -77,10 +77,13 @@ def plot_simulation(
 
 
 def compute_energies(motion: ShownMotion, mechanism: Mechanism) -> tuple[Array, dict[str, Array]]:
-    """Moments (m,) and, at them, kinetic energy and potential energy of gravity (J), zero at the origin of the ground.
+    """Compute the energies of a motion; potential energy is zero at the origin of ground.
 
-    A trajectory knows what contacts and springs store besides; of another motion that cannot be
-    told.
+    Only a simulated trajectory has the energy that contacts and springs store. Other motions are
+    evaluated at `MOST_ENERGIES` times at most.
+
+    Returns:
+        Times (m,), s, and the energies (m,), J, by name.
     """
     times = np.asarray(motion.times, dtype=float)
     known = getattr(motion, "energy", None)
@@ -134,7 +137,7 @@ def _draw_table(
 
 
 def _one_of_each_pair(forces: Sequence[ContactForce]) -> Iterator[ContactForce]:
-    """Of an element that pushes two frames with opposite forces, the first; of any other, all."""
+    """Yield the forces, but only the first of an element with opposite forces on two frames."""
     by_element: dict[str, list[ContactForce]] = {}
     for force in forces:
         by_element.setdefault(force.element, []).append(force)
@@ -180,7 +183,15 @@ def _plot_energy(times: Array, parts: Mapping[str, Array]) -> Any:
 
 
 def make_sheet(title: str, heights: Sequence[float]) -> tuple[Any, Any]:
-    """A figure with panels of these heights (inches) above each other, and its panels."""
+    """Make a figure with panels one above the other.
+
+    Args:
+        title: title of the figure.
+        heights: heights of the panels, inches.
+
+    Returns:
+        The figure and the array of its panels.
+    """
     figure = figure_of(title, (9.0, 0.7 + sum(heights)))
     grid = {"height_ratios": list(heights)}
     panels = figure.subplots(len(heights), 1, sharex=True, squeeze=False, gridspec_kw=grid)[:, 0]

@@ -40,7 +40,7 @@ class Pages(list[tuple[str, Any]]):
 
     @property
     def figures(self) -> list[Any]:
-        """The matplotlib figures."""
+        """Matplotlib figures of all pages, in order."""
         return [figure for _, figure in self]
 
     def write(self, folder: str | Path) -> list[Path]:

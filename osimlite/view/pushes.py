@@ -25,7 +25,9 @@ class Push:
     torques: Array | None
 
     def point(self, number: int, bodies: Bodies) -> Array:
-        """Where the force acts (3,) in ground: the point of its line of action nearest to the contact surface's middle.
+        """Return the point (3,) in ground where the force is drawn.
+
+        It is the point of the line of action that is nearest to the middle of the contact surface.
 
         A force F with the moment M about the origin acts along the line through F × M / F².
         """
@@ -78,5 +80,5 @@ class Pushes:
         )
 
     def at(self, number: int, bodies: Bodies) -> list[tuple[Pushed, Array, Array]]:
-        """At a moment: on what, the point (3,) and the force (3,) of each, in ground."""
+        """Return for each force at a moment where it acts, its point (3,) in ground and the force (3,), N."""
         return [(push.on, push.point(number, bodies), push.forces[number]) for push in self.pushes]

@@ -112,7 +112,7 @@ def compute_forces(
     speeds: Array,
     folder: Path | None = None,
 ) -> dict[str, Array]:
-    """What the forces of a model do at n states, as columns (n,) by the labels of OpenSim's ForceReporter.
+    """Compute the values that OpenSim's ForceReporter would report at n states.
 
     Forces that osimlite does not know are left out. No engine is needed.
 
@@ -123,6 +123,9 @@ def compute_forces(
         values: of the coordinates (n, k).
         speeds: generalized speeds (n, k).
         folder: where the model's file is, for the files that contact meshes name.
+
+    Returns:
+        Columns (n,) by label; empty if no force is supported.
 
     Raises:
         OsimliteError: a file is missing or cannot be read.

@@ -67,13 +67,13 @@ class Line:
     radius: float = 0.004  # how thick to draw it, m
     visible: bool = True  # whether the model wants it shown
     wraps: tuple[str, ...] = ()  # paths of the wrap objects that it may bend around
-    # how thick the fibers of a muscle are in their middle, m; 0 where there are none
+    # radius of the drawn muscle fibers in their middle, m; 0 for lines without fibers
     fibers: float = 0.0
     tendon: float = 0.0  # slack length of its tendon, m: half of it is at each end
 
     @property
     def start(self) -> LinePoint:
-        """Its first point."""
+        """First point of the line."""
         return self.course[0] if isinstance(self.course, tuple) else LinePoint(*self.course.start)
 
     @property
@@ -133,7 +133,7 @@ class Bodies:
         return cast("Array", points @ self.rotations[body].T + self.origins[body])
 
     def matrix(self, body: int, placed: Array) -> Array:
-        """What is placed (4, 4) in a body, in ground; it may stretch."""
+        """Return a transform (4, 4) from a body's frame to ground; it may contain a scale."""
         result = placed.copy()
         result[:3, :3] = self.rotations[body] @ placed[:3, :3]
         result[:3, 3] = self.points(body, placed[None, :3, 3])[0]
@@ -157,7 +157,7 @@ class Scene:
     remarks: Sequence[tuple[str, str]] = ()  # what cannot be shown, as (component's path, sentence)
 
     def at(self, q: Array) -> Bodies:
-        """Where all bodies are at coordinate values q (n,)."""
+        """Return the poses of all bodies at coordinate values q (n,)."""
         state = self.mechanism.at(q)
         return Bodies(self, state.q, state.rotations, state.origins)
 
@@ -171,7 +171,7 @@ class Scene:
 
     @cached_property
     def up(self) -> Array:
-        """Unit vector (3,) against gravity; ground's Y axis if there is none."""
+        """Unit vector (3,) against gravity; ground's Y axis without gravity."""
         g = self.mechanism.gravity
         size = float(np.linalg.norm(g))
         return -g / size if size > 0.0 else np.array((0.0, 1.0, 0.0))
@@ -217,7 +217,11 @@ class Scene:
                 yield -2 if line.body is None else line.body, corners
 
     def box(self, q: Array) -> tuple[Array, Array]:
-        """The least and greatest coordinates (3,), (3,) in ground of what is drawn and no scenery."""
+        """Compute the bounding box in ground of the drawn objects without scenery.
+
+        Returns:
+            Least and greatest coordinates (3,), m, widened if the box is a point.
+        """
         bodies = self.at(q)
         result: list[Array] = [points for _, points in self.extent(bodies) if len(points)]
         points = np.concatenate(result or [bodies.origins])

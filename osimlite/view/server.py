@@ -53,7 +53,7 @@ class PageServer:
 
     @property
     def url(self) -> str:
-        """Where the page is."""
+        """Address of the page in the browser."""
         return f"http://{HOST}:{self.server.server_address[1]}/"
 
     def wait(self) -> None:
@@ -62,7 +62,7 @@ class PageServer:
             self._thread.join(0.5)
 
     def close(self) -> None:
-        """Stop serving."""
+        """Stop the server and wait for its thread."""
         self.server.shutdown()
         self.server.server_close()
         self._thread.join()
@@ -79,7 +79,7 @@ class _QuietServer(ThreadingHTTPServer):
     allow_reuse_address = sys.platform != "win32"
 
     def handle_error(self, request: Any, client_address: Any) -> None:
-        """A browser that hangs up in the middle is nobody's mistake."""
+        """Log at debug level only: a browser may close its connection at any time."""
         _log.debug("a question was not answered", exc_info=True)
 
 
@@ -147,10 +147,17 @@ def _make_handler(
 
 
 def assemble_pose(mechanism: Mechanism, question: bytes) -> dict[str, Any]:
-    """The answer to the page's question for a pose that fulfils the constraints.
+    """Answer the request of the page for a pose that satisfies the constraints.
+
+    Args:
+        mechanism: mechanism of the model.
+        question: JSON text of the request.
+
+    Returns:
+        `values` of the coordinates, or `error` with a message.
 
     Raises:
-        _BadQuestion: it is no question for one.
+        _BadQuestion: the request is not a list of one number per coordinate.
     """
     try:
         match json.loads(question):

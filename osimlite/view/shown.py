@@ -35,7 +35,7 @@ HOME = (1.0, 0.35, 1.3)
 
 @dataclass(frozen=True, eq=False)
 class Shown:
-    """What is shown of a model.
+    """Model with its scene, motion and findings, ready to be shown.
 
     Attributes:
         model: which.
@@ -110,7 +110,7 @@ class Shown:
         return cls(model, scene, q, motion, findings, tuple(remarks))
 
     def page_text(self, story: Story | None = None) -> str:
-        """One self-contained page (HTML)."""
+        """Return one self-contained HTML page with the viewer."""
         return page_text(
             page_data(self.model, self.scene, self.motion, self.findings, self.q, story=story)
         )

@@ -57,7 +57,7 @@ def plot_runs(
 
 
 def _to_numbers(column: Any) -> Array:
-    """Return a column as numbers; NaN where there is none."""
+    """Return a column as numbers; NaN in place of None."""
     return np.array([np.nan if value is None else value for value in column], dtype=float)
 
 

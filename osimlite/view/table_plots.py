@@ -110,7 +110,7 @@ class ColumnNames(NamedTuple):
 
     @classmethod
     def of_model(cls, model: Model | None, mechanism: Mechanism | None = None) -> ColumnNames:
-        """Return the names of a model; none of what is not known.
+        """Return the names of a model; without a model or a mechanism theirs are missing.
 
         Args:
             model: the model, with the actuators that a tool has added.

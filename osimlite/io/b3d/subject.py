@@ -245,9 +245,10 @@ class B3dTrial:
         return StoTable(self.name or "trial", self.times, labels, rows, file=str(self.subject.path))
 
     def read_markers(self) -> tuple[tuple[str, ...], Array]:
-        """Return the names of the markers (m,) and their positions in ground (frames, m, 3), m.
+        """Return the measured markers; markers without a name are left out.
 
-        A position is NaN where the marker was not seen. Markers without a name are left out.
+        Returns:
+            Names (m,) and positions in ground (frames, m, 3), m; NaN where a marker was not seen.
         """
         names = self.subject.marker_names
         rows = self.read_arrays().get(
@@ -373,7 +374,11 @@ class B3dSubject:
 
     @property
     def model_texts(self) -> tuple[str, ...]:
-        """Text of the .osim file of each processing pass."""
+        """Text of the .osim file of each processing pass.
+
+        Returns:
+            One text per pass, in the order of `pass_types`.
+        """
         return tuple(each["model_text"] for each in self.header["passes"])
 
     @property

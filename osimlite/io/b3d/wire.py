@@ -12,8 +12,17 @@ import struct
 from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
-VARINT, FIXED64, BYTES, FIXED32 = 0, 1, 2, 5
-"""Wire types of the fields."""
+VARINT = 0
+"""Wire type of integers of variable length."""
+
+FIXED64 = 1
+"""Wire type of numbers of 8 bytes."""
+
+BYTES = 2
+"""Wire type of fields with a length: texts, messages, packed numbers."""
+
+FIXED32 = 5
+"""Wire type of numbers of 4 bytes."""
 
 MAX_VARINT_BYTES = 10
 """Number of bytes of the longest varint, which holds 64 bits."""

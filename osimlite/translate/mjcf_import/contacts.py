@@ -195,7 +195,7 @@ def _add_forces(draft: ConversionDraft, surfaces: dict[int, list[ContactGeometry
 
 
 def _can_touch(draft: ConversionDraft, one: int, two: int) -> bool:
-    """Whether MuJoCo tests two geoms for contact, pairs in the file not regarded."""
+    """Return whether MuJoCo tests two geoms for contact, without the explicit pairs of the file."""
     model = draft.mj
     types, affinities = model.geom_contype, model.geom_conaffinity
     if not (types[one] & affinities[two] or types[two] & affinities[one]):

@@ -57,12 +57,16 @@ class Osim:
 
     @property
     def text(self) -> str:
-        """The model as text."""
+        """Text of the model in the .osim format."""
         return to_text(self.model)
 
     @property
     def summary(self) -> dict[str, object]:
-        """Numbers of components, as plain data."""
+        """Summary of the converted model.
+
+        Returns:
+            Numbers of components, by name, as plain data.
+        """
         model = self.model
         return {
             "bodies": len(model.body_set.objects),

@@ -63,6 +63,9 @@ class CoordinateMap:
 
         Args:
             qpos: MuJoCo's positions (nq,).
+
+        Returns:
+            Values by the names of the coordinates.
         """
         values: dict[str, float] = {}
         for kind, address, rest, names in self.joints:

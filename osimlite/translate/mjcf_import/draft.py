@@ -150,16 +150,23 @@ class ConversionDraft:
 
 
 def vector(values: Sequence[float] | Array) -> tuple[float, float, float]:
-    """Return three numbers as a tuple of floats, without negative zeros."""
+    """Convert three numbers to floats, without negative zeros.
+
+    Returns:
+        The three floats.
+    """
     x, y, z = (float(value) + 0.0 for value in values)
     return x, y, z
 
 
 def angles_of(rotation: Array) -> tuple[float, float, float]:
-    """Return the body-fixed X-Y-Z angles (rad) of a rotation matrix (3, 3), exact near 90 degrees also.
+    """Return the body-fixed X-Y-Z angles of a rotation matrix (3, 3), exact near 90 degrees also.
 
     The third angle is computed first and the first one from what remains, so that rounding of one
     is made good by the other where the second angle is near 90 degrees.
+
+    Returns:
+        The three angles, rad.
     """
     second = np.arctan2(rotation[0, 2], np.hypot(rotation[0, 0], rotation[0, 1]))
     third = np.arctan2(-rotation[0, 1], rotation[0, 0])

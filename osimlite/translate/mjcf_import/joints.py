@@ -29,8 +29,17 @@ from osimlite.translate.mjcf_import.draft import (
     vector,
 )
 
-FREE, BALL, SLIDE, HINGE = 0, 1, 2, 3
-"""MuJoCo's joint types (``mjtJoint``)."""
+FREE = 0
+"""MuJoCo's ``mjJNT_FREE``."""
+
+BALL = 1
+"""MuJoCo's ``mjJNT_BALL``."""
+
+SLIDE = 2
+"""MuJoCo's ``mjJNT_SLIDE``."""
+
+HINGE = 3
+"""MuJoCo's ``mjJNT_HINGE``."""
 SAME_ANCHOR_M = 1e-12
 """Distance up to which two hinges have the same anchor."""
 PARALLEL = 1e-4
@@ -490,7 +499,7 @@ def _same_anchor(model: object, one: int, other: int) -> bool:
 
 
 def _is_independent(model: object, joint: int, others: list[int]) -> bool:
-    """Whether no other axis is parallel to that of a joint."""
+    """Return whether no other axis is parallel to that of a joint."""
     axes = model.jnt_axis  # type: ignore[attr-defined]
     return all(
         float(np.linalg.norm(np.cross(axes[joint], axes[other]))) > PARALLEL for other in others

@@ -87,7 +87,11 @@ class Shape(NamedTuple):
         return np.asarray(self.fpmax * np.where(s <= 1.0, 0.5 * s**2, s - 0.5))
 
     def formulas(self) -> tuple[str, str, str]:
-        """Return the formulas of active force, passive force and velocity factor, in ``x``."""
+        """Write the curves as formulas of OpenSim in the variable ``x``.
+
+        Returns:
+            Active force, passive force and velocity factor.
+        """
         low, high = 0.5 * (self.lmin + 1.0), 0.5 * (1.0 + self.lmax)
         y = self.fvmax - 1.0
 
@@ -127,7 +131,15 @@ class FittedCurves(NamedTuple):
     passive: dict[str, float]
 
     def evaluate(self, lengths: Array, velocities: Array) -> tuple[Array, Array, Array]:
-        """Return active force, passive force and velocity factor."""
+        """Evaluate the curves.
+
+        Args:
+            lengths: arguments of the active and passive force curves.
+            velocities: arguments of the velocity curve.
+
+        Returns:
+            Active force, passive force and velocity factor.
+        """
         return (
             _evaluate(active_force_length(*self.active.values()), lengths),
             _evaluate(fiber_force_length(*self.passive.values()), lengths),

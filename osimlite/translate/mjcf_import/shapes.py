@@ -12,8 +12,32 @@ from osimlite.schema.geometry import Appearance, Brick, Cylinder, Ellipsoid, Geo
 from osimlite.translate.fidelity import LEFT_OUT
 from osimlite.translate.mjcf_import.draft import ConversionDraft, quaternion_matrix
 
-PLANE, HFIELD, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX, MESH, SDF = range(9)
-"""MuJoCo's geom types (``mjtGeom``)."""
+PLANE = 0
+"""MuJoCo's ``mjGEOM_PLANE``."""
+
+HFIELD = 1
+"""MuJoCo's ``mjGEOM_HFIELD``."""
+
+SPHERE = 2
+"""MuJoCo's ``mjGEOM_SPHERE``."""
+
+CAPSULE = 3
+"""MuJoCo's ``mjGEOM_CAPSULE``."""
+
+ELLIPSOID = 4
+"""MuJoCo's ``mjGEOM_ELLIPSOID``."""
+
+CYLINDER = 5
+"""MuJoCo's ``mjGEOM_CYLINDER``."""
+
+BOX = 6
+"""MuJoCo's ``mjGEOM_BOX``."""
+
+MESH = 7
+"""MuJoCo's ``mjGEOM_MESH``."""
+
+SDF = 8
+"""MuJoCo's ``mjGEOM_SDF``."""
 GEOMETRY_FOLDER = "Geometry"
 """Folder of mesh files; OpenSim looks for meshes there."""
 
@@ -59,7 +83,7 @@ def _draw(
     if material >= 0 and np.allclose(rgba, (0.5, 0.5, 0.5, 1.0)):
         rgba = model.mat_rgba[material]
     red, green, blue, opacity = (float(min(max(value, 0.0), 1.0)) for value in rgba)
-    # Viewers of MuJoCo show the groups 0 to 2 only, unless they are told otherwise.
+    # MuJoCo's viewers show only groups 0 to 2 by default.
     shape.appearance = Appearance(
         name="appearance",
         visible=bool(model.geom_group[geom] < 3),

@@ -15,8 +15,20 @@ from osimlite.translate.mjcf.wrapping import bend_tendon, norm
 from osimlite.translate.mjcf_import.poses import SampledPoses
 from osimlite.translate.mjcf_import.source import MjcfSource
 
-JOINT, PULLEY, SITE, SPHERE, CYLINDER = 1, 2, 3, 4, 5
-"""MuJoCo's types of the parts of a tendon (``mjtWrap``)."""
+JOINT = 1
+"""MuJoCo's ``mjWRAP_JOINT``."""
+
+PULLEY = 2
+"""MuJoCo's ``mjWRAP_PULLEY``."""
+
+SITE = 3
+"""MuJoCo's ``mjWRAP_SITE``."""
+
+SPHERE = 4
+"""MuJoCo's ``mjWRAP_SPHERE``."""
+
+CYLINDER = 5
+"""MuJoCo's ``mjWRAP_CYLINDER``."""
 
 
 class TendonSegment(NamedTuple):
@@ -39,7 +51,7 @@ class Tendon(NamedTuple):
 
     @property
     def is_fixed(self) -> bool:
-        """Whether the length is a linear function of joint positions."""
+        """True if the length is a linear function of joint positions."""
         return bool(self.joints)
 
 

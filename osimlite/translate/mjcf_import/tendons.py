@@ -177,7 +177,7 @@ class _Selection:
         return result, bad
 
     def _is_inside(self, item: TendonSegment) -> bool:
-        """Whether the side site is inside of the geom, so that the tendon passes through it."""
+        """Return whether the side site is inside of the geom, so that the tendon passes through it."""
         model = self.draft.mj
         apart = self.poses.sites[:, item.side] - self.poses.geoms[:, item.geom]
         return bool(norm(apart).max() < float(model.geom_size[item.geom, 0]))

@@ -143,7 +143,11 @@ class UpgradeResult:
 
     @property
     def moved(self) -> dict[tuple[int, str], int]:
-        """Index in the old document of a property, by the index of its owner and its present tag."""
+        """Indices of changed properties in the old document.
+
+        Returns:
+            Index of the property by the index of its owner and its present tag.
+        """
         result: dict[tuple[int, str], int] = {}
         for element in self._draft.touched:
             parent = element.getparent()
