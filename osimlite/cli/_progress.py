@@ -143,7 +143,7 @@ class _Line:
 
     def draw(self) -> None:
         """Show the current task if nothing was printed for a while."""
-        # Nobody waits for the line: what is printed at the same time comes first.
+        # Skip the update rather than wait: text that another thread prints is more important.
         if not self._lock.acquire(blocking=False):
             return
         try:

@@ -44,7 +44,11 @@ class Table(CheckTarget):
 
     @property
     def entries(self) -> dict[str, Entry]:
-        """Entries of the header by key."""
+        """Entries of the header.
+
+        Returns:
+            Entries by key.
+        """
         return self.header.entries
 
     @property

@@ -285,7 +285,7 @@ def _read_muscle_output(
         if motion.system.has_quantity(path, name)
     ]
     known = motion.read_records([path], *LAW_RECORDS, *extra)
-    # Fibers without equilibrium have NaN, of which numpy would warn.
+    # Fibers without equilibrium have NaN, and numpy would warn.
     with np.errstate(invalid="ignore", divide="ignore"):
         quantities = known | compute_quantities(known, [muscle])
         turning = (

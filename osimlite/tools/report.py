@@ -211,7 +211,7 @@ def _render_verdicts(outcomes: Mapping[str | Path, Outcome]) -> Iterator[str]:
     setups = [setup for setup in outcomes if type(get_object(str(setup))).__name__ in SETUPS]
     try:
         result = check_trial(*setups, written=written) if setups else None
-    # A trial of which nothing can be checked has no verdicts, but has a report.
+    # A trial without checkable results has no verdicts, but it has a report.
     except OsimliteError:
         return
     if result is None or not result.verdicts:

@@ -224,6 +224,6 @@ def find_format(path: Path) -> str | None:
 
 
 def _has_mark(beginning: bytes, marks: Iterable[bytes]) -> bool:
-    """Return whether a beginning has one of some texts; True if there are none."""
+    """Return whether the beginning of a file contains one of the marks; True without marks."""
     marks = tuple(marks)
     return not marks or any(mark in beginning for mark in marks)

@@ -121,7 +121,7 @@ def _turn_ellipsoid(joint: EllipsoidJoint, tree: Tree) -> NimbleChange:
     """Turn the frames of an EllipsoidJoint by 90 degrees about Z, and exchange two radii.
 
     OpenSim rotates by Rx(q0) Ry(q1) Rz(q2), Nimble by Ry(q0) Rx(-q1) Rz(q2). With E = Rz(90 deg),
-    Nimble's rotation is E Rx(q0) Ry(q1) Rz(q2) E^T, and the centre moves likewise on an ellipsoid
+    Nimble's rotation is E Rx(q0) Ry(q1) Rz(q2) E^T, and the centre moves on an ellipsoid
     with the radii (ry, rx, rz).
     """
     path = joint.path
@@ -365,7 +365,7 @@ def _extend_spline(spline: SimmSpline, low: float, high: float) -> None:
     if low < x[0]:
         start = x[0]
         value, slope, bend, cubic = pieces[0]
-        # From the inner to the outer point, each of which becomes the first.
+        # Insert from the inner to the outer point, so that the points stay in ascending order.
         for t in [fraction * (low - margin - start) for fraction in fractions]:
             x.insert(0, start + t)
             y.insert(0, value + t * (slope + t * (bend + t * cubic)))

@@ -34,8 +34,8 @@ def build_showable(model: Model) -> ShowableModel:
     shown at ground.
 
     Raises:
-        ModelError: no single part of the model is to blame.
-        UnsupportedError: likewise.
+        ModelError: the model is invalid, and no single part of it is the cause.
+        UnsupportedError: the model is unsupported, and no single part of it is the cause.
     """
     left_out: list[tuple[str, str]] = []
     first: ModelError | UnsupportedError | None = None
@@ -82,7 +82,7 @@ def describe_errors(findings: Iterable[Finding], parts: Sequence[tuple[str, str]
 
     Args:
         findings: of the validator.
-        parts: paths of what is not shown, and why.
+        parts: paths of the omitted components, and the reason of each.
     """
     known = [path for path, _ in parts]
     errors = [

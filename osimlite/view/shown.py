@@ -38,12 +38,12 @@ class Shown:
     """Model with its scene, motion and findings, ready to be shown.
 
     Attributes:
-        model: which.
-        scene: what there is to see.
+        model: the model.
+        scene: drawable objects of the model.
         q: coordinate values (n,) at first.
         motion: how it moves, or None.
-        findings: of the validator.
-        remarks: sentences on what is not shown.
+        findings: findings of the validator.
+        remarks: sentences about parts that cannot be shown.
     """
 
     model: Model

@@ -172,7 +172,11 @@ class DocumentAnalysis:
 
     @cached_property
     def objects(self) -> dict[int, Object]:
-        """Return the objects of the document by the index of their element."""
+        """Objects of the document.
+
+        Returns:
+            Objects by the index of their element.
+        """
         top = None if self.document is None else self.document.top
         result: dict[int, Object] = {}
         for item in top.walk() if top is not None else ():

@@ -121,7 +121,7 @@ class B3dTrial:
     def missing_forces(self) -> Array:
         """Numbers (n,) in `MISSING_FORCE_REASONS`: why the forces of a frame are not to be trusted; 0 if they are."""
         reasons = np.array(self.header["missing_forces"][: self.frame_count], dtype=int)
-        # Nimble takes frames without a reason for frames with external forces that nobody measured.
+        # Nimble takes frames without a reason for frames with external forces that were not measured.
         rest = np.full(self.frame_count - len(reasons), 2)
         return np.concatenate([reasons, rest])
 
@@ -132,7 +132,11 @@ class B3dTrial:
 
     @property
     def features(self) -> tuple[str, ...]:
-        """Detected features of the trial in words."""
+        """Detected features of the trial.
+
+        Returns:
+            Names of the features in words, in the order of the file.
+        """
         return tuple(_get_name(TRIAL_FEATURES, number) for number in self.header["features"])
 
     def find_pass(self, processing_pass: int | str | None = None) -> int:
@@ -204,7 +208,17 @@ class B3dTrial:
                 yield block
 
     def read_arrays(self, processing_pass: int | None = None) -> dict[str, Array]:
-        """Return all frames of the trial; arguments, result and errors as of :meth:`read_blocks`."""
+        """Read all frames of the trial at once.
+
+        Args:
+            processing_pass: as of :meth:`read_blocks`.
+
+        Returns:
+            Arrays with one row per frame, by field; empty if the trial has no frames.
+
+        Raises:
+            DocumentError: the trial is damaged.
+        """
         blocks = list(self.read_blocks(processing_pass))
         if any(block.keys() != blocks[0].keys() for block in blocks):
             raise DocumentError(
@@ -369,7 +383,11 @@ class B3dSubject:
 
     @property
     def pass_types(self) -> tuple[str, ...]:
-        """Types of the processing passes in words; a trial can have fewer passes."""
+        """Types of the processing passes; a trial can have fewer passes.
+
+        Returns:
+            Names of the types in words, one for each pass.
+        """
         return tuple(_get_name(PASS_TYPES, each["type"]) for each in self.header["passes"])
 
     @property
@@ -444,6 +462,9 @@ class B3dSubject:
 
         Args:
             processing_pass: index of the pass; the last one by default.
+
+        Returns:
+            Names, one for each column of the positions.
 
         Raises:
             DocumentError: the model cannot be read, or has another number of coordinates.

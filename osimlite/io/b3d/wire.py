@@ -185,7 +185,7 @@ def _decode_values(field: WireField, declared: Field) -> list[Any]:
 
 
 def _convert_integer(value: int, kind: str | Schema) -> int | bool:
-    """Return an integer of 32 bits, of which negative ones are written with 64 bits, or a truth value."""
+    """Convert a varint to a truth value or a signed integer of 32 bits; negative ones have 64 bits in the file."""
     if kind == "bool":
         return bool(value)
     value &= 0xFFFF_FFFF

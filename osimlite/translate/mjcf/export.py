@@ -160,7 +160,7 @@ def to_mjcf(
         fit: "wraps" moves and resizes wrap geoms until tendons match the paths, "force" also fits
             the curves and lengths of muscles to their isometric forces, "none" keeps all numbers of
             the model.
-        spline: "quartic" fits one quartic to a function that is none, "series" a quartic of a
+        spline: "quartic" fits one quartic to a function that is not one, "series" a quartic of a
             quartic, which needs a helper joint for each and is about twice as close.
         driver: whether to write the file for `osimlite.mjcf.Driver`, which has no forces: the
             driver computes them from a copy of the model, which is among the files.

@@ -507,7 +507,7 @@ def _is_independent(model: object, joint: int, others: list[int]) -> bool:
 
 
 def _complete_axes(axes: list[Array]) -> list[Array]:
-    """Return three axes, no two parallel, of which the first are those given."""
+    """Append perpendicular axes to a list of axes until there are three."""
     result = list(axes)
     while len(result) < 3:
         if not result:

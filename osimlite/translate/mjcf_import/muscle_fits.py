@@ -149,7 +149,11 @@ class FittedCurves(NamedTuple):
     def components(
         self,
     ) -> tuple[ActiveForceLengthCurve, ForceVelocityCurve, FiberForceLengthCurve]:
-        """Return the curves as components of a muscle."""
+        """Create the curves as components of a muscle.
+
+        Returns:
+            Curves of active force, velocity and passive force.
+        """
         return (
             ActiveForceLengthCurve(name="ActiveForceLengthCurve", **self.active),
             ForceVelocityCurve(name="ForceVelocityCurve", **self.velocity),

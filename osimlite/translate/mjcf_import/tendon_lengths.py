@@ -83,7 +83,7 @@ def read_tendon(source: MjcfSource, index: int) -> Tendon:
 def segment_lengths(
     source: MjcfSource, segments: list[TendonSegment], poses: SampledPoses, version: int
 ) -> tuple[Array, Array]:
-    """Return the lengths (S, P) of segments, and how much of them is on a surface (S, P), m.
+    """Compute the lengths of tendon segments in sampled poses.
 
     A segment that goes through the inside of a surface and touches it has NaN there.
 
@@ -92,6 +92,9 @@ def segment_lengths(
         segments: the segments.
         poses: the poses.
         version: version of MuJoCo whose rules hold, 3 or 4.
+
+    Returns:
+        Lengths (S, P), m, and the parts of them on a surface (S, P), m.
     """
     model = source.model
     first = poses.sites[:, [item.first for item in segments]]

@@ -240,7 +240,7 @@ class _Selection:
         polynomials: dict[int, tuple[FunctionBasedPath, Array]],
         routes: dict[int, tuple[Quadrant | None, ...]],
     ) -> None:
-        """Measure the paths that were selected, and record what is not exact."""
+        """Measure the selected paths, and record their deviations."""
         draft, model = self.draft, self.draft.mj
         bench = Bench(draft)
         surfaces = Surfaces(draft, bench.frames, self.reach)
