@@ -416,8 +416,8 @@ class _SceneCollector:
             width = max(1.0, WIDTH_OF_HALF_SPACE * float(np.linalg.norm(high - low)))
             for place in self.half_spaces:
                 matrix = self.items[place].matrix
-                # A little inside, so that a floor drawn at the same place is seen, and not spots of
-                # both.
+                # Move the surface inwards: a floor mesh in the same plane would flicker through it
+                # (z-fighting).
                 matrix[:3, 3] += 0.002 * width * matrix[:3, 0]
                 matrix[:3, :3] *= width
         return scene

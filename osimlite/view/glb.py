@@ -139,6 +139,7 @@ def _make_continuous(quaternions: Array) -> Array:
     q and -q are the same rotation, but a player that interpolates components would make a detour.
     """
     turned = np.sum(quaternions[1:] * quaternions[:-1], axis=1) < 0.0
+    # A change of sign also inverts all later quaternions: an odd number of changes is negative.
     signs = np.where(np.cumsum(np.concatenate(((False,), turned))) % 2 == 1, -1.0, 1.0)
     result: Array = quaternions * signs[:, None]
     return result

@@ -282,6 +282,7 @@ def _choose_view(scene: Scene, values: Array) -> dict[str, Any]:
     travels = np.linalg.norm(middles[-1] - middles[0]) > TRAVELS * np.linalg.norm(
         boxes[0, 1] - boxes[0, 0]
     )
+    # A following camera moves with the bodies, so their travel must not widen the view.
     if travels:
         boxes -= (middles - middles[0])[:, None]
     return {

@@ -513,6 +513,7 @@ def _complete_axes(axes: list[Array]) -> list[Array]:
         if not result:
             result.append(np.array((1.0, 0.0, 0.0)))
         elif len(result) == 1:
+            # The basis vector least aligned with the axis keeps the cross product far from zero.
             smallest = np.eye(3)[int(np.argmin(np.abs(result[0])))]
             across = np.cross(result[0], smallest)
             result.append(across / np.linalg.norm(across))
