@@ -175,6 +175,7 @@ class Request:
                 files = imported.write(self.folder)
                 result = Conversion(files, imported.fidelity, dict(imported.summary))
             else:
+                # Only importers that make one model can be followed by an exporter, and these have it.
                 model: Model = getattr(imported, "model")  # noqa: B009
                 result = self._export(model, exporter, motion, geometry, values[exporter.name])
                 # Losses of the first step are losses of the result, too.

@@ -115,7 +115,7 @@ def animate(
 
 
 def _encode_frames(frames: list[Any], fps: int, image: Any) -> bytes:
-    """The frames as a GIF, all with one palette, so that colours do not flicker."""
+    """Return the frames as a GIF, all with one palette, so that colours do not flicker."""
     # A sheet of some of the frames, side by side, has all the colours.
     some = frames[:: max(1, len(frames) // 6)]
     width, height = frames[0].size
@@ -134,7 +134,7 @@ def _encode_frames(frames: list[Any], fps: int, image: Any) -> bytes:
 
 
 class Film:
-    """The motion at the moments of the film, and how much of space it takes."""
+    """Motion at the moments of the film, and how much of space it takes."""
 
     def __init__(
         self, scene: Scene, motion: ShownMotion, fps: int, speed: float, plane: Plane
@@ -283,7 +283,7 @@ def to_hex(color: tuple[float, ...]) -> str:
 
 
 def round_down(value: float) -> float:
-    """The largest of 1, 2, 5 times a power of ten that is not above a positive value."""
+    """Return the largest of 1, 2, 5 times a power of ten that is not above a positive value."""
     power = 10.0 ** np.floor(np.log10(value))
     return float(
         max(step * power for step in (1.0, 2.0, 5.0) if step * power <= value * (1 + 1e-9))

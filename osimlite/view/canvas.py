@@ -80,7 +80,7 @@ class Canvas:
             ]
 
     def pixels(self, fine: int = 1) -> NDArray[np.uint8]:
-        """The picture (height, width, 3), every `fine` times `fine` pixels made one."""
+        """Return the picture (height, width, 3), every `fine` times `fine` pixels made one."""
         fields = self._colors.reshape(self.height // fine, fine, self.width // fine, fine, 3)
         # One after the other: numpy takes several times as long for the mean over axes that short.
         colors = np.zeros_like(fields[:, 0, :, 0])
@@ -92,7 +92,7 @@ class Canvas:
         return result
 
     def _spans(self, places: Array) -> Iterator[_Spans]:
-        """The pixels whose centres triangles cover, in portions: row by row, from edge to edge."""
+        """Yield the pixels whose centres triangles cover, in portions: row by row, from edge to edge."""
         flat = places[:, :, :2]
         with np.errstate(all="ignore"):
             low, high = flat.min(axis=1), flat.max(axis=1)
@@ -118,7 +118,7 @@ class Canvas:
             yield _Spans(triangle, row * self.width + start, lengths[part], *weights)
 
     def _ends(self, corners: Array, y: Array) -> tuple[Indices, Indices]:
-        """The first and the last pixel of a row that triangles cover, given corners (r, 3, 2) and heights (r,)."""
+        """Return the first and the last pixel of a row that triangles cover, given corners (r, 3, 2) and heights (r,)."""
         left, right = np.full(len(y), np.inf), np.full(len(y), -np.inf)
         for one, other in ((0, 1), (1, 2), (2, 0)):
             (ax, ay), (bx, by) = corners[:, one].T, corners[:, other].T
@@ -180,7 +180,7 @@ def _enumerate_ranges(starts: Indices, counts: Indices) -> tuple[Indices, Indice
 
 
 def _compute_weights(corners: Array, x: Array, y: Array) -> tuple[Array, Array]:
-    """The weights (k, 3) of the corners (k, 3, 2) of triangles at points in them, and their derivatives along x."""
+    """Return the weights (k, 3) of the corners (k, 3, 2) of triangles at points in them, and their derivatives along x."""
     (ax, ay), (bx, by), (cx, cy) = (corners[:, index].T for index in range(3))
     with np.errstate(all="ignore"):
         size = 1.0 / ((bx - ax) * (cy - ay) - (by - ay) * (cx - ax))

@@ -230,7 +230,7 @@ class _SceneCollector:
         )
 
     def _shape(self, shape: Component) -> tuple[Surface, Array]:
-        """A unit shape, and what makes the shape of it (4, 4)."""
+        """Return a unit shape, and the matrix (4, 4) that turns it into the shape."""
         match shape:
             case geometry.Brick():
                 return unit_shapes.make_cube(), _make_stretch(2.0 * np.array(shape.half_lengths))
@@ -289,7 +289,7 @@ class _SceneCollector:
         )
 
     def _force(self, force: Force, path: str) -> None:
-        """The line of a force between two points, and where the force of a contact is shown."""
+        """Add the line of a force between two points, and where the force of a contact is shown."""
         match force:
             case springs.PointToPointSpring():
                 self._add_line_between(
@@ -388,7 +388,7 @@ class _SceneCollector:
         self.lines.append(Line(path, layer, points, color, 0.003, visible))
 
     def _mesh(self, name: str) -> Surface:
-        """The mesh in a file; the same for the same file."""
+        """Return the mesh in a file; one object for each file."""
         result = self.folders.find(name)
         if result is None:
             raise ModelError(
@@ -431,7 +431,7 @@ def _measure_fibers(muscle: Muscle) -> tuple[float, float]:
 
 
 def _make_stretch(size: Any, where: Any = (0.0, 0.0, 0.0)) -> Array:
-    """A matrix (4, 4) that stretches along the axes and then moves."""
+    """Return the matrix (4, 4) that stretches along the axes and then moves."""
     matrix = np.diag((*np.asarray(size, dtype=float).tolist(), 1.0))
     matrix[:3, 3] = where
     return matrix

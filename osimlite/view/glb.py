@@ -115,7 +115,7 @@ def _list_segments(
 
 
 def _lay_tubes(ends: Array, radius: float) -> _Track:
-    """A tube of length 1 along Z, laid from one end to the other (n, 2, 3)."""
+    """Return the poses of a tube of length 1 along Z that is laid from one end to the other (n, 2, 3)."""
     ways = ends[:, 1] - ends[:, 0]
     lengths = np.linalg.norm(ways, axis=1)
     ways = ways / np.maximum(lengths, 1e-300)[:, None]
@@ -127,7 +127,7 @@ def _lay_tubes(ends: Array, radius: float) -> _Track:
 
 
 def _make_turns(axis: Array, cosine: float) -> Array:
-    """The quaternion x y z w that turns one unit vector into another, from their cross product and cosine."""
+    """Return the quaternion x y z w that turns one unit vector into another, from their cross product and cosine."""
     result = np.array((*axis, 1.0 + cosine))
     size = float(np.linalg.norm(result))
     return result / size if size > 1e-9 else np.array((1.0, 0.0, 0.0, 0.0))
@@ -180,14 +180,14 @@ class _GlbWriter:
         return len(self.accessors) - 1
 
     def _once(self, key: Any, into: list[dict[str, Any]], entry: dict[str, Any]) -> int:
-        """The place of an entry, which is written the first time."""
+        """Return the index of an entry, which is written at its first use."""
         if key not in self._known:
             self._known[key] = len(into)
             into.append(entry)
         return self._known[key]
 
     def mesh(self, surface: Any, color: Color, opacity: float) -> int:
-        """The place of a surface in a colour (sRGB)."""
+        """Return the index of a surface in a colour (sRGB)."""
         key = (id(surface), color, opacity)
         if key in self._known:
             return self._known[key]
@@ -216,7 +216,7 @@ class _GlbWriter:
         return self._once(key, self.meshes, {"primitives": [primitive]})
 
     def node(self, name: str, track: _Track, mesh: int | None = None) -> int:
-        """A node in ground, which moves if it is not the same all the time."""
+        """Add a node in ground, which moves if it is not the same all the time."""
         place = len(self.nodes)
         node: dict[str, Any] = {"name": name} | ({} if mesh is None else {"mesh": mesh})
         for what, values in track._asdict().items():
@@ -233,7 +233,7 @@ class _GlbWriter:
         return place
 
     def shape(self, parent: int, name: str, mesh: int, matrix: Array) -> None:
-        """A node fixed to another: `matrix` (4, 4) in its frame."""
+        """Add a node that is fixed to another: `matrix` (4, 4) in its frame."""
         self.nodes[parent].setdefault("children", []).append(len(self.nodes))
         self.nodes.append({"name": name, "mesh": mesh, "matrix": matrix.T.ravel().tolist()})
 

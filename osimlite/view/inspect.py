@@ -140,7 +140,7 @@ def place_pins(model: Model, scene: Scene, findings: Sequence[Finding]) -> list[
 def _find_point(
     tree: Tree, mechanism: Mechanism, scene: Scene, component: Component | None
 ) -> tuple[int, Any] | None:
-    """Body and point (3,) in its frame of a component, or of the nearest above it that is anywhere."""
+    """Return the body of a component and its point (3,) there, or those of the nearest owner that has a position."""
     while component is not None:
         path = tree.path_of(component) or ""
         item = next((item for item in scene.items if item.path == path), None)

@@ -86,5 +86,5 @@ def kernels_text(program: Mapping[str, Any]) -> str:
 
 
 def text_of(array: Any) -> str:
-    """The numbers of an array as text (base64), in their order."""
+    """Return the numbers of an array as text (base64), in their order."""
     return base64.b64encode(np.ascontiguousarray(array).tobytes()).decode("ascii")

@@ -55,7 +55,7 @@ class ContactForce(NamedTuple):
 
 
 def contact_forces(motion: ShownMotion) -> list[ContactForce]:
-    """The force vectors among the columns of `motion.forces`, in their order."""
+    """Return the force vectors among the columns of `motion.forces`, in their order."""
     result = []
     for label in motion.forces:
         if label.endswith(".force.X"):
@@ -95,7 +95,7 @@ def read_activations(scene: Scene, motion: ShownMotion) -> dict[str, Array]:
 
 
 def activity_color(activation: float) -> Color:
-    """The colour of a muscle, as OpenSim has it: from blue to red."""
+    """Return the colour of a muscle, as OpenSim has it: from blue to red."""
     return activation, 0.0, 1.0 - activation
 
 
@@ -113,19 +113,19 @@ def find_moving_bodies(poses: Sequence[Bodies]) -> Array:
 
 
 def at_times(motion: ShownMotion, columns: Array, times: Array) -> Array:
-    """Columns (n, k) of the motion at other times (m,), along straight lines between the moments on record."""
+    """Interpolate columns (n, k) of the motion linearly at other times (m,)."""
     recorded = np.asarray(motion.times, dtype=float)
     rows = [np.interp(times, recorded, columns[:, k]) for k in range(columns.shape[1])]
     return np.array(rows).reshape(len(rows), len(times)).T
 
 
 def values_of(motion: ShownMotion, mechanism: Mechanism) -> Array:
-    """Coordinate values (n, c) of the motion in the order of the mechanism's coordinates."""
+    """Return the coordinate values (n, c) of the motion in the order of the mechanism's coordinates."""
     return in_mechanism_order(motion, mechanism, np.asarray(motion.values, dtype=float))
 
 
 def in_mechanism_order(motion: ShownMotion, mechanism: Mechanism, columns: Array) -> Array:
-    """Columns (n, k) of the motion in the order of the mechanism's coordinates (n, c); defaults where it has none."""
+    """Return columns (n, k) of the motion in the order of the mechanism's coordinates (n, c), defaults elsewhere."""
     result = np.tile(mechanism.default_state()[0], (len(columns), 1))
     for k, name in enumerate(motion.coordinates):
         result[:, mechanism.coordinate_index(name)] = columns[:, k]

@@ -55,7 +55,7 @@ new Response(new Blob([Uint8Array.from(atob("@PAGE@"), (c) => c.charCodeAt(0))])
 
 
 def model(item: Model) -> str:
-    """The component tree, and the model in space."""
+    """Return the HTML of the component tree and of the model in space."""
     tree = item.tree()
     own = [component for component in tree.components if not tree.is_internal(component)]
     below: dict[int, list[Component]] = {}
@@ -85,7 +85,7 @@ def trajectory(item: Trajectory) -> str:
 
 
 def findings(item: Report) -> str:
-    """A table of the findings, the worst first."""
+    """Return the HTML of a table of findings, the worst first."""
     rows = sorted(item.findings, key=lambda finding: finding.severity.rank)
     parts = ("error", item.errors), ("warning", item.warnings), ("remark", item.infos)
     counts = ", ".join(format_count(len(part), kind) for kind, part in parts)
@@ -142,7 +142,7 @@ def muscle_curves(item: MuscleCurves) -> str:
 
 
 def runs(item: Outcome) -> str:
-    """The first rows of a sweep."""
+    """Return the HTML of the first rows of a sweep."""
     table = item.to_arrow()
     rows = table.slice(0, FIRST_ROWS).to_pylist()
     cells = ([_format_number(value) for value in row.values()] for row in rows)
@@ -155,7 +155,7 @@ def runs(item: Outcome) -> str:
 
 
 def optimum(item: Optimum) -> str:
-    """The best that a search has found."""
+    """Return the HTML of the best result of a search."""
     words = f"{_format_number(item.value)} in evaluation {item.evaluation} of {item.evaluations} ({escape(item.ended)})"
     cells = ([escape(name), _format_number(value)] for name, value in item.values.items())
     return f"<div>best: {words}</div>" + _make_table(("variable", "value"), cells, len(item.values))

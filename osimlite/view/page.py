@@ -51,7 +51,7 @@ class Story(NamedTuple):
 
 
 def page_text(data: Mapping[str, Any]) -> str:
-    """The page (HTML) that shows data from :func:`page_data`."""
+    """Return the page (HTML) that shows data from :func:`page_data`."""
     web = files("osimlite.view").joinpath("web")
 
     def read(name: str) -> str:
@@ -336,6 +336,6 @@ def _directions(up: Array) -> dict[str, list[float]]:
 
 
 def _flatten_rows(matrix: Array) -> list[float]:
-    """The upper three rows of a matrix (4, 4), one after the other."""
+    """Return the upper three rows of a matrix (4, 4), one after the other."""
     rows: list[float] = matrix[:3].ravel().tolist()
     return rows

@@ -65,7 +65,7 @@ class Camera(NamedTuple):
         return np.cross(self.right, self.up)
 
     def places(self, points: Array, width: int, height: int) -> Array:
-        """Pixels to the right and down, and depth (m), of points (..., 3) in a picture of that many pixels."""
+        """Return pixels to the right and down, and depth (m), of points (..., 3) in a picture of that size."""
         away = points - self.center
         x = (away @ self.right / self.half[0] + 1.0) * (0.5 * width)
         y = (1.0 - away @ self.up / self.half[1]) * (0.5 * height)
@@ -75,7 +75,7 @@ class Camera(NamedTuple):
     def around(
         cls, points: Array, up: Array, direction: Array, aspect: float, margin: float = 1.12
     ) -> Camera:
-        """The camera that sees all points (k, 3) from a direction (3,), in a picture `aspect` times as wide as high."""
+        """Return the camera that sees all points (k, 3) from a direction (3,), in a picture `aspect` times as wide as high."""
         back = direction / np.linalg.norm(direction)
         right = np.cross(up, back)
         if np.linalg.norm(right) < 1e-9:
@@ -114,7 +114,7 @@ def draw_scene(
     arrows: Sequence[ForceArrow] = (),
     style: Style | None = None,
 ) -> Any:
-    """A picture (pillow image) of a scene.
+    """Draw a picture (pillow image) of a scene.
 
     Args:
         scene: what is to be seen.
@@ -193,7 +193,7 @@ def _fill_background(
 
 
 def _lay_floor(heap: _Heap, scene: Scene, height: float) -> None:
-    """A square mesh at a height over ground's origin, its lines half a metre apart."""
+    """Add a square mesh at a height over ground's origin, its lines half a metre apart."""
     up, half = scene.up, max(heap.camera.half)
     across = np.cross(up, (0.0, 0.0, 1.0) if abs(up[2]) < 0.9 else (1.0, 0.0, 0.0))
     across /= np.linalg.norm(across)
@@ -216,7 +216,7 @@ def _lay_floor(heap: _Heap, scene: Scene, height: float) -> None:
 
 
 def _cut_half_space(heap: _Heap, placed: Array) -> None:
-    """A half space seen from its edge: its line, and what is below it, behind everything else."""
+    """Add a half space seen from its edge: its line, and what is below it, behind everything else."""
     camera, inward = heap.camera, placed[:3, 0] / np.linalg.norm(placed[:3, 0])
     if abs(float(inward @ camera.towards)) > _FROM_THE_EDGE:
         return
@@ -297,7 +297,7 @@ class _Heap:
 
 
 def _make_cylinder(start: Array, end: Array, radius: float) -> Array:
-    """The matrix (4, 4) that puts a unit cylinder along Z between two points."""
+    """Return the matrix (4, 4) that puts a unit cylinder along Z between two points."""
     along = end - start
     length = float(np.linalg.norm(along))
     z = along / length if length > 0.0 else np.array((0.0, 0.0, 1.0))

@@ -51,7 +51,7 @@ class Pushes:
 
     @classmethod
     def of(cls, scene: Scene, motion: ShownMotion, times: Array) -> Pushes:
-        """The forces on record of a motion, at other times (n,).
+        """Return the recorded forces of a motion at other times (n,).
 
         Surfaces of one element on one body share a record, and are shown once.
         """

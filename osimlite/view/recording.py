@@ -55,7 +55,7 @@ def read_recording(
     *,
     folder: Path | None = None,
 ) -> Recording:
-    """The motion in a .sto or .mot file.
+    """Read the motion in a .sto or .mot file.
 
     Coordinates that are not in it keep their default values, or follow others by their couplers.
     Contact forces are those in the file `forces` (with the labels of OpenSim's ForceReporter);

@@ -177,7 +177,7 @@ class Scene:
         return -g / size if size > 0.0 else np.array((0.0, 1.0, 0.0))
 
     def drawn(self) -> Iterator[Item]:
-        """The items that the model wants to be shown."""
+        """Return the items that the model does not hide."""
         return (item for item in self.items if item.visible and item.layer in self.shown)
 
     @cached_property

@@ -140,7 +140,7 @@ def test_no_path_of_a_file_is_broken_into_lines(
 ) -> None:
     monkeypatch.setenv("COLUMNS", "60")
     path = "/tmp/" + "pytest-of-somebody/" * 4 + "best.par"
-    FactTable("search", [("runs", "40"), ("files", f"/tmp/best.osim, {path}")]).show()
+    FactTable("search", [("runs", "40"), ("files", f"results/best.osim, {path}")]).show()
     assert path in capsys.readouterr().out.splitlines()[-1]
 
 
