@@ -33,6 +33,7 @@ class ParameterSpec:
         bare_value: value of an option that is given without one; None if it requires a value.
     """
 
+    # No dataclass: every command imports this module, and dataclasses take a millisecond each.
     __slots__ = "bare_value", "maker", "names", "settings"
 
     def __init__(
@@ -75,9 +76,11 @@ class _BoundParameter(NamedTuple):
             Value that a switch has, by its spelling.
         """
         names = self.declared.names
+        # Typer derives the spelling from the name of the parameter in the same way.
         if not any(name.startswith("--") for name in names):
             names = (*names, f"--{self.name.replace('_', '-')}")
             if self.type is bool:
+                # A switch has a spelling that turns it off.
                 names = (*names[:-1], f"{names[-1]}/--no-{names[-1][2:]}")
         result = {}
         for name in names:
@@ -108,6 +111,7 @@ class _BoundParameter(NamedTuple):
             return kind(word)
         if kind not in _NUMBERS or not _NUMBERS[kind].fullmatch(word):
             return None
+        # Numbers outside of their limits are left to typer, which words the error.
         value = kind(word)
         settings = self.declared.settings
         return value if settings.get("min", value) <= value <= settings.get("max", value) else None
@@ -145,6 +149,7 @@ class Command:
         function: Any = self.function
         defaults = dict(
             zip(
+                # Defaults belong to the last parameters.
                 reversed([*_list_argument_names(function)]),
                 reversed(function.__defaults__ or ()),
                 strict=False,
@@ -152,6 +157,8 @@ class Command:
         )
         result = []
         for name in _list_argument_names(function):
+            # Annotations are texts (`from __future__ import annotations`) that are evaluated when a
+            # command is read.
             annotation = eval(function.__annotations__[name], function.__globals__)
             kind, declared = annotation.__origin__, annotation.__metadata__[0]
             result.append(_BoundParameter(name, kind, declared, defaults.get(name, ...)))
@@ -200,6 +207,7 @@ class Command:
             for spelling in each.spellings
         }
         result: list[str] = []
+        # The added "-" makes the last word a word with a successor.
         for word, following in pairwise([*words, "-"]):
             result.append(word)
             if word in bare_values and following.startswith("-"):
@@ -215,6 +223,7 @@ class Command:
         parameters = self.parameters()
         values: dict[str, Any] = {each.name: each.default for each in parameters}
         options = {
+            # Switches and options by spelling, each with the value that a switch has.
             spelling: (each, flag)
             for each in parameters
             if each.declared.maker == "Option"
@@ -224,6 +233,7 @@ class Command:
         seen: set[str] = set()
         rest = iter(words)
         for word in rest:
+            # "-" alone means standard input, and is no option.
             if word == "-" or not word.startswith("-"):
                 if not arguments:
                     return None
@@ -243,6 +253,7 @@ class Command:
                 # A value that starts with "-" may be a negative number or a forgotten value; typer decides.
                 if word.startswith("-") or (equals and kind is bool):
                     return None
+            # Typer refuses an option that is given twice, unless it is a list.
             value = flag if kind is bool else parameter.value(kind, word)
             if value is None or (parameter.name in seen and not is_list):
                 return None
@@ -254,6 +265,7 @@ class Command:
             else:
                 values[parameter.name] = value
             seen.add(parameter.name)
+        # A parameter without a value is required, and typer words the error.
         return None if any(value is ... for value in values.values()) else values
 
 

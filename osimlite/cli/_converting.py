@@ -78,6 +78,7 @@ class Request:
             SettingError: a format is unknown, or not determined by the names.
             MissingFileError: the file does not exist.
         """
+        # 1. The formats on both sides: named by an option, or known by the file.
         importers = list_importers()
         sources = {OSIM, *importers}
         if source is not None and source not in sources:
@@ -93,6 +94,7 @@ class Request:
         by_suffix = None if output is None else _find_target(output, found)
         default = importers[found].target if found in importers else None
         goal = target or by_suffix or default
+        # An existing folder may have a name that looks like a file with a suffix.
         if None not in (target, by_suffix) and target != by_suffix and not _is_folder(output):
             raise SettingError(
                 f"-o names a file of the format '{by_suffix}', but --to is '{target}'; leave out one of them"
@@ -113,16 +115,19 @@ class Request:
             raise SettingError(
                 f"a file of the format '{found}' cannot be written as '{goal}'{usual}"
             )
+        # 3. Where to write.
         if goal == found:
             raise SettingError(
                 f"'{file.name}' already has the format '{goal}'; to bring a model to the current version, use "
                 "'osimlite upgrade'"
             )
+        # A suffix that belongs to the format makes `-o` the name of the file, else it is a folder.
         is_file = output is not None and output.suffix.lower() == _get_suffix(goal) != ""
         folder = output.parent if output is not None and is_file else output
         name = output.stem if output is not None and is_file else file.stem
         folder = options.choose_output_folder(file, folder)
         written = folder / f"{name}{_get_suffix(goal)}"
+        # `samefile` sees through links and letter case, which text comparisons do not.
         if written.exists() and file.exists() and written.samefile(file):
             raise SettingError(
                 f"'{file}' would be replaced by its conversion; name another file with -o"
@@ -144,11 +149,14 @@ class Request:
                 would be replaced.
             OsimliteError: the file cannot be read, or the results cannot be written.
         """
+        # Checked before anything is written.
         _protect_summary(self.folder)
         importer = list_importers().get(self.source)
         exporter = next((each for each in EXPORTERS if each.name == self.target), None)
         used = [each for each in (importer, exporter) if each is not None]
         known = {choice.name for each in used for choice in each.choices}
+        # All options of all formats are on the command line; only those of these two formats may be
+        # given.
         for name in chosen:
             if name not in known:
                 raise SettingError(
@@ -162,6 +170,7 @@ class Request:
             }
             for each in used
         }
+        # OpenSim's own files are read by the reader of documents, not by an importer.
         if importer is None:
             assert exporter is not None
             from osimlite.io.document.reader import read
@@ -181,6 +190,7 @@ class Request:
                 # Losses of the first step are losses of the result, too.
                 result.fidelity.records[:0] = imported.fidelity.records
                 result.summary.update(imported.summary)
+        # Both files are written last, since they describe the others.
         same, changed, dropped = result.fidelity.counts()
         summary = {
             "source": self.file.name,
@@ -192,6 +202,7 @@ class Request:
         }
         fidelity = write_into(self.folder, FIDELITY_FILE, result.fidelity.to_json())
         written = write_into(self.folder, SUMMARY_FILE, format_json(summary))
+        # Some exporters write their own record, which the complete one replaces.
         files = [*(path for path in result.files if path.name != FIDELITY_FILE), fidelity, written]
         return Conversion(files, result.fidelity, summary)
 
@@ -205,6 +216,7 @@ class Request:
     ) -> Conversion:
         """Write a model in the format of an exporter."""
         folders = options.list_mesh_folders(self.file, geometry)
+        # Exporters of pages and pictures take what the viewer shows; the others take the model.
         if exporter.command != "view":
             moved = {"motion": motion} if exporter.takes_motion else {}
             made = exporter.write(
@@ -222,6 +234,7 @@ class Request:
             model, mechanism, folders, file=self.file, motion=motion, left_out=left_out
         )
         fidelity = Fidelity(mechanism.name, exporter.name)
+        # Bodies become nodes of the scene; forces are no part of it.
         for body in model.components(Body):
             fidelity.translated[body.path] = "node"
         for force in model.components(Force):
@@ -282,6 +295,7 @@ def _get_suffix(target: str) -> str:
 
 def _get_relative(path: Path, folder: Path) -> str:
     """Return a path relative to a folder, or its name if it is elsewhere."""
+    # A name is better than an absolute path, which would differ between machines.
     return path.relative_to(folder).as_posix() if path.is_relative_to(folder) else path.name
 
 

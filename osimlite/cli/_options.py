@@ -253,6 +253,7 @@ def choose_output_folder(file: Path, output: Path | None) -> Path:
     Raises:
         OsimliteError: the default folder is a link that leads elsewhere.
     """
+    # The functions of this module import what they use: its declarations are read by every command.
     from osimlite.base.writing import expect_folder_inside
 
     if output is not None:
@@ -283,6 +284,7 @@ def parse_named_words(
 
     result = {}
     for word in words or ():
+        # The first equals sign separates: values may contain more of them.
         name, equals, value = (part.strip() for part in word.partition("="))
         if not equals:
             raise SettingError(f"{option} takes {form}, got '{word}'")
@@ -304,6 +306,7 @@ def parse_applied_loads(words: Iterable[str] | None) -> dict[str, list[list[str]
     """
     named = parse_named_words(words, "--applied-to", "BODY=FORCE,POINT,MOMENT")
     return {
+        # Several loads on one body are separated by "+", the columns of a load by commas.
         body: [load.strip().split(",") for load in text.split("+")] for body, text in named.items()
     }
 
@@ -358,6 +361,7 @@ def parse_quantities(
     form = "COORDINATE=VALUE with a number such as 0.5 or 30deg"
     for name, text in parse_named_words(words, option, form).items():
         try:
+            # States such as activations have no unit to convert.
             if name in states:
                 result[name] = float(text)
                 continue
@@ -393,12 +397,14 @@ def read_source(source: str, parameter: Iterable[str] | None) -> tuple[Model, Pa
     from osimlite.io.document.reader import read
     from osimlite.models.source import make_model
 
+    # Other words than files are built-in models, or functions that build one.
     if Path(source).suffix.lower() != ".osim":
         return make_model(source, parse_named_words(parameter, "-p")), None
     if parameter:
         raise SettingError(
             f"'{source}' is a file and has no parameters; -p is for functions that build a model"
         )
+    # Meshes and tables are searched beside the file, also if the command runs elsewhere.
     return read(source), Path(source).resolve().parent
 
 
@@ -410,6 +416,7 @@ def resolve_folders(geometry: Sequence[Path] | None) -> Sequence[Path]:
     """
     from osimlite.errors import MissingFolderError
 
+    # A misspelt folder would otherwise only show as missing meshes.
     for place in geometry or ():
         if not place.is_dir():
             raise MissingFolderError(
@@ -431,6 +438,7 @@ def list_mesh_folders(file: Path, geometry: Sequence[Path] | None) -> list[Path]
     """
     from osimlite.lint.settings import load_settings
 
+    # The user's folders come before those of the settings.
     return [*resolve_folders(geometry), *map(Path, load_settings(file.resolve().parent).mesh_paths)]
 
 
@@ -444,4 +452,5 @@ def check_number_format(numbers: str) -> NumberStyle:
 
     if numbers not in ("shortest", "opensim"):
         raise SettingError(f"--numbers must be 'shortest' or 'opensim', not '{numbers}'")
+    # The comparison tells mypy which of the two literals is returned.
     return "opensim" if numbers == "opensim" else "shortest"

@@ -70,6 +70,7 @@ class _Task:
 
     def receive(self, title: str, done: float, total: float, unit: str) -> None:
         """Take over what the library reports."""
+        # A new stage starts its own clock, from which the time left is computed.
         if title != self.title:
             self.title, self.started, self.details = title, time.monotonic(), ""
         self.done, self.total, self.unit = float(done), total, unit
@@ -113,11 +114,13 @@ class _Line:
         self._shown = 0
         self._last_output = time.monotonic()
         self._last_drawn = 0.0
+        # Re-entrant: what is printed while the line is erased erases it again.
         self._lock = threading.RLock()
         self._thread: threading.Thread | None = None
 
     def is_terminal(self) -> bool:
         """Return whether standard error is a terminal that can erase a line."""
+        # A "dumb" terminal has no carriage return that overwrites.
         return bool(sys.stderr and sys.stderr.isatty()) and os.environ.get("TERM") != "dumb"
 
     def start(self) -> None:
@@ -127,12 +130,14 @@ class _Line:
             if hasattr(os, "register_at_fork"):
                 # A child has the line of its parent, but not the thread.
                 os.register_at_fork(after_in_child=self.abandon)
+            # A daemon thread does not keep the program alive.
             self._thread = threading.Thread(target=self._redraw, daemon=True)
             self._thread.start()
 
     def abandon(self) -> None:
         """Never draw again, in a process that another has started."""
         self.tasks, self._shown = [], 0
+        # The lock of the parent may be held by a thread that the child does not have.
         self._lock = threading.RLock()
         before_output(None)
 
@@ -151,7 +156,9 @@ class _Line:
             is_due = now - self._last_output >= SILENT_S and now - self._last_drawn >= REDRAW_S
             if self.tasks and is_due and self.is_terminal():
                 self._last_drawn = now
+                # One column less than the terminal has, which would break the line.
                 words = self.tasks[-1].describe(now)[: max(1, count_columns() - 1)]
+                # Padding with blanks overwrites the rest of a longer line.
                 self._write(f"\r{words:{self._shown}}")
                 self._shown = len(words)
         finally:
@@ -166,6 +173,7 @@ class _Line:
                 self._shown = 0
 
     def _write(self, text: str) -> None:
+        # The terminal may be closed; progress is no reason to fail.
         with contextlib.suppress(OSError, ValueError):
             stream = get_raw_stream(sys.stderr)
             stream.write(text)
@@ -221,9 +229,11 @@ def progress_bar(title: str, total: float | None, unit: str = "") -> Iterator[Ca
         now = time.monotonic()
         if more is not None:
             elapsed = max(now - task.started, 1e-9)
+            # A function of the rate is called here, where the rate is known.
             task.details = more(task.done / elapsed) if callable(more) else str(more)
         if _line.is_terminal():
             _line.draw()
+        # Logs get one line when work turns out to be long, not one for each step.
         elif not task.is_told and now - task.started > LONG_S:
             task.is_told = True
             complain(task.describe(now))
@@ -231,6 +241,7 @@ def progress_bar(title: str, total: float | None, unit: str = "") -> Iterator[Ca
     try:
         yield advance
     finally:
+        # `watch_command` may have removed all tasks at the end of the program.
         if task in _line.tasks:
             _line.tasks.remove(task)
         _line.erase()
@@ -278,6 +289,8 @@ def show_engine_warnings() -> None:
         def emit(self, record: logging.LogRecord) -> None:
             if record.levelno >= logging.WARNING:
                 complain(record.getMessage())
+            # Compiling takes seconds on the first run, which people should not take for the
+            # simulation.
             elif _line.tasks:
                 words = record.getMessage()
                 is_over = not words.startswith("compiling")

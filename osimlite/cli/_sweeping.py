@@ -110,12 +110,14 @@ def make_plan(
     from osimlite.studies.sweep.variables import parse_ranges
 
     ranges = parse_ranges(vary or [])
+    # A controller has parameters that vary by default.
     if not ranges and choices.get("controller") is None:
         raise SettingError("say what to vary, as in --vary RHip_rz=0.2:0.6")
     levels = {
         "below": _parse_levels(below, "--stop-below"),
         "above": _parse_levels(above, "--stop-above"),
     }
+    # A suspicious unit is a warning in the library and an error here, where a run may take hours.
     with warnings.catch_warnings():
         warnings.simplefilter("error", UnitWarning)
         try:
@@ -141,10 +143,12 @@ def _make_plan(
     from osimlite.models.source import list_parameters
     from osimlite.studies.sweep.plan import plan
 
+    # A model file has no parameters; a function may be called with others for each run.
     if Path(source).suffix.lower() == ".osim":
         model, folder = read_source(source, parameter)
         return plan(model, ranges, folder=str(folder), **choices)
     given = parse_named_words(parameter, "-p")
+    # A value for a parameter that also varies would be overwritten in each run.
     both = [name for name in ranges if name in given]
     if both:
         raise SettingError(f"the parameter '{both[0]}' is set and varied; do one of the two")
@@ -159,6 +163,7 @@ def _make_plan(
         if known[name] is Parameter.empty and name in ranges
     }
     return plan(
+        # A partial function of this module can be sent to other processes.
         partial(_make_model, source, {**needed, **given}), ranges, parameters=known, **choices
     )
 

@@ -74,6 +74,7 @@ def demo(
     from osimlite.base.require import require
     from osimlite.simulation.engines import engine_factory
 
+    # Optional packages are looked for first: a missing one should not end the tour in the middle.
     engine_factory("compiled")
     if pictures:
         require("matplotlib", extra="plot", purpose="drawing")
@@ -142,10 +143,12 @@ def _build_and_check(tour: _Tour) -> None:
 
     with tour.step("Validate a copy in which the name of a contact is misspelt") as tell:
         text = file.read_text(encoding="utf-8")
+        # A walker without this text would be copied without the mistake.
         assert text.count(MISSPELT[0]) == 1
         broken = file.with_name("misspelt.osim")
         write_atomically(broken, text.replace(*MISSPELT))
         result = validate(broken)
+        # Remarks on the copy would hide the one finding that the step is about.
         show(render(replace(result, findings=result.errors), "full"))
         tell("OpenSim reads such a file, and refuses to simulate it", broken)
 
@@ -165,6 +168,7 @@ def _simulate_motions(tour: _Tour, pictures: bool) -> Sequence[Path]:
     from osimlite.simulation.run import Simulation
 
     result = []
+    # The stack closes all simulations, also if the tour fails half-way.
     with ExitStack() as work:
         with tour.step("Make three models ready to move") as tell:
             ready = [
@@ -187,10 +191,12 @@ def _simulate_motions(tour: _Tour, pictures: bool) -> Sequence[Path]:
                 write(simulation.model, folder / f"{simulation.model.name}.osim")
                 tell(motion.describe(trajectory), folder)
             result.append(trajectory)
+    # The first motion is the one that PyBullet can compute, without muscles.
     _compare_engines(tour, result[0])
     human, states, said = _simulate_walking(tour)
     if not pictures:
         return []
+    # Drawing imports large packages, which a tour without pictures does not need.
     from osimlite.mechanics.multibody import build_mechanism
     from osimlite.view import Shown, Story, plot_simulation
 
@@ -208,6 +214,7 @@ def _simulate_motions(tour: _Tour, pictures: bool) -> Sequence[Path]:
             *((motion.title, f"{motion.model}.html") for motion in MOTIONS),
             (human_title, human_page),
         ]
+        # `Simulation` keeps the model of its trajectories.
         for motion, trajectory in zip(MOTIONS, result, strict=True):
             assert trajectory.model is not None
             shown = Shown.of(trajectory.model, trajectory.mechanism, motion=trajectory)
@@ -290,6 +297,7 @@ def _simulate_walking(tour: _Tour) -> tuple[Scenario, Path, str]:
         table = walked.states
         write_sto(file, "states", table.times, table.columns, table.rows)
         speed, steps = walked.report["speed"][0], int(walked.report["steps"][0])
+        # The second half of the walk is steady; the first steps start from a guess.
         peak = float(walked.loads.rows[len(table.times) // 2 :].max())
         mass, t = scenario.get_walkers(1).mass, walked.times[0]
         said = (
@@ -319,6 +327,8 @@ def _describe_walk(motion: Trajectory) -> str:
     steps = [
         event["time_s"] for event in events if event["event"] == "begin" and event["time_s"] > 0.0
     ]
+    # Distance and duration are taken between the first and the last touch-down, so that the start
+    # does not count.
     way = np.interp(steps, motion.times, motion.values[:, motion.coordinates.index("Pelvis_tx")])
     return (
         "The same walker, but for the moment of inertia of its shanks (0.0921 instead of 1 kg·m²) and its feet, 7.4 cm "
@@ -331,6 +341,7 @@ def _describe_jump(motion: Trajectory) -> str:
     import numpy as np
 
     heights = [motion.mechanism.center_of_mass(q)[1] for q in motion.values]
+    # The time at which the mass centre is highest separates take-off and landing.
     middle = motion.times[int(np.argmax(heights))]
     events = motion.summary["contact_events"]
     off = max(
@@ -346,6 +357,7 @@ def _describe_jump(motion: Trajectory) -> str:
         for label, column in motion.forces.items()
         if ".foot_" in label and label.endswith(".force.Y")
     ]
+    # The mass is in kg, so the quotient is in body weights.
     push, mass = np.sum(pushes, axis=0)[motion.times < off].max(), motion.mechanism.total_mass
     return (
         f"A human of {mass:.0f} kg jumps by 16 muscles, whose excitations a search found: the feet push with "
@@ -384,6 +396,7 @@ MOTIONS = (
 
 def _has_display() -> bool:
     """Return whether a browser can open a window here; text browsers in the terminal do not count."""
+    # Output in a pipe or a log belongs to a program, which has no use for a window.
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
         return False
     return sys.platform != "linux" or any(map(os.environ.get, ("DISPLAY", "WAYLAND_DISPLAY")))
@@ -401,6 +414,7 @@ def compute_distance_to_opensim(trajectory: Trajectory) -> float:
         files("osimlite.models").joinpath("dynamic_walker_opensim.csv").read_text(encoding="utf-8")
     )
     largest = 0.0
+    # Times are rounded, since both motions have them as sums of steps.
     times = [round(float(t), 6) for t in trajectory.times]
     for row in csv.DictReader(text.splitlines()):
         index = times.index(round(float(row["time"]), 6))

@@ -125,6 +125,7 @@ def doctor(
 
     Example: osimlite doctor gait2392.osim
     """
+    # rich is imported where a table is printed: it takes longer than most commands.
     from rich.text import Text
 
     from osimlite import __version__
@@ -140,10 +141,12 @@ def doctor(
 
     wanted = list_requirements()
     uses = list_purposes(wanted)
+    # A package may be in several extras, and is imported once.
     every = {name for names in wanted.values() for name in names}
     result = {}
     with (
         progress_bar("loading each package", len(every)) as progress,
+        # Threads suffice, since each waits for a process; importing is bound by the disk.
         ThreadPoolExecutor(2 * count_cores()) as pool,
     ):
         # Each package is imported in a process of its own, several at a time.
@@ -181,6 +184,7 @@ def list_requirements() -> dict[str, list[str]]:
     """
     wanted: dict[str, list[str]] = {extra: [] for extra in EXTRAS}
     for line in metadata.requires("osimlite") or []:
+        # A requirement begins with the name; version, extras and marker follow.
         name = re.split(r"[\s\[<>=!~;(]", line, maxsplit=1)[0]
         extra = re.search(r"extra\s*==\s*['\"]([^'\"]+)['\"]", line)
         group = extra[1] if extra else ""
@@ -200,6 +204,7 @@ def list_purposes(wanted: dict[str, list[str]]) -> dict[str, list[str]]:
     """
     result: dict[str, list[str]] = {extra: [] for extra in wanted}
     for use, packages in NEEDS.items():
+        # The first extra in the order of the table is the smallest one.
         extra = next((extra for extra, names in wanted.items() if {*packages} <= {*names}), None)
         if extra is not None:
             result[extra].append(use)
@@ -213,6 +218,7 @@ def find_extra(module: str | None, use: str = "") -> str | None:
         module: name of the missing module.
         use: use in `NEEDS`; the extra then has all packages of it.
     """
+    # The names of modules that differ from those of their packages.
     name = {"PIL": "pillow", "yaml": "pyyaml"}.get(module or "", module)
     if name in NEEDS.get(use, ()):
         return next(
@@ -233,6 +239,7 @@ def examine_package(name: str) -> Package:
         version = metadata.version(name)
     except metadata.PackageNotFoundError:
         return Package(name, "", "")
+    # The search path is a part of the key, so that a change of it is seen.
     modules = _list_modules(tuple(sys.path)).get(name.lower(), [])
     # The module with the package's name is the main one of several. A few packages have none: pillow
     # provides PIL, pyyaml provides yaml.
@@ -263,6 +270,7 @@ def examine_package(name: str) -> Package:
 def _list_modules(path: tuple[str, ...]) -> dict[str, list[str]]:
     """Return the importable modules of each package, by the package's name in lower case."""
     result: dict[str, list[str]] = {}
+    # Sorted, so that the first module does not depend on the file system.
     for module, owners in sorted(metadata.packages_distributions().items()):
         for owner in owners:
             result.setdefault(owner.lower(), []).append(module)

@@ -108,6 +108,7 @@ def find_gait(
             stage=stage,
         )
     _describe_result(gait).show()
+    # Scripts test the exit code: 0 means a stable walk to the end without scuffs.
     if not (gait.walk.walks and not gait.walk.scuffs and gait.found.cycle.largest < 1.0):
         raise SystemExit(1)
 

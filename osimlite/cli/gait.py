@@ -104,8 +104,10 @@ def gait(
     )
     from osimlite.studies.gait.stepmap import refuse_constraints
 
+    # A missing package is reported before the walk, which may take minutes.
     if basin and pictures and output:
         require("matplotlib", extra="plot", purpose="a picture of a basin")
+    # The numbers are checked before the simulation, and names of variables after the model is read.
     _check_numbers(to, accuracy, reach, perturb or (), seed)
     model, folder = options.read_source(source, parameter)
     with ExitStack() as work:
@@ -118,10 +120,12 @@ def gait(
             options.parse_quantities(start, simulation.mechanism, "--set"),
             options.parse_quantities(start_speed, simulation.mechanism, "--set-speed"),
         )
+        # Batches are methods of the compiled engine only, which the type of `engine` does not say.
         engine: Any = simulation.engine
         # Check the names of the variables before the walk, not after it.
         find_basin_offsets(engine, basin_x, basin_y)
         result, step_map = simulate_walk(engine, state, foot, to, settle, accuracy)
+        # Forces that were left out change the gait, so the report names them.
         result.skipped = simulation.forces.skipped
         cycle = result.cycle
         if step_map is not None and cycle is not None:
@@ -146,6 +150,7 @@ def gait(
                     )
         files = _write(where, result, pictures) if where else []
     _describe_cycle(result, files).show()
+    # Scripts test the exit code for a cycle.
     if cycle is None:
         raise SystemExit(1)
 
@@ -169,6 +174,7 @@ def _check_numbers(
         *(("--perturb", part) for part in perturb),
     ]
     for option, number in numbers:
+        # `not 0 < number < inf` also refuses NaN.
         if not 0.0 < number < inf:
             raise SettingError(f"{option} must be a positive number, not {number:g}")
     if seed < 0:
@@ -252,6 +258,7 @@ def simulate_walk(
     try:
         step_map = StepMap(engine, state, footing=footing, accuracy=accuracy)
         result.cycle = find_cycle(step_map, warm_up_steps=settle)
+    # A walker that falls has no cycle: that is a result, not an error.
     except OsimliteError as error:
         result.why_not = error.message
     return result, step_map
@@ -287,6 +294,8 @@ def _describe_cycle(result: GaitReport, files: Sequence[Path]) -> FactTable:
             )
         stable = "stable" if cycle.largest < 1.0 else "not stable"
         facts.add("stability", f"{stable}: largest multiplier {cycle.largest:.4g}")
+        # Large eigenvalues decide about stability; of high-dimensional models only the first six
+        # are shown.
         sizes = ", ".join(f"{size:.3g}" for size in abs(cycle.multipliers[:6]))
         facts.add("multipliers", f"{sizes} ...; {cycle.neutral} neutral directions left out")
         facts.add(
@@ -324,6 +333,7 @@ def _write(folder: Path, result: GaitReport, pictures: bool) -> list[Path]:
         (folder / name).unlink(missing_ok=True)
     if basin is not None:
         rows = [f"{basin.x.label},{basin.y.label},steps"]
+        # `tolist` gives Python's floats, whose repr has the digits that read back equal.
         for y, line in zip(basin.y.values.tolist(), basin.steps.tolist(), strict=True):
             rows += [
                 f"{x!r},{y!r},{count}"
@@ -368,6 +378,7 @@ def _make_json(result: GaitReport) -> dict[str, Any]:
             "step_length_m": cycle.length,
             "period_s": cycle.period,
             "speed_m_per_s": cycle.speed,
+            # JSON has no complex numbers.
             "multipliers": [[value.real, value.imag] for value in cycle.multipliers.tolist()],
             "neutral_directions": cycle.neutral,
             "residual": cycle.residual,

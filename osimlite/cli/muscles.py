@@ -83,6 +83,7 @@ def muscles(
     from osimlite.mechanics.multibody import build_mechanism
     from osimlite.simulation.muscle_curves import muscle_curves
 
+    # All options are checked before the model is read, which may take seconds.
     if output is not None and output.suffix not in (".csv", ".parquet"):
         raise SettingError(f"-o must name a .csv or .parquet file, not '{output.name}'")
     if output is not None:
@@ -95,6 +96,7 @@ def muscles(
     model = read(file)
     mechanism = build_mechanism(model)
     values = _sample_coordinates(
+        # Two coordinates make a grid, whose size is the square of the number of values.
         mechanism, coordinate or (), points or (15 if len(coordinate or ()) > 1 else 50)
     )
     result: dict[str, MuscleCurves] = {}
@@ -109,6 +111,7 @@ def muscles(
                 folder=path.parent,
                 progress=advance,
             )
+        # Muscles that do not move with the coordinates would fill the table with constants.
         result[str(path)] = curves if muscle else curves.select_muscles(curves.crossing)
     first, *others = result.values()
     if not first.muscles:
@@ -117,6 +120,7 @@ def muscles(
             + (f" that moves with {join_words(list(values))}" if values else "s")
         )
     if others:
+        # Only muscles of both models can be compared.
         first, second = _select_common_muscles(first, others[0])
         result = dict(zip(result, (first, second), strict=True))
     _print_ranges(list(result.values()), file, compare)
@@ -127,6 +131,7 @@ def muscles(
         from osimlite.view.muscle_plots import plot_muscles
         from osimlite.view.table_plots import ColumnNames
 
+        # Pictures go beside the table, if there is one.
         folder = output.parent / output.stem if output is not None else Path(f"{file.stem}-muscles")
         with progress_bar("drawing", None):
             regions = ColumnNames.of_model(model, mechanism).regions
@@ -188,6 +193,7 @@ def _select_common_muscles(
     from osimlite.cli._console import say
     from osimlite.errors import ModelError
 
+    # Models may keep their muscles in different sets, so names are compared, not paths.
     names = [[path.rpartition("/")[2] for path in curves.muscles] for curves in (first, second)]
     both = [name for name in names[0] if name in names[1]]
     alone = [name for name in dict.fromkeys(names[0] + names[1]) if name not in both]
@@ -197,6 +203,7 @@ def _select_common_muscles(
         say(f"in one model only: {join_words(alone)}")
     one, other = (
         curves.select_muscles([own.index(name) for name in both])
+        # Both selections have the order of the first model.
         for curves, own in zip((first, second), names, strict=True)
     )
     return one, other
@@ -211,6 +218,7 @@ def _print_ranges(curves: Sequence[MuscleCurves], file: Path, compare: Path | No
 
     first, *others = curves
     arms = {f"moment_arm_{name}": f"arm {name} (mm)" for name in first.coordinates}
+    # The length belongs to one coordinate; over two, arms say more.
     lengths = {"length": "length (mm)"} if len(arms) < 2 else {}
     shown = {
         **lengths,
@@ -232,6 +240,7 @@ def _print_ranges(curves: Sequence[MuscleCurves], file: Path, compare: Path | No
         )
         low, high = first.get_bounds(name)
         if others:
+            # `fmax` ignores NaN, where a muscle has no equilibrium.
             low = high = np.fmax.reduce(np.abs(others[0].columns[name] - first.columns[name]))
         columns.append(
             [
@@ -242,6 +251,7 @@ def _print_ranges(curves: Sequence[MuscleCurves], file: Path, compare: Path | No
     for row in zip(*columns, strict=True):
         add_row(table, *row)
     create_console().print(table)
+    # NaN marks poses without an equilibrium.
     unsettled = sum(bool(np.isnan(rows.columns["tendon_force"]).any()) for rows in curves)
     if unsettled:
         say("'-' and gaps in the table: the muscle has no equilibrium there")
@@ -257,6 +267,7 @@ def _write_curves(result: Mapping[str, MuscleCurves], output: Path) -> None:
 
     columns: dict[str, list[Any]] = {}
     for file, curves in result.items():
+        # Models are written below each other, told apart by the first column.
         rows, numbers = curves.table
         for name, column in {
             "model": np.full(len(rows["muscle"]), file),

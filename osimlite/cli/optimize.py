@@ -175,6 +175,7 @@ def _describe_optimum(objective: str, found: Optimum) -> FactTable:
         BEST_FILE,
         HISTORY_FILE,
         SUMMARY_FILE,
+        # Only searches for parameters of a controller write this file.
         *([PAR_FILE] if found.model.with_name(PAR_FILE).exists() else []),
     )
     facts.add("files", ", ".join(str(found.model.with_name(name)) for name in names))

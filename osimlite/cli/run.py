@@ -119,6 +119,7 @@ def run(
     require_plots(plot=plot)
     files = find_setups(setups)
     for option in (["--report"] if report is not None else []) + (["--plot"] if plot else []):
+        # Pictures and reports need the outcomes in this process, which workers do not send back.
         if resume or cluster or workers not in (None, 1):
             raise SettingError(
                 f"{option} runs setups one after the other; leave out --workers, --cluster and --resume"
@@ -126,10 +127,12 @@ def run(
         workers = 1
     if report is not None:
         expect_folder_of(report)
+        # The report must not replace a file that it describes.
         if any(find_inputs([report], setup) for setup in files):
             raise SettingError(
                 f"--report would replace '{report}', which the results come from; give it another name"
             )
+    # One setup is shown in full; several get a row each.
     if len(files) == 1 and not as_json and not (resume or cluster):
         outcome = _run_alone(
             files[0],
@@ -147,7 +150,9 @@ def run(
         raise SettingError(
             "--refine takes one study; leave out the others, --json, --resume and --cluster"
         )
+    # Outcomes hold all tables: they are kept only if something is drawn from them.
     kept: dict[str | Path, Outcome] | None = {} if report is not None or plot else None
+    # Starting processes for few setups takes longer than running them.
     count = 1 if workers is None and cluster is None and len(files) < WORTH_SHARING else workers
     with progress_bar("running", len(files)) as progress:
         trials = run_many(
@@ -189,6 +194,7 @@ def run(
 def _list_exit_codes(trials: list[RunRecord]) -> list[int]:
     from osimlite.tools.many import DONE, NO
 
+    # Exit code 2: the setup could not be run; 1: it ran, and its tool reported a failure.
     return [{DONE: 0, NO: 1}.get(trial.status, 2) for trial in trials]
 
 
@@ -219,6 +225,7 @@ def _run_alone(
             write_outside=write_outside,
         )
     except FaultySetup as fault:
+        # Only the errors: the warnings do not stop the setup.
         _show_findings(Report(fault.report.errors, fault.report.texts))
         raise
     _print_outcome(setup, outcome)
@@ -255,6 +262,7 @@ def _draw_outcome(
     if not outcome.tables:
         return
     folder = parent / f"{setup.stem}-plots"
+    # Pictures into a folder that the user did not name must stay inside the current one.
     if output is None:
         expect_folder_inside(folder)
     evidence = outcome.evidence
@@ -276,6 +284,7 @@ def _print_outcome(setup: Path, outcome: Outcome) -> None:
     from osimlite.cli._console import FactTable
 
     facts = FactTable(str(setup), outcome.told)
+    # Findings with a suggestion were shown before the run.
     unsaid = [finding for finding in outcome.warnings if finding.suggestion is None]
     for finding in unsaid[:MOST_WARNINGS]:
         facts.add("check", str(finding))
@@ -305,6 +314,7 @@ def _show_trials(trials: list[RunRecord]) -> None:
                 trial.summary.get("rms_marker_error", 0.0),
             ),
         )
+        # The worst come first in the table.
         shown = worst[-MOST_ROWS:][::-1]
     rows = []
     for trial in shown:
@@ -316,6 +326,7 @@ def _show_trials(trials: list[RunRecord]) -> None:
                 else ""
             )
             words = f"{words}; {trial.warnings[0]}{more}"
+        # A setup that a former run did has no time of this run.
         seconds = "" if trial.was_done else f"{trial.seconds:.2f}"
         status = trial.status + (", before" if trial.was_done else "")
         rows.append((trial.setup, status, seconds, words))

@@ -64,11 +64,13 @@ def simulate(
     from osimlite.errors import SettingError, SimulationError
     from osimlite.io.document.reader import read
 
+    # Missing packages are reported before the simulation.
     if plot:
         require("matplotlib", extra="plot", purpose="drawing")
     if animate:
         require("PIL", extra="view", purpose="an animation")
     results, before = options.choose_output_folder(file, output), chosen["resume"]
+    # The earlier simulation is read at the start and would be replaced at the end.
     if before is not None and results.resolve() == Path(before).resolve():
         raise SettingError(f"'{results}' has the earlier simulation; name another folder with -o")
     model, feedback = read(file), options.read_feedback(controller, par)
@@ -91,6 +93,7 @@ def simulate(
         speeds = options.parse_quantities(start_speed, simulation.mechanism, "--set-speed")
         try:
             with motion_bar("simulating", to) as progress:
+                # PyBullet's window shows motion in real time, for which steps must be equal.
                 trajectory = simulation.run(
                     to,
                     fixed_step=LIVE_STEP_S
@@ -102,6 +105,7 @@ def simulate(
                     controller=feedback,
                     progress=progress,
                 )
+        # Both exceptions carry the motion up to where it stopped.
         except (Interrupted, SimulationError) as stopped:
             trajectory = stopped.trajectory
             if trajectory is None:
@@ -115,6 +119,7 @@ def simulate(
             _describe_run(trajectory, write_results(trajectory, results)).show()
             if is_failure:
                 raise
+            # 128 + SIGINT, as shells report an interruption.
             raise SystemExit(130) from None
 
         def film(path: Path) -> Path:
@@ -135,6 +140,7 @@ def simulate(
 
         files = write_results(trajectory, results, plot=plot, film=film if animate else None)
         _describe_run(trajectory, files).show()
+        # The window stays open until the user closes it.
         simulation.hold()
 
 
@@ -172,6 +178,7 @@ def _list_earlier(folder: Path) -> set[str]:
         for page in range(2, MAX_PAGES):
             name = f"{picture.stem}-{page}.png"
             if not (folder / name).is_file():
+                # Pages are numbered without gaps.
                 break
             names.add(name)
     return names
@@ -209,6 +216,7 @@ def write_results(
     is_new = not folder.exists()
     make_folder(folder)
     try:
+        # In the output folder, so that moving the files is a rename within one file system.
         temporary = Path(tempfile.mkdtemp(prefix=".osimlite-", dir=folder))
     except OSError as error:
         raise OsimliteError(f"cannot write here: {error.strerror}", file=str(folder)) from None
@@ -226,6 +234,7 @@ def write_results(
         # Files of an earlier simulation would be mistaken for results of this one.
         for name in _list_earlier(folder) - {path.name for path in written}:
             (folder / name).unlink(missing_ok=True)
+    # `BaseException` includes Ctrl-C, after which no temporary folder may stay.
     except BaseException as error:
         shutil.rmtree(folder if is_new else temporary, ignore_errors=True)
         if isinstance(error, OSError):
@@ -249,6 +258,7 @@ def _describe_run(trajectory: Trajectory, files: Sequence[Path]) -> FactTable:
     )
     facts.add("time taken", f"{summary['wall_time_s']:.3g} s")
     lengths = {path for path in trajectory.auxiliary if path.endswith("/fiber_length")}
+    # Fiber lengths that were neither given nor equilibrated make forces jump at the start.
     if lengths - set(summary["settings"]["initial"]) and "equilibrate" not in summary["settings"]:
         facts.add(
             "warning",

@@ -107,6 +107,7 @@ def sweep(
         controller=options.read_feedback(controller, par),
         **chosen,
     )
+    # Samples are drawn before the runs, so that a resumed sweep has the same.
     points = choose(plan.variables, sampler, samples, seed)
     with progress_bar("sweeping", points.count) as progress:
         outcome = run(
@@ -131,6 +132,7 @@ def sweep(
                 outcome.to_arrow().to_pydict(), variables, names, output.parent, output.stem
             )
         say(describe_pictures(written))
+    # Some failures are expected in a sweep; if all runs fail, the setting is wrong.
     if outcome.status["failed"] == outcome.count:
         complain("every run failed")
         raise SystemExit(1)
@@ -152,6 +154,7 @@ def _describe_sweep(plan: Plan, outcome: Outcome) -> FactTable:
         facts.add(
             "ended", ", ".join(f"{count} {word}" for word, count in outcome.status.most_common())
         )
+    # The usual reasons; the table has a column with all of them.
     reasons = outcome.reasons.most_common(3)
     for reason, count in reasons:
         facts.add("failed", f"{format_count(count, 'run')}: {reason}")

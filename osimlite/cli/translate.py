@@ -72,6 +72,7 @@ def translate(
     from osimlite.errors import OsimliteError, SettingError
     from osimlite.io.document.reader import read
 
+    # With a file, `--check` compares and translates nothing.
     if check is not None and str(check) != WRITTEN:
         from osimlite.cli._checking_mjcf import print_mjcf_check as check_mjcf
 
@@ -81,6 +82,7 @@ def translate(
         from osimlite.base.require import require
 
         require("mujoco", extra="mujoco", purpose="--check")
+        # A check needs a translation to MJCF, whatever `--to` says.
         to = "mjcf"
     formats = list_exporters("translate")
     if to not in (*formats, OSIM):
@@ -93,6 +95,7 @@ def translate(
         (each, f"--to {OSIM} from {each.title}", each is importer)
         for each in _list_model_importers()
     ]
+    # An option of another format would be ignored without a message.
     for each, words, is_used in owners:
         strange = [
             option.name
@@ -101,6 +104,7 @@ def translate(
         ]
         if strange:
             raise SettingError(f"--{strange[0].replace('_', '-')} is an option of {words}")
+    # Formats have defaults of their own, which None must not replace.
     given = {name: value for name, value in chosen.items() if value is not None}
     made: Any
     if importer is not None:
@@ -119,6 +123,7 @@ def translate(
         create_console().print(tabulate(made.fidelity, to.upper()))
     same, otherwise, lost = made.fidelity.counts()
     say(f"components: {same} exact, {otherwise} approximated or converted, {lost} left out")
+    # URDF has a robot, whose links and joints are the summary.
     robot = getattr(made, "robot", None)
     summary = (
         ", ".join(f"{count} {what}" for what, count in made.summary.items())
@@ -126,6 +131,7 @@ def translate(
         else f"{len(robot.links)} links, {len(robot.joints)} joints of which {len(robot.moving)} move"
     )
     say(f"{summary}; wrote " + join_words([str(path) for path in written], most=4))
+    # Some formats cannot express the initial state, and say so.
     if getattr(made, "start_note", ""):
         say(made.start_note)
     if check is not None:

@@ -85,14 +85,18 @@ class BvhMotion:
         rotations = np.empty((count, len(self.joints), 3, 3))
         positions = np.empty((count, len(self.joints), 3))
         column = 0
+        # Joints come depth-first, so that a parent is computed before its children.
         for index, joint in enumerate(self.joints):
             turn = np.broadcast_to(np.eye(3), (count, 3, 3))
             place = np.tile(joint.offset, (count, 1))
             for channel in joint.channels:
                 axis = "XYZ".index(channel[0])
                 if channel.endswith("position"):
+                    # A position replaces the offset, as in Blender.
                     place[:, axis] = self.values[:, column]
                 else:
+                    # Channels are applied from left to right, each in the axes that the previous
+                    # ones have turned.
                     turn = turn @ _rotate(axis, np.radians(self.values[:, column]))
                 column += 1
             if joint.parent >= 0:
@@ -105,6 +109,7 @@ class BvhMotion:
 
 def _rotate(axis: int, angles: Array) -> Array:
     """Return rotations (n, 3, 3) about a coordinate axis by angles (n,), rad."""
+    # The two other axes in cyclic order make a right-handed rotation.
     i, j = ((1, 2), (2, 0), (0, 1))[axis]
     result = np.zeros((len(angles), 3, 3))
     result[:, axis, axis] = 1.0
@@ -120,14 +125,17 @@ def find_angles(rotations: Array) -> Array:
     The angles are those of Rz(a) Rx(b) Ry(c). They continue from frame to frame without jumps by
     360 degrees. Where b is a right angle, c is 0.
     """
+    # Element (2, 1) of Rz Rx Ry is sin(b); rounding may exceed 1.
     b = np.arcsin(np.clip(rotations[:, 2, 1], -1.0, 1.0))
     is_locked = np.hypot(rotations[:, 2, 0], rotations[:, 2, 2]) < 1e-9
     a = np.where(
+        # cos(b) is the length of the row without it: at 0 only a + c is determined.
         is_locked,
         np.arctan2(rotations[:, 1, 0], rotations[:, 0, 0]),
         np.arctan2(-rotations[:, 0, 1], rotations[:, 1, 1]),
     )
     c = np.where(is_locked, 0.0, np.arctan2(-rotations[:, 2, 0], rotations[:, 2, 2]))
+    # `unwrap` removes jumps by full turns.
     angles = np.unwrap(np.stack([a, b, c], axis=1), axis=0)
     return np.asarray(np.degrees(angles), dtype=float)
 
@@ -151,6 +159,7 @@ def format_bvh(motion: BvhMotion) -> Iterator[str]:
         yield f"{indent}\tOFFSET {_format_numbers(joint.offset)}\n"
         yield f"{indent}\tCHANNELS {len(joint.channels)} {' '.join(joint.channels)}\n"
         if joint.end is not None:
+            # "End Site" gives the length of the last bone.
             yield f"{indent}\tEnd Site\n{indent}\t{{\n{indent}\t\tOFFSET {_format_numbers(joint.end)}\n{indent}\t}}\n"
         waiting.append((index, True, depth))
         waiting += [(child, False, depth + 1) for child in reversed(children.get(index, []))]
@@ -169,9 +178,11 @@ class _BvhReader:
 
     def __init__(self, path: str | Path) -> None:
         self.file = str(path)
+        # Some editors write a byte-order mark.
         text = read_file(path).decode("utf-8", "replace").lstrip("\ufeff")
         self.lines = text.splitlines()
         self.words = [
+            # Line breaks have no meaning in the format, so words are read.
             (word, number) for number, line in enumerate(self.lines, 1) for word in line.split()
         ]
         self.position = 0
@@ -203,6 +214,7 @@ class _BvhReader:
             number = float(word)
         except ValueError:
             number = math.nan
+        # NaN and infinity are words that float() accepts.
         if not math.isfinite(number):
             raise self.fail(f"expected a number, found '{word}'")
         self.position += 1
@@ -245,6 +257,7 @@ def read_bvh(path: str | Path) -> BvhMotion:
         reader.take()
         _read_joints(reader, joints)
     if not joints:
+        # Some files have several roots.
         raise reader.fail("the file has no ROOT joint")
     reader.take("MOTION")
     reader.take("Frames:")
@@ -258,6 +271,7 @@ def read_bvh(path: str | Path) -> BvhMotion:
         raise reader.fail(f"the frame time is {frame_time:g} s; it must be positive")
     width = sum(len(joint.channels) for joint in joints)
     rest = len(reader.words) - reader.position
+    # Compared before the numbers are read, so that a wrong count does not fill the memory.
     if rest != count * width:
         raise reader.fail(
             f"{count} frames of {width} channels are {count * width} numbers, but {rest} words follow"
@@ -290,6 +304,7 @@ def _read_joints(reader: _BvhReader, joints: list[BvhJoint]) -> None:
                 last.name, last.parent, last.offset, last.channels, reader.take_vector()
             )
             reader.take("}")
+        # Closing braces end joints; the next JOINT hangs on what is still open.
         while parents and reader.peek() == "}":
             reader.take()
             parents.pop()
@@ -314,6 +329,7 @@ def _take_channel(reader: _BvhReader) -> str:
     word = reader.peek()
     known = {name.lower(): name for name in (*POSITIONS, *ROTATIONS)}
     if word.lower() not in known:
+        # Channel names are in any letter case.
         raise reader.fail(f"unknown channel '{word}'; channels are {', '.join(known.values())}")
     reader.take()
     return known[word.lower()]

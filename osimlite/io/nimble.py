@@ -103,18 +103,22 @@ def classify_custom_joint(joint: CustomJoint) -> NimbleJoint:
             constants.append(float(function.value) * scale)
         else:
             kinds.append("linear" if isinstance(function, LinearFunction) else "curve")
+    # The decisions follow the order of the tests in Nimble's parser.
     linear = [index for index, kind in enumerate(kinds) if kind == "linear"]
     count = len(joint.coordinates)
+    # All functions are zero.
     if len(constants) == 6 and not any(constants):
         return NimbleJoint.WELD
     if "curve" in kinds:
         return NimbleJoint.CUSTOM
     if len(linear) == 6 and count == 6:
         return NimbleJoint.EULER_FREE
+    # Nimble reads the first three axes only, if they rotate.
     if linear[:3] == [0, 1, 2] and count in (3, 6):
         return NimbleJoint.EULER
     if len(linear) == 1:
         return NimbleJoint.REVOLUTE if linear[0] < 3 else NimbleJoint.PRISMATIC
+    # Two rotations; a rotation with a translation is CUSTOM.
     if len(linear) == 2 and linear[1] < 3:
         return NimbleJoint.UNIVERSAL
     return NimbleJoint.CUSTOM
@@ -133,6 +137,7 @@ def is_nimble_ellipsoid(joint: EllipsoidJoint, model_name: str) -> bool:
         joint: the joint.
         model_name: name of the model.
     """
+    # A file that was rewritten must not be rewritten again.
     if is_turned(joint):
         return False
     names = [coordinate.name.lower() for coordinate in joint.coordinates]
@@ -173,6 +178,7 @@ def list_coordinates(model: Model) -> list[Coordinate]:
         parent = _find_body(tree, joint, "socket_parent_frame")
         edges = children.setdefault(parent, []) if parent in bodies and parent else roots
         edges.append((joint, child))
+    # Nimble keeps the largest tree.
     joints = max((_walk(children, root) for root in roots), key=len, default=[])
     if model.document_version < JOINT_SET_VERSION:
         selected = {id(joint) for joint in joints}
@@ -207,6 +213,7 @@ def _find_body(tree: Tree, owner: Component, socket: str) -> str | None:
             target = tree.target(owner, socket, getattr(owner, socket))
         except ModelError:
             return None
+        # Offset frames lead to the body or ground, unless they form a circle.
         if not isinstance(target, PhysicalOffsetFrame):
             return tree.path_of(target)
         if id(target) in visited:

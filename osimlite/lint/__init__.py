@@ -67,6 +67,7 @@ def validate(
         named = [classes] if isinstance(classes, str | os.PathLike) else classes
         files = tuple(map(os.path.abspath, named))
         config = Config(parse_codes(select), parse_codes(ignore), mesh_paths=meshes, classes=files)
+    # Plug-in classes are registered for this check only.
     with classes_in_use(config.classes):
         if isinstance(model, Model):
             return run_rules(Subject(model, config))

@@ -37,6 +37,7 @@ class Cache:
     """Folder with a file for each entry; any error means that the entry is missing."""
 
     def __init__(self, folder: Path) -> None:
+        # A new version has other rules, so it starts with an empty folder.
         self.folder = folder / __version__
         self._stamps: dict[str, Stamp] = {}
 
@@ -48,6 +49,8 @@ class Cache:
             key: key of the entry, from `make_key`.
         """
         try:
+            # Entries may be damaged or made by someone else, hence each value is checked before it
+            # is used.
             match json.loads(read_file(self._entry(file))):
                 case {
                     "key": str(kept),
@@ -67,12 +70,15 @@ class Cache:
                         [_parse_finding(file, values) for values in findings], unmeasured=why_not
                     )
                     now = time_ns()
+                    # The stamp differs after a checkout or a copy, though the text may be the same.
                     if rest.get("file") != _stamp_file(file):
                         if text != fingerprint_text(read_file(file)):
                             return None
+                        # With a new stamp, the next check need not read the text.
                         self.store(file, key, text, known, stamps, now)
                     mark_used(self._entry(file))
                     return known
+        # A damaged entry is no reason to fail: the file is checked again.
         except (OsimliteError, OSError, ValueError, TypeError, RecursionError):
             pass
         return None
@@ -133,6 +139,7 @@ def make_key(file: str, config: Config) -> str:
         file: path of the file.
         config: configuration of its check.
     """
+    # Sorted, since the order of keys in a configuration does not change the report.
     severity = sorted((word, str(level)) for word, level in config.severity.items())
     thresholds = sorted((name, float(number)) for name, number in config.thresholds.items())
     setting = (
@@ -146,6 +153,7 @@ def make_key(file: str, config: Config) -> str:
         thresholds,
         [(path, get_file_stamp(path)) for path in config.classes],
         config.target_version,
+        # Rules that measure are skipped without numpy; installing it changes the report.
         find_missing_packages("numpy"),
     )
     return ascii(setting)
@@ -168,8 +176,11 @@ def _stamp_file(file: str) -> list[int]:
 
 def _stamp_if_settled(file: str, moment: int) -> list[int] | None:
     """Return the stamp of a file; None if it may have changed after a moment (ns), since file clocks tick slowly."""
+    # A change within the tick of the file system's clock would leave the time of modification as it
+    # was.
     stamp = _stamp_file(file)
     changed = max(stamp[:2])
+    # Whole seconds point to a file system such as FAT, which records them in steps of two seconds.
     tick = 100_000_000 if changed % 1_000_000_000 else 2_000_000_000
     return stamp if changed + tick < moment else None
 
@@ -180,6 +191,7 @@ def describe_code_version() -> str:
 
     What is installed changes as a whole.
     """
+    # Only a working copy has pyproject.toml beside the package.
     package = Path(__file__).parents[1]
     if not (package.parent / "pyproject.toml").exists():
         return f"{__version__} {os.stat(__file__).st_mtime_ns}"
@@ -236,6 +248,8 @@ def _parse_finding(file: str, values: Any) -> Finding:
         values, *_FINDING
     )
     place = [number for number in (line, column) if number is not None]
+    # A line without a column, or the other way round, cannot come from a finding; numbers count
+    # from 1.
     if len(place) == 1 or min(*place, length, length) < 1:
         raise TypeError
     level = Severity(severity)

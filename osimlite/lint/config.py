@@ -45,6 +45,7 @@ class Config:
 
     def includes(self, rule: Rule) -> bool:
         """Return whether a rule runs."""
+        # The usual case, for each of several hundred rules.
         if not self.select and not self.ignore:
             return True
         selected = not self.select or any(rule.matches(word) for word in self.select)
@@ -57,6 +58,7 @@ class Config:
             rule: the rule.
             own: severity that the finding has without settings.
         """
+        # The first setting that matches decides, in the order of the configuration file.
         for word, severity in self.severity.items():
             if rule.matches(word):
                 return severity
@@ -83,6 +85,7 @@ def _check_thresholds(given: Mapping[str, float]) -> None:
                 "shows the thresholds of a rule"
             )
         if (
+            # `bool` is a subclass of `int` in Python.
             isinstance(number, bool)
             or not isinstance(number, int | float)
             or not 0 <= number < math.inf
@@ -106,6 +109,7 @@ def parse_codes(words: tuple[str, ...] | list[str] | str | None) -> tuple[str, .
     cleaned = tuple(word.strip() for word in given if word.strip())
     if not cleaned:
         return ()
+    # Importing all rules takes a tenth of a second, which a check without options need not spend.
     from osimlite.lint.registry import all_rules, rule_groups
 
     for word in cleaned:

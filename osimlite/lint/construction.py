@@ -118,6 +118,7 @@ def may_fail(subject: Subject) -> bool:
     if any(item.prescribed for item in subject.find_by_class("Coordinate")):
         return True
     return any(
+        # `not >` includes NaN.
         not body.mass > 0.0 or not min(body.inertia[:3]) > 0.0
         for body in subject.find_by_class("Body")
     )
@@ -149,6 +150,7 @@ def find_obstacles(subject: Subject, *, anew: bool = True) -> str:
     subject.cache[CONSTRUCTION] = obstacles
     if key is not None:
         _memory[key] = obstacles
+        # The editor checks the same text many times; few models are open at once.
         _memory.move_to_end(key)
         while len(_memory) > REMEMBERED_MODELS:
             _memory.popitem(last=False)
@@ -172,6 +174,7 @@ def _try_construction(subject: Subject) -> list[Obstacle]:
 
     assert subject.model is not None
     try_construction = import_module("osimlite.lint.measuring.construction").try_construction
+    # The mechanism uses the component tree that the rules have made already.
     with lend_tree(subject.tree):
         try:
             result: list[Obstacle]

@@ -166,6 +166,7 @@ class Report:
         parts = ("error", self.errors), ("warning", self.warnings), ("remark", self.infos)
         counts = ", ".join(format_count(len(part), kind) for kind, part in parts)
         lines = [f"Report: {counts} in {format_count(self.checked, 'file')}"]
+        # The sort is stable: equal severities keep the order of the files.
         ranked = sorted(self.findings, key=lambda finding: finding.severity.rank)
         lines += [_shorten(str(finding)) for finding in ranked[:MAX_LISTED]]
         if (more := len(ranked) - MAX_LISTED) > 0:

@@ -63,6 +63,7 @@ def load_subject(file: str, config: Config | None = None) -> CheckTarget:
         config: configuration of the check.
     """
     try:
+        # Pipes and devices are not read: they may never end.
         return make_subject(Source.from_file(file), config)
     except SpecialFileError as fault:
         return _make_document_subject(Survey(Source(b"", file), None, [fault]), config)
@@ -123,6 +124,7 @@ def run_rules(subject: CheckTarget, *, measure: bool = True, recall: bool = Fals
             checks.setdefault(known.check, {})[known.name if known.group else ""] = known
     for check, told_apart in checks.items():
         check(subject, FindingCollector(told_apart, subject, findings))
+    # Text after a syntax error was guessed by the reader; findings there may be wrong.
     if subject.sure_until is not None:
         limit = subject.sure_until
         findings = [
@@ -131,6 +133,7 @@ def run_rules(subject: CheckTarget, *, measure: bool = True, recall: bool = Fals
     comments = subject.suppressions()
     if comments:
         findings = _apply_suppressions(subject, comments, findings, left_out)
+    # Rules may find the same fault on two ways, for example by a class and by its base.
     unique = list(dict.fromkeys(findings))
     unique.sort(key=lambda finding: (finding.line or 0, finding.column or 0, finding.code))
     why_not = why_not or unbuilt
@@ -149,6 +152,8 @@ def _make_ignore_test(comments: list[Suppression]) -> Callable[[Finding], bool]:
     """Return a test of whether a comment ignores a finding; it records which comments were used."""
     by_line: dict[int, list[Suppression]] = {}
     long: list[Suppression] = []
+    # Short comments are found by the line of a finding, so that thousands of findings and comments
+    # do not multiply.
     for comment in comments:
         if comment.last - comment.first < MAX_SHORT_LINES:
             for line in range(comment.first, comment.last + 1):
@@ -158,6 +163,7 @@ def _make_ignore_test(comments: list[Suppression]) -> Callable[[Finding], bool]:
 
     def is_ignored(finding: Finding) -> bool:
         near = by_line.get(finding.line or 0, [])
+        # A list, not a generator: every comment that covers the finding counts as used.
         return any(
             [comment.covers(finding, get_rule(finding.code).has_name) for comment in (*long, *near)]
         )

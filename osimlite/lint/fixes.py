@@ -25,6 +25,7 @@ def replace_text(
     """
     if source is None or place is None or text is None:
         return None
+    # Columns count from 1, offsets from 0.
     start = source.line_start(place.line) + place.column - 1
     return Fix((Edit(start, start + place.length, text),), safe)
 
@@ -41,11 +42,15 @@ def replace_name(
         text: new name.
         certain: whether the fix is safe also if more than the letter case differs.
     """
+    # A name with quotes could end the attribute that it is in.
     if source is None or not isinstance(named, str) or "'" in text or '"' in text:
         return None
     start = source.line_start(place.line) + place.column - 1
+    # The value may be an entity, or come from an included file, where this fix would damage the
+    # text.
     if source.text[start : start + place.length] != escape_text(named.strip()):
         return None
+    # OpenSim's names depend on the case; a different case is almost certainly a slip.
     return replace_text(
         source, place, escape_text(text), safe=certain or text.lower() == named.lower()
     )
@@ -65,6 +70,8 @@ def rename_tag(
     if source is None or tag is None:
         return None
     span = source.spans[number]
+    # The first edit is the start tag after "<", the second the end tag after "</"; an empty element
+    # has no end tag.
     edits = [Edit(span.start + 1, span.start + 1 + len(span.tag), tag)]
     if span.inner_end < span.end:
         edits.append(Edit(span.inner_end + 2, span.inner_end + 2 + len(span.tag), tag))
@@ -96,11 +103,13 @@ def comment_out(source: Source | None, number: int) -> Fix | None:
     if source is None:
         return None
     span = source.spans[number]
+    # Commenting out an element with children would also remove them.
     if source.children(number):
         return None
     text = source.text[span.tag_end : span.inner_end].strip() if span.inner_end < span.end else ""
     if not text:
         return remove_element(source, number)
+    # XML forbids two hyphens inside a comment, and a hyphen before its end.
     if "--" in text or text.endswith("-") or "<" in text:
         return None
     return Fix((Edit(span.start, span.end, f"<!-- {text} -->"),), True)
@@ -147,6 +156,7 @@ def select_edits(findings: Iterable[Finding], *, unsafe: bool = False) -> tuple[
         fix = finding.fix
         if fix is None or not (fix.safe or unsafe):
             continue
+        # Of overlapping fixes the first wins; a second run of the fixes applies the others.
         if any(_touches(edit, chosen) for edit in fix.edits):
             continue
         for edit in fix.edits:
@@ -161,6 +171,8 @@ def _get_start(edit: Edit) -> int:
 
 def _touches(edit: Edit, chosen: list[Edit]) -> bool:
     """Return whether an edit overlaps one of some sorted, disjoint edits."""
+    # The edits are disjoint and sorted, so only the last one that starts before this edit's end can
+    # overlap it.
     before = bisect_left(chosen, edit.end, key=_get_start)
     return before > 0 and chosen[before - 1].end > edit.start
 
@@ -198,12 +210,15 @@ def apply_fixes_in_pieces(
     """
     edits, count = select_edits(report.findings, unsafe=unsafe)
     ends = [0, *(edit.end for edit in edits)]
+    # Offsets of tables are bytes, which are copied without decoding.
     if not count or is_table(source.file):
         data = memoryview(source.data)
         pieces: list[bytes | memoryview] = []
         for end, edit in zip(ends, edits, strict=False):
             pieces += data[end : edit.start], edit.text.encode()
         return [*pieces, data[ends[-1] :]], count
+    # Decoding replaced what it could not read, and writing the replacement would change the file
+    # beyond the fix.
     if source.text.encode(source.encoding, "replace") != source.data:
         raise OsimliteError(
             "the file mixes encodings and cannot be fixed; save it as UTF-8 first",
@@ -224,6 +239,7 @@ def apply_fixes_in_pieces(
 def _delete_range(text: str, start: int, end: int) -> Edit:
     before = text.rfind("\n", 0, start) + 1
     after = text.find("\n", end)
+    # If nothing else is on these lines, they go too, with their indentation.
     if after >= 0 and not text[before:start].strip() and not text[end:after].strip():
         return Edit(before, after + 1, "")
     return Edit(start, end, "")

@@ -62,6 +62,7 @@ def check_files(
     texts = SourceTexts()
     jobs: list[CheckJob] = []
     caches: dict[Path, Cache] = {}
+    # The same file may be named twice, by a folder and by itself.
     for file in dict.fromkeys(files):
         settings = find_settings(file)
         config = settings.config_for(file, given)
@@ -126,8 +127,12 @@ def _check_jobs(jobs: list[CheckJob], processes: int | None) -> Iterator[tuple[C
 
     # On Linux forked processes share what is loaded here.
     all_rules()
+    # Objects that exist before the fork are kept out of garbage collection, which would copy their
+    # pages.
     gc.freeze()
     context = multiprocessing.get_context("fork" if sys.platform == "linux" else "spawn")
+    # Several files in one message to a process; not too many, so that all processes end at the same
+    # time.
     share = max(1, min(16, len(jobs) // (4 * processes)))
     with ProcessPoolExecutor(processes, context) as pool:
         yield from zip(jobs, pool.map(check_job, jobs, chunksize=share), strict=True)
@@ -143,6 +148,7 @@ def count_processes(jobs: list[CheckJob]) -> int:
             continue
     if size < WORTH_SHARING or len(jobs) < 2:
         return 1
+    # ProcessPoolExecutor allows at most 61 processes on Windows.
     return min(count_cores(), len(jobs), 61)
 
 

@@ -125,8 +125,10 @@ def successor(cls: type[Object], tag: str) -> Successor | None:
     specs = get_field_specs(cls)
     for base in cls.__mro__:
         known = _OLD.get(base.__name__, {}).get(tag)
+        # The successor must be a property of this class: derived classes may lack it.
         if known is not None and (known.tag is None or known.tag in specs):
             return known
+    # Connectors were renamed to sockets in version 30517.
     match = _CONNECTEE.fullmatch(tag)
     if match is not None and f"socket_{match[1]}" in specs:
         return Successor(30517, f"socket_{match[1]}")

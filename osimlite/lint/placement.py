@@ -104,6 +104,7 @@ def locate_frame(subject: Subject, frame: Component | None) -> FrameLocation:
         frame: the frame.
     """
     pose, seen = FramePose(), 0
+    # The bound ends a chain of frames that forms a loop.
     while isinstance(frame, PhysicalOffsetFrame) and seen < 100:
         pose = make_offset(frame.orientation, frame.translation).compose(pose)
         frame, seen = subject.target_of(frame, "socket_parent"), seen + 1
@@ -150,8 +151,11 @@ def compute_poses(
     )
     poses: dict[int, FramePose] = {id(bones.ground): FramePose()}
     pending: list[Component] = [bones.ground]
+    # Breadth first from ground, as in the assembly of the tree of joints.
     while pending:
         base = pending.pop(0)
+        # A joint may connect its parent or its child to what is known; either end may be located
+        # first.
         for link in bones.find_joints(base):
             parent, child = ends[id(link.joint)]
             if (
@@ -170,6 +174,7 @@ def compute_poses(
                 .compose(_compute_joint_pose(link.joint, motions[id(link.joint)], values))
                 .compose(child[1].inverse())
             )
+            # A joint whose child is known is passed backwards, by the inverse of its transform.
             end, step = (child[0], across) if parent[0] is base else (parent[0], across.inverse())
             poses[id(end)] = poses[id(base)].compose(step)
             pending.append(end)
@@ -196,6 +201,7 @@ def _find_joint_motions(subject: Subject, rough: bool) -> dict[int, list[_JointM
     result: dict[int, list[_JointMotion]] = {}
     for link in build_skeleton(subject).links:
         joint, names = link.joint, [item.name for item in link.joint.coordinates]
+        # The first three of the six axes of a CustomJoint rotate, the others translate.
         if is_a(joint, "CustomJoint"):
             axes = [*enumerate(list_axes(cast("CustomJoint", joint)))]
             functions = [_make_function(axis, rough) for _, axis in axes]
@@ -204,6 +210,7 @@ def _find_joint_motions(subject: Subject, rough: bool) -> dict[int, list[_JointM
                 result[id(joint)] = [
                     _JointMotion(
                         place < 3,
+                        # OpenSim normalizes axes; a zero axis stays zero.
                         divide(axis.axis, norm(axis.axis) or 1.0),
                         [] if isinstance(axis.function, Constant) else axis.names,
                         function,
@@ -213,6 +220,7 @@ def _find_joint_motions(subject: Subject, rough: bool) -> dict[int, list[_JointM
         elif (
             joint.moves is not None
             and len(words := joint.moves.split()) == len(names)
+            # "r" stands for a free rotation (ball joint), which has no single axis.
             and "r" not in words
         ):
             result[id(joint)] = [
@@ -224,6 +232,7 @@ def _find_joint_motions(subject: Subject, rough: bool) -> dict[int, list[_JointM
 
 def _make_function(axis: TransformAxis, rough: bool) -> SmoothFunction | None:
     """Return the function of an axis; None if it is not known."""
+    # Imported here, since the rules that do not place bodies run without this module.
     from osimlite.mechanics.multibody.schema_functions import convert_function
 
     function: Any = axis.function
@@ -234,6 +243,7 @@ def _make_function(axis: TransformAxis, rough: bool) -> SmoothFunction | None:
             else None
         )
     count = len(axis.coordinates)
+    # OpenSim's curves are functions of one argument, while polynomials and products may have more.
     try:
         # Of several coordinates, which should not be, a curve takes the first.
         takes_one = isinstance(function, (SimmSpline, PiecewiseLinearFunction))
@@ -256,6 +266,7 @@ def _compute_joint_pose(
             axes = multiply_rotations(axes, rotation_about_axis(motion.axis, *_sine_cosine(amount)))
         elif amount:
             place = add_scaled(place, amount, motion.axis)
+    # OpenSim places the child on the ellipsoid where the rotated z axis points.
     if isinstance(joint, EllipsoidJoint):
         place = multiply_elementwise(joint.radii_x_y_z, axes[2])
     return FramePose(axes, place)
@@ -279,10 +290,12 @@ def find_rotation_axes(subject: Subject, joint: Joint) -> list[tuple[str, Vector
     for motion in _find_joint_motions(subject, False).get(id(joint), []):
         if not motion.turns or len(motion.names) != 1:
             continue
+        # Without a direction the rotation cannot be computed, and neither can all that follow.
         if motion.names[0] not in values or motion.axis == ZERO:
             return []
         result[motion.names[0]] = combine_axes(axes, motion.axis)
         axes = multiply_rotations(
+            # Each rotation is about an axis that all earlier rotations have turned.
             axes, rotation_about_axis(motion.axis, *_sine_cosine(motion.amount(values)))
         )
     return (

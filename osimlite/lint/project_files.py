@@ -33,6 +33,7 @@ def is_opensim_xml(beginning: bytes) -> bool:
     in.
     """
     # A file in UTF-16 is read as well, and reported.
+    # UTF-16 of ASCII text is ASCII with zero bytes between.
     text = beginning.replace(b"\0", b"").decode("latin-1")
     if _ROOT.search(text):
         return True
@@ -42,6 +43,7 @@ def is_opensim_xml(beginning: bytes) -> bool:
         result for result in _TAGS.findall(text) if result[1]
     ):
         tag = name.rpartition(":")[2]
+        # Malformed XML may lack closing tags, hence up to the matching one.
         if closing:
             while open_tags and open_tags.pop() != tag:
                 pass
@@ -50,6 +52,7 @@ def is_opensim_xml(beginning: bytes) -> bool:
             return True
         if open_tags and _is_property(open_tags[-1], tag):
             evidence.add((open_tags[-1], tag))
+            # A single property could be an accident.
             if len(evidence) > 1:
                 return True
         if not empty:
@@ -67,6 +70,7 @@ def find_misspelt_name(word: str, known: Iterable[str]) -> str | None:
     from rapidfuzz.distance import OSA
     from rapidfuzz.process import extractOne
 
+    # Names of fewer than eight letters differ from many words by two letters.
     if len(word) < 8:
         return next((name for name in known if name.lower() == word.lower()), None)
     result = extractOne(word, list(known), scorer=OSA.distance, processor=str.lower, score_cutoff=2)
@@ -161,6 +165,7 @@ def find_project_files(
             result.append(str(path))
         else:
             others.append(str(path))
+    # Of a file that is named twice the first spelling of its path remains.
     return list({os.path.abspath(file): file for file in reversed(result)}.values())[::-1]
 
 
@@ -170,5 +175,6 @@ def is_opensim_file(file: str) -> bool:
         return True
     try:
         return is_opensim_xml(read_at_most(file, BEGINNING))
+    # An unreadable file is reported by the check, not passed over.
     except OsimliteError:
         return True

@@ -95,6 +95,8 @@ class FindingCollector:
         if at is None and (item is not None or where.get("number") is not None):
             at = subject.position(item, **where)
         line, column, length = at if at is not None else (None, None, 1)
+        # Fixes of rules on models are made by the rules, which know what to rename; the others
+        # replace the text at the position.
         if rule.fixes and rule.about != "model" and suggestion is not None and at is not None:
             named = where.get("word") or (
                 item and getattr(item, where.get("attribute") or where.get("tag") or "name")
@@ -162,8 +164,12 @@ class Rule:
         """
         if self.fault is not None:
             return self.fault.page(f"{self.code[:-2]} {self.group}")
+        # A page has exactly four parts separated by blank lines, as `rule` in CONTRIBUTING.md says;
+        # a test checks each.
         summary, what, why, example = cleandoc(self.check.__doc__ or "").split("\n\n", 3)
         fence, *lines, end = example.splitlines()
+        # The lines with "-" are the example that fails, those with "+" the corrected one, and
+        # others belong to both.
         fails, fixed = (
             "\n".join(line[2:] for line in lines if line[:1] != left_out) for left_out in "+-"
         )
@@ -190,6 +196,7 @@ class Rule:
 
     def has_name(self, word: str) -> bool:
         """Return whether `word` is the code of this rule, a prefix of it, its name, or that of its group."""
+        # An empty word would be a prefix of every code.
         return bool(word) and (
             self.code.startswith(word.upper()) or word in (self.name, self.group)
         )
@@ -244,6 +251,7 @@ def rule(
 
 
 def _register_rule(table: dict[str, Rule], rule: Rule) -> None:
+    # Names and codes are in baselines and comments of users, so they must be unique.
     if not _NAMES.isdisjoint((rule.code, rule.name)):
         raise ValueError(f"rule {rule.code} {rule.name} is registered twice")
     _NAMES.update((rule.code, rule.name))
@@ -320,6 +328,8 @@ def all_rules(about: str = "") -> tuple[Rule, ...]:
         The rules.
     """
     for subject, modules in RULE_MODULES.items():
+        # Rules on text apply to tables and setups too, therefore modules of "model" are always
+        # needed.
         if about in ("", subject) or subject == "model":
             for module in modules:
                 import_module(f"osimlite.lint.rules.{module}")

@@ -80,6 +80,7 @@ class TableRows:
             (fault for fault in self.faults.values() if fault.kind in kinds),
             key=lambda fault: fault.line,
         )
+        # The last of the reported faults carries the count of those that are left out.
         if len(result) > _MAX_FAULTS:
             result[_MAX_FAULTS - 1 :] = [
                 result[_MAX_FAULTS - 1]._replace(others=len(result) - _MAX_FAULTS)
@@ -88,6 +89,8 @@ class TableRows:
 
     def line_of(self, row: int) -> int:
         """Return the line of a row; lines count from 1, rows from 0."""
+        # `lines` has one entry for each jump (blank lines, comments); a search from the end finds
+        # the jump before this row.
         first = next((place for place in reversed(self.lines) if place[0] <= row), (0, 0))
         return first[1] + row - first[0]
 
@@ -101,10 +104,14 @@ _SAMPLES = 64
 """Number of rows at the beginning that are all samples; later rows are sampled ever more sparsely."""
 _SAMPLED = 200_000
 """Largest total of numbers in these rows."""
+# Python's float() also accepts underscores, which C++ does not, and NaN and infinity, which count
+# as missing here.
 _PLAIN = re.compile(rb"[-+]?(\d+(?:\.\d*)?|\.\d+)([eE][-+]?\d+)?")
 _WORD = re.compile(rb"\S+")
 _LETTER = re.compile(rb"[A-Za-z]")
+# A line with a digit, NaN or infinity is taken for a row, even if it has letters as well.
 _OF_ROW = re.compile(rb"\d|\b(?:nan|inf)", re.IGNORECASE)
+# OpenSim takes a line that begins with a tab or a blank for no frame.
 _FRAME = re.compile(rb"^[^\t\r\n ]", re.MULTILINE)
 
 
@@ -141,12 +148,16 @@ class RowScanner:
         whole = (b"\t" if self.markers else b"").join(cells)
         for block in _split_blocks(data, start):
             lines = block.split(b"\n")
+            # Each line of a block ends with a line feed, so that the last piece is empty.
             lines.pop()
             looks, zeros = (
                 _compute_shapes(block, layout)
                 if len(block) < _LONGEST
+                # A line of several megabytes would need tables of shapes of many times its size;
+                # "!" sends it to the examination cell by cell.
                 else (b"!\n" * len(lines), False)
             )
+            # The usual case: a block of rows of plain numbers is recognised by one comparison.
             if looks == (whole + b"\n") * len(lines):
                 self._note_rows(lines, [whole] * len(lines), line, zeros)
             else:
@@ -160,6 +171,8 @@ class RowScanner:
                     )
                     for form in forms
                 ]
+                # Runs of valid rows are recorded together; each kind is True, False, or the empty
+                # form of a blank line.
                 for kind, group in groupby(range(len(lines)), kinds.__getitem__):
                     places = list(group)
                     if kind:
@@ -171,6 +184,7 @@ class RowScanner:
                     elif self.rows.count:
                         self._note("blank", 0, line + places[0], 0, b"", times=len(places))
             line += len(lines)
+        # Without rows every marker would be missing, which is not what is wrong with such a table.
         if not self.rows.count:
             self.rows.unseen.clear()
         return self.rows
@@ -185,12 +199,14 @@ class RowScanner:
             rows.unseen.difference_update(
                 *(_find_seen_markers(form, self.cells) or () for form in looks if rows.unseen)
             )
+            # Only incomplete rows and rows with three zeros in a row can hold faults of markers.
             if zeros or any(b"\t\t" in form for form in looks):
                 for number, (text, form) in enumerate(zip(lines, forms, strict=True)):
                     if b"\t\t" in form or b"\t\t\t" in text.translate(None, b"0.-+"):
                         self._examine_markers(text, line + number)
         else:
             times = [float(text.split(None, 1)[0]) for text in lines]
+        # `not >` instead of `<=`, so that NaN counts as a fault of the order.
         if not times[0] > self._get_last_time() or not all(map(lt, times, islice(times, 1, None))):
             for number, (before, now) in enumerate(pairwise([self._get_last_time(), *times])):
                 if not now > before:
@@ -201,12 +217,15 @@ class RowScanner:
             rows.samples += [
                 self._read_numbers(text, float) for text in lines[: self._count_missing_samples()]
             ]
+        # Beyond the first rows their number grows with the square root of the row count, so that
+        # long tables cost little memory.
         elif len(rows.samples) ** 2 < 2 * rows.count:
             rows.samples.append(self._read_numbers(lines[0], float))
 
     def _read_marker_times(self, lines: list[bytes], line: int) -> list[float]:
         """Return the times of frames; a missing time becomes the next number after the previous time."""
         heads = [text.split(b"\t", 2)[:2] for text in lines]
+        # One comparison of lists is faster than a check of each frame number.
         if [frame for frame, _ in heads] != [
             b"%d" % (self._frame + number) for number in range(1, len(heads) + 1)
         ]:
@@ -216,6 +235,7 @@ class RowScanner:
             self._frame += len(heads)
         times = [float(moment.strip() or b"nan") for _, moment in heads]
         for number, time in enumerate(times):
+            # Only NaN differs from itself.
             if time != time:
                 self._note("time", 1, line + number, len(heads[number][0]) + 1, heads[number][1])
                 times[number] = nextafter(
@@ -229,10 +249,13 @@ class RowScanner:
         start = 0
         for number, cell in enumerate(cells[: self.cells]):
             if number > 1 and number % 3 == 2:
+                # Cells 0 and 1 are the frame and the time; coordinates of markers start at cell 2.
                 place = [part.strip() for part in cells[number : number + 3]]
                 seen = [part.lower() not in (b"", b"nan") for part in place]
                 if any(seen) and not all(seen):
                     self._note("part", number, line, start, cell)
+                # What is left after removing zeros, points and signs is empty for a marker exactly
+                # at the origin.
                 elif all(seen) and not b"".join(place).strip(b"0.-+"):
                     self._note("zero", number, line, start, cell)
             start += len(cell) + 1
@@ -258,6 +281,8 @@ class RowScanner:
                 self._note("blank", 0, line, 0, b"")
             return
         rows = self.rows
+        # Comments in tables are not allowed by OpenSim; these are the signs that other programs
+        # begin them with.
         if text.lstrip()[:1] in (b"#", b"/", b"%", b";") or (
             _LETTER.search(text) and not _OF_ROW.search(text)
         ):
@@ -265,6 +290,8 @@ class RowScanner:
             return
         cells, count = self._split_cells(text)
         if count != self.cells:
+            # Blanks in place of tabs are a usual fault of converters, and deserve a message of
+            # their own.
             end = cells[self.cells][0] if count > self.cells else len(text.rstrip())
             blanks = (
                 self.markers
@@ -298,6 +325,8 @@ class RowScanner:
                     parse_number(part) != parse_number(part) for part in parts
                 ):
                     self._note("cell", number, line, start, cell)
+        # A row of the right width counts even if cells are wrong, so that later times and lines
+        # stay right.
         if count == self.cells > time:
             self._note_line_of_row(line)
             value = parse_number(cells[time][1])
@@ -337,9 +366,11 @@ class RowScanner:
             self.rows.lines.append((self.rows.count, line))
 
     def _expect_frame(self, cell: bytes, line: int) -> None:
+        # Python refuses to convert integers of more than 4,300 digits.
         number = int(cell) if cell.isdigit() and len(cell) < 20 else None
         if number is None or (self._frame and number != self._frame + 1):
             self._note("frame", 0, line, 0, cell)
+        # After a wrong frame number the count continues from it: one shift is one finding.
         self._frame = number if number is not None else self._frame + 1
 
     def _note_order(self, text: bytes, line: int, time: float, before: float) -> None:
@@ -359,6 +390,7 @@ class RowScanner:
     ) -> None:
         faults = self.rows.faults
         if (kind, number) in faults:
+            # A fault in the same column is counted, not reported again.
             known = faults[kind, number]
             faults[kind, number] = known._replace(times=known.times + times)
         else:
@@ -385,6 +417,7 @@ def _compute_shapes(block: bytes, layout: RowLayout) -> tuple[bytes, bool]:
 @lru_cache(maxsize=256)
 def _find_seen_markers(form: bytes, cells: int) -> frozenset[int] | None:
     """Return the markers that a row of this shape contains; None if it is not a row of markers."""
+    # This is cached, since tables have few distinct shapes of rows.
     numbers = form.split(b"\t")
     if len(numbers) == cells + 1 and not numbers[-1]:
         numbers.pop()
@@ -400,10 +433,12 @@ def _find_seen_markers(form: bytes, cells: int) -> frozenset[int] | None:
 def _split_blocks(data: bytes, start: int) -> Iterator[bytes]:
     """Yield blocks of complete lines from an offset on, without blank lines at the end."""
     size = len(data)
+    # Blank lines at the end are no rows and no fault.
     while size > start and data[size - 1] in b"\r\n" and data[size - 2] in b"\r\n":
         size -= 1
     while start < size:
         end = (
+            # A line longer than a block becomes a block of its own.
             data.rfind(b"\n", start, min(start + BLOCK, size)) + 1
             or data.find(b"\n", start, size) + 1
             or size

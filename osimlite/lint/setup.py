@@ -35,7 +35,9 @@ from osimlite.schema.tree import Tree, Use, is_a
 
 NO_FILE_CONSEQUENCE = "OpenSim rejects it unless a program or the GUI supplies one"
 """Consequence for a tool that lacks the name of a required file."""
+# Cheap test of the first bytes of a file, which saves parsing documents that cannot be tools.
 _NAMES_MODEL = re.compile(rb"Tool|Moco|ModelProcessor")
+# Folders of data sets hold thousands of documents; a check must not read them all.
 _MAX_NEIGHBOURS = 200
 _MODEL_RULES = frozenset(("OSIM110", "OSIM111", "OSIM209"))
 """Codes of rules on tags and values that apply to models only."""
@@ -67,6 +69,8 @@ class Setup(Subject):
         if rule.name == "included-file":
             return self.top is not None
         if rule.about == "model":
+            # Codes 0xx are about text, 1xx about structure, 2xx about values: these hold for any
+            # object.
             return rule.code not in _MODEL_RULES and (
                 rule.code[4] == "0" or (rule.code[4] in "12" and self.top is not None)
             )
@@ -92,6 +96,7 @@ class Setup(Subject):
     @cached_property
     def setup_items(self) -> list[Object]:
         """Objects outside of any model in the document, in document order."""
+        # A study of Moco may contain its model; rules for setups must not report on that.
         inside = {id(part) for model in self.by_class.get(Model, ()) for part in model.walk()}
         return [item for item in self.items if id(item) not in inside]
 
@@ -106,6 +111,7 @@ class Setup(Subject):
         return item
 
     def _find_element(self, item: Object | None) -> int | None:
+        # The top element is the place of findings on what is missing in the document.
         """Return the element of an object; the top element if the text does not contain the object."""
         number = None if item is None else item._index
         return number if number is not None or self.top is None else self.top._index
@@ -127,9 +133,12 @@ class Setup(Subject):
         """Return where OpenSim finds a file of this setup, if it is started in the folder of the setup."""
         folder = str(self.folder or Path())
         path = os.path.join(folder, name)
+        # Recorded for the cache of reports: the finding changes when a file appears here.
         self._looked_at[path] = None
         if not os.path.isfile(path):
             self._looked_at[os.path.dirname(path)] = None
+            # OpenSim changes into the folder of the setup, but some tools look in the working
+            # folder as well.
             if os.path.isfile(name) and not os.path.isabs(name):
                 return name
         return path
@@ -198,6 +207,7 @@ class Setup(Subject):
             yield self.file, self.top
             return
         here = os.path.realpath(self.file)
+        # Paths may differ by symbolic links and by "..".
         for file, top in self.neighbours:
             folder = os.path.dirname(file)
             if any(
@@ -274,6 +284,7 @@ class Setup(Subject):
         """Return the names of all components of a class, in the model and in added sets."""
         if self.tree is None or self.tool is None:
             return set()
+        # The sets that the tool adds are part of its model when it runs.
         names = {item.name for item in self.tree.find_by_class(target).values()}
         return names | {
             item.name for _, added in self.added_sets for item in added.walk() if is_a(item, target)
@@ -283,6 +294,8 @@ class Setup(Subject):
         """Return whether a coordinate of the model is locked, prescribed, or determined by others."""
         assert self.tree is not None
         bound: Any = self.tree.find_by_class("CoordinateCouplerConstraint").values()
+        # OpenSim determines the values of all of these itself, so no tool can drive such a
+        # coordinate.
         item = self.tree.find_by_class("Coordinate").get(name)
         held = any(getattr(item, flag, False) for flag in ("locked", "prescribed"))
         return held or name in {str(coupler.dependent_coordinate_name) for coupler in bound}
@@ -305,6 +318,7 @@ class Setup(Subject):
         named: dict[int, str] = {}
         for file, top in dict(self.neighbours + around).items():
             if self.file is not None and os.path.realpath(file) == os.path.realpath(self.file):
+                # A setup does not write the files that it reads.
                 continue
             folder = os.path.dirname(file)
             results = getattr(top, "results_directory", "") or "."
@@ -322,6 +336,7 @@ class Setup(Subject):
                         os.path.realpath(os.path.join(place, name)) for place in (folder, within)
                     ):
                         return file
+        # Of several names that fit, the longest is the most specific.
         return named[max(named)] if named else None
 
 

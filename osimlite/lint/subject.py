@@ -40,6 +40,8 @@ def cache_per_subject(
 
     @wraps(make)
     def get_cached(subject: S, /, *args: P.args, **named: P.kwargs) -> Cached:
+        # Functions of different modules may share a name, hence the function itself is a part of
+        # the key.
         key = (make, *args, *named.items())
         if key not in subject.cache:
             subject.cache[key] = make(subject, *args, **named)
@@ -82,6 +84,7 @@ class Subject(CheckTarget):
             self.upgraded = bool(self.changes)
             self.refusals = found.document.refusals if found.document else []
             if self.sure_until is not None:
+                # The reader guesses after a syntax error; findings on guesses would mislead.
                 self.notes = [note for note in self.notes if self._is_sure(note)]
 
     def _is_sure(self, note: Note) -> bool:
@@ -96,6 +99,7 @@ class Subject(CheckTarget):
         """Return whether a rule applies; after a syntax error only rules on single places do."""
         if rule.about == MEASURES and self.about == "model":
             return self.model is not None and self.sure_until is None and has_measures(self)
+        # Without this quick test every check would build the complete mechanism.
         if rule.about == CONSTRUCTION and self.about == "model":
             return self.model is not None and self.sure_until is None and self._may_fail
         if rule.about != self.about:
@@ -180,6 +184,7 @@ class Subject(CheckTarget):
     def owner(self, item: Object) -> Component:
         """Return the component that an object belongs to; the model, for an object that OpenSim ignores."""
         try:
+            # Objects that OpenSim ignores hang on no component.
             return self.tree.owner_of(item)
         except KeyError:
             assert self.model is not None
@@ -239,6 +244,7 @@ class Subject(CheckTarget):
         if number is None or self.source is None:
             return None, 0
         span = self.source.spans[number]
+        # OpenSim accepts commas between the words of a list.
         words = self.source.text[span.tag_end : span.inner_end].replace(",", " ").split()
         if index >= len(words):
             return None, 0
@@ -323,6 +329,8 @@ class Subject(CheckTarget):
     def list_outside_paths(self) -> list[str] | None:
         """Return every path outside the text that findings may depend on; None if that is unknown."""
         if self.needs_remeasuring or any(note.kind == "include" for note in self.notes):
+            # Included files and special files (pipes, devices) have no time of modification to
+            # compare.
             return None
         if any(isinstance(fault, SpecialFileError) for fault in self.faults):
             return None
@@ -352,6 +360,7 @@ class Subject(CheckTarget):
         if self.source is None:
             return True
         if item._index is None:
+            # Objects that the reader adds, such as default frames, have no element.
             return False
         return "name" in self.source.get_attributes(item._index)
 

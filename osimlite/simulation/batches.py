@@ -85,6 +85,7 @@ class BatchOptions(IntegrationOptions):
         self.check_integration()
         if not self.to >= 0.0:
             raise SettingError(f"the runs must end at 0 s or later, not at {self.to} s")
+        # The pairs begin at 0 s, since no report is before the start.
         if not all(one <= other for one, other in pairwise([0.0, *self.report_times])):
             raise SettingError("the report times do not increase from 0 on; sort them")
         for number, least, what in (
@@ -277,6 +278,7 @@ class Runs:
             chosen[name] = (
                 rows[places]
                 if isinstance(rows, np.ndarray)
+                # Lists that are empty were not requested.
                 else [rows[place] for place in places if rows]
             )
         return Runs(**chosen)

@@ -63,6 +63,7 @@ def make_bvh(
     centers = []
     for body in bodies:
         mobilizer = body.mobilizer
+        # A reversed mobilizer has its joint at the frame of the parent.
         frame = mobilizer.parent_frame if mobilizer.reversed else mobilizer.child_frame
         centers.append(frame[:3, 3])
     rotations = np.empty((len(times), len(bodies), 3, 3))
@@ -73,6 +74,7 @@ def make_bvh(
             rotations[row, index] = upright @ state.rotations[index]
             places[row, index] = upright @ state.point(index, center)
     rest = mechanism.at(mechanism.default_state()[0])
+    # The skeleton of the file is the default pose.
     rest_places = np.array(
         [upright @ rest.point(index, center) for index, center in enumerate(centers)]
     )
@@ -104,8 +106,10 @@ def make_bvh(
         else:
             back = rotations[:, above].transpose(0, 2, 1)
             local_turns = back @ rotations[:, index]
+            # Poses relative to the body above, in its axes.
             local_places = np.einsum("nij,nj->ni", back, places[:, index] - places[:, above])
             offset = rest.rotations[above].T @ upright.T @ (rest_places[index] - rest_places[above])
+        # A joint whose centre stays in the body above needs no positions.
         moves = float(np.ptp(np.vstack([local_places, offset]), axis=0).max()) > MIN_TRANSLATION_M
         if is_root or moves:
             columns.append(scale * local_places)
@@ -114,6 +118,8 @@ def make_bvh(
         columns.append(find_angles(local_turns))
         channels = (*POSITIONS, *ROTATIONS) if is_root or moves else ROTATIONS
         end = None
+        # The last bone points to the mass centre, and twice as far: about to the end of the
+        # segment.
         if index not in inner:
             end = 2.0 * (body.mass_properties.center - centers[index])
             end = scale * (
@@ -122,6 +128,7 @@ def make_bvh(
         parent = -1 if is_root else 0 if above == GROUND else joint_of_body[above]
         joint_of_body[index] = len(joints)
         joints.append(BvhJoint(name, parent, scale * offset, channels, end))
+    # A motion of one row has no step; 60 frames a second is usual.
     step = float(times[1] - times[0]) if len(times) > 1 else 1.0 / 60.0
     motion = BvhMotion(tuple(joints), step, np.hstack(columns))
     return BvhSkeleton(motion, tuple(names), tuple(translating), is_resampled)
@@ -144,6 +151,7 @@ def _list_depth_first(mechanism: Mechanism) -> list[int]:
 def _make_uniform(times: Array, values: Array) -> tuple[Array, Array, bool]:
     """Return times with one step, values there, and whether they differ from those of the motion."""
     steps = np.diff(times)
+    # Steps that are equal up to rounding are not changed.
     if not len(steps) or np.ptp(steps) <= UNIFORM_STEP * float(np.mean(steps)):
         return times, values, False
     count = max(2, round(float(times[-1] - times[0]) / float(np.median(steps))) + 1)
@@ -161,6 +169,7 @@ def _make_upright(mechanism: Mechanism) -> Array:
     up: Array = -gravity / size
     axis = np.cross(up, (0.0, 1.0, 0.0))
     cosine = float(up[1])
+    # Gravity points up: half a turn about X.
     if cosine < -1.0 + 1e-12:
         return np.diag([1.0, -1.0, -1.0])
     cross = np.array([[0.0, -axis[2], axis[1]], [axis[2], 0.0, -axis[0]], [-axis[1], axis[0], 0.0]])

@@ -131,6 +131,7 @@ def inverse_dynamics(
         exclude_forces(pushed, excluded)
     mechanism = build_mechanism(pushed, opensim_derivatives=opensim_derivatives)
     recorded = prepare_motion(mechanism, motion, times, False, lowpass, start, end)
+    # Forces that the caller excludes were switched off in the copy.
     forces = force_elements(
         pushed, mechanism, wrapping=wrapping, external_loads=external_loads, folder=folder
     )
@@ -178,6 +179,7 @@ def add_forces(
     from osimlite.io.document.reader import read_document
     from osimlite.io.document.source import Source
 
+    # Replaced forces leave before new ones of the same names come.
     if replace:
         model.force_set.objects.clear()
     for each in forces:

@@ -187,6 +187,7 @@ def muscle_curves(
         raise SettingError(f"an activation is a number from 0 to 1, not {activation:g}")
     mechanism = build_mechanism(model)
     places = [mechanism.coordinate_index(name) for name in values]
+    # A name and a path may mean the same coordinate.
     if len(set(places)) < len(places):
         raise SettingError(f"{join_words(values)} are one coordinate; leave one out")
     forces = force_elements(
@@ -200,6 +201,7 @@ def muscle_curves(
     result = {
         element.path: element for element in forces.elements if isinstance(element, DeclaredForce)
     }
+    # Forces that cannot be computed were skipped above.
     missing = [path for path in named if path not in result]
     if missing:
         # Raises an error that explains why the class is not supported.
@@ -213,6 +215,7 @@ def muscle_curves(
         _Muscle(
             result[path],
             System(free, Forces((result[path],), (), controls)),
+            # The controls of all muscles are the activation.
             activation,
             optimal[path],
         )
@@ -220,6 +223,7 @@ def muscle_curves(
     ]
     paths = Paths(model, wrapping)
     names = [*QUANTITIES, *(f"moment_arm_{name}" for name in values)]
+    # NaN stays where a muscle has no equilibrium.
     curves = MuscleCurves(tuple(named), dict(values), {})
     poses = curves.poses
     columns = {name: np.full((len(poses), len(named)), np.nan) for name in names}
@@ -244,6 +248,7 @@ def muscle_curves(
 
 def _select_muscles(paths: list[str], names: Sequence[str]) -> list[str]:
     """Return the named paths in the order of the model; all without names."""
+    # Reversed, so that of several muscles of one name the first is found.
     known = {key: path for path in reversed(paths) for key in (path.rpartition("/")[2], path)}
     for name in names:
         if name not in known:
@@ -278,6 +283,7 @@ class _Muscle(NamedTuple):
         """
         element, system = self.element, self.system
         y = system.state.pack(q.tolist(), [0.0] * len(q))
+        # Activations are states of most muscles, and follow the control of the others.
         for place, path in enumerate(system.state.paths, 2 * len(system.order)):
             if path.endswith("/activation"):
                 y[place] = self.activation

@@ -125,6 +125,7 @@ class IntegrationOptions:
         if not 0.0 < self.accuracy < 1.0:
             raise SettingError(f"the accuracy must lie between 0 and 1; {self.accuracy} does not")
         check_integrator(self.integrator)
+        # An ignored option would look as if it had an effect.
         if self.step_bounds != UNBOUNDED_STEPS and self.integrator not in BOUNDED_INTEGRATORS:
             raise SettingError(
                 f"`step_bounds` has no effect on the steps of '{self.integrator}'; leave it out, or select the integrator "
@@ -337,6 +338,7 @@ MAX_FIXED_STEP_S = 0.1
 
 def _is_number(value: object) -> bool:
     """Return whether a value is a real number; callers without a type checker may pass anything."""
+    # A bool is a Real too, and harmless.
     return isinstance(value, Real)
 
 
@@ -387,6 +389,7 @@ def compute_report_times(to: float, interval: float, start: float = 0.0) -> list
         raise SettingError(f"the end of a simulation is {expected}, not {to:g} s")
     if not (isfinite(interval) and interval > 0.0):
         raise SettingError(f"the report interval is a positive time, not {interval:g} s")
+    # Ten million rows fill the memory.
     if to / interval > 1e7:
         raise SettingError(
             f"a report every {interval:g} s makes more than ten million rows; use a longer interval"

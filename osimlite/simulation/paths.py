@@ -98,6 +98,7 @@ class Paths:
     ) -> None:
         mechanism = build_mechanism(model) if mechanism is None else mechanism
         builder = ElementBuilder(model, mechanism, Path(), wrapping=wrapping)
+        # The lazy filter asks each component once.
         owners = filter(_has_path, builder.tree.components)
         self._build_system(
             builder, [owner for owner in owners if builder.path(owner) not in left_out], code
@@ -113,6 +114,7 @@ class Paths:
         elements = [MeasuredPath(name, PATH.read(builder, owner)) for name, owner in pairs]
         self._coupled = np.array([element.along.coupled for element in elements], dtype=bool)
         # OpenSim gives a locked coordinate the moment arm that it has when it is unlocked.
+        # The coupling is applied to moment arms afterwards.
         self.routes = {element.path: element.along for element in elements}
         self.system = PathSystem(
             self.mechanism.without_constraints(), Forces(tuple(elements)), code=code
@@ -131,6 +133,7 @@ class Paths:
         names = [
             name for name, route in routes if isinstance(route, ThroughPoints) and route.surfaces
         ]
+        # No constructor: the mechanism is that of this object.
         other = object.__new__(Paths)
         other._build_system(builder, [builder.tree.find(name) for name in names], code)
         return other
@@ -257,6 +260,7 @@ class Paths:
             move.
         """
         arms = self.system.compute_pulls(poses)
+        # Without constraints other than locks, the coupling is the identity.
         if not all(isinstance(item, Lock) for item in self.mechanism.constraints):
             each = map(self.compute_coupling, poses) if couplings is None else couplings
             for row, coupling in zip(arms, each, strict=True):
@@ -286,6 +290,7 @@ class Paths:
         coupling = self.compute_free_coupling(state)
         # OpenSim unlocks a coordinate before it computes its moment arm.
         for place, lock in self._locks.items():
+            # Without its lock a coordinate moves, with all others that constraints couple.
             others = [item for item in constraints if item is not lock]
             coupling[:, [place]] = _compute_coupled_speeds(others, state, [place])[:, [place]]
         return coupling
@@ -333,11 +338,13 @@ def _compute_coupled_speeds(
     """
     coupling = np.eye(len(state.q))
     if constraints and places:
+        # The least-norm correction is subtracted from the unit speed.
         rows, wanted = stack_equations([item.velocity_equations(state) for item in constraints])
         speeds = coupling[:, places] - solve_least_norm(
             rows, rows[:, places] - wanted[:, None], REDUNDANT * len(rows)
         )
         own = speeds[places, range(len(places))]
+        # A speed that constraints do not allow has no moment arm (NaN).
         coupling[:, places] = speeds / np.where(np.abs(own) > ARM_ROUNDING, own, np.nan)
     return coupling
 

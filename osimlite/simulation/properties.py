@@ -56,6 +56,7 @@ class PropertyPath:
         holder: object = model.tree().by_path.get(self.component)
         try:
             for step in self.steps[:-2]:
+                # All steps but the last two lead to the object that holds the number.
                 holder = _get_step(holder, step)
             *_, last = self.steps
             if isinstance(last, str):
@@ -124,11 +125,13 @@ def match_components(pattern: str, components: Iterable[NamedItemType]) -> list[
     known = list(components)
     result: dict[int, NamedItemType] = {}
     for part in pattern.split(","):
+        # A part with a slash at its beginning is compared with paths.
         own = [
             item
             for item in known
             if _matches(part, item.path if part.startswith("/") else item.name)
         ]
+        # A part that selects nothing is probably misspelt.
         if not own:
             return []
         result |= {id(item): item for item in own}
@@ -150,6 +153,7 @@ def expand_braces(name: str, model: Model) -> list[str]:
         Names in the order of the model; the name itself without braces.
     """
     head, brace, rest = name.partition("{")
+    # Without braces the name stands for itself.
     if not brace:
         return [name]
     inner, _, tail = rest.partition("}")
@@ -170,6 +174,7 @@ def expand_braces(name: str, model: Model) -> list[str]:
 def _to_regular_expression(pattern: str) -> str:
     """Return a part of a pattern as a regular expression."""
     return "".join(
+        # "*" stays within one component of a path.
         {"*": "[^/]*", "?": "[^/]", "[": "[", "]": "]"}.get(letter, re.escape(letter))
         for letter in pattern
     )
@@ -232,6 +237,7 @@ def _iterate_numbers(holder: Object) -> Iterator[tuple[str, tuple[tuple[Step, ..
             elif value is not None:
                 yield spec.tag, ((spec.name,), kind.unit or "")
     for spec, item in holder.list_owned_objects():
+        # Components have paths of their own.
         if isinstance(item, Component) and item.is_component:
             continue
         held = getattr(holder, spec.name)
@@ -243,6 +249,7 @@ def _iterate_numbers(holder: Object) -> Iterator[tuple[str, tuple[tuple[Step, ..
         place = next(number for number, other in enumerate(held) if other is item)
         # A set consists of its list only, so the name of the list is omitted.
         front = "" if spec.tag == "objects" else f"{spec.tag}/"
+        # An entry is named by its index, by its name, or not at all if it is the only one.
         names = [str(place), *([item.name] if item.name else []), *([""] if len(held) == 1 else [])]
         for route, (steps, unit) in rest:
             for name in names:

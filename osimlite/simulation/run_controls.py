@@ -85,6 +85,7 @@ def add_controls(
     require_table_span(controls, start, to)
     if given is None:
         return controls
+    # Actuators may be named by their name or their path.
     known = {key: name for name in controls.names for key in (name.rpartition("/")[2], name)}
     functions: dict[str, SmoothFunction] = {}
     begin, end = -inf, inf
@@ -93,6 +94,7 @@ def add_controls(
             raise SettingError(
                 f"the model has no actuator '{key}' to control{suggest_name(key, known)}"
             )
+        # A name is ambiguous in models with several sets.
         paths = [name for name in controls.names if name.endswith(f"/{key}")]
         if len(paths) > 1:
             raise SettingError(
@@ -102,6 +104,7 @@ def add_controls(
             raise SettingError(
                 f"'{known[key]}' is controlled twice, by its name and by its path; leave one out"
             )
+        # (times, values) is an interpolated table.
         if isinstance(value, tuple):
             functions[known[key]], first, last = _interpolate(key, *value)
             begin, end = max(begin, first), min(end, last)
@@ -182,6 +185,7 @@ def _map_by_name(given: Mapping[str, Any] | StoTable | str | Path) -> Mapping[st
     """Return controls by actuator from a mapping, a table or a file."""
     if isinstance(given, Mapping):
         return given
+    # .xml is the older format of control sets.
     if isinstance(given, str | Path) and Path(given).suffix == ".xml":
         curves = ControlCurves.read(Path(given))
         return {name: curves.find_curve(name) for name in curves.actuators}

@@ -78,6 +78,7 @@ class Recorder:
         """Record the initial state, directly after the stepper was made."""
         self._stepper = stepper
         self._start = self._last = stepper.time
+        # The last entry of the loads has one bit for each contact that touches.
         self._touching = self._loads[-1]
         self.initially = self._touching
         self._steps = [(stepper.time, stepper.state)]
@@ -140,6 +141,7 @@ class Recorder:
             bit = 1 << number
             low, high = change.start, change.end
             # Bisection, since the force of a contact is not smooth where it begins.
+            # The bit at the middle says in which half the contact changed.
             while high - low > EVENT_TIME_TOLERANCE_S:
                 middle = 0.5 * (low + high)
                 if (
@@ -196,6 +198,7 @@ class Extreme:
 
     def __init__(self, operation: str, *, is_known: bool = False) -> None:
         self._extreme, self._is_new = EXTREME_RULES[operation]
+        # Simbody starts an extreme at the initial value, or at 0 where there was none before.
         if is_known:
             self._extreme = 0.0
 
@@ -244,6 +247,7 @@ class Rate:
             t: time, s.
             value: value there.
         """
+        # At the first time there is no earlier value.
         if t == self.time or self.time == -inf:
             return self.rate
         line = (value - self.value) / (t - self.time)

@@ -141,6 +141,7 @@ class Stepper(ABC):
         rows: list[list[float]] = []
         try:
             for t in times:
+                # Steps end at the last time only, so that rows do not shorten them.
                 while self.time < t:
                     # Steps end at the last time only. Rows between are interpolated, so that the
                     # number of rows does not change the motion.
@@ -174,6 +175,7 @@ class Stepper(ABC):
 
     def _accept_step(self, t: float, y: list[float]) -> None:
         """Make (t, y) the present state."""
+        # The previous state is kept for interpolation.
         self.previous = self.time, self.state, self.derivative
         self.derivative = self._evaluate(t, y)
         self.time = t

@@ -67,6 +67,7 @@ class Trajectory(Tabular):
         ]
         self.paths = tuple(paths) or (*own, *auxiliary)
         # Auxiliary states get the order in which OpenSim writes them.
+        # States that the model does not list come last.
         rank = {path: number for number, path in enumerate(self.paths)}
         ordered = sorted(auxiliary, key=lambda path: rank.get(path, len(rank)))
         self.auxiliary: dict[str, Array] = {
@@ -124,6 +125,7 @@ class Trajectory(Tabular):
 
     def __getstate__(self) -> dict[str, Any]:
         # The report refers to an engine, which cannot be sent to another process.
+        # Reading the properties computes and stores them.
         _ = self.forces, self.energy, self.probes, self.summary
         return {**self.__dict__, "_report": None, "_model": self.model}
 
@@ -260,6 +262,7 @@ class Trajectory(Tabular):
     def states(self) -> StoTable:
         """Table of all states, in the order of `paths`."""
         columns: dict[str, Array] = dict(self.auxiliary)
+        # Paths of states have the form that OpenSim writes.
         for index, info in enumerate(self.mechanism.coordinates):
             columns[f"{info.path}/value"], columns[f"{info.path}/speed"] = (
                 self.values[:, index],
@@ -267,6 +270,7 @@ class Trajectory(Tabular):
             )
         rows = (
             np.array([columns[path] for path in self.paths])
+            # Also a table without states keeps its times.
             .reshape(len(self.paths), len(self.times))
             .T
         )
@@ -306,6 +310,7 @@ class Trajectory(Tabular):
             OsimliteError: the folder cannot be made or a file cannot be written.
         """
         base = Path(folder)
+        # Everything is computed first, so that an error leaves no half of a result.
         # All texts are made before the first file is written, so that an error leaves no half of a
         # result.
         texts = {

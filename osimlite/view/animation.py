@@ -116,6 +116,7 @@ def animate(
 
 def _encode_frames(frames: list[Any], fps: int, image: Any) -> bytes:
     """Return the frames as a GIF, all with one palette, so that colours do not flicker."""
+    # Colours of the first frame alone may lack those of active muscles.
     # A sheet of some of the frames, side by side, has all the colours.
     some = frames[:: max(1, len(frames) // 6)]
     width, height = frames[0].size
@@ -144,6 +145,7 @@ class Film:
         self.right, self.up = _AXES[plane]
         self.scene, self.mechanism = scene, scene.mechanism
         recorded = np.asarray(motion.times, dtype=float)
+        # 1e-9: the last frame counts if it differs by rounding only.
         count = int(np.floor((recorded[-1] - recorded[0]) * fps / speed + 1e-9)) + 1
         self.times = recorded[0] + np.arange(count) * speed / fps
         values = values_of(motion, self.mechanism)
@@ -168,6 +170,7 @@ class Film:
         Without a moving mass it is the mean of the body origins in the first pose.
         """
         masses = np.array([body.mass_properties.mass for body in self.mechanism.bodies])
+        # Bodies that stand still would hold the camera back.
         masses = np.where(self.moving[:-1], masses, 0.0)
         if not masses.any():
             return np.tile(self.poses[0].origins.mean(axis=0), (len(self.poses), 1))
@@ -192,6 +195,7 @@ class Film:
                 away = np.abs(corners - focus).max(axis=0)
                 if moves:
                     moving = np.maximum(moving, away)
+                # Static objects are measured apart.
                 else:
                     still = np.maximum(still, away)
         return np.maximum(moving, still) if (still <= SCENERY * moving.max()).all() else moving
@@ -208,7 +212,9 @@ class Film:
         for item in self.scene.drawn():
             if item.path in self.scene.half_spaces:
                 placed = pose.matrix(item.body, item.matrix)
+                # The direction into a half space is its X axis.
                 inward = placed[:3, 0]
+                # A steep plane crosses the line below the focus far away.
                 if abs(inward @ self.up) > STEEPEST * np.linalg.norm(inward):
                     below = focus + self.up * ((placed[:3, 3] - focus) @ inward) / (
                         inward @ self.up
@@ -225,6 +231,7 @@ class _Painter:
         fonts = require("PIL.ImageFont", extra="view", purpose="an animation")
         self.font, self.small = (fonts.load_default(size[1] / part) for part in (26.0, 32.0))
         # Half the width and half the height of the picture, in metres, with a margin around what
+        # 12 % margin.
         # moves.
         wide, high = (1.12 * film.reach).tolist()
         aspect = size[0] / size[1]
@@ -254,6 +261,7 @@ class _Painter:
         style = {"font": self.font, "fill": ink, "stroke_width": 3, "stroke_fill": sky}
         pen.text((0.03 * width, 0.03 * height), f"t = {self.film.times[number]:.2f} s", **style)
         pen.text((0.97 * width, 0.03 * height), self.film.mechanism.name, anchor="ra", **style)
+        # Pixels per metre.
         pixels = 0.5 * width / self.half[0]
         length = round_down(0.4 * self.half[0])
         self._bar(pen, 0.03 * width, length * pixels, f"{length:g} m", ink)

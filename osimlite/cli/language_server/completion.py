@@ -83,6 +83,7 @@ def _complete_names(
     for name in list_names(known, cursor, reference, holder) if known is not None else ():
         item = _make_item(
             analysis, cursor, name.text, name.text, types.CompletionItemKind.Reference, name.detail
+        # `sort_text` is compared as text.
         )
         # Editors sort by this text, so likely names come first.
         item.sort_text = f"{'0' if name.likely else '1'}{name.text}"
@@ -93,6 +94,7 @@ def _complete_tags(
     analysis: DocumentAnalysis, cursor: Cursor, around: Element | None, bracket: str
 ) -> Iterator[types.CompletionItem]:
     """Yield completions for the elements that may be inside the enclosing one."""
+    # The tag of an object, or of a list of objects; values have no tags inside.
     if around is None:
         return
     if around.cls is None:
@@ -107,6 +109,7 @@ def _complete_tags(
             for tag in list_class_tags(around.spec.accepts):
                 yield _complete_object(analysis, cursor, tag, bracket, "")
         return
+    # Properties that the object has already would be ignored by OpenSim.
     given = _list_written_tags(analysis, around)
     for spec in get_field_specs(around.cls).values():
         if spec in list_single_object_properties(around.cls):
@@ -133,6 +136,7 @@ def _complete_property(
     analysis: DocumentAnalysis, cursor: Cursor, spec: FieldSpec, bracket: str
 ) -> types.CompletionItem:
     if isinstance(spec.kind, ObjectField):
+        # An unnamed property takes objects of several classes, which a name tells apart.
         inner = ' name="$1">\n\t$0\n' if spec.kind.form == "unnamed" else ">\n\t$0\n"
         text = f"{bracket}{spec.tag}{inner}</{spec.tag}>"
     else:
@@ -142,6 +146,7 @@ def _complete_property(
         choices = (
             ("true", "false") if isinstance(spec.kind, Value) and spec.kind.scalar == "bool" else ()
         )
+        # `${1|a,b|}` is the choice of a snippet, `${1:text}` a placeholder.
         place = f"${{1|{','.join(choices)}|}}" if choices else f"${{1:{_escape_snippet(default)}}}"
         text = f"{bracket}{spec.tag}>{place}</{spec.tag}>"
     item = _make_item(

@@ -37,6 +37,7 @@ class Project:
 
     def find_uri(self, path: str) -> str:
         """Return the URI of a file in the spelling of the editor if the file is open."""
+        # Editors may spell a path in another way, for example with links.
         real = os.path.realpath(path)
         opened = (
             uri for uri, analysis in self.open.items() if os.path.realpath(analysis.file) == real
@@ -62,6 +63,8 @@ class Project:
         path = os.path.realpath(analysis.file)
         # The byte order mark overrides the encoding that the XML declaration names. The editor has
         # decoded the text already.
+        # Readers of files get the text in the encoding of a byte-order mark, whatever the
+        # declaration says.
         held = codecs.BOM_UTF8 + analysis.source.data
         before = unsaved.get(path)
         if before is None:
@@ -91,6 +94,7 @@ class Project:
         for uri, other in self.open.items():
             if other is not analysis and other.is_checked:
                 outside = other.subject.list_outside_paths()
+                # Unknown dependencies count as possible ones.
                 if outside is None or path in map(os.path.realpath, outside):
                     result.append(uri)
         return result
@@ -127,6 +131,8 @@ class Project:
         for folder in dict.fromkeys(map(os.path.realpath, folders)):
             for path in list_documents(folder) or ():
                 other = self.get_analysis(path) if os.path.realpath(path) != real else None
+                # A search in the text is much cheaper than an analysis, which most files of a
+                # project do not need.
                 if other is not None and target.item.name in other.text.content:
                     yield other
 
@@ -175,6 +181,7 @@ class Project:
             if not name or any(character in name for character in ILLEGAL_CHARACTERS):
                 raise ModelError(f"'{name}' is not a legal name")
             edits = _compute_setup_edits(own, target, path)
+        # The name itself first, then all references.
         edits.insert(0, types.TextEdit(own.text.range(*place), name))
         changes[self.find_uri(own.file)] = edits
         for other in self.find_documents_naming(target):

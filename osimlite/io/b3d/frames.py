@@ -39,18 +39,22 @@ def decode_frames(
     """
     if not len(rows):
         return {}
+    # The layout of the first frame is taken for all.
     layout = _find_layout(memoryview(rows[0].tobytes()))
     is_number = np.zeros(rows.shape[1], dtype=bool)
     for offset, size in layout.values():
         is_number[offset : offset + size] = True
+    # The bytes between the numbers, tags and lengths, must be equal in all frames.
     structure = rows[:, ~is_number]
     odd = np.flatnonzero((structure != structure[0]).any(axis=1))
     result = {}
     for number, (offset, size) in layout.items():
         if number in names and size:
+            # Protocol Buffers are little-endian.
             numbers = np.ascontiguousarray(rows[:, offset : offset + size]).view("<f8")
             result[names[number]] = numbers.astype(float)
     for index in odd:
+        # A frame whose bytes differ may have its fields in another order.
         _replace_row(result, int(index), rows[index], layout, names)
     return result
 

@@ -98,6 +98,7 @@ SENSOR_FIELDS = {
 
 PASS_FIELDS = {
     1: "positions",
+    # Numbers that are missing here are fields that nimblephysics has removed.
     2: "velocities",
     3: "accelerations",
     4: "moments",

@@ -121,6 +121,7 @@ class B3dTrial:
     def missing_forces(self) -> Array:
         """Numbers (n,) in `MISSING_FORCE_REASONS`: why the forces of a frame are not to be trusted; 0 if they are."""
         reasons = np.array(self.header["missing_forces"][: self.frame_count], dtype=int)
+        # Older files have no reason for some frames.
         # Nimble takes frames without a reason for frames with external forces that were not measured.
         rest = np.full(self.frame_count - len(reasons), 2)
         return np.concatenate([reasons, rest])
@@ -150,6 +151,7 @@ class B3dTrial:
             SettingError: the trial has no such pass.
         """
         if processing_pass is None:
+            # Dynamics is the last step that adds forces; later passes only filter.
             types = [each.type for each in self.passes]
             indices = [index for index, kind in enumerate(types) if kind == DYNAMICS]
             if not types:
@@ -157,6 +159,7 @@ class B3dTrial:
             return indices[-1] if indices else len(types) - 1
         names = [each.name for each in self.passes]
         if isinstance(processing_pass, str):
+            # Of passes of one type the last one counts.
             if processing_pass in names:
                 return len(names) - 1 - names[::-1].index(processing_pass)
         elif 0 <= processing_pass < len(names):
@@ -182,6 +185,7 @@ class B3dTrial:
             DocumentError: a frame is damaged.
         """
         subject = self.subject
+        # All frames of a trial have one size, so a block is read in one piece.
         stride = subject.sensor_frame_size + len(self.passes) * subject.pass_frame_size
         start, size, names = 0, subject.sensor_frame_size, SENSOR_FIELDS
         if processing_pass is not None:
@@ -189,6 +193,7 @@ class B3dTrial:
             size, names = subject.pass_frame_size, PASS_FIELDS
         if not stride:
             return
+        # At least one frame, however large.
         count = max(1, block_bytes // stride)
         with open_file(subject.path) as stream:
             for first in range(0, self.frame_count, count):
@@ -220,6 +225,7 @@ class B3dTrial:
             DocumentError: the trial is damaged.
         """
         blocks = list(self.read_blocks(processing_pass))
+        # A damaged file may have frames of different layouts.
         if any(block.keys() != blocks[0].keys() for block in blocks):
             raise DocumentError(
                 f"the trial '{self.name}' is damaged: its frames have different fields",
@@ -271,6 +277,7 @@ class B3dTrial:
         positions = rows.reshape(len(rows), len(names), VECTOR_SIZE)
         indices = [index for index, name in enumerate(names) if name]
         return tuple(names[index] for index in indices), positions[:, indices]
+# Markers without a name cannot be assigned to the model.
 
     def read_wrenches(self, processing_pass: int | str | None = None) -> Array:
         """Return torque about the origin of ground (N m) and force (N) of the ground on each contact body.
@@ -287,6 +294,7 @@ class B3dTrial:
         arrays = self.read_arrays(self.find_pass(processing_pass))
         shape = (self.frame_count, len(self.subject.contact_bodies))
         wrenches = arrays.get("contact_wrenches", np.zeros(0))
+        # Files before September 2023 have points and torques, but no wrenches.
         if wrenches.any():
             return wrenches.reshape(*shape, WRENCH_SIZE)
         zero = np.zeros((self.frame_count, VECTOR_SIZE * shape[1]))
@@ -294,6 +302,7 @@ class B3dTrial:
             arrays.get(name, zero).reshape(*shape, VECTOR_SIZE)
             for name in ("contact_points", "contact_torques", "contact_forces")
         )
+        # The moment about the origin of ground, from that about the point.
         return np.concatenate([torques + np.cross(points, forces), forces], axis=2)
 
     def read_ground_forces(self, processing_pass: int | str | None = None) -> StoTable:
@@ -311,6 +320,7 @@ class B3dTrial:
         columns, labels = [], list[str]()
         for index, body in enumerate(self.subject.contact_bodies):
             torques, forces = np.split(wrenches[:, index], 2, axis=1)
+            # ExternalLoads apply a force at a point: the centre of pressure.
             points = find_pressure_centers(torques, forces, self.plate_height)
             columns += [forces, points, torques - np.cross(points, forces)]
             name = body.rpartition("/")[2]
@@ -340,6 +350,7 @@ class B3dTrial:
                 array = arrays.get(name, np.zeros((self.frame_count, 0)))
                 selected = array[:, VECTOR_SIZE * plate : VECTOR_SIZE * (plate + 1)]
                 if selected.shape[1] == VECTOR_SIZE:
+                    # The last plates may be missing in a damaged frame.
                     columns.append(selected)
                     labels += [f"plate_{plate + 1}_{part}{axis}" for axis in "xyz"]
         rows = np.concatenate(columns, axis=1) if columns else np.zeros((self.frame_count, 0))
@@ -351,6 +362,7 @@ class B3dTrial:
     def plate_corners(self) -> Array:
         """Corners of the force plates (plates, 4, 3) in ground, m; no plates if they are unknown."""
         corners = np.array(self.header["plate_corners"], dtype=float)
+        # Each plate has four corners of three coordinates.
         if len(corners) % 12 or not np.isfinite(corners).all() or not corners.any():
             return np.zeros((0, 4, VECTOR_SIZE))
         return corners.reshape(-1, 4, VECTOR_SIZE)
@@ -420,6 +432,7 @@ class B3dSubject:
         return self.header["height"]
 
     @property
+    # Nimble writes -1 for an unknown age.
     def age(self) -> int | None:
         """Age of the subject in years; None if it is unknown."""
         return self.header["age"] if self.header["age"] >= 0 else None
@@ -440,6 +453,7 @@ class B3dSubject:
             SettingError: there is no such pass.
         """
         count = len(self.model_texts)
+        # Negative indices count from the last pass, as for lists.
         index = processing_pass + count if processing_pass < 0 else processing_pass
         if not 0 <= index < count:
             raise SettingError(
@@ -524,6 +538,7 @@ def read_b3d(path: str | Path) -> B3dSubject:
         if len(start) < LENGTH_BYTES or not 0 < length <= size - LENGTH_BYTES:
             raise DocumentError(
                 "this is not a .b3d file, or it was cut off within its header", file=file
+            # 1. The header: its length is compared with the file's before memory is taken for it.
             )
         expect_size(length, path)
         data = memoryview(_read_at(stream, LENGTH_BYTES, length, Path(path)))
@@ -533,6 +548,7 @@ def read_b3d(path: str | Path) -> B3dSubject:
     except DamagedMessageError as error:
         raise DocumentError(f"the header of the file is damaged: {error}", file=file) from None
     sensor, processed = header["sensor_frame_size"], header["pass_frame_size"]
+    # 2. The trials: their frames follow each other without gaps.
     trials: list[B3dTrial] = []
     subject = B3dSubject(Path(path), header, sensor_frame_size=sensor, pass_frame_size=processed)
     offset = LENGTH_BYTES + length
@@ -544,6 +560,7 @@ def read_b3d(path: str | Path) -> B3dSubject:
             B3dTrial(subject, values["name"], count, values["time_step"], passes, values, offset)
         )
         offset += count * (sensor + len(passes) * processed)
+    # 3. Header and file must agree to the byte.
     if offset != size:
         raise DocumentError(
             f"the file has {size} bytes, but its header describes {offset}; it was cut off or is damaged",
@@ -591,6 +608,7 @@ def _expect_plausible(header: Mapping[str, Any], file: str) -> None:
     counts = ("dof_count", "sensor_frame_size", "pass_frame_size", "emg_samples")
     problems += [f"'{name}' is {header[name]}" for name in counts if header[name] < 0]
     if len(header["custom_names"]) != len(header["custom_sizes"]) or any(
+        # Sizes of custom values must belong to their names.
         size < 0 for size in header["custom_sizes"]
     ):
         problems.append("its custom values have wrong sizes")
@@ -609,6 +627,7 @@ def _expect_plausible(header: Mapping[str, Any], file: str) -> None:
 def _read_at(stream: BinaryIO, offset: int, size: int, path: Path) -> bytes:
     """Return bytes of a file from an offset on."""
     try:
+        # The position may be beyond what the system allows.
         stream.seek(offset)
         content = stream.read(size)
     except OSError as error:
@@ -640,6 +659,7 @@ def find_pressure_centers(torques: Array, forces: Array, height: float) -> Array
         height: height of the plate, m.
     """
     points = np.zeros_like(forces)
+    # Small vertical forces move the quotient by metres.
     loaded = np.flatnonzero(np.abs(forces[:, 1]) > MIN_PRESSURE_FORCE_N)
     if not len(loaded):
         return points
@@ -648,6 +668,8 @@ def find_pressure_centers(torques: Array, forces: Array, height: float) -> Array
     points[loaded, 1] = height
     points[loaded, 2] = (height * forces[loaded, 2] - torques[loaded, 0]) / up
     frames = np.arange(len(forces))
+    # Frames without load take the point of the nearest loaded frame, so that the curve has no jumps
+    # to the origin.
     after = np.clip(np.searchsorted(loaded, frames), 0, len(loaded) - 1)
     before = np.clip(after - 1, 0, len(loaded) - 1)
     is_nearer = frames - loaded[before] <= np.abs(loaded[after] - frames)

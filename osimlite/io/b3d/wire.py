@@ -57,7 +57,9 @@ def split_message(data: memoryview) -> Iterator[WireField]:
     position, size = 0, len(data)
     while position < size:
         tag, position = _read_varint(data, position)
+        # A tag has the number of the field and, in three bits, its type.
         number, wire_type = tag >> 3, tag & 7
+        # Field numbers begin at 1.
         if not number:
             raise DamagedMessageError("a field has the number 0")
         if wire_type == VARINT:
@@ -86,8 +88,10 @@ def _read_varint(data: memoryview, position: int) -> tuple[int, int]:
         if position + index >= len(data):
             raise DamagedMessageError("the message ends within a number")
         byte = data[position + index]
+        # Seven bits a byte, the lowest first; the eighth says that more follow.
         result |= (byte & 0x7F) << (7 * index)
         if byte < 0x80:
+            # Nimble writes negative integers as 64 bits.
             return result & 0xFFFF_FFFF_FFFF_FFFF, position + index + 1
     raise DamagedMessageError("a number has more than 64 bits")
 
@@ -135,6 +139,7 @@ def decode_message(data: memoryview, schema: Schema) -> dict[str, Any]:
     repeated: dict[str, list[Any]] = {}
     for name, kind, is_repeated in schema.values():
         if is_repeated:
+            # Absent fields have their defaults, nested messages those of their fields.
             repeated[name] = []
         else:
             result[name] = (
@@ -142,6 +147,7 @@ def decode_message(data: memoryview, schema: Schema) -> dict[str, Any]:
             )
     for field in split_message(data):
         declared = schema.get(field.number)
+        # Fields of later versions are passed over.
         if declared is None:
             continue
         values = _decode_values(field, declared)
@@ -161,6 +167,7 @@ def _decode_values(field: WireField, declared: Field) -> list[Any]:
     if kind in ("int", "bool"):
         if isinstance(value, int):
             return [_convert_integer(value, kind)]
+        # Packed: several varints in one field.
         if field.wire_type == BYTES and declared.repeated:
             result, position = [], 0
             while position < len(value):
@@ -188,5 +195,6 @@ def _convert_integer(value: int, kind: str | Schema) -> int | bool:
     """Convert a varint to a truth value or a signed integer of 32 bits; negative ones have 64 bits in the file."""
     if kind == "bool":
         return bool(value)
+    # Two's complement of 32 bits.
     value &= 0xFFFF_FFFF
     return value - (1 << 32) if value >= 1 << 31 else value

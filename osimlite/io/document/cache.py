@@ -34,6 +34,7 @@ class FileCache(Generic[T]):
     def __init__(self, make: Callable[[str], T], size: int) -> None:
         self._make, self._size = make, size
         self._cached: dict[str, tuple[int, T]] = {}
+        # Documents depend on the registered classes.
         add_change_callback(self._cached.clear)
 
     def __call__(self, path: str) -> T | None:
@@ -43,11 +44,13 @@ class FileCache(Generic[T]):
         key = os.path.abspath(path)
         if stamp is None:
             return None
+        # Removed and added again: the dictionary keeps the order of use.
         known = self._cached.pop(key, None)
         if known is None or known[0] != stamp:
             known = stamp, self._make(path)
         self._cached[key] = known
         if len(self._cached) > self._size:
+            # The first key is the one that was used longest ago.
             del self._cached[next(iter(self._cached))]
         return known[1]
 
@@ -83,6 +86,7 @@ def get_object(path: str) -> Object | None:
     """Return the object of a document; None if it cannot be read."""
     try:
         return read_document(Source.from_file(path), of=Object).top
+    # A caller that needs the reason reads the document itself.
     except (OsimliteError, ValueError, RecursionError):
         return None
 
@@ -109,6 +113,7 @@ def read_copy(path: str | Path, of: type[Top]) -> Top:
     from osimlite.io.document.plugins import classes_in_use
 
     file = str(path)
+    # Plug-in classes of the caller are not those of the cached document.
     with classes_in_use(()):
         top = get_object(file) if get_object.has(file) and _has_no_include(file) else None
         if not isinstance(top, of):
@@ -116,6 +121,7 @@ def read_copy(path: str | Path, of: type[Top]) -> Top:
             assert isinstance(document.top, of)
             return document.top
         copied = top.copy_deep()
+        # Relative names in the document are resolved from its file.
         get_layout(copied).file = file
         return copied
 

@@ -132,12 +132,14 @@ class _Writer:
 
     def convert_object(self, item: Object, accepts: type[Object] | None) -> dict[str, Any]:
         data: dict[str, Any] = {}
+        # The class is written only where the property does not say it.
         if type(item) is not accepts:
             data["class"] = type(item).tag
         if item.name and ("name" in item.model_fields_set or not isinstance(item, Unknown)):
             data["name"] = item.name
         if isinstance(item, Unknown):
             return {**data, "class_name": item.class_name, "content": item.content}
+        # Values from <defaults> are written too: data has no such block.
         inherited = item.layout.inherited if item.layout is not None else frozenset()
         for spec in get_field_specs(type(item)).values():
             value = getattr(item, spec.name)
@@ -172,8 +174,10 @@ class _Writer:
         if spec.factory is not None and not default_name:
             default = spec.factory()
             default_name = default.name if isinstance(default, Object) else ""
+        # A name that the property gives anyway is left out.
         if data.get("name") == default_name:
             del data["name"]
+        # A set is written as the list of its members.
         return data["objects"] if data.keys() == {"objects"} else data
 
     def _convert_reference(self, item: Object, reference: Reference, value: Any) -> Any:
@@ -196,7 +200,9 @@ class _Reader:
         self, data: Any, accepts: type[Object], where: str, name: str = ""
     ) -> Object:
         """Return the object that `data` describes, where a property accepts the class `accepts`."""
+        # The count limits what the aliases of YAML can expand to.
         self._count_values(10)
+        # The short form of a set.
         if isinstance(data, list) and "objects" in get_field_specs(accepts):
             data = {"objects": data}
         if not isinstance(data, Mapping):
@@ -223,6 +229,7 @@ class _Reader:
                 raise ModelError(
                     f"{where}: a {cls.tag} has no property '{key}'{suggest_name(str(key), by_name)}"
                 )
+            # A property may be given by its Python name and by its tag.
             if spec.name in values:
                 raise ModelError(f"{where}: '{spec.name}' is given twice, also as '{spec.tag}'")
             values[spec.name] = self._convert_value(value, spec, place)
@@ -274,6 +281,7 @@ class _Reader:
                 return ObjectList(members)
             if data is None and kind.form == "optional":
                 return None
+            # The default tells the name that an object has in this property.
             default = spec.factory() if spec.factory is not None else None
             return self.convert_object(
                 data,
@@ -282,6 +290,7 @@ class _Reader:
                 spec.tag if kind.form == "single" else getattr(default, "name", ""),
             )
         if isinstance(kind, Value) and kind.scalar == "double":
+            # YAML reads "1e-9" as text, and JSON has no infinity.
             data = (
                 [self._parse_number(word) for word in data]
                 if isinstance(data, list)
@@ -295,6 +304,7 @@ class _Reader:
     def _parse_number(self, data: Any) -> Any:
         """Parse a number that JSON cannot represent or that YAML reads as text (1e-9); return others unchanged."""
         self._count_values()
+        # Text that is no number is left to `check`, whose message names the property.
         if isinstance(data, str):
             try:
                 return parse_real(data.strip())
@@ -305,6 +315,7 @@ class _Reader:
     def _count_values(self, weight: int = 1) -> None:
         self.count += weight
         if self.count > MAX_NUMBERS:
+            # Billion-laughs attacks repeat a short list by aliases.
             raise ModelError(
                 "the data has more values than any model; its aliases may repeat it endlessly"
             )

@@ -69,6 +69,7 @@ def get_reading_plan(cls: type[Object]) -> ReadingPlan:
     steps: dict[Any, ReadingStep] = {}
     named: dict[str, FieldSpec] = {}
     for tag, spec in get_field_specs(cls).items():
+        # Elements have encoded names, since XML names cannot contain every character of a tag.
         tag = encode_name(tag)
         if not isinstance(spec.kind, ObjectField):
             steps[tag] = ReadingStep(_TEXT, spec.name, make_converter(spec.kind), spec)
@@ -78,6 +79,7 @@ def get_reading_plan(cls: type[Object]) -> ReadingPlan:
             steps[tag] = ReadingStep(
                 _LIST if spec.kind.form == "list" else _WRAPPED, spec.name, str, spec
             )
+            # Only single objects are found by name; members of a list have names of their own.
             if spec.kind.form == "single":
                 named[spec.tag] = spec
     return ReadingPlan(steps, named)
@@ -171,6 +173,7 @@ class ObjectReader:
             name: name that replaces the attribute `name`.
             skip: child element to skip.
         """
+        # The index counts elements in document order, so it is taken before the children are read.
         number = self.count
         self.count = number + 1
         values: dict[str, Any] = {}
@@ -178,6 +181,7 @@ class ObjectReader:
         present = set(values)
         for key, attribute in element.items():
             if key == "name":
+                # OpenSim's XML has one name for an object; the name of a property overrides it.
                 name = name or str(attribute)
             else:
                 extra = extra or _ExtraContent()
@@ -203,6 +207,8 @@ class ObjectReader:
         steps, named = get_reading_plan(cls)
         extra: _ExtraContent | None = None
         for child in element:
+            # The lookup of a step is the innermost operation of reading, hence one dictionary for
+            # each class.
             step = steps.get(child.tag)
             if step is None:
                 if child is skip:
@@ -211,6 +217,7 @@ class ObjectReader:
                     extra = extra or _ExtraContent()
                     self._read_unknown_tag(child, named, values, extra)
                 continue
+            # OpenSim takes the first of several elements.
             action, field_name, convert, spec = step
             if field_name in values:
                 extra = extra or _ExtraContent()
@@ -227,6 +234,7 @@ class ObjectReader:
             # Most elements are values, so they are read here to save a call for each.
             number = self.count
             self.count = number + 1
+            # Comments inside a value split its text.
             text = child.text or ""
             if len(child):
                 extra = extra or _ExtraContent()
@@ -251,6 +259,7 @@ class ObjectReader:
     ) -> Any:
         """Return the value of a text that OpenSim reads only in part or not at all, and note the problem."""
         missing = unclean.value is ABSENT
+        # An unreadable text gives the default, a readable beginning that part.
         value = self._get_default(cls, spec.name) if missing else unclean.value
         extra.raw[spec.name] = (value, text)
         extra.late.append((unclean.trouble, number, unclean.word, spec, None if missing else value))
@@ -264,12 +273,14 @@ class ObjectReader:
         values: Mapping[str, Any],
     ) -> tuple[Any, list[_PendingNote]]:
         """Read the element of a property that holds objects; return its value, and notes."""
+        # The actions are integers, which are compared faster than strings.
         spec, number = step.spec, self.count
         if step.action == _ONE:
             return self._read_object_or_include(element, spec.accepts), []
         members, late = self._read_members(element, spec)
         if step.action == _LIST:
             return members, late
+        # OpenSim takes the first object of a property that holds one.
         late += [
             ("duplicate-tag", left_out._index, left_out.tag, spec, None) for left_out in members[1:]
         ]
@@ -293,6 +304,7 @@ class ObjectReader:
         if extra.raw:
             get_layout(built).raw = extra.raw
         for kind, where, word, spec, value in extra.late:
+            # Unknown attributes stay with the object, so that writing keeps them.
             if kind in ("include", "unknown-attribute"):
                 get_layout(built).attributes[word] = value
             self.notes.append(Note(kind, where, word, built, spec, value))
@@ -314,6 +326,7 @@ class ObjectReader:
         if not file or self.read_include is None:
             return self.read_object(element, cls, name)
         result, number, known = self.read_include(str(file), cls), self.count, len(self.notes)
+        # The reason why the file is not read is added to the note that the reader made.
         if isinstance(result, str):
             empty: Object = self.read_object(element, cls, name)
             self.notes[known:] = [
@@ -324,6 +337,7 @@ class ObjectReader:
             ]
             return empty
         self.count += count_elements(element)
+        # Objects of another file have no position here: all get that of the element.
         item, include, notes = result
         for part in item.walk():
             object.__setattr__(part, "_index", number)
@@ -332,6 +346,7 @@ class ObjectReader:
             object.__setattr__(item, "__dict__", {**item.__dict__, "name": name})
         get_layout(item).include = include
         self.notes.append(Note("include", number, "file", item, None, str(file)))
+        # Notes of the other file are reported at this element; positions there would mislead.
         self.notes.extend(
             note._replace(number=number) for note in notes if note.kind != "include" or note.why
         )
@@ -376,6 +391,7 @@ class ObjectReader:
             else:
                 add_comment(child, pending)
                 continue
+            # A comment in a list belongs to the member after it, those at the end to the last one.
             if pending:
                 get_layout(member).comments.extend(remark.text for remark in pending)
                 pending = []
@@ -407,6 +423,7 @@ class ObjectReader:
                 for s in named.values()
                 if s.name not in values and _find_accepted_class(child.tag, s.accepts)
             )
+            # The first free property, in the order of the declaration.
             spec = next(free, None)
         if spec is not None and spec.name not in values:
             accepted = _find_accepted_class(child.tag, spec.accepts)
@@ -422,6 +439,7 @@ class ObjectReader:
             return
         else:
             extra.late.append(("unknown-tag", self.count, tag, None, held))
+        # What is not read is kept as text, so that writing loses nothing.
         extra.pending.append(Remark(format_element(child), True))
         self.count += count_elements(child)
 
@@ -447,6 +465,7 @@ class ObjectReader:
                 for piece in (element.text, *(node.tail for node in element))
                 if piece and piece.strip()
             )
+            # Two pieces of text mean that a comment stands in the middle of a value.
             > 1
         ):
             extra.late.append(("child-in-value", number, "!--", spec, None))
@@ -463,6 +482,7 @@ class ObjectReader:
                 result.append(self._read_unknown(child))
                 continue
             item = self.read_object(child, cls)
+            # Of two defaults of a class the first counts.
             self.defaults.setdefault(cls, item)
             result.append(item)
         return result
@@ -477,8 +497,10 @@ class ObjectReader:
         block = self.defaults.get(cls)
         if block is None:
             return frozenset()
+        # Objects inherit neither their name nor what the file gives.
         inherited = frozenset(block.model_fields_set - values.keys() - {"name"})
         for name in inherited:
+            # A copy, since the object may be changed later.
             values[name] = copy.deepcopy(getattr(block, name))
         return inherited
 

@@ -100,6 +100,7 @@ def classes_in(*paths: str | PathLike[str]) -> dict[str, type[Object]]:
     """
     return dict(
         _load_declarations(
+            # The time of modification is a part of the key of the cache.
             tuple((name, get_file_stamp(name)) for name in [fspath(path) for path in paths])
         )
     )
@@ -134,6 +135,7 @@ MAX_VALUES = 1_000_000
 
 class _Declarations:
     """Declarations of one file; its classes are added to those of earlier files."""
+# The classes of earlier files may be bases of this one.
 
     def __init__(self, path: str, found: dict[str, type[Object]]) -> None:
         self.path = path
@@ -176,6 +178,7 @@ class _Declarations:
 
     def find_class(self, name: str, *words: str) -> type[Object]:
         """Return a class by name: OpenSim's, one of an earlier file, or one of this file, made when needed."""
+        # OpenSim's classes are imported one by one; importing all takes half a second.
         if name in MODULES and name not in self.entries:
             return cast("type[Object]", getattr(import_module(MODULES[name]), name))
         if name not in self.found:
@@ -192,6 +195,7 @@ class _Declarations:
                 raise self.make_error(
                     f"{join_words(self.pending)} derive from each other, or hold each other", name
                 )
+            # The list also shows the chain of names in the error.
             # A class that refers to itself while it is being made is found by this list.
             self.pending.append(name)
             self.found[name] = self.make_class(name)
@@ -213,6 +217,7 @@ class _Declarations:
                 name,
             )
         base = self.find_class(
+            # Names with "<" are templates of C++, which have no class here.
             next((word for word in bases if "<" not in word), "Object"), name, "bases", bases[0]
         )
         inside: dict[str, Any] = {
@@ -226,6 +231,7 @@ class _Declarations:
         known = base.field_specs()
         sockets = {row["tag"] for row in self.list_sockets(entry, name)}
         for row in self.list_sockets(entry, name):
+            # Inherited sockets are declared already.
             if row["tag"] not in known:
                 self.add_field(inside, base, row["tag"], *self.parse_socket(row))
         for row in self.list_properties(name):
@@ -256,6 +262,7 @@ class _Declarations:
         default: Any,
     ) -> None:
         """Add a property to the namespace of a new class; attributes of all objects are not overridden."""
+        # A Python attribute must be free and a legal name; the tag stays as it is.
         taken = hasattr(base, tag) or iskeyword(tag) or not tag.isidentifier()
         field = (
             "".join(letter if letter.isalnum() else "_" for letter in tag) + "_" if taken else tag
@@ -298,6 +305,7 @@ class _Declarations:
                 f"there is no kind '{shape}'{suggest_or_list(str(shape), _KINDS)}",
                 owner,
                 name,
+                # The words lead to the line of the error, each searched after the previous one.
                 str(shape),
             )
         legacy = bool(row.get("legacy"))
@@ -344,9 +352,11 @@ class _Declarations:
         default = row.get("default")
         if shape == "optional":
             held = held | None
+            # An optional value without a default is absent.
             if default is None:
                 return held, kind, None
         text = (
+            # Without a default OpenSim's types start at zero, texts empty.
             _ZEROS.get(typed, "")
             if default is None and shape == "single"
             else _format_default(default)
@@ -395,6 +405,7 @@ class _Declarations:
                 owner,
                 name,
             )
+        # An unnamed property has no name to look for, a single object that of the property.
         form = "optional" if shape == "optional" else "unnamed" if row.get("unnamed") else "single"
         named = {"name": name} if form == "single" else {}
         return accepts, ObjectField(cast("Any", form), legacy), make_default(starts, **named)
@@ -478,6 +489,7 @@ class _Declarations:
             message: the message.
             words: the words, as strings of JSON.
         """
+        # The search starts at the classes: "meta" may contain the same words.
         place = max(0, self.text.find('"classes"'))
         for word in words:
             place = max(place, self.text.find(json.dumps(word, ensure_ascii=False), place))

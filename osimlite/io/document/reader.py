@@ -106,6 +106,7 @@ class Document:
         result = [] if self.upgraded is None else self.upgraded.refusals
         if not result:
             return []
+        # An element that the reader passes over is no obstacle for OpenSim either.
         tops = (self.top, *(self.top.layout.defaults if self.top.layout is not None else ()))
         read = {item._index for top in tops for item in top.walk()}
         return [refusal for refusal in result if refusal.owner in read]
@@ -183,8 +184,11 @@ def read_document(source: Source, *, of: type[Object] = Model, to_check: bool = 
             line and column.
     """
     try:
+        # 1. Parse the text; 2. on a syntax error parse a repaired text; 3. make objects of the
+        # tree.
         root = parse_source(source)
         if to_check:
+            # The search for text between elements is needed by the checks only.
             mixed = cast("list[etree._Element]", _MIXED(root))
             source.mixed = (
                 [number for number, each in enumerate(root.iter("*")) if each in mixed]
@@ -228,6 +232,8 @@ def read_tree(
             return _build_document(source, root, version, of, _upgrade_tree(source, root, version))
         document = (
             None
+            # A first attempt without renaming: nearly all files have no old class names, and the
+            # search for them takes time.
             if _find_class(_find_first_element(root)) is None
             else _build_document(source, root, version, of, None)
         )
@@ -273,6 +279,7 @@ def require_stated_version(source: Source) -> None:
     )
     if newer is None:
         return
+    # Positions are found by the index of an element, which counts elements only.
     number = [*root.iter(etree.Element)].index(newer.element)
     message = (
         f"the document says version {version} and holds <{decode_name(newer.element.tag)}> in "
@@ -297,6 +304,7 @@ def _build_document(
     if upgraded is not None:
         notes = _map_to_old_text(source, top, notes, upgraded)
         if isinstance(top, Model) and not is_known:
+            # A current model without a version has been upgraded from its real version.
             _check_leftovers(source, version, notes)
     return Document(top, source, version, notes, upgraded)
 
@@ -338,6 +346,7 @@ def _check_leftovers(source: Source, version: int, notes: list[Note]) -> None:
     """Reject a very old document with unknown elements, which the upgrade would lose."""
     left = [note for note in notes if note.kind in _UNKNOWN_KINDS]
     if version >= FIRST_COMPLETE_VERSION or not left:
+        # Newer documents lose what OpenSim loses as well; of older ones nothing is known.
         return
     tags = ", ".join(f"<{tag}>" for tag in sorted({note.word for note in left})[:8])
     message = (
@@ -366,10 +375,12 @@ def parse_source(source: Source, *, recover: bool = False) -> etree._Element:
     Raises:
         NotWellFormedError: the text is not well-formed (without `recover`), or declares entities.
     """
+    # Namespaces: OpenSim's parser takes a colon for a part of the name.
     # lxml gets UTF-8 whatever the text declares, because the encoding was detected before.
     data = source.data if source.encoding in ("utf-8", "utf-8-sig") else source.text.encode()
     data = replace_colons(data)
     # OpenSim accepts blank lines before the XML declaration, with or without a byte-order mark
+    # The parser would refuse the blanks; their lines are added to positions.
     # before them.
     unmarked = data.removeprefix(BOM_UTF8)
     body = unmarked.lstrip()
@@ -378,6 +389,8 @@ def parse_source(source: Source, *, recover: bool = False) -> etree._Element:
     blank = data[: len(data) - len(body)].count(b"\n")
     plain = has_only_generated_comments(data)
     parser = etree.XMLParser(
+        # No entities, network or DTD: a model file must not read other files, nor expand to
+        # gigabytes.
         encoding="utf-8",
         resolve_entities=False,
         no_network=True,
@@ -403,6 +416,7 @@ def parse_source(source: Source, *, recover: bool = False) -> etree._Element:
         )
     if root.getroottree().docinfo.internalDTD is not None:
         check_doctype(source)
+        # These warnings come with a DOCTYPE only.
         for remark in parser.error_log.filter_types(etree.ErrorTypes.WAR_UNDECLARED_ENTITY):
             # With a DOCTYPE, lxml assumes that an unknown entity is declared elsewhere, and drops
             # it without an error.
@@ -437,6 +451,7 @@ def read_version(source: Source, root: etree._Element) -> int:
     """
     text = root.get("Version")
     # OpenSim reads a 32-bit integer, which only blanks may follow.
+    # `Version="30000 "` is valid for OpenSim, and `Version="3.0"` is not.
     digits = None if text is None else re.fullmatch(r"[ \t\r\n]*\+?0*([0-9]{1,10})[ \t\r\n]*", text)
     number = int(digits[1]) if digits is not None and int(digits[1]) < 2**31 else None
     if root.tag == ROOT and number is not None and number >= OLDEST_VERSION:
@@ -446,6 +461,7 @@ def read_version(source: Source, root: etree._Element) -> int:
 
         if _find_class(root) is not None or root.tag in RENAMED:
             return OLDEST_VERSION
+    # Errors follow; the order is from the worst mismatch to the mildest.
     # Computing a position takes a pass over the text, so it is done for errors only.
     place = source.locate_tag(0)
     if root.tag != ROOT:
@@ -486,6 +502,7 @@ def _guess_root(tag: str, root: etree._Element) -> str | None:
         first is not None
         and find_nearest(decode_name(first.tag), list_tags(), cutoff=85) is not None
     )
+    # A likely object inside, or a similar name, speaks for the root of a document.
     return (
         ROOT
         if held or find_nearest(name, [ROOT], cutoff=85) is not None
@@ -525,11 +542,13 @@ def _read_top(
             else find_nearest(tag, list_tags() if of is Object else [of.tag])
         )
         raise _add_suggestion(source.fault(DocumentError, f"the document holds {what}", at), meant)
+    # Element 0 is the root, 1 the object.
     reader.count = 1
     top = reader.read_top(first, cls)
     for second in first.itersiblings(etree.Element):
         reader.notes.append(Note("second-object", reader.count, decode_name(second.tag)))
         reader.count += count_elements(second)
+    # Comments before an element are listed backwards by lxml.
     for place, nodes in (
         ("comments", [*first.itersiblings(preceding=True)][::-1]),
         ("after", first.itersiblings()),
@@ -562,21 +581,26 @@ def _make_include_reader(
     around_it = source.file
     if around_it is None:
         return None
+    # The list is shared by all files that include each other.
     total = [0] if read is None else read
 
     def read_include(file: str, cls: type[Object]) -> tuple[Object, Include, list[Note]] | str:
         place = Path(around_it).parent / file
         path = os.path.realpath(place)
         if path in around:
+            # A file that includes itself, directly or through others.
             return "is being read already"
         if len(around) == _MAX_INCLUDE_DEPTH:
             return _TOO_DEEP_MESSAGE
         try:
             inner = Source.from_file(place)
+            # Each file counts at least some bytes, so that ten thousand tiny files are refused as
+            # well.
             total[0] += max(_MIN_INCLUDED_BYTES, len(inner.data))
             expect_size(total[0], place)
             root = parse_source(inner)
             version = read_version(inner, root)
+            # An included file may have another version than the one around it.
             if version < CURRENT_VERSION:
                 root = _upgrade_tree(inner, root, version).root
             top = next((child for child in root if is_element(child)), None)
@@ -609,5 +633,6 @@ def pause_collector() -> Iterator[None]:
     try:
         yield
     finally:
+        # The collector may have been off before.
         if enabled:
             gc.enable()

@@ -21,8 +21,10 @@ from osimlite.io.document.source import Source
 from osimlite.io.document.spans import find_markup
 from osimlite.io.document.syntax import check_doctype
 
+# A line that begins with seven brackets is no XML in any case.
 _MARK = re.compile(r"^(?:<{7}|>{7})(?=[ \r]|$).*", re.MULTILINE)
 _HYPHENS = re.compile(r"-{2,}|-\Z")
+# XML has five entities of its own; the others of HTML are known to editors.
 # OpenSim also rejects a character number without a semicolon.
 _AMPERSAND = re.compile(r"&(?!#(?!x?;))(?:([A-Za-z][A-Za-z0-9]{0,31});)?")
 _OWN_ENTITIES = frozenset(("amp", "lt", "gt", "quot", "apos"))
@@ -81,6 +83,7 @@ def read_repaired(
     Raises:
         NotWellFormedError: the meaning is not certain; with line and column of the error.
     """
+    # 1. Refuse what is ambiguous.
     mark = _MARK.search(source.text)
     if mark is not None:
         advice = (
@@ -94,11 +97,13 @@ def read_repaired(
         message = "not well-formed XML: what begins here with '<!' has no end"
         raise source.fault(NotWellFormedError, message, source.position(unended))
     check_doctype(source)
+    # 2. Repair, and parse again.
     text, repairs = repair_text(source.text)
     if not repairs or not source.spans:
         raise fault
     root = parse(Source(text.encode("utf-8", "replace"), source.file))
     spans = source.spans
+    # 3. The repaired text must have the same elements, or positions would be wrong.
     tags = [element.tag for element in root.iter(etree.Element)]
     if len(tags) != len(spans) or any(
         span.tag != decode_name(tag) for span, tag in zip(spans, tags, strict=True)
@@ -126,6 +131,7 @@ def find_elements_at(source: Source, offsets: Sequence[int]) -> Iterator[int]:
     around: list[int] = []
     for offset in offsets:
         while following < count and spans[following].start <= offset:
+            # Leave the elements that end before this one starts.
             while around and spans[around[-1]].end <= spans[following].start:
                 around.pop()
             around.append(following)
@@ -142,6 +148,7 @@ def repair_text(text: str) -> tuple[str, list[Repair]]:
         The repaired text, and the repairs.
     """
     repairs: list[Repair] = []
+    # Form feed and vertical tab are blanks for OpenSim and no XML.
     for match in _BLANK_CONTROLS.finditer(text):
         repairs.append(Repair("control-character", match.start(), f"\\x{ord(match[0]):02x}", " "))
     text = _BLANK_CONTROLS.sub(" ", text)
@@ -154,7 +161,9 @@ def repair_text(text: str) -> tuple[str, list[Repair]]:
         repairs.append(Repair("overlooked", unended.start(1), unended[1], "OpenSim passes over it"))
         text = _replace_by_blanks(unended[0]) + text[unended.end() :]
     pieces: list[str] = []
+    # `depth` counts open elements: text outside of the root is treated differently.
     place = depth = 0
+    # `as_opensim`: comments and sections end where OpenSim's parser ends them.
     for kind, start, end, _ in find_markup(text, as_opensim=True):
         gap, piece = text[place:start], text[start:end]
         pieces.append(
@@ -179,6 +188,7 @@ def repair_text(text: str) -> tuple[str, list[Repair]]:
                 repairs,
             )
         elif kind == "close":
+            # A closing tag without a start tag.
             if not depth:
                 repairs.append(Repair("overlooked", start, piece, "OpenSim passes over it"))
                 piece = _replace_by_blanks(piece)
@@ -209,6 +219,7 @@ def _repair_outside(text: str, offset: int, repairs: list[Repair]) -> str:
     if offset and nul and not before.strip():
         repairs.append(Repair("overlooked", offset + len(before), nul, "OpenSim reads no further"))
         return _replace_by_blanks(text)
+    # A byte-order mark is white space here.
     stripped = text.strip("\ufeff \t\r\n")
     if offset and stripped.startswith("<?") and ">" not in stripped:
         repairs.append(
@@ -228,6 +239,7 @@ def _repair_outside(text: str, offset: int, repairs: list[Repair]) -> str:
 
 def _repair_comment(piece: str, offset: int, repairs: list[Repair]) -> str:
     """Replace hyphens that a comment must not have by dashes."""
+    # Without "<!--" and "-->".
     inner = piece[4:-3]
     result = _HYPHENS.search(inner)
     if result is None:
@@ -242,6 +254,7 @@ def _repair_comment(piece: str, offset: int, repairs: list[Repair]) -> str:
 
 def _repair_attributes(piece: str, offset: int, repairs: list[Repair]) -> str:
     """Remove repeated attributes but the last, which counts for OpenSim."""
+    # The last one counts for OpenSim, the first for most other programs.
     matches = list(ATTRIBUTE.finditer(piece))
     last = {match["name"]: match for match in matches}
     for match in matches:
@@ -283,6 +296,7 @@ def _quote_attributes(piece: str, offset: int, repairs: list[Repair]) -> str:
         )
         return f"{match[0]} "
 
+    # Most tags have no attributes.
     return _VALUE.sub(quote, _TOUCHING.sub(add_blank, piece)) if "=" in piece else piece
 
 
@@ -297,11 +311,13 @@ def _escape_ampersands(text: str, offset: int, repairs: list[Repair]) -> str:
             Repair("overlooked", offset + m.start(), m[0], "OpenSim keeps it")
             for m in _ENDING.finditer(text)
         ]
+        # The end of a CDATA section must not occur in text.
         text = text.replace("]]>", "]]&gt;")
     if "&" not in text:
         return text
 
     def replace_invalid_number(match: re.Match[str]) -> str:
+        # The ranges are those of XML 1.0, section 2.2.
         value = int(match[1], 16) if match[1] else int(match[2])
         if (
             value in (9, 10, 13)
@@ -324,6 +340,7 @@ def _escape_ampersands(text: str, offset: int, repairs: list[Repair]) -> str:
             Repair("bare-ampersand", offset + match.start(), match[0], meant or match[0])
         )
         if meant is None:
+            # Line feeds would move all positions below.
             return "&amp;" + match[0][1:]
         return meant.replace("\n", " ").replace("&", "&amp;").replace("<", "&lt;")
 

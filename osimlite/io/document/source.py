@@ -98,6 +98,7 @@ class Source:
             file: path of the file, if any.
         """
         source = cls(text.encode("utf-8", "replace"), file)
+        # A text in memory is decoded; its declaration may name another encoding.
         source.encoding, source.text = "utf-8", text
         return source
 
@@ -111,6 +112,7 @@ class Source:
             span = self.spans[number]
             result = self._attributes[number] = {}
             for match in ATTRIBUTE.finditer(self.text, span.start, span.tag_end):
+                # The blanks before an attribute go with it when a fix removes it.
                 before = span.start + len(self.text[span.start : match.start()].rstrip())
                 value = match["quoted"][1:-1]
                 result.setdefault(
@@ -121,6 +123,7 @@ class Source:
     @cached_property
     def spans(self) -> Sequence[Span]:
         """Return the spans of all elements in document order; of malformed text, as far as tags can be paired."""
+        # Well-formed text without comments and sections takes a faster search for tags.
         if self.elements is not None:
             plain = PlainSpans(self.text, self.elements)
             if len(plain) == self.elements:
@@ -182,6 +185,7 @@ class Source:
         Only a few positions are needed, and counting line ends is much faster than listing them.
         """
         text = self.text
+        # Only "\r" alone makes lines that a count of "\n" misses.
         if "\r" in text and text.count("\r") != text.count("\r\n"):
             return None
         counts = (
@@ -239,6 +243,7 @@ class Source:
         """
         if not self.spans:
             return self.position(0)
+        # Text that ends within a tag has indices beyond the last span.
         number = min(number, len(self.spans) - 1)
         return self.position(self._starts[number], len(self._tag(number)) + 1)
 
@@ -253,6 +258,7 @@ class Source:
         span = self.spans[number]
         inner = self.text[span.tag_end : span.inner_end]
         if word:
+            # The word must be delimited by white space, so that "1" does not match in "10".
             places = [m.start() for m in re.finditer(rf"(?<!\S){re.escape(word)}(?!\S)", inner)]
             # The word may be a part of a longer one, such as a number before a comma.
             places = places or [m.start() for m in re.finditer(re.escape(word), inner)]
@@ -273,6 +279,7 @@ class Source:
         result = self.get_attributes(number).get(name)
         if result is None:
             return self.locate_tag(number)
+        # The quote before the end is not a part of the value.
         return self.position(result.end - 1 - len(result.value), max(1, len(result.value)))
 
 
@@ -298,11 +305,13 @@ def _detect_encoding(data: bytes) -> str:
     declared = _DECLARED.match(data)
     if name is None and declared is not None:
         # A declaration that was found byte by byte cannot be in an encoding of two bytes.
+        # Python has no codec "cp1252" by the name "windows1252" of some programs.
         word = declared[1].decode().lower().replace("cp125", "windows-125")
         name = word if _BYTEWISE.match(word) else None
     try:
         data.decode(name or "utf-8")
     except (UnicodeError, LookupError, ValueError):
+        # Bytes that are no UTF-8 were nearly always written by Windows programs.
         return "cp1252"
     return name or "utf-8"
 
@@ -322,5 +331,6 @@ def _decode_windows(error: UnicodeError) -> tuple[str, int]:
     byte = error.object[error.start : error.start + 1]
     try:
         return byte.decode("cp1252"), error.start + 1
+    # A few bytes have no character in cp1252; each byte has one in latin-1.
     except UnicodeDecodeError:
         return byte.decode("latin-1"), error.start + 1

@@ -61,12 +61,14 @@ def make_cube() -> Surface:
         for sign in (-1.0, 1.0):
             side = np.zeros((4, 3))
             side[:, axis] = 0.5 * sign
+            # Negative indices give the two other axes in cyclic order.
             side[:, axis - 2] = (-0.5, 0.5, 0.5, -0.5)
             side[:, axis - 1] = (-0.5, -0.5, 0.5, 0.5)
             first = 4 * len(points)
             points.append(side)
             normals.append(np.tile(sign * np.eye(3)[axis], (4, 1)))
             corners = np.array(((0, 1, 2), (0, 2, 3))) + first
+            # Corners run counterclockwise as seen from outside.
             triangles.append(corners if sign > 0.0 else corners[:, ::-1])
     return Surface(
         np.concatenate(points), np.concatenate(triangles), np.concatenate(normals), is_closed=True
@@ -102,11 +104,13 @@ def _revolve_profile(strips: Sequence[Array], slices: int = SLICES) -> Surface:
     first = 0
     for strip in strips:
         for vectors, columns in ((points, strip[:, :2]), (normals, strip[:, 2:])):
+            # Distance from the axis, and height along it.
             out, up = columns[:, :1], np.repeat(columns[:, 1:], slices, axis=1)
             vectors.append(
                 np.stack((out * np.cos(around), out * np.sin(around), up), axis=2).reshape(-1, 3)
             )
         row, k = np.divmod(np.arange((len(strip) - 1) * slices), slices)
+        # The last point of a row is followed by the first.
         a, b = first + row * slices + k, first + row * slices + (k + 1) % slices
         # Points on the axis coincide; leave out the degenerate triangles there.
         apart = np.abs(strip[:, 0]) > 1e-12
@@ -123,9 +127,11 @@ def compute_normals(surface: Surface) -> Array:
     if surface.normals is not None:
         return surface.normals
     a, b, c = (surface.points[surface.triangles[:, index]] for index in range(3))
+    # The cross product is twice the area, which weights the mean.
     areas = np.cross(b - a, c - a)
     total = np.zeros_like(surface.points)
     for index in range(3):
         np.add.at(total, surface.triangles[:, index], areas)
     lengths = np.linalg.norm(total, axis=1, keepdims=True)
+    # A point of no triangle has no normal, and no division by zero.
     return total / np.where(lengths > 0.0, lengths, 1.0)

@@ -36,6 +36,7 @@ MAX_BYTES = 400_000_000
 def _decompress_zlib(block: bytes, size: int) -> bytes:
     """Decompress a block of zlib to at most `size` bytes; raise ValueError for more."""
     stream = zlib.decompressobj()
+    # One byte more than allowed shows that there is more.
     data = stream.decompress(block, size + 1)
     if len(data) > size or not stream.eof:
         raise ValueError
@@ -123,10 +124,12 @@ class _File:
                 content.find(b"_", content.find(b">", mark)) + 1,
                 content.rfind(b"</AppendedData"),
             )
+            # The data begin after an underscore.
             if not 0 < first <= last:
                 raise _Unreadable("the file ends in the middle")
             self.appended, content = content[first:last], content[:first] + content[last:]
         try:
+            # `huge_tree`: meshes have texts beyond the parser's limit of 10 MB.
             parser = etree.XMLParser(resolve_entities=False, no_network=True, huge_tree=True)
             self.root = etree.fromstring(content, parser)
         except etree.XMLSyntaxError as error:
@@ -139,6 +142,7 @@ class _File:
             raise _Unreadable("it is not a VTK file with a surface (type PolyData)")
         section = self.root.find("AppendedData")
         self.raw = section is not None and section.get("encoding") == "raw"
+        # VTK writes the byte order of the machine that wrote the file.
         self.order = ">" if self.root.get("byte_order") == "BigEndian" else "<"
         self.header = np.dtype(
             self.order + _TYPES.get(self.root.get("header_type", "UInt32"), "u4")
@@ -148,6 +152,7 @@ class _File:
             offsets = {int(array.get("offset", "0")) for array in self.root.iter("DataArray")}
         except ValueError:
             raise _Unreadable("one of its offsets is no number") from None
+        # An array ends where the next one begins.
         self.offsets = [*sorted(offsets), len(self.appended)]
 
     def read_surface(self) -> Surface:
@@ -170,9 +175,11 @@ class _File:
             own = self._read_vectors(piece.find("Points/DataArray"))
             points.append(own)
             for around, lengths in self._iterate_polygons(piece, len(own)):
+                # Indices of a piece count from its first point.
                 corners.append(around + count)
                 sizes.append(lengths)
             at_points = self._read_normals(piece, len(own))
+            # Normals of some pieces only would not fit the points of all.
             all_normals = all_normals and at_points is not None
             normals += [] if at_points is None else [at_points]
             count += len(own)
@@ -190,6 +197,7 @@ class _File:
         yield corners, np.diff(ends, prepend=0)
         corners, ends = self._read_cells(piece, "Strips", count)
         for strip in np.split(corners, ends[:-1]) if len(ends) else []:
+            # A strip of n points makes n - 2 triangles.
             if len(strip) >= 3:
                 triangles = split_strip(strip)
                 yield triangles.ravel(), np.full(len(triangles), 3)
@@ -209,6 +217,7 @@ class _File:
             return corners[:0], ends
         if ends[0] < 0 or np.any(np.diff(ends) < 0) or ends[-1] > len(corners):
             raise _Unreadable(f"the offsets of its {tag} do not fit their connectivity")
+        # Corners beyond the last cell are ignored.
         corners = corners[: ends[-1]]
         if len(corners) and not 0 <= corners.min() <= corners.max() < count:
             raise _Unreadable(f"its {tag} name points that are not there")
@@ -218,6 +227,7 @@ class _File:
         data = piece.find("PointData")
         if data is None:
             return None
+        # PointData names its normals in an attribute; "Normals" is VTK's usual name.
         wanted = data.get("Normals", "Normals")
         array = next(
             (item for item in data.iterfind("DataArray") if item.get("Name") == wanted), None
@@ -246,6 +256,7 @@ class _File:
         try:
             match form:
                 case "ascii":
+                    # Text of single precision has more digits than the type holds.
                     exact = self.all_digits and dtype.kind == "f"
                     return np.array(
                         (array.text or "").split(), dtype=np.float64 if exact else dtype
@@ -285,6 +296,7 @@ class _File:
         width = self.header.itemsize
         if not self.compressor:
             size = int(np.frombuffer(stream, self.header, 1)[0])
+            # The size that the header says may be more than is there.
             self._count_bytes(min(size, len(stream)))
             data = stream[width : width + size]
             if len(data) != size:
@@ -297,6 +309,8 @@ class _File:
         blocks = int(np.frombuffer(stream, self.header, 1)[0])
         if not blocks:
             return b""
+        # The header has the number of blocks, their size, the size of the last one, and the
+        # compressed sizes.
         _, whole, last, *sizes = np.frombuffer(stream, self.header, 3 + blocks).tolist()
         # Check the declared size before decompressing anything; no block may be larger.
         self._count_bytes(whole * (blocks - bool(last)) + last)
@@ -314,5 +328,6 @@ class _File:
 
 def _decode_base64(text: bytes) -> bytes:
     """Decode base64 text, in which header and data may be encoded and padded separately."""
+    # "=" ends a part.
     parts = re.findall(rb"[^=]+=*", b"".join(text.split()))
     return b"".join(base64.b64decode(part, validate=True) for part in parts)

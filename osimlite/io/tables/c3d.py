@@ -95,9 +95,11 @@ def _run_reader(path: str | Path, what: str) -> dict[str, Array]:
     # Imported here because most commands never read such a file.
     import subprocess
 
+    # The package is found also if it is not installed but on the path.
     package = str(Path(__file__).parents[3])
     command = [
         sys.executable,
+        # -P: nothing is imported from the current folder.
         "-P",
         "-c",
         PROGRAM,
@@ -114,6 +116,7 @@ def _run_reader(path: str | Path, what: str) -> dict[str, Array]:
             timeout=PATIENCE * seconds,
             check=False,
             cwd=Path(__file__).parent,
+            # One thread of OpenBLAS: its threads count as memory in the limit.
             env={**os.environ, SAFE_PATH: "1", "OPENBLAS_NUM_THREADS": "1"},
         )
     except subprocess.TimeoutExpired:
@@ -126,6 +129,7 @@ def _run_reader(path: str | Path, what: str) -> dict[str, Array]:
         ) from None
     if done.returncode != 0:
         raise DocumentError(f"the file cannot be read: {_find_reason(done)}", file=str(path))
+    # No pickles: the output of a crashed process may be anything.
     with np.load(io.BytesIO(done.stdout), allow_pickle=False) as arrays:
         return dict(arrays)
 

@@ -53,10 +53,13 @@ def read_markers(path: str) -> dict[str, Array]:
     """
     result = import_module("ezc3d").c3d(path)
     points = result["parameters"]["POINT"]
+    # Millimetres are what most systems write.
     unit = METRES_PER_UNIT.get(points["UNITS"]["value"][0].strip().lower(), 0.001)
     names = [
+        # More than 255 labels continue in LABELS2 and so on.
         name for key, more in points.items() if key.startswith("LABELS") for name in more["value"]
     ]
+    # ezc3d has (coordinate, marker, frame).
     positions = np.moveaxis(result["data"]["points"][:3], (2, 1, 0), (0, 1, 2))
     times = (
         _compute_start(result)
@@ -78,7 +81,9 @@ def read_forces(path: str) -> dict[str, Array]:
     result = import_module("ezc3d").c3d(path, extract_forceplat_data=True)
     columns, rows = list[str](), list[Array]()
     for number, plate in enumerate(result["data"]["platform"], start=1):
+        # Positions and moments may have units of their own.
         length = METRES_PER_UNIT.get(plate["unit_position"].strip().lower(), 0.001)
+        # Forces act at the middle of the plate; the moment is about it, as OpenSim reads it.
         middle = np.repeat(
             length * plate["corners"].mean(axis=1)[:, None], plate["force"].shape[1], axis=1
         )
@@ -126,5 +131,6 @@ def _limit_resources(seconds: int) -> None:
         (resource.RLIMIT_CORE, 0),
     ):
         _, hard = resource.getrlimit(kind)
+        # The limit cannot be raised beyond what the system has set.
         most = limit if hard == resource.RLIM_INFINITY else min(limit, hard)
         resource.setrlimit(kind, (most, hard))

@@ -72,6 +72,7 @@ class StoTable(Tabular):
         columns, again = dict[str, Array](), Counter[str]()
         for label, column in zip(self.columns, self.rows.T, strict=True):
             columns[f"{label}.{again[label]}" if again[label] else label] = column
+            # A label may occur several times.
             again[label] += 1
         return {"time": self.times}, columns
 
@@ -131,6 +132,7 @@ def write_sto(
     import shutil
     import tempfile
 
+    # The header states the number of rows, so that rows go to a temporary file first.
     # How many rows there are stands before them.
     with tempfile.TemporaryFile("w+b") as body:
         count = 0
@@ -154,10 +156,12 @@ def read_sto(path: str | Path) -> StoTable:
             rows.extend(row)
         return StoTable(
             stream.name,
+            # `frombuffer` shares the memory of the arrays, without a copy.
             np.frombuffer(times) if times else np.zeros(0),
             stream.columns,
             np.frombuffer(rows).reshape(-1, len(stream.columns))
             if rows
+            # A table without columns still has times.
             else np.zeros((len(times), len(stream.columns))),
             stream.in_degrees,
             stream.header,
@@ -176,6 +180,7 @@ def find_named_file(folder: Path, name: str) -> Path:
         name: name of the file in the document.
     """
     there, here = folder / name, Path(name)
+    # The folder of the document wins; if the file is in neither place, messages name that folder.
     return there if there.is_file() or not here.is_file() else here
 
 
@@ -208,6 +213,7 @@ def expect_increasing_times(times: Array, file: str | None) -> None:
         DocumentError: a time is not finite, is beyond `MAX_TIME_S`, or does not come after the one
             before.
     """
+    # `not <` catches NaN as well.
     odd = np.flatnonzero(~(np.abs(times) < MAX_TIME_S))
     if len(odd):
         raise DocumentError(
@@ -260,9 +266,11 @@ def _format_lines(
 ) -> Iterator[str]:
     """Yield lines of numbers, `size` per value; numbers of named columns must be finite."""
     for time, row in zip(times, rows, strict=True):
+        # Rows are checked one by one, since they may come from a generator.
         if columns and not np.isfinite(values := np.array([*row], dtype=float)).all():
             labels = columns if size == 1 else [column for column in columns for _ in range(size)]
             expect_numbers("results", labels, np.array([time]), values[None])
+        # Integers are written without ".0", as OpenSim does.
         words = [word[:-2] if word.endswith(".0") else word for word in map(repr, map(float, row))]
         if size > 1:
             if len(words) % size:
@@ -279,8 +287,10 @@ def format_adapter_table(table: StoTable) -> Iterator[str]:
     yield "".join(f"{key}={value}\n" for key, value in table.header.items())
     yield f"DataType={table.kind}\nversion=3\nendheader\n"
     ends = list_suffixes(table.kind)
+    # Vectors have one label for all their components.
     labels = [column.removesuffix(ends[0]) for column in table.columns[:: len(ends)]]
     yield "\t".join(("time", *labels)) + "\n"
+    # One format for the complete row is several times faster than one for each number.
     line = "\t".join(["%.16g", *[",".join(["%.16g"] * len(ends))] * len(labels)]) + "\n"
     for row in np.column_stack([table.times, table.rows]).tolist():
         yield line % tuple(row)

@@ -26,6 +26,7 @@ class TableStream:
         self._stream = open_file(path)
         try:
             self._read_header()
+        # Ctrl-C must not leave the file open either.
         except BaseException:
             self.close()
             raise
@@ -44,10 +45,12 @@ class TableStream:
         place, size = self._time, len(self.columns) + 1
         vectors = self.kind != "double"
         for number, data in enumerate(self._stream, start=self.line + 1):
+            # A broken character belongs to a word that is reported, not to an error of decoding.
             line = data.decode("utf-8", "replace")
             self.line, self.text = number, line
             text = line.replace(",", " ") if vectors else line
             try:
+                # The fast path: nearly all rows are plain numbers.
                 row = list(map(float, text.split()))
             except ValueError:
                 row = self._odd(text, number)
@@ -62,6 +65,7 @@ class TableStream:
                     if len(row) < size
                     else find_word_start(text, size),
                 )
+            # The time may be in any column in files of version 1.
             time = row.pop(place)
             yield time, row
 
@@ -72,6 +76,7 @@ class TableStream:
             word = match.group()
             odd = _NO_NUMBER.fullmatch(word)
             if odd:
+                # "-1.#INF" becomes "-inf": the sign, without the digit.
                 word = word[0].replace("1", "") + "inf" if odd.group(1).upper() == "INF" else "nan"
             try:
                 row.append(float(word))
@@ -96,7 +101,9 @@ class TableStream:
                 "the table ends before its column labels", file=self.file, line=result.end.at.line
             )
         labels = [label.text for label in result.labels]
+        # OpenSim accepts "Time" in old files.
         at = next((index for index, label in enumerate(labels) if label.lower() == "time"), None)
+        # Vectors are split into columns, so that the time cannot stand between them.
         if at is None or (at > 0 and self.kind != "double"):
             raise DocumentError(
                 f"the first column is '{labels[0]}'; it must be 'time'",

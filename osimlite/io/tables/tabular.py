@@ -128,11 +128,13 @@ def _describe_columns(
     columns: Mapping[str, Any], units: Mapping[str, str], count: int
 ) -> list[tuple[str, str, str, str]]:
     """Return name, smallest and largest value, and unit of the first columns."""
+    # Imported here: most results are printed without numbers to compare.
     import numpy as np
 
     result = []
     for name, column in islice(columns.items(), count):
         values = np.asarray(column)
+        # Columns of text have no range.
         known = values[np.isfinite(values)] if values.dtype.kind in "iuf" else values[:0]
         low, high = (f"{known.min():.4g}", f"{known.max():.4g}") if known.size else ("-", "-")
         result.append((name, low, high, units.get(name, "")))

@@ -47,6 +47,7 @@ MIDDLE_PART = 0.5
 """Middle part of a range in which fiber lengths are computed; at its ends most muscles reach a limit."""
 
 
+# Poses that cannot be computed give NaN, which the measurements pass over.
 @np.errstate(all="ignore")
 def measure_model(
     model: Model,
@@ -72,15 +73,19 @@ def measure_model(
         NoMachineCodeError: the model has many surfaces, and kernels run as Python only.
     """
     before, still = known if known is not None else (None, None)
+    # Without machine code, models with many surfaces are measured when it is there.
     if compiles and not has_machine_code():
         raise NoMachineCodeError(NEEDS_MACHINE_CODE)
+    # `READY_CODE` uses machine code only if it has been compiled before.
     code = None if compiles else READY_CODE
     paths = Paths(
+        # What an earlier measurement found at rest need not be measured again.
         model, code=code, left_out=still.swept if still is not None else (), mechanism=mechanism
     )
     has_surfaces = any(
         isinstance(route, ThroughPoints) and route.surfaces for route in paths.routes.values()
     )
+    # The same paths along geodesics, which are the reference for OpenSim's wrapping.
     around = paths.rewrap_paths(model, GEODESIC, code) if has_surfaces else None
     _check_loop_count(paths.mechanism)
     start = paths.mechanism.assemble({})
@@ -162,12 +167,14 @@ def _find_length_extremes(
     poses, rows = [MeasuringPose()], [default[None]]
     for sweep in looked_at:
         low, high = sweep.info.range
+        # Rounded, so that values at the bounds of the middle part belong to it.
         inside = np.flatnonzero(
             np.round(np.abs((sweep.values - low) / (high - low) - 0.5), 9) <= 0.5 * MIDDLE_PART
         )
         poses += [sweep.pose(value) for value in sweep.values[inside]]
         rows.append(sweep.lengths[inside])
     lengths = np.concatenate(rows)
+    # Where a path has no length its pose is left out, unless it has none by default either.
     unknown = np.isnan(lengths) & ~np.isnan(default)
     ends = (
         np.argmin(np.where(unknown, np.inf, lengths), axis=0),

@@ -87,10 +87,13 @@ class MuscleFibers(NamedTuple):
         known = dict(
             zip(
                 self.kind.outputs,
+                # Tension and length are compared between muscles, hence relative to strength and
+                # optimal length.
                 map(float, self._call_law(self.kind.law, length, states)),
                 strict=False,
             )
         )
+        # A strength of 0 gives NaN, not an error.
         known["tension"] /= self.component.max_isometric_force or nan
         known["fiber_length"] /= self.component.optimal_fiber_length
         return known
@@ -125,11 +128,13 @@ def find_fibers(
         if kind is None or not muscle.appliesForce or builder.path(muscle) not in wanted:
             continue
         _, *terms = kind.terms
+        # Terms that are bundled are looked at one by one.
         parts = (
             part
             for term in terms
             for part in (term.terms if isinstance(term, Together) else (term,))
         )
+        # Laws with curves or other objects as parameters would have to be compiled.
         if not all(isinstance(part, Fields | Number | Numbers) for part in parts):
             continue
         # Other rules report what OpenSim rejects.
@@ -180,6 +185,7 @@ def compute_reach(
             fibers.get_start_states() | {"activation": 1.0 if is_active else REST_ACTIVATION},
         ),
     )
+    # The names of the smallest fiber length differ between the muscle classes.
     numbers = fibers.values[0]
     least = (
         getattr(numbers, "smallest", getattr(numbers, "shortest", 0.0))

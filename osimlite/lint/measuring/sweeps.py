@@ -55,6 +55,7 @@ class Sweep:
     @property
     def moved(self) -> NDArray[np.bool_]:
         """Flags (p,) of the paths whose length changes."""
+        # `nan_to_num`: a path without a length at some value counts as not moved.
         return np.nan_to_num(np.ptp(self.lengths, axis=0)) > MIN_CHANGE_M
 
     @property
@@ -83,6 +84,7 @@ class Sweep:
 
     def find_poses_before(self, values: Array) -> NDArray[np.intp]:
         """Return the indices (k,) of the poses before values of the coordinate."""
+        # The last interval also serves values at the upper end.
         return np.clip(np.searchsorted(self.values, values), 1, len(self.values) - 1) - 1
 
 
@@ -106,6 +108,7 @@ def sweep_coordinates(paths: Paths, start: Array, others: Container[int] = ()) -
         ):
             continue
         is_tied = bool(are_tied[place])
+        # Each value of a tied coordinate needs an assembly, of which a check can afford few.
         if is_tied and left < TIED_VALUES:
             continue
         left -= is_tied * TIED_VALUES
@@ -118,6 +121,7 @@ def sweep_coordinates(paths: Paths, start: Array, others: Container[int] = ()) -
         )
         if len(poses) > 1:
             result.append((place, poses, is_tied))
+    # All poses are measured in one call, which costs less than one call for each coordinate.
     rows = paths.system.measure_poses(
         np.concatenate([np.empty((0, len(start))), *(poses for _, poses, _ in result)])
     )
@@ -136,6 +140,7 @@ def _find_poses(paths: Paths, start: Array, place: int, values: Array, is_tied: 
         return poses
     result: list[Array] = []
     above = values >= start[place]
+    # From the default outwards, each pose is the guess of the next.
     for away in (poses[above], poses[~above][::-1]):
         for q in away:
             try:
@@ -157,5 +162,6 @@ def find_tied_coordinates(paths: Paths, start: Array) -> Array:
     if not constraints:
         return np.zeros(len(start), dtype=bool)
     state = paths.mechanism.at(start)
+    # A coordinate is tied if it is in the velocity equation of some constraint.
     rows, _ = stack_equations([item.velocity_equations(state) for item in constraints])
     return np.abs(rows).max(axis=0) > 0.0

@@ -45,6 +45,7 @@ def _format_command(finding: Finding) -> str:
 
 def _escape_data(text: str) -> str:
     """Escape a message as GitHub's runner unescapes it."""
+    # The per cent sign first, since the other escapes contain it.
     return escape_unprintable(text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A"))
 
 
@@ -107,7 +108,9 @@ def render_junit(report: Report) -> str:
             etree.SubElement(case, "failure", message=message).text = "\n".join(map(str, bad))
         rest = [finding for finding in findings if not _is_failure(finding)]
         if rest:
+            # Remarks do not fail a test; they are printed with it.
             etree.SubElement(case, "system-out").text = "\n".join(map(str, rest))
+    # Reports know the number of files without findings, not their names.
     for number in range(report.checked - len(by_file)):
         etree.SubElement(
             suite, "testcase", name=f"without findings {number + 1}", classname="osimlite"
@@ -142,6 +145,7 @@ def render_sarif(report: Report) -> str:
     run = {
         "tool": {"driver": driver},
         "columnKind": "unicodeCodePoints",
+        # Columns of osimlite count characters of Unicode, and SARIF's default is UTF-16.
         "results": [_describe_result(finding, places[finding.code]) for finding in report.findings],
     }
     notes = [note.message for note in report.missing_package_notes()]
@@ -174,7 +178,7 @@ def _describe_rule(rule: Rule) -> dict[str, Any]:
 
 
 def _to_camel_case(name: str) -> str:
-    """Return the name of a rule in camel case, as SARIF recomfixes."""
+    """Return the name of a rule in camel case, as SARIF recommends."""
     return "".join(word.capitalize() for word in name.split("-"))
 
 
@@ -199,6 +203,7 @@ def _describe_result(finding: Finding, index: int) -> dict[str, Any]:
     location: dict[str, Any] = {}
     if finding.file is not None:
         path = PurePath(finding.file)
+        # SARIF asks for URIs; a relative path stays relative to the working folder.
         uri = path.as_uri() if path.is_absolute() else quote(os.fsencode(path.as_posix()))
         location["physicalLocation"] = {"artifactLocation": {"uri": uri}}
         if finding.line is not None and finding.column is not None:

@@ -144,6 +144,7 @@ def fold_findings(findings: Iterable[Finding], *, everything: bool = False) -> l
     every = list(findings)
     if everything:
         return [Fold(finding, [], []) for finding in every]
+    # 1. Fold similar findings of each file.
     parts = [
         part
         for group in _group_by(
@@ -166,6 +167,7 @@ def fold_findings(findings: Iterable[Finding], *, everything: bool = False) -> l
             result.append(
                 Fold(first, here, [finding for finding in rest if finding.file != first.file])
             )
+    # 3. Back into the order of the findings.
     place = {id(finding): number for number, finding in enumerate(every)}
     return sorted(result, key=lambda fold: place[id(fold.first)])
 
@@ -253,6 +255,7 @@ def render_full(
             describe_unmeasured(report),
         ),
     ):
+        # A sentence that does not fit beside the summary gets its own line.
         fits = length + 1 + len(more) <= width
         closing, length = (
             f"{closing}{' ' if fits else chr(10)}{more}",
@@ -352,6 +355,7 @@ def _format_snippet(finding: Finding, line: str, colour: bool, width: int) -> li
 def _cut_line(shown: str, start: int, length: int, room: int) -> tuple[str, int, int]:
     """Return the part of a long line around the caret, with dots where it is cut, and the caret's start and length."""
     first = 0
+    # The caret stays in sight, about in the middle of the line.
     if start + length > room - len(_ELLIPSIS):
         first = min(start, max(0, start + min(length, room // 2) - room // 2))
     part = shown[first:]

@@ -46,6 +46,7 @@ def report_missing_mass(subject: Subject, report: FindingCollector) -> None:
         if (
             body.mass != body.mass
             and "mass" not in body.model_fields_set
+            # An unreadable mass is reported as that.
             and not subject.has_note(body, mass)
         ):
             report(f"{describe_object(body)} has no mass: OpenSim rejects the file", body)
@@ -69,6 +70,7 @@ def report_impossible_inertia(subject: Subject, report: FindingCollector) -> Non
     slack = subject.config.value_of(SLACK)
     for body, moments in _list_inertias(subject):
         small, middle, large = moments
+        # A negative moment has OSIM503.
         if small >= 0 and large > (small + middle) * (1 + slack):
             excess = 100 * (large / (small + middle) - 1) if small + middle > 0 else math.inf
             report(
@@ -102,6 +104,7 @@ def report_inertia_not_positive(subject: Subject, report: FindingCollector) -> N
     for body, moments in _list_inertias(subject):
         if moments[0] < -slack * max(map(abs, moments)):
             cause = (
+                # Negative moments on the diagonal are seen; products that are too large are not.
                 "" if min(body.inertia[:3]) < 0 else "; its products are too large for its moments"
             )
             report(
@@ -140,6 +143,7 @@ def report_no_inertia(subject: Subject, report: FindingCollector) -> None:
                 severity=INFO,
             )
         if body.mass > 0 and not any(body.inertia) and not subject.has_note(body, inertia):
+            # The default of OpenSim is zero.
             state = "is zero" if "inertia" in body.model_fields_set else "is not given"
             spins = _spins_freely(subject, body)
             report(
@@ -158,6 +162,7 @@ def _spins_freely(subject: Subject, body: Body) -> bool:
     A ball joint, or any that turns about three axes, always has an axis through the mass center.
     """
     links = build_skeleton(subject).find_joints(body)
+    # Inside a chain the bodies beyond give inertia.
     if len(links) != 1 or links[0].child_base is not body:
         return False
     joint, place = links[0].joint, locate_frame(subject, links[0].child)
@@ -193,6 +198,7 @@ def report_mass_out_of_proportion(subject: Subject, report: FindingCollector) ->
                 suggestion=f"{body.mass / 1000:.6g}",
             )
     for body, moments in _list_inertias(subject):
+        # Without a mass the radius has no meaning.
         if not 0 < body.mass < math.inf:
             continue
         radius = math.sqrt(max(moments[2], 0) / body.mass)
@@ -201,6 +207,7 @@ def report_mass_out_of_proportion(subject: Subject, report: FindingCollector) ->
                 f"the inertia of {describe_object(body)} would need its "
                 f"{format_quantity(body.mass, 'kg')} to be {format_quantity(radius, 'm')} from "
                 "its mass center; is it in kg mm^2?",
+                # kg mm^2 are 1e-6 kg m^2.
                 body,
                 tag="inertia",
                 suggestion=" ".join(f"{number / 1e6:.6g}" for number in body.inertia),

@@ -50,10 +50,12 @@ def report_unknown_class(subject: Subject, report: FindingCollector) -> None:
         )
         suggestion = _find_nearest_class(subject, note, accepted)
         message = f"OpenSim has no class '{note.word}' and {consequence}"
+        # Classes of plug-ins are not misspelt.
         plugin = find_plugin(note.word)
         if plugin:
             message += f"; it belongs to {plugin}: load that first; nothing in it was checked"
         elif suggestion is None or suggestion.lower() != note.word.lower():
+            # The class differs in letter case only: nothing else can be meant.
             message += "; if it belongs to a plug-in, load that first: nothing in it was checked"
         same = suggestion is not None and suggestion.lower() == note.word.lower()
         fix = rename_tag(subject.source, note.number, suggestion, safe=same)
@@ -80,12 +82,14 @@ def _find_nearest_class(subject: Subject, note: Note, accepted: Iterable[str]) -
     missing, added, exchanged or swapped. The class may stand there, OpenSim 4.6 has it, and at
     least half of the elements inside are properties of it.
     """
+    # A namespace prefix belongs to no class name.
     word = note.word.rpartition(":")[2]
     if find_plugin(word):
         return None
     known = [tag for tag in accepted if not _is_later(tag)]
     whole = {note.word.lower(), word.lower()}
     same = [tag for tag in known if tag.lower() in whole]
+    # The tag with the namespace prefix is compared as well, as the colon may be the slip.
     candidates = same or [tag for tag in known if _is_slip(note.word, tag) or _is_slip(word, tag)]
     best = find_nearest(note.word, candidates, cutoff=0) if candidates else None
     if best is None or subject.source is None:
@@ -93,6 +97,7 @@ def _find_nearest_class(subject: Subject, note: Note, accepted: Iterable[str]) -
     children = [subject.source.spans[child].tag for child in subject.source.children(note.number)]
     cls = find_class(best)
     specs = get_field_specs(cls) if cls is not None else {}
+    # Elements that the class does not have point to another class.
     fitting = sum(tag in specs or _is_part(specs, tag) or is_old(cls, tag) for tag in children)
     return best if 2 * fitting >= len(children) else None
 
@@ -103,6 +108,7 @@ def _is_slip(word: str, tag: str) -> bool:
 
     one, other = word.lower(), tag.lower()
     distance = OSA.distance(one, other)
+    # Two letters of a short word are half of it.
     if distance > (2 if len(tag) > 6 else 1):
         return False
     # A prefix such as My or UW makes another class of it.
@@ -244,6 +250,7 @@ def find_wrapper(note: Note, owner: Object) -> str | None:
         owner: object that contains it.
     """
     if note.value is None or find_part(note, owner) is not None:
+        # Such an object has OSIM108.
         return None
     lists = (
         s
@@ -254,6 +261,7 @@ def find_wrapper(note: Note, owner: Object) -> str | None:
         (
             s
             for s in lists
+            # Components may stand there as well, but the specific list is what is meant.
             if s.accepts and issubclass(note.value, s.accepts) and s.tag != "components"
         ),
         None,
@@ -274,6 +282,7 @@ def find_part(note: Note, owner: Object) -> FieldSpec | None:
         free = (
             isinstance(spec.kind, ObjectField)
             and spec.kind.form == "single"
+            # A property that is given has its object already.
             and spec.name not in owner.model_fields_set
         )
         if free and spec.accepts is not None and issubclass(note.value, spec.accepts):
@@ -291,6 +300,7 @@ def _describe_consequence(subject: Subject, note: Note) -> str:
     if spec.kind.form != "single":
         return "leaves the object out"
     attributes = None if subject.source is None else subject.source.get_attributes(note.number)
+    # With the name of the property OpenSim tries to make this object, and fails.
     if attributes is None or ("name" in attributes and attributes["name"].value == spec.tag):
         return "rejects the file"
     return "leaves the object out, and fails where it needs one"
@@ -302,6 +312,7 @@ def find_set(cls: type[Object] | None) -> str | None:
         return None
     for spec in get_field_specs(Model).values():
         members = get_field_specs(spec.accepts).get("objects") if spec.accepts is not None else None
+        # Any component fits into the ComponentSet, so that it says nothing.
         taken = members.accepts if members is not None and spec.tag != "ComponentSet" else None
         if taken is not None and issubclass(cls, taken):
             return spec.tag

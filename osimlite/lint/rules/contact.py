@@ -72,9 +72,11 @@ def _explain_missing_contact(subject: Subject, force: Component, uses: list[Use]
     surfaces = [subject.resolution(use).target for use in uses]
     known = [surface for surface in surfaces if isinstance(surface, ContactGeometry)]
     bases = [find_base(subject, subject.target_of(surface, "socket_frame")) for surface in known]
+    # An unresolved surface or frame may be the partner.
     if len(known) != len(surfaces) or any(base is None for base in bases):
         return ""
     pairs = [*combinations(zip(known, bases, strict=True), 2)]
+    # Surfaces of one body do not move against each other.
     if all(first[1] is second[1] for first, second in pairs):
         return f"surfaces of {describe_object(bases[0])} alone" if bases[0] is not None else ""
     if any(
@@ -107,6 +109,7 @@ def report_contact_listed_twice(subject: Subject, report: FindingCollector) -> N
         words: dict[tuple[int, str], int] = {}
         for use in uses:
             target = subject.resolution(use).target
+            # Equal words are told apart by their position in the list.
             nth = words.get((id(use.holder), use.text), 0)
             words[id(use.holder), use.text] = nth + 1
             if target is None:
@@ -145,6 +148,7 @@ def report_unused_contact_geometry(subject: Subject, report: FindingCollector) -
     if any(broken.use.reference.target in _SURFACES for broken in find_broken_references(subject)):
         # A misspelt name may mean any of them.
         return
+    # A force that lacks a surface has a finding, and the unused surface may be the missing one.
     if any(len(uses) < 2 for _, _, uses in _find_contact_lists(subject)):
         return
     used = {

@@ -94,11 +94,13 @@ def report_default_outside_range(subject: Subject, report: FindingCollector) -> 
     """
     for coordinate in subject.find_instances(Coordinate):
         low, high = coordinate.range
+        # Ranges and defaults are often written with nine digits.
         slack = (
             1e-9 * max(abs(low), abs(high), 1.0)
             if math.isfinite(low) and math.isfinite(high)
             else 0.0
         )
+        # Reversed ranges have OSIM511.
         if low <= high and not low - slack <= coordinate.default_value <= high + slack:
             if not math.isfinite(coordinate.default_value):
                 continue
@@ -139,6 +141,7 @@ def report_locked_and_prescribed(subject: Subject, report: FindingCollector) -> 
         function = coordinate.prescribed_function
         if not (coordinate.locked and coordinate.prescribed) or function is None:
             continue
+        # A constant function at the locked value is no contradiction.
         value = get_constant_value(function)
         if value is None or abs(value - coordinate.default_value) > _ASSEMBLY_ACCURACY:
             report(
@@ -197,6 +200,7 @@ def report_degrees_for_radians(subject: Subject, report: FindingCollector) -> No
     """
     turns, unbounded = subject.config.value_of(ANGLE), subject.config.value_of(UNBOUNDED)
     for joint in subject.find_instances(Joint):
+        # Joints whose coordinates have no fixed meaning are left out.
         for coordinate, motion in zip(joint.coordinates, joint.motion_types or (), strict=False):
             if motion != "rotational" or not isinstance(coordinate, Coordinate):
                 continue
@@ -245,6 +249,7 @@ def get_constant_value(function: Object | None) -> float | None:
         case MultiplierFunction():
             inner = get_constant_value(function.function)
             return None if inner is None else function.scale * inner
+        # The first coefficient is the slope, the second the constant.
         case LinearFunction() if len(function.coefficients) > 1:
             return None if function.coefficients[0] else function.coefficients[1]
         case PolynomialFunction() if function.coefficients:

@@ -55,6 +55,7 @@ def report_made_up_coordinate(subject: Subject, report: FindingCollector) -> Non
             continue
         for axis in list_axes(joint):
             for index, name in enumerate(axis.coordinates):
+                # An unreadable word has a finding of its own.
                 if not isinstance(name, str) or name in declared:
                     continue
                 word, nth = subject.word_at(axis, "coordinates", index)
@@ -89,6 +90,7 @@ def report_axis_without_coordinate(subject: Subject, report: FindingCollector) -
     for joint in subject.find_by_class("CustomJoint"):
         for axis in list_axes(joint):
             function = axis.function
+            # Scaled functions are wrapped.
             while (
                 is_a(function, "MultiplierFunction")
                 and getattr(function, "function", None) is not None
@@ -125,6 +127,7 @@ def report_collinear_axes(subject: Subject, report: FindingCollector) -> None:
     """
     for joint in subject.find_by_class("CustomJoint"):
         axes = list_axes(joint)
+        # OpenSim compares rotations with rotations and translations with translations.
         for kind in (axes[:3], axes[3:]):
             # Of an axis with NaN in it OpenSim's comparison says nothing.
             kind = [axis for axis in kind if not any(map(math.isnan, axis.axis))]
@@ -133,6 +136,7 @@ def report_collinear_axes(subject: Subject, report: FindingCollector) -> None:
                     (
                         other
                         for other in kind[:index]
+                        # `not >=` counts NaN as parallel.
                         if not norm(cross(axis.axis, other.axis)) >= _COLLINEAR
                     ),
                     None,
@@ -176,11 +180,13 @@ def report_idle_coordinate(subject: Subject, report: FindingCollector) -> None:
     """
     for joint in subject.find_by_class("CustomJoint"):
         coordinates = list_coordinates(joint)
+        # Where OpenSim rejects the joint, OSIM405 says why.
         if not coordinates or refuses_axes(joint):
             continue
         columns = {
             coordinate.name: _compute_axis_rates(joint, coordinate) for coordinate in coordinates
         }
+        # A zero column of the joint's Jacobian: the mass matrix is singular.
         idle = [coordinate for coordinate in coordinates if not any(columns[coordinate.name])]
         for coordinate in idle:
             axes = [axis.name for axis in list_axes(joint) if coordinate.name in axis.names]
@@ -195,6 +201,7 @@ def report_idle_coordinate(subject: Subject, report: FindingCollector) -> None:
                 coordinate,
                 attribute="name",
             )
+        # Two coordinates with dependent columns make it singular as well.
         if not idle and _compute_rank(list(columns.values())) < len(columns):
             report(
                 f"the coordinates of {describe_object(joint)} produce the same motion: "
@@ -223,6 +230,7 @@ def _compute_axis_rates(joint: CustomJoint, coordinate: Coordinate) -> list[floa
             if place is None
             else _compute_slope(axis.function, place, values.get(names[0], 0.0))
         )
+        # Square roots of different integers are independent over the rationals.
         # No combination of these numbers is 0 by chance.
         result.append(math.sqrt(2 + number + 7 * (place or 0)) if known is None else known)
     return result
@@ -239,10 +247,13 @@ def _compute_slope(function: Function | None, place: int, first: float) -> float
             inner = _compute_slope(function.function, place, first)
             return 0.0 if function.scale == 0 else None if inner is None else function.scale * inner
         case PolynomialFunction() if place == 0:
+            # OpenSim lists the highest power first.
             degree = len(function.coefficients) - 1
             powers = enumerate(function.coefficients[:-1])
             return sum((degree - n) * weight * first ** (degree - n - 1) for n, weight in powers)
         case SimmSpline() | PiecewiseLinearFunction() | PiecewiseConstantFunction() | GCVSpline():
+            # With different values the slope depends on the pose, which is not worth computing
+            # here.
             return 0.0 if place or len(set(function.y)) < 2 else None
     return (
         0.0
@@ -255,8 +266,10 @@ def _compute_rank(rows: list[list[float]]) -> int:
     """Return the number of linearly independent rows, by elimination."""
     rank = 0
     rows = [row[:] for row in rows]
+    # A joint has six axes.
     for column in range(6):
         pivot = max(range(rank, len(rows)), key=lambda n: abs(rows[n][column]), default=None)
+        # The pivot is the largest number of the column, so that rounding stays small.
         if pivot is None or abs(rows[pivot][column]) < 1e-12:
             continue
         rows[rank], rows[pivot] = rows[pivot], rows[rank]

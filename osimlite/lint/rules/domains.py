@@ -30,10 +30,12 @@ def describe_consequence(
         The consequence, and whether it is a failure.
     """
     is_allowed = rigid_tendon and name == "tendon_slack_length"
+    # A class may say more exactly than its base what happens, hence the order of resolution.
     for base in cls.__mro__:
         facts = base.__dict__.get("facts")
         if facts is None:
             continue
+        # NaN stands for a missing value.
         case = (
             facts.missing
             if number != number
@@ -68,8 +70,10 @@ def report_not_finite(subject: Subject, report: FindingCollector) -> None:
     ```
     """
     for item, spec, value in _find_large_numbers(subject):
+        # A missing mass has the default NaN in OpenSim, and a rule about it.
         if spec.tag == "mass" and value != value and subject.has_note(item, spec):
             continue
+        # A default of NaN that the file does not set is no value of the file.
         if _has_nan(spec.default) and spec.name not in item.model_fields_set:
             continue
         bad = [
@@ -93,6 +97,7 @@ def _describe_nan_consequence(
 ) -> str:
     """Return what OpenSim 4.6 does with NaN or infinity in a property (measured)."""
     assert isinstance(spec.kind, Value)
+    # Lists of the older format are parsed number by number, which fails at "nan".
     if spec.kind.legacy and spec.kind.shape == "list":
         return "OpenSim rejects the file"
     if spec.tag == "gravity" or (spec.tag == "mass" and not number > 0.0):
@@ -127,6 +132,7 @@ def report_impossible_value(subject: Subject, report: FindingCollector) -> None:
     """
     for item, spec, value, verdict in find_outside_domain(subject):
         if verdict.known:
+            # Unknown consequences are reported by OSIM207.
             _report_domain(subject, report, item, spec, value, verdict)
     for item in subject.find_by_class("CoordinateLimitForce"):
         _report_lost_transition(subject, report, item)
@@ -230,6 +236,7 @@ def report_unknown_choice(subject: Subject, report: FindingCollector) -> None:
                 value = getattr(item, spec.name)
                 if spec.name not in item.model_fields_set or subject.has_note(item, spec):
                     continue
+                # The word is marked only in a list; of a single value the complete text is marked.
                 for word in value if isinstance(value, tuple) else (value,):
                     if word not in choices:
                         report(
@@ -305,11 +312,14 @@ def _iterate_outside_domain(subject: Subject) -> Iterator[_OutsideDomain]:
         for obstacle in subject.find_by_class("Scholz2015GeometryPathObstacle")
     }
     for cls, items in subject.by_class.items():
+        # The class of the value is compared, since most values are plain floats and this loop meets
+        # every number of a model.
         for spec, inside in _list_domains(cls):
             assert isinstance(spec.kind, Value)
             for item in items:
                 value = item.__dict__[spec.name]
                 if value is None or (value.__class__ is float and inside(value)):
+                    # Infinity and NaN have the rule OSIM205.
                     continue
                 wrong = [
                     number
@@ -321,10 +331,13 @@ def _iterate_outside_domain(subject: Subject) -> Iterator[_OutsideDomain]:
                     if fails:
                         yield item, spec, value, DomainVerdict(math.nan, "", consequence, fails)
                     continue
+                # The reader noted that the text was not read and the default was used; that default
+                # is not the author's.
                 if not wrong or (
                     subject.has_note(item, spec) and wrong == list(_to_numbers(spec.default))
                 ):
                     continue
+                # A torus radius of 0 makes a sphere, which is a surface.
                 if id(item) in obstacles and (spec.name, wrong[0]) != ("torus_radius", 0):
                     consequence, fails = REFUSED, True
                 else:
@@ -364,6 +377,7 @@ def _report_domain(
         if given
         else f"not given (default {format_quantity(value, spec.kind.unit)})"
     )
+    # Domains are written as comparisons; the message needs words.
     wanted = (
         re.sub(r"^>= (\S+)$", r"\1 or more", verdict.domain)
         .replace(">", "more than")
@@ -381,6 +395,7 @@ def _report_domain(
 def _get_domain(cls: type[Object], spec: FieldSpec) -> str:
     """Return the domain of a property of a class; a class may widen that of its base."""
     assert isinstance(spec.kind, Value)
+    # Facts in the class itself, not inherited ones, replace the domain.
     return (
         cls.facts.domains.get(spec.name, spec.kind.domain)
         if "facts" in cls.__dict__
@@ -422,8 +437,12 @@ def _find_large_numbers(subject: Subject) -> Iterator[tuple[Object, FieldSpec, A
             for spec, name in specs:
                 value = state[name]
                 if value.__class__ is float:
+                    # One comparison excludes NaN as well: with NaN both are false, and the value is
+                    # yielded.
                     if -HUGE < value < HUGE:
                         continue
+                # The sum of a list is huge or NaN if one of its numbers is; sums that cancel are no
+                # such numbers.
                 elif not value or -HUGE < sum(value) < HUGE:
                     continue
                 yield item, spec, value
@@ -450,8 +469,11 @@ def _has_nan(value: Any) -> bool:
 
 def _may_be_infinite(item: Object, spec: FieldSpec) -> bool:
     """Return whether infinity is allowed because it means that there is no bound."""
+    # Times of an analysis may be infinite in both directions, which means from the start, or to the
+    # end.
     if type(item).__name__ == "AnalyzeTool" and spec.tag.endswith("_time"):
         return True
+    # A default of infinity says that the property has no bound unless it is set.
     if any(
         isinstance(number, float) and math.isinf(number) for number in _to_numbers(spec.default)
     ):
@@ -470,6 +492,7 @@ def _find_word(subject: Subject, item: Object, spec: FieldSpec, number: float) -
             value = float(word)
         except ValueError:
             continue
+        # Texts differ from the printed number ("1e3" and "1000"), so the values are compared.
         if value == number or (value != value and number != number):
             return word
     return None

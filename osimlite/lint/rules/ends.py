@@ -57,6 +57,7 @@ def report_ends_in_one_place(subject: Subject, report: FindingCollector) -> None
                 force,
                 attribute="name",
             )
+    # Points of one frame have OSIM612, which does not depend on the pose.
     for path in subject.find_by_class("GeometryPath"):
         owner = subject.owner(path)
         holder = owner if owner is not path else subject.tree.parent_of(path)
@@ -179,6 +180,7 @@ def _find_two_ended_forces(subject: Subject) -> Iterator[tuple[Component, _End, 
     for force in subject.find_by_class("PointToPointActuator"):
         first, second = (subject.target_of(force, f"body{letter}") for letter in "AB")
         ground = subject.model.ground if subject.model is not None else None
+        # OpenSim takes both points as points of ground then.
         if force.points_are_global:
             first, second = ground, ground
         yield force, (first, force.pointA), (second, force.pointB)
@@ -204,6 +206,8 @@ def _coincide(subject: Subject, before: Any, point: Any) -> bool:
         if frame is None:
             return False
         frames.append(frame)
+    # The direction of a segment between points of one body is never needed by the equations of
+    # motion.
     if find_base(subject, frames[0]) is find_base(subject, frames[1]):
         return False
     first = _locate_in_ground(subject, frames[0], before.location)

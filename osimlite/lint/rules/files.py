@@ -42,9 +42,11 @@ def report_missing_mesh(subject: Subject, report: FindingCollector) -> None:
     folder = subject.folder if items else None
     if folder is None:
         return
+    # OpenSim's search order.
     beside = (folder, folder / "Geometry", *(folder / path for path in subject.config.mesh_paths))
     places = [str(path) for path in beside]
     tried = join_words(dict.fromkeys(places))
+    # A hundred meshes lie in one folder, which is listed once.
     remedy = f"name its folder {MESH_FOLDER_HINT}"
     folders = _FolderListings()
     for item, tag, name in items:
@@ -65,6 +67,7 @@ def report_missing_mesh(subject: Subject, report: FindingCollector) -> None:
             f"the file '{name}' of {describe_object(item)} was not found; searched {tried}; "
             f"{remedy}"
         )
+        # `lexists` is true also for broken links.
         if any(os.path.lexists(os.path.join(place, name)) for place in places):
             message = (
                 f"'{name}' of {describe_object(item)} is a folder, a device or a broken link, not "
@@ -75,6 +78,7 @@ def report_missing_mesh(subject: Subject, report: FindingCollector) -> None:
                 f"the file '{name}' of {describe_object(item)} is named '{twin}': systems with "
                 "case-sensitive file names do not find it"
             )
+        # First the same name with slashes, then one in another letter case.
         elif "\\" in name:
             plain = name.replace("\\", "/")
             twin = plain if any(folders.has(place, plain) for place in places) else None
@@ -115,6 +119,7 @@ def report_included_file(subject: Subject, report: FindingCollector) -> None:
         if note.kind != "include" or note.owner is None or not note.value:
             continue
         included = note.owner.layout is not None and note.owner.layout.include is not None
+        # Without a folder the reader could not look for the file, and has no reason.
         read = included or (subject.folder is None and not note.why)
         if note.owner is subject.top:
             report(
@@ -158,6 +163,7 @@ def _has_content(source: Source | None, number: int) -> bool:
     if source is None:
         return False
     # An empty set has empty elements for members and groups.
+    # GUI programs write these empty elements into every set.
     if all(
         source.spans[i].tag in ("objects", "groups") and not source.children(i)
         for i in source.children(number)
@@ -200,6 +206,7 @@ def report_missing_data_file(subject: Subject, report: FindingCollector) -> None
     folders = _FolderListings()
     for item, cls, tag in items:
         name = getattr(item, tag)
+        # "Unassigned" stands for none, except where OpenSim reads the file without a test.
         if name is None or (cls != "PrescribedController" and name.lower() in ("", "unassigned")):
             continue
         if name and any(folders.has(place, name) for place in places):
@@ -225,6 +232,7 @@ class _FolderListings:
     def has(self, place: str, name: str) -> bool:
         """Return whether the folder `place` has a file `name`, which may contain folders."""
         listing, last = self._listing(place, name)
+        # Of ASCII names the listing decides; it saves a call to the system for each mesh.
         if last.isascii() and last.lower() not in listing:
             return False
         # The file system may ignore letter case for other characters, and the name may be that of
@@ -255,6 +263,7 @@ class _FolderListings:
 def _list_lower_case(folder: str) -> dict[str, str]:
     try:
         # The listing of a folder holds until something in it is made, renamed or removed.
+        # The time of modification is a part of the key, so that a new file is seen.
         return _list_folder(folder, os.stat(folder).st_mtime_ns)
     except (OSError, ValueError):
         return {}

@@ -56,12 +56,16 @@ def report_unsorted_abscissae(subject: Subject, report: FindingCollector) -> Non
     ```
     """
     for function in _find_tabulated(subject):
+        # Splines divide by the difference of neighbours; piecewise functions may have two equal
+        # abscissae at a step.
         strictly = isinstance(function, (SimmSpline, GCVSpline))
         for index in range(1, len(function.x)):
             before, here = function.x[index - 1], function.x[index]
             if here < before or (strictly and here == before):
                 rejected = isinstance(function, GCVSpline)
                 is_off = is_unused(subject, function)
+                # Where both values repeat, the slope of 0/0 is never used: SimmSpline gives the
+                # constant.
                 level = (
                     here == before
                     and not rejected
@@ -87,6 +91,8 @@ def report_unsorted_abscissae(subject: Subject, report: FindingCollector) -> Non
                     nth=nth,
                     severity=WARNING if level or is_off else None,
                 )
+                # A reversed order makes many pairs wrong; the first is reported. Equal points are
+                # reported each.
                 if not level:
                     break
 
@@ -152,6 +158,7 @@ def report_too_few_points(subject: Subject, report: FindingCollector) -> None:
         if isinstance(function, SimmSpline):
             least = 2
         elif isinstance(function, GCVSpline):
+            # A GCVSpline of order 2 m needs 2 m points (Woltring's GCVSPL).
             least = 2 * function.half_order
         if isinstance(function, GCVSpline) and function.half_order < 1:
             given = (
@@ -218,6 +225,8 @@ def report_coefficient_count(subject: Subject, report: FindingCollector) -> None
             polynomial.order,
             len(polynomial.coefficients),
         )
+        # The number of monomials of n variables up to order m is (n + m)! / (n! m!). Larger orders
+        # would take very long to compute.
         wanted = (
             comb(dimension + order, order) if 0 <= dimension < 100 and 0 <= order < 100 else given
         )
@@ -232,6 +241,7 @@ def report_coefficient_count(subject: Subject, report: FindingCollector) -> None
                 severity=WARNING if is_off else ERROR,
             )
     for holder, names, function in _find_linear_functions(subject):
+        # The last coefficient is the constant.
         given, wanted = len(function.coefficients), names + 1
         if given and given != wanted:
             # Measured: of ten runs with no coordinate, three computed NaN.
@@ -277,9 +287,11 @@ def report_function_of_several(subject: Subject, report: FindingCollector) -> No
     ```
     """
     for holder, count, held in _find_functions_of_coordinates(subject):
+        # Scaling wraps functions in multipliers, maybe several times.
         function = held
         while isinstance(function, MultiplierFunction):
             function = function.function
+        # Linear functions take any number, which the rule OSIM604 compares.
         wanted = function.dimension if isinstance(function, MultivariatePolynomialFunction) else 1
         if (
             not isinstance(function, (*_ONE_VARIABLE, MultivariatePolynomialFunction))
@@ -341,6 +353,7 @@ def report_missing_function(subject: Subject, report: FindingCollector) -> None:
                     "rejects the file",
                     functions,
                 )
+    # An unknown class may be a function that stands where the property seems empty.
     if subject.has_unknown:
         return
     for kind, properties in _REQUIRED_FUNCTIONS.items():
@@ -398,6 +411,7 @@ def _find_linear_functions(subject: Subject) -> Iterator[tuple[Object, int, Line
         function = held
         while isinstance(function, MultiplierFunction):
             function = function.function
+        # Functions that the upgrade adds have no element, so no author could correct them.
         if isinstance(function, LinearFunction) and (
             function._index is not None or subject.source is None
         ):
@@ -442,5 +456,6 @@ def _describe_refusal(subject: Subject, function: Object) -> str:
 def _find_tabulated(subject: Subject) -> Iterator[Tabulated]:
     for cls in (SimmSpline, GCVSpline, PiecewiseLinearFunction, PiecewiseConstantFunction):
         for function in subject.find_instances(cls):
+            # Functions that the reader adds by default have no element in the text.
             if function._index is not None or subject.source is None:
                 yield cast("Tabulated", function)

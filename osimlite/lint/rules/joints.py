@@ -68,6 +68,7 @@ def report_wrong_coordinate_count(subject: Subject, report: FindingCollector) ->
             [coordinate.name for coordinate in list_coordinates(custom)],
         )
         if refuses_axes(custom) and all(name in declared_names for name in names):
+            # Names that axes use and the joint does not declare belong to other rules.
             unused = [f"'{name}'" for name in declared_names if name not in names]
             reason = f"no axis of {describe_object(custom)} uses {join_words(unused)}"
             if not unused:
@@ -88,6 +89,8 @@ def report_wrong_coordinate_count(subject: Subject, report: FindingCollector) ->
             continue
         wanted = len(joint.motion_types)
         given = len(list_coordinates(joint))
+        # An empty element says that there are no coordinates, where a missing one leaves them to
+        # OpenSim.
         declared = "coordinates" in joint.model_fields_set and (
             given > 0 or _declares_none(subject, joint)
         )
@@ -139,9 +142,11 @@ def report_shared_coordinate_name(subject: Subject, report: FindingCollector) ->
     """
     first: dict[str, Coordinate] = {}
     tree = subject.tree
+    # Forces look a coordinate up by its name, and find the first.
     for component in subject.find_instances(Coordinate):
         joint = tree.parent_of(component)
         known = first.setdefault(component.name, component)
+        # Within one joint the rule on names reports it.
         if known is component or not component.name or tree.parent_of(known) is joint:
             continue
         named = (use for use in subject.uses if use.reference.rule == "coordinate-name")
@@ -217,6 +222,7 @@ def report_stray_joint_frame(subject: Subject, report: FindingCollector) -> None
       </PinJoint>
     ```
     """
+    # Joints that cannot be resolved leave the depths unknown.
     bones = build_skeleton(subject)
     if not bones.complete:
         return
@@ -227,6 +233,8 @@ def report_stray_joint_frame(subject: Subject, report: FindingCollector) -> None
             if base is None or base is link.parent_base or base is link.child_base:
                 continue
             deepest = max(depth.get(id(end), 0) for end in (link.parent_base, link.child_base))
+            # OpenSim adds bodies in the order of their distance from ground; one that is too deep
+            # does not exist yet.
             late = depth.get(id(base), 0) > deepest
             report(
                 f"{describe_object(frame)} of {describe_object(link.joint)} is fixed to "
@@ -270,7 +278,10 @@ def report_gimbal_lock(subject: Subject, report: FindingCollector) -> None:
     """
     for joint in subject.find_instances(Joint):
         turns = find_rotation_axes(subject, joint)
+        # With fewer rotations there is no gimbal lock.
         if len(turns) == 3:
+            # The triple product is the volume that the three unit vectors span: 0 if they are in a
+            # plane.
             (first, one), (_, two), (third, three) = turns
             across = (
                 two[1] * three[2] - two[2] * three[1],

@@ -38,6 +38,7 @@ def report_unknown_attribute(subject: Subject, report: FindingCollector) -> None
     """
     for note, owner in subject.notes_of("unknown-attribute"):
         message = f"OpenSim ignores the attribute '{note.word}' of {describe_object(owner)}"
+        # The author meant a property, and wrote it as an attribute.
         if note.word in get_field_specs(type(owner)):
             message += f"; write <{note.word}>{note.value}</{note.word}> inside"
         suggestion = (
@@ -48,6 +49,7 @@ def report_unknown_attribute(subject: Subject, report: FindingCollector) -> None
         fix = (
             remove_attribute(subject.source, note.number, note.word) if suggestion is None else None
         )
+        # Namespaces are added by editors and do no harm.
         of_xml = INFO if _is_xml_attribute(note.word) else None
         place = subject.attribute_name(note.number, note.word)
         report(
@@ -78,7 +80,9 @@ def _find_ignored_attributes(subject: Subject) -> Iterator[tuple[int, str, str]]
     source = subject.source
     if source is None or not source.attributes:
         return
+    # Attributes of objects have the findings above.
     known = {(note.number, note.word) for note in subject.notes if note.kind == "unknown-attribute"}
+    # What OpenSim does not read has a finding as a whole.
     kept = {note.number for note in subject.notes if note.kind in _UNREAD_KINDS}
     inside = 0
     for number, span in enumerate(source.spans):
@@ -90,6 +94,8 @@ def _find_ignored_attributes(subject: Subject) -> Iterator[tuple[int, str, str]]
         head = source.text[span.start : span.tag_end]
         for match in ATTRIBUTE.finditer(head) if "=" in head else ():
             word = match["name"]
+            # The root has a version; other elements may have a name, or the file of an included
+            # object.
             meant = ("Version",) if number == 0 else ("name", "file")
             if word not in meant and (number, word) not in known:
                 yield number, span.tag, word
@@ -112,6 +118,7 @@ def report_stray_text(subject: Subject, report: FindingCollector) -> None:
     source = subject.source
     if source is None or not source.spans:
         return
+    # Text inside a value that also has elements is reported by OSIM107.
     in_values = [
         (source.spans[note.number].start, source.spans[note.number].end)
         for note in subject.notes
@@ -122,6 +129,7 @@ def report_stray_text(subject: Subject, report: FindingCollector) -> None:
         if any(first < start < last for first, last in in_values) or start >= source.spans[0].end:
             continue
         text = stray.splitlines()[0]
+        # A byte-order mark is invisible.
         shown = "U+FEFF (a byte-order mark)" if text == "\ufeff" else f"'{text}'"
         whole = remove_text(source, start, start + len(stray))
         report(
@@ -134,8 +142,10 @@ def report_stray_text(subject: Subject, report: FindingCollector) -> None:
 def _find_stray_texts(source: Source) -> Iterator[tuple[int, str]]:
     """Yield each text beside elements with its offset; comments do not count."""
     if source.mixed is None:
+        # A ">" inside a value of an attribute would end the tag for the patterns.
         plain = _QUOTED.sub(lambda match: match[0].replace(">", "_"), blank_comments(source.text))
         for start, end in {
+            # Both patterns may find the same text, hence the set.
             match.span(1) for pattern in (_AFTER, _BEFORE) for match in pattern.finditer(plain)
         }:
             yield start, plain[start:end].rstrip()
@@ -143,6 +153,7 @@ def _find_stray_texts(source: Source) -> Iterator[tuple[int, str]]:
     for number in source.mixed:
         begin, around = source.spans[number].tag_end, source.spans[number].inner_end
         inner = [source.spans[child] for child in source.children(number)]
+        # The last pair closes the element: text after its last child.
         for end, behind in (*((span.start, span.end) for span in inner), (around, around)):
             plain = blank_comments(source.text[begin:end])
             if text := plain.strip():
@@ -174,6 +185,7 @@ def report_defaults_block(subject: Subject, report: FindingCollector) -> None:
         report(
             "<defaults> changes the defaults of every model that OpenSim loads later",
             model,
+            # OpenSim registers the defaults for all models of the process.
             number=number,
         )
         for item in source.children(number):
@@ -209,6 +221,7 @@ def report_force_outside_set(subject: Subject, report: FindingCollector) -> None
     - </components>
     ```
     """
+    # One finding for each place, since a model may hold all its muscles there.
     places: dict[int, list[Component]] = {}
     for force in subject.find_instances(Force):
         above = subject.tree.parent_of(force)
@@ -264,6 +277,7 @@ def report_not_upgradable(subject: Subject, report: FindingCollector) -> None:
         return
     told = {note.number for note in subject.notes if note.kind == "child-in-value"}
     for refusal in subject.refusals:
+        # OSIM107 reports what makes the value unreadable.
         if refusal.number in told:
             continue
         report(

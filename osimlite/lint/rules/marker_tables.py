@@ -45,8 +45,10 @@ def report_marker_units(table: Table, report: FindingCollector) -> None:
     )
     if not spreads:
         return
+    # The median is not moved by single wrong markers.
     usual = spreads[len(spreads) // 2]
     if not _MIN_SPREAD_M <= usual * unit <= _MAX_SPREAD_M:
+        # The markers of a person or an animal are spread over 0.2 to 3 m.
         right = next(
             (name for name in ("m", "mm", "cm") if 0.2 <= usual * METRES_PER_UNIT[name] <= 3.0),
             None,

@@ -38,6 +38,7 @@ def report_character_reference(subject: Subject, report: FindingCollector) -> No
         return
     for match in _NUMBERED.finditer(source.text):
         number = int(match[1], 16) if match[1] else int(match[2])
+        # ASCII is read correctly; larger numbers are no characters of Unicode.
         if 127 < number < 0x110000:
             report(
                 f"OpenSim cuts '{match[0]}' to the byte 0x{number & 255:02X}; write the character "
@@ -71,6 +72,7 @@ def report_lenient_xml(subject: Subject, report: FindingCollector) -> None:
     for note in subject.notes:
         if note.kind not in _OVERLOOKED:
             continue
+        # Notes are in the order of the text, so the search continues after the previous word.
         offset = _find_word(source, max(offset + 1, source.line_start(note.line or 1)), note.word)
         place = source.position(offset, len(note.word.splitlines()[0]))
         match note.kind:
@@ -94,6 +96,7 @@ def report_lenient_xml(subject: Subject, report: FindingCollector) -> None:
                     fix=replace_text(source, place, "-"),
                 )
             case "overlooked":
+                # A single unprintable character is named by its code point.
                 odd = len(note.word) == 1 and not note.word.isprintable()
                 what = (
                     f"the character U+{ord(note.word):04X}"
@@ -120,6 +123,7 @@ def report_lenient_xml(subject: Subject, report: FindingCollector) -> None:
                     fix=remove_text(source, offset, offset + len(note.word)),
                 )
     start = source.text.find("<?xml")
+    # Blanks before the declaration are the only text that the reader accepts there.
     if start > 0 and not source.text[:start].strip():
         report(
             "there are blanks before the XML declaration; OpenSim reads the file, other programs "
@@ -221,6 +225,7 @@ def report_closing_tag(subject: Subject, report: FindingCollector) -> None:
     source = subject.source
     if source is None or not _BLANK_BEFORE_END.search(source.text):
         return
+    # Closing tags inside comments are no tags; their length is kept.
     plain = blank_comments(source.text, "-")
     for match in _BLANK_IN_CLOSING.finditer(plain):
         start, end = match.span(1)

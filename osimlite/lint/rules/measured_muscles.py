@@ -44,6 +44,7 @@ def report_start_off_equilibrium(subject: Subject, report: FindingCollector) -> 
     for start in get_measures(subject).starts:
         muscle = subject.tree.find(start.owner)
         (length, settled), (tension, settled_tension) = start.lengths, start.tensions
+        # Only NaN differs from itself.
         if settled != settled:
             report(
                 f"{describe_object(muscle)} has no equilibrium in the default pose: OpenSim fails "

@@ -60,6 +60,7 @@ def report_wrong_wrapping(subject: Subject, report: FindingCollector) -> None:
     ```
     """
     most, measures = subject.config.value_of(OFF), get_measures(subject)
+    # Paths through a surface have OSIM633, which says more.
     told = {item.owner for item in measures.on_surfaces}
     for wrapping in measures.wrappings:
         if abs(wrapping.worst) >= most and wrapping.owner not in told:
@@ -67,6 +68,7 @@ def report_wrong_wrapping(subject: Subject, report: FindingCollector) -> None:
                 subject.tree.find(wrapping.owner),
                 join_words([f"'{name}'" for name in wrapping.surfaces]),
             )
+            # The default pose is mentioned only if it is not the worst pose itself.
             by_default = f"{1000.0 * wrapping.default:.3g} mm in the default pose and by "
             default = by_default if wrapping.pose.values and abs(wrapping.default) >= SHOWN else ""
             report(
@@ -199,6 +201,7 @@ def report_moving_point_range(subject: Subject, report: FindingCollector) -> Non
     ```
     """
     made_up, rate = subject.config.value_of(MADE_UP), subject.config.value_of(RATE)
+    # A limit force keeps the coordinate in its range, so that the rate beyond does not matter.
     limits = subject.find_by_class("CoordinateLimitForce")
     kept = {
         item.name
@@ -208,6 +211,7 @@ def report_moving_point_range(subject: Subject, report: FindingCollector) -> Non
     worst: dict[tuple[str, str], MovingPoint] = {}
     for point in get_measures(subject).moving_points:
         if point.moved >= made_up or (point.rate >= rate and point.end.coordinate not in kept):
+            # One finding for each point: the largest motion, then the largest rate.
             other = worst.setdefault((point.owner, point.point), point)
             worst[point.owner, point.point] = max(
                 other, point, key=lambda it: (it.moved >= made_up, it.moved, it.rate)

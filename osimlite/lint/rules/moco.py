@@ -46,11 +46,13 @@ def report_impossible_bounds(setup: Setup, report: FindingCollector) -> None:
     for item in chain.from_iterable(
         map(setup.find_by_class, ("MocoBounds", "MocoVariableInfo", "MocoScaleFactor"))
     ):
+        # Initial and final bounds are intervals inside the bounds of the phase.
         for tag in ("bounds", "initial_bounds", "final_bounds"):
             ends: tuple[float, ...] = getattr(item, tag, ())
             whole: tuple[float, ...] = item.bounds
             if len(ends) == 2 and ends[0] > ends[1]:
                 report(f"bounds from {ends[0]:g} to {ends[1]:g}: OpenSim fails", item, tag=tag)
+            # Reversed bounds of the phase have a finding of their own.
             elif (
                 ends
                 and whole
@@ -70,6 +72,7 @@ def report_impossible_bounds(setup: Setup, report: FindingCollector) -> None:
             largest = max(filter(math.isfinite, map(abs, bounds)), default=0.0)
             if (
                 info.name.endswith("/value")
+                # Bounds of speeds and of translations may well be larger.
                 and coordinate_name(info.name) in angles
                 and largest > 10.0
             ):
@@ -80,6 +83,7 @@ def report_impossible_bounds(setup: Setup, report: FindingCollector) -> None:
                     severity=WARNING,
                 )
         for bounds in (phase.time_initial_bounds, phase.time_final_bounds):
+            # Only a time that the setup writes without bounds; the default of Moco has none either.
             if bounds._index and not bounds.bounds:
                 report(
                     "a time without bounds is free: the optimizer seldom converges",
@@ -162,6 +166,7 @@ def report_study_data(setup: Setup, report: FindingCollector) -> None:
                 tag="filepath",
             )
     for item in setup.items:
+        # Disabled goals are not read.
         for spec in get_member_specs(type(item)) if getattr(item, "enabled", True) else ():
             held = getattr(item, spec.name)
             assert spec.names is not None and spec.accepts is not None
@@ -172,6 +177,7 @@ def report_study_data(setup: Setup, report: FindingCollector) -> None:
             table = setup.read_table(name)
             if table is not None and spec.names.target == "state variable":
                 said = table.entries.get("inDegrees")
+                # Moco accepts only these two spellings.
                 if said is None or said.value.text not in ("yes", "no"):
                     report(
                         f"'{name}' must say inDegrees=yes or inDegrees=no: OpenSim rejects the "
@@ -202,6 +208,7 @@ def report_study_data(setup: Setup, report: FindingCollector) -> None:
                     held,
                     tag=tag,
                 )
+    # Operators of a ModelProcessor may add muscles and reserves that the guess has columns for.
     if setup.tree is None or any(setup.find_by_class("ModelOperator")):
         return
     for item, guess in setup.iterate_with_tables(setup.find_having("guess_file"), "guess_file"):
@@ -214,11 +221,13 @@ def report_study_data(setup: Setup, report: FindingCollector) -> None:
 def _describe_guess_fault(setup: Setup, tree: Tree, guess: Table) -> str:
     """Return what is wrong with the columns of a trajectory; empty if nothing is."""
     wanted = set(find_variables(tree, "state or control variable")) | {
+        # Parameters are columns of a guess as well.
         item.name for item in setup.find_by_class("MocoParameter")
     }
     columns = {
         column
         for column in guess.columns
+        # Other columns, such as multipliers and slacks, are named without a path.
         if column in wanted or (column.startswith("/") and "/implicitderiv_" not in column)
     }
     missing, more = sorted(wanted - columns), sorted(columns - wanted)
@@ -232,6 +241,7 @@ def _describe_guess_fault(setup: Setup, tree: Tree, guess: Table) -> str:
         what: guess.entries[key].value.text if (key := f"num_{what}") in guess.entries else ""
         for what in _COUNTED
     }
+    # A number for input controls was added later, and older files lack it.
     odd = next((what for what in _COUNTED[:-1] if not said[what].isdecimal()), None)
     if odd is not None:
         return f"must say how many of its columns are {odd} (num_{odd}=...)"
@@ -242,6 +252,7 @@ def _describe_guess_fault(setup: Setup, tree: Tree, guess: Table) -> str:
     if total != count:
         return f"has {count} columns, and {total} by the counts in its header"
     states = find_variables(tree, "state variable")
+    # OpenSim reads the first columns as states, by their number.
     odd = next(
         (column for column in guess.columns[: int(said["states"])] if column not in states), None
     )
@@ -301,6 +312,7 @@ def report_study_parts(setup: Setup, report: FindingCollector) -> None:
         if hasattr(goal, "contact_groups") and goal.enabled:
             loads = goal.external_loads or setup.read_document(goal.external_loads_file)
             names = [force.name for force in getattr(loads, "objects", ())]
+            # Without readable loads there is nothing to compare.
             for group in goal.contact_groups if names else ():
                 if group.external_force_name not in names:
                     report(
@@ -338,6 +350,8 @@ def report_study_parts(setup: Setup, report: FindingCollector) -> None:
         if any(map(setup.find_by_class, ("MocoStudy", "MocoTool")))
         else ()
     ):
+        # Moco needs speeds that are rates of coordinates (no ball joints), and no locked
+        # coordinates.
         for joint in tree.find_by_class("Joint").values():
             faults = [
                 f"{describe_object(item)} is locked"
@@ -348,6 +362,7 @@ def report_study_parts(setup: Setup, report: FindingCollector) -> None:
                 faults.append(
                     f"{describe_object(joint)} has speeds that are not the rates of its coordinates"
                 )
+            # A weld that an operator puts in the place of the joint removes both obstacles.
             for fault in faults if tree.path_of(joint) not in welded else ():
                 report(f"{fault}: Moco rejects the model", processor, tag="filepath")
 
@@ -358,6 +373,7 @@ def _describe_property_fault(parameter: Any, component: Component) -> str:
     spec = get_field_specs(type(component)).get(name)
     if spec is None:
         return f"{describe_object(component)} has no property '{name}'"
+    # A MocoParameter optimizes a number, a vector of three, or an inertia of six.
     size = spec.kind.size if isinstance(spec.kind, Value) and spec.kind.scalar == "double" else None
     if size not in (1, 3, 6):
         return f"{name} of {describe_object(component)} is not one, three or six numbers"

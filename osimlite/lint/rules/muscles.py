@@ -133,6 +133,7 @@ def report_out_of_reach(subject: Subject, report: FindingCollector) -> None:
             continue
         length = sum(math.dist(*pair) for pair in pairwise(points))
         tells = f"the path of {describe_object(muscle)} is {length:.4g} m long in the default pose"
+        # A path around a surface is longer than its straight line.
         if length < slack and not path.path_wrap_set.objects:
             report(
                 f"{tells}, less than its tendon_slack_length, {slack:.4g} m",
@@ -172,8 +173,10 @@ def report_shared_time_constants(subject: Subject, report: FindingCollector) -> 
     """
     first = None
     for muscle in subject.find_by_class("DeGrooteFregly2016Muscle"):
+        # Without activation dynamics the constants are not used.
         if muscle.ignore_activation_dynamics:
             continue
+        # OpenSim 4.6 shares the constants by mistake: the first such muscle sets them.
         first = first or muscle
         for tag in _SHARED_CONSTANTS:
             own, counts = getattr(muscle, tag), getattr(first, tag)
@@ -204,6 +207,7 @@ def _locate_path_points(subject: Subject, path: GeometryPath) -> list[Vector]:
             coordinate = subject.target_of(point, "socket_coordinate")
             if not isinstance(coordinate, Coordinate):
                 return []
+            # A point outside its range is not a part of the path.
             if not point.range[0] <= coordinate.default_value <= point.range[1]:
                 continue
         places.append(

@@ -41,12 +41,14 @@ def report_short_path(subject: Subject, report: FindingCollector) -> None:
         owner = subject.tree.parent_of(path)
         if len(points) > 1 or owner is None:
             continue
+        # A path that the upgrade added is reported at its owner.
         if path._index is not None or subject.source is None:
             report(
                 f"the path of {describe_object(owner)} has {format_count(len(points), 'point')} and "
                 "needs two",
                 path,
             )
+        # An element that was not read may be the path, and has a finding.
         elif not any(note.owner is owner and note.kind in _NOT_READ for note in subject.notes):
             report(f"{describe_object(owner)} has no path: OpenSim rejects the model", owner)
     for path in subject.find_by_class("Scholz2015GeometryPath"):
@@ -101,14 +103,17 @@ def report_coincident_path_points(subject: Subject, report: FindingCollector) ->
     for path in subject.find_instances(GeometryPath):
         points: list[Object] = list(path.path_point_set.objects)
         for before, point in pairwise(points):
+            # Conditional and moving points are not always there.
             if type(before) is not PathPoint or type(point) is not PathPoint:
                 continue
             if (
                 before.location != point.location
+                # `not >` includes NaN.
                 and not math.dist(before.location, point.location) <= nearest
             ):
                 continue
             frame = subject.target_of(point, "socket_parent_frame")
+            # Equal coordinates in different frames are different points.
             if frame is not None and frame is subject.target_of(before, "socket_parent_frame"):
                 owner = subject.tree.parent_of(path)
                 report(
@@ -172,17 +177,21 @@ def _report_unreachable(
         if isinstance(joint, Joint) and joint.motion_types
         else None
     )
+    # Where the function of the joint is unknown, the coordinate is taken for an angle.
     turns = motion != "translational"
+    # Two per cent of the range allow for rounded numbers of degrees.
     slack = 0.02 * (high - low) + 1e-5
     meant = (radians(first), radians(last))
     fits = (
         turns
+        # An angle beyond half a turn is unusual in radians.
         and max(abs(first), abs(last)) > pi
         and low - slack <= meant[0]
         and meant[1] <= high + slack
     )
     never = last < low - 1e-5 or first > high + 1e-5
     # A range in degrees may begin at 0 or end there, which is in the range in radians too.
+    # Two turns: no joint's range in radians reaches so far.
     if never or (fits and max(abs(first), abs(last)) > 4.0 * pi):
         unit = "rad" if turns else "m"
         verb = "lies outside of" if never else "goes far beyond"
@@ -215,6 +224,7 @@ def report_unused_wrap_object(subject: Subject, report: FindingCollector) -> Non
     ```
     """
     surfaces = list(subject.find_instances(WrapObject))
+    # An unknown class may be a path.
     if not surfaces or subject.has_unknown:
         return
     used = {
@@ -248,6 +258,7 @@ def report_moving_point_coordinates(subject: Subject, report: FindingCollector) 
     for point in subject.find_by_class("MovingPathPoint"):
         tags = ("socket_x_coordinate", "socket_y_coordinate", "socket_z_coordinate")
         x, *others = (subject.target_of(point, tag) for tag in tags)
+        # Missing sockets have rules of their own.
         for tag, other in zip(tags[1:], others, strict=True):
             if x is not None and other is not None and other is not x:
                 report(

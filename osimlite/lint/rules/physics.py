@@ -54,11 +54,14 @@ def report_strange_gravity(subject: Subject, report: FindingCollector) -> None:
     model = subject.model
     assert model is not None
     size = math.sqrt(sum(part * part for part in model.gravity))
+    # NaN and infinity have OSIM205.
     if not math.isfinite(size):
         return
     if size > subject.config.value_of(GRAVITY):
+        # 9.81 m/s^2 are 9810 mm/s^2.
         unit = "; is it in millimetres?" if 9000 < size < 11000 else ""
         report(f"gravity is {format_quantity(size, 'm/s^2')}{unit}", model, tag="gravity")
+    # Numbers of the order of rounding, relative to the gravity, are no direction.
     elif model.gravity[1] > 1e-9 * size and model.gravity[1] > 0.9 * size:
         report("gravity points up: Y is the upward axis in OpenSim", model, tag="gravity")
 
@@ -83,6 +86,7 @@ def report_friction_order(subject: Subject, report: FindingCollector) -> None:
     ```
     """
     for material in subject.find_instances(HuntCrossleyContactParameters):
+        # Negative coefficients have OSIM207.
         if 0 <= material.static_friction < material.dynamic_friction:
             report(
                 f"static friction of {subject.describe(material)}, "
@@ -141,7 +145,9 @@ def report_limit_outside_range(subject: Subject, report: FindingCollector) -> No
     ```
     """
     for force, coordinate, scale, low, high in _find_limits(subject):
+        # Limits of angles are in degrees in OpenSim, those of lengths in metres.
         unit = "m" if scale == 1.0 else "deg"
+        # The limit force acts from the transition on; 1e-6 allows for rounded numbers.
         slack = abs(force.transition) + subject.config.value_of(BEYOND) * (high - low) + 1e-6
         for tag, limit, outside in (
             ("upper_limit", force.upper_limit, force.upper_limit > high + slack),
@@ -197,6 +203,7 @@ def report_limit_inside_range(subject: Subject, report: FindingCollector) -> Non
             # given.
             widest = math.degrees(subject.config.value_of(UNLIMITED))
             given = tag in force.model_fields_set and (unit == "m" or high - low < widest)
+            # Swapped limits have OSIM507.
             if inside and given and force.lower_limit <= force.upper_limit:
                 meant = math.degrees(limit)
                 # Both limits are as small as angles in radians are, and one is a bound of the range
@@ -229,6 +236,8 @@ def _drives_sliding(subject: Subject, material: HuntCrossleyContactParameters) -
         if isinstance(force, HuntCrossleyForce)
         else 0.0
     )
+    # Simbody's curve (Hunt and Crossley, Sherman) peaks near twice the static coefficient times the
+    # relative speed.
     return 2 * material.static_friction + viscous < material.dynamic_friction
 
 
@@ -253,5 +262,6 @@ def _find_limits(
         )
         if motion is not None:
             scale = 180 / math.pi if motion == "rotational" else 1.0
+            # A reversed range has OSIM511.
             low, high = sorted(bound * scale for bound in coordinate.range)
             yield force, coordinate, scale, low, high

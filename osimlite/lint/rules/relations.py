@@ -58,6 +58,7 @@ def report_contradicting_values(subject: Subject, report: FindingCollector) -> N
       </WrapObjectSet>
     ```
     """
+    # A number outside its domain is reported already, and would give a second message here.
     strange = {id(item) for item, *_ in find_outside_domain(subject)}
     for cls, items in subject.by_class.items():
         relation = next(
@@ -111,13 +112,16 @@ def _make_curve_relation(make: Callable[..., object]) -> _Relation:
 
     def contradiction(curve: Any, owner: Any) -> Iterator[Contradiction]:
         used = {name: getattr(curve, name) for name in type(curve).__annotations__}
+        # NaN and infinity have OSIM205.
         if not all(value is None or math.isfinite(value) for value in used.values()):
             return
+        # Muscles overwrite some properties of their curves.
         overwritten = owner.overwritten if is_a(owner, "Muscle") else {}
         used |= {name: overwritten[name] for name in used.keys() & overwritten.keys()}
         try:
             make(*used.values())
         except ValueError as error:
+            # The message names the property as its second word.
             word = str(error).split()[1].rstrip(",")
             yield word if word in used else None, str(error)
 
@@ -134,6 +138,7 @@ def _check_function_based_path(path: Any, owner: Any) -> Iterator[Contradiction]
     if arms and len(arms) != count:
         given = f"{len(arms)} functions for {format_count(count, 'coordinate')}"
         yield "moment_arm_functions", f"moment_arm_functions has {given}"
+    # The speed depends on all coordinates and their speeds.
     functions = [("length_function", path.length_function, count)]
     functions += [("moment_arm_functions", arm, count) for arm in arms]
     functions.append(("lengthening_speed_function", path.lengthening_speed_function, 2 * count))

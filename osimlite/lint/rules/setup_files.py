@@ -51,8 +51,10 @@ def report_missing_input(setup: Setup, report: FindingCollector) -> None:
     ```
     """
     for naming in setup.find_named_files("file"):
+        # A file that another setup of the project writes may come into being later.
         if os.path.isfile(naming.path) or setup.find_writer(naming.path):
             continue
+        # Backslashes work on Windows, where OpenSim is mostly used.
         slashed = naming.name.replace("\\", "/")
         is_meant = slashed != naming.name and os.path.isfile(setup.resolve_path(slashed))
         twin = slashed if is_meant else _find_other_case(naming)
@@ -64,11 +66,13 @@ def report_missing_input(setup: Setup, report: FindingCollector) -> None:
             f"{consequence}",
             naming.item,
             tag=naming.spec.tag,
+            # This property lists several files; the word is marked.
             word=naming.name if naming.spec.tag == "force_set_files" else None,
             suggestion=twin,
             certain=True,
         )
     for maker in setup.find_having("marker_set_file"):
+        # An empty name differs from a missing one, which OpenSim takes for none.
         if "marker_set_file" in maker.model_fields_set and not maker.marker_set_file.strip():
             report(
                 f"marker_set_file of {describe_object(maker)} is empty: OpenSim rejects the "
@@ -88,6 +92,7 @@ def report_missing_input(setup: Setup, report: FindingCollector) -> None:
                 )
         if (
             is_a(item, "MocoPhase")
+            # A phase inside a study, which needs a model of its own.
             and item is not setup.top
             and not (item.model.filepath or getattr(item.model.model, "_index", None))
         ):
@@ -118,6 +123,7 @@ def report_missing_input(setup: Setup, report: FindingCollector) -> None:
 
 def _find_other_case(naming: FileReference) -> str | None:
     folder, last = os.path.split(naming.path)
+    # Windows and macOS find files whatever the letter case, Linux does not.
     try:
         twin = next(
             (
@@ -196,6 +202,7 @@ def report_lost_output(setup: Setup, report: FindingCollector) -> None:
     if setup.folder is None:
         return
     for naming in setup.find_named_files("output-folder"):
+        # OpenSim creates one folder, not its parents.
         above = os.path.dirname(os.path.abspath(os.path.join(setup.folder, naming.name)))
         if not os.path.isdir(above):
             report(
@@ -212,6 +219,7 @@ def report_lost_output(setup: Setup, report: FindingCollector) -> None:
                 severity=INFO,
             )
     # A tool makes its own folder before it writes.
+    # Folders that a tool makes exist when it writes.
     made = {os.path.normpath(naming.name) for naming in setup.find_named_files("output-folder")}
     for naming in setup.find_named_files("output-file"):
         folder = os.path.dirname(naming.name)
@@ -237,6 +245,7 @@ def report_lost_output(setup: Setup, report: FindingCollector) -> None:
             )
     for tool in setup.find_by_class("InverseKinematicsTool"):
         folder, name = os.path.normpath(tool.results_directory or "."), tool.output_motion_file
+        # Only in inverse kinematics; other tools write into the folder for results.
         if folder != "." and name and not os.path.dirname(name):
             report(
                 f"'{name}' is written beside the setup: results_directory does not apply to it",
@@ -276,6 +285,7 @@ def report_tools_differ(setup: Setup, report: FindingCollector) -> None:
     ```
     """
     if (
+        # A set that is read by a tool has no motion itself.
         setup.tool is None
         or setup.tool[1] is not setup.top
         or not (mine := find_motion_file(*setup.tool))
@@ -298,6 +308,7 @@ def report_tools_differ(setup: Setup, report: FindingCollector) -> None:
                 and two is not None
                 and _is_set(two)
                 and not _is_set(one)
+                # Each setting is reported once, however many tools differ.
                 and tag not in told
             ):
                 told.add(tag)

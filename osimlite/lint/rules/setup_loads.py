@@ -77,6 +77,7 @@ def report_load_columns(setup: Setup, report: FindingCollector) -> None:
                     severity=INFO,
                 )
                 continue
+            # A pure torque needs no force, unless it has a point.
             if not force.force_identifier and (
                 force.point_identifier or not force.torque_identifier
             ):
@@ -95,8 +96,11 @@ def report_load_columns(setup: Setup, report: FindingCollector) -> None:
                 )
             for tag in ("force_identifier", "point_identifier", "torque_identifier"):
                 prefix = getattr(force, tag)
+                # An empty identifier turns this part of the load off.
                 if not prefix:
                     continue
+                # OpenSim compares the beginnings of labels, so that "ground_force_v" matches
+                # "ground_force_vx" and others.
                 own = [column for column in columns if column.startswith(prefix)]
                 if len(own) != 3 or len(set(own)) != 3:
                     what = join_words(own) if own else "none"
@@ -106,6 +110,8 @@ def report_load_columns(setup: Setup, report: FindingCollector) -> None:
                         "loads",
                         force,
                         tag=tag,
+                        # Too many columns match if the identifier is too short, for which another
+                        # spelling is no help.
                         suggestion=None if len(own) > 3 else find_nearest_name(prefix, prefixes),
                     )
                 elif [column[-1:].lower() for column in own] != ["x", "y", "z"] and {
@@ -153,9 +159,11 @@ def report_load_place(setup: Setup, report: FindingCollector) -> None:
     if setup.tree is None:
         return
     # Of several tools that read the same loads, some have no motion yet.
+    # A load may be read by several tools: inverse dynamics, RRA and so on.
     motions = (setup.read_tool_table(find_motion_file(*reader)) for reader in setup.find_readers())
     motion = next((table for table in motions if table is not None and not table.is_markers), None)
     model: Any = setup.tree.model
+    # Without gravity there is no upward direction.
     weight = math.hypot(*model.gravity)
     if motion is None or not weight:
         return
@@ -165,6 +173,7 @@ def report_load_place(setup: Setup, report: FindingCollector) -> None:
         table = setup.read_table(loads.datafile)
         whole = [0.0, 0.0, 0.0]
         for force in select_members(loads, "ExternalForce") if table is not None else ():
+            # The signs of axes show in the mean of all loads.
             acting = _sample_load(setup, force, table, motion)
             for push in acting:
                 whole = [
@@ -172,6 +181,8 @@ def report_load_place(setup: Setup, report: FindingCollector) -> None:
                     for total, part in zip(whole, push.direction, strict=True)
                 ]
             far = [push.away for push in acting if push.away > _MAX_DISTANCE_M]
+            # At a few times the measured centre of pressure may be far off, when the foot touches
+            # the ground.
             if len(far) > max(2, len(acting) // 4):
                 report(
                     f"at {len(far)} of {len(acting)} times {describe_object(force)} acts more "
@@ -190,10 +201,13 @@ def report_load_place(setup: Setup, report: FindingCollector) -> None:
                     tag="torque_identifier",
                 )
             lifted = [
+                # The rule compares the numbers as they are written with those rotated to ground.
                 dot(push.written, up) - dot(push.direction, up)
                 for push in acting
                 if push.written != push.direction
             ]
+            # The numbers point up more than the rotated vector at all times: they are given in
+            # ground.
             if len(lifted) > 2 and max(lifted) > 0.03 and min(lifted) > -0.02:
                 report(
                     f"{describe_object(force)} is expressed in {force.force_expressed_in_body}, "
@@ -202,6 +216,7 @@ def report_load_place(setup: Setup, report: FindingCollector) -> None:
                     tag="force_expressed_in_body",
                 )
         lift = sum(part * share for part, share in zip(whole, up, strict=True))
+        # The sum of the reactions of a gait points up, apart from some braking.
         if math.hypot(*whole) > max(0.5 * mass * weight, 2.0 * lift):
             report(
                 f"the mean sum of these forces is {math.hypot(*whole):.0f} N "
@@ -246,14 +261,17 @@ def _sample_load(setup: Setup, force: Any, table: Table | None, motion: Table) -
     first, last = max(table.span[0], motion.span[0]), min(table.span[1], motion.span[1])
     if [len(part) for part in places[:2]] != [3, 3] or not first < last or not force.appliesForce:
         return []
+    # Moments in the middle of equal parts of the time.
     rows = [
         table.read_row(first + (last - first) * (k + 0.5) / _SAMPLE_COUNT)
         for k in range(_SAMPLE_COUNT)
     ]
+    # Missing data make a row useless.
     rows = [row for row in rows if len(row) == len(table.labels) and not any(map(math.isnan, row))]
     sizes = [math.hypot(*(row[place] for place in places[0])) for row in rows]
     result = []
     for row, size in zip(rows, sizes, strict=True):
+        # Small forces have an undefined centre of pressure.
         if size > max(20.0, 0.2 * max(sizes)):
             poses = compute_poses_of_motion(setup, motion, row[0])
             (x, y, z), (px, py, pz), torque = ([row[place] for place in part] for part in places)
@@ -268,6 +286,7 @@ def _sample_load(setup: Setup, force: Any, table: Table | None, motion: Table) -
                 for name in names
             ]
             body, of_force, of_point = within
+            # Frames on joints of unknown motion have no pose.
             if body is not None and of_force is not None and of_point is not None:
                 direction = (x / size, y / size, z / size)
                 point = of_point.transform_point((px, py, pz))
@@ -308,6 +327,7 @@ def _list_body_points(setup: Setup) -> dict[str, list[Vector]]:
     for station in subject.find_by_class("Marker"):
         add(subject.target_of(station, "socket_parent_frame"), station.location)
     for surface in subject.find_by_class("ContactGeometry"):
+        # The location of a half-space is not a place on the body.
         if not is_a(surface, "ContactHalfSpace"):
             add(subject.target_of(surface, "socket_frame"), surface.location)
     return result

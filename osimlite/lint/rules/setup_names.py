@@ -55,6 +55,7 @@ def report_unknown_name(setup: Setup, report: FindingCollector) -> None:
     tree = setup.tree
     if tree is None:
         return
+    # Parts of disabled goals are not looked up by OpenSim.
     off = {
         id(part)
         for goal in setup.find_by_class("MocoGoal")
@@ -78,12 +79,14 @@ def report_unknown_name(setup: Setup, report: FindingCollector) -> None:
                         tag=spec.tag,
                         severity=severity,
                     )
+    # An object of an unknown class may be what is named.
     unknown = {item.name for item in tree.by_class.get(Unknown, ())}
 
     @cache
     def list_known_names(what: str, rule: str) -> set[str]:
         if rule in _PATHS:
             return set(find_variables(tree, what))
+        # Actuators may be named by their path in the force set.
         if what == "Actuator":
             return {
                 *find_variables(tree, what),
@@ -96,6 +99,7 @@ def report_unknown_name(setup: Setup, report: FindingCollector) -> None:
         )
 
     for use in setup.uses:
+        # References that OpenSim does not look up at all are no finding.
         item, kind, text = use.holder, use.reference, str(use.value).strip()
         if (
             not text
@@ -110,6 +114,7 @@ def report_unknown_name(setup: Setup, report: FindingCollector) -> None:
         if what is None or target is not None:
             continue
         names = list_known_names(what, kind.rule)
+        # 1. Known names; 2. parts of unknown objects; 3. what operators of the study will create.
         if (
             text in names
             or not unknown.isdisjoint(text.split("/"))
@@ -126,6 +131,7 @@ def report_unknown_name(setup: Setup, report: FindingCollector) -> None:
         where: Where = {"tag": use.spec.tag, "word": text}
         if use.spec.tag == "@name":
             where = {"attribute": "name"}
+            # Names that other objects of this class use already are no likely spelling.
             names = names.difference(other.name for other in setup.by_class[type(item)])
         report(
             f"the model has no {what} '{text}', which {describe_object(item)} names: {consequence}{more}",
@@ -153,6 +159,7 @@ def _look_up_text(
         What it should name or None, the text as looked up, and the component or None.
     """
     item, kind, what = use.holder, use.reference, _get_kind(use.reference)
+    # In older formats controllers name their actuators without a path.
     if kind.rule == "socket" and kind.target == "Actuator" and setup.upgraded:
         # A name, that OpenSim looks for everywhere.
         return "actuator", text.rpartition("/")[2], None
@@ -165,6 +172,7 @@ def _look_up_text(
         return what, text, tree.walk(text, place, kind.target).target
     if kind.rule == "state-path" and kind.target == "output":
         # A channel and another name may follow.
+        # The channel of an output, and an alias, follow after ":" or in brackets.
         text = re.sub(r"(?<=\|)([^:(]*).*", r"\1", text if text.startswith("/") else f"/{text}")
     target = tree.lookup(kind, text, tree.model).target if what is not None else None
     return what, text, target or (tree.walk(text, "", "Frame").target if what == "frame" else None)
@@ -174,6 +182,7 @@ def _look_up_controls(
     setup: Setup, tool: Object, plain: set[str], report: FindingCollector
 ) -> None:
     """Report controls, and columns of controls, without an actuator."""
+    # Without a model every control would be unknown.
     if not plain:
         return
     # Of tools that follow a motion these are bounds, and go by the whole name.
@@ -181,6 +190,7 @@ def _look_up_controls(
     consequence, severity = _CONSEQUENCES["left out" if follows else "refused"]
     actuators = {f"{name}.excitation" for name in plain} | (set() if follows else plain)
     controls = list(setup.find_by_class("Control"))
+    # A free actuator is more likely to be meant than one that has a control.
     free = sorted(actuators.difference(control.name for control in controls))
     for control in controls:
         if control.name not in actuators:
@@ -248,6 +258,7 @@ def report_excluded_force(setup: Setup, report: FindingCollector) -> None:
     groups = [group.name for group in forces.groups]
     names = [force.name for force in forces.objects]
     for tool in setup.find_by_class("InverseDynamicsTool"):
+        # Inverse dynamics with muscles computes what they leave, which is seldom meant.
         if not tool.forces_to_exclude and any(is_a(force, "Muscle") for force in forces.objects):
             report(
                 f"{describe_object(tool)} excludes no force: muscles are included",
@@ -263,6 +274,7 @@ def report_excluded_force(setup: Setup, report: FindingCollector) -> None:
         ):
             continue
         why = "; the model has groups, and OpenSim then looks at groups only"
+        # If a model has groups, OpenSim compares with their names only.
         report(
             f"the model has no force or group of forces '{word}'{why if word in names else ''}: "
             "OpenSim excludes nothing for it",

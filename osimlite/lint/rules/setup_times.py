@@ -92,6 +92,7 @@ def report_time_outside_data(setup: Setup, report: FindingCollector) -> None:
     """
     for item in setup.find_having("time_range"):
         count = len(item.time_range)
+        # A disabled loads or task object has a time range that OpenSim does not read.
         if count != 2 and getattr(item, "apply", True):
             consequence, severity = (
                 ("fails", ERROR) if count < 2 else ("takes the first two", WARNING)
@@ -128,6 +129,7 @@ def report_time_outside_data(setup: Setup, report: FindingCollector) -> None:
                 fault="impossible-times",
             )
             continue
+        # Only tools must run for some time; AnalyzeTool can analyze one moment.
         if first > last or (
             first == last and is_a(item, "AbstractTool") and not is_a(item, "AnalyzeTool")
         ):
@@ -148,11 +150,14 @@ def report_time_outside_data(setup: Setup, report: FindingCollector) -> None:
                 )
             continue
         window = getattr(item, "cmc_time_window", math.nan)
+        # Without the property the window is NaN, and the comparison false: only computed muscle
+        # control has one.
         if last - first < _FIRST_STATES + window:
             report(
                 f"{describe_object(item)} runs for {last - first:.4g} s and needs "
                 f"{_FIRST_STATES + window:g} s for its first controls: OpenSim fails",
                 item,
+                # The window is blamed if it is larger than the default, else the time range.
                 tag="cmc_time_window" if window > _USUAL_WINDOW else tags[-1],
                 fault="too-short-for-control",
             )
@@ -163,6 +168,7 @@ def report_time_outside_data(setup: Setup, report: FindingCollector) -> None:
             )
             if table is None or span is None:
                 continue
+            # One row more or less, and rounded times, are no fault.
             slack = max(table.step, 1e-9) * 1.01
             if first > span[1] + slack or last < span[0] - slack:
                 report(
@@ -173,6 +179,7 @@ def report_time_outside_data(setup: Setup, report: FindingCollector) -> None:
                     fault="no-data-at-times",
                 )
                 continue
+            # A tool with default times is reported only where the default cuts data off.
             specs = get_field_specs(type(item))
             said = [
                 setup.element_of(item, tag) is not None and not setup.has_note(item, specs[tag])
@@ -211,6 +218,8 @@ def _find_time_ranges(setup: Setup) -> Iterator[tuple[Object, tuple[str, ...], f
         if item.initial_time is not None and item.final_time is not None:
             yield item, ("initial_time", "final_time"), item.initial_time, item.final_time
     for item in setup.find_by_class("Analysis"):
+        # Reversed times of an analysis are reported; others are cut to those of its tool, without
+        # harm.
         if item.start_time > item.end_time:
             yield item, ("start_time", "end_time"), item.start_time, item.end_time
 
@@ -224,6 +233,8 @@ def _list_tables(item: Any) -> Iterator[tuple[str, str]]:
         "coordinate_file",
         "orientations_file",
     ):
+        # ForwardTool reads controls, not coordinates; MarkerPlacer reads one pose from its
+        # coordinates.
         if is_a(item, "ForwardTool") or (tag == "coordinate_file" and is_a(item, "MarkerPlacer")):
             continue
         yield (
@@ -258,6 +269,7 @@ def report_loads_end_early(setup: Setup, report: FindingCollector) -> None:
         loads: Any = setup.read_document(getattr(item, "external_loads_file", ""))
         if loads is None or not hasattr(loads, "datafile"):
             continue
+        # OpenSim searches the data beside the loads file, and in the working folder.
         beside = os.path.join(os.path.dirname(item.external_loads_file), loads.datafile)
         table = setup.read_table(loads.datafile) or setup.read_table(beside)
         span = table.span if table is not None and not table.rows.select("order", "time") else None
@@ -267,6 +279,7 @@ def report_loads_end_early(setup: Setup, report: FindingCollector) -> None:
             name = getattr(item, tag, "")
             motion = setup.read_table(name)
             if motion is not None and motion.span is not None:
+                # The tool runs only where it has a motion as well.
                 first, last = max(first, motion.span[0]), min(last, motion.span[1])
             elif is_given(name):
                 # It may be written yet, and is not known to last longer than the loads.
@@ -308,6 +321,7 @@ def report_filter_frequency(setup: Setup, report: FindingCollector) -> None:
                 report(f"{describe_object(item)} filters the motion at 0 Hz", item, tag=filter_tag)
             elif table.step > 0.0 and cutoff > 0.5 / table.step:
                 report(
+                    # The Nyquist frequency is half the sampling rate.
                     f"{describe_object(item)} filters at {cutoff:g} Hz, and "
                     f"'{getattr(item, tag)}' has {1.0 / table.step:.4g} rows a second, of which "
                     f"{0.5 / table.step:.4g} Hz is the highest that can be filtered",
@@ -346,6 +360,7 @@ def report_motion_in_degrees(setup: Setup, report: FindingCollector) -> None:
         ]
         largest, place = _find_largest(table, places)
         label = table.labels[place].text
+        # Few joints may stay almost straight for a whole trial; many do not.
         if header.in_degrees and 0.0 < largest < math.pi and len(places) >= _MIN_JOINTS:
             report(
                 f"'{getattr(item, tag)}' has inDegrees=yes, and its largest angle is "
@@ -353,6 +368,7 @@ def report_motion_in_degrees(setup: Setup, report: FindingCollector) -> None:
                 item,
                 tag=tag,
             )
+        # No joint turns by 10 rad (573 degrees), while a gait has knee angles of 60 degrees.
         elif largest > 10.0 and not header.in_degrees:
             report(
                 f"'{getattr(item, tag)}' does not say inDegrees=yes, and '{label}' is "
@@ -367,6 +383,8 @@ def report_motion_in_degrees(setup: Setup, report: FindingCollector) -> None:
         if isinstance(values.header, MarkerHeader) or values.header.in_degrees:
             continue
         tasks = select_members(user.ik_task_set, "IKCoordinateTask")
+        # OpenSim's inverse kinematics converts the values of this file from degrees without a look
+        # at `inDegrees` (4.6).
         read = {
             task.name for task in tasks if task.apply and task.value_type == "from_file"
         } & find_angles(setup)
@@ -389,6 +407,7 @@ def _find_largest(table: Table, places: list[int]) -> tuple[float, int]:
         (abs(sample[place]), place)
         for place in places
         for sample in table.rows.samples
+        # Samples may be shorter than the header; NaN is missing.
         if place < len(sample) and sample[place] == sample[place]
     )
     return max(numbers, default=(0.0, 0))

@@ -188,18 +188,22 @@ def report_tool_setting(setup: Setup, report: FindingCollector) -> None:
 
     Some make OpenSim crash or run forever, some give wrong results without a message.
     """
+    # 1. Settings that one comparison decides.
     for fault, of_class, tag, is_wrong, told in _SETTINGS:
         for item in setup.find_by_class(of_class):
             value = getattr(item, tag)
             if is_wrong(value):
                 report(told.format(value), item, fault=fault, tag=tag)
+    # 2. Settings of tools that depend on each other.
     for tool in setup.find_by_class("AbstractTool"):
+        # AnalyzeTool integrates nothing, so its tolerance does not matter; `not >` includes NaN.
         if not (tool.integrator_error_tolerance > 0.0 or is_a(tool, "AnalyzeTool")):
             report(
                 f"an error tolerance of {tool.integrator_error_tolerance:g} is never met: OpenSim "
                 "runs for ever",
                 tool,
                 tag="integrator_error_tolerance",
+                # Other tools use the tolerance only if they integrate.
                 severity=None if is_a(tool, "ForwardTool") else WARNING,
                 fault="integrator-error-tolerance",
             )
@@ -211,6 +215,7 @@ def report_tool_setting(setup: Setup, report: FindingCollector) -> None:
                 tag="force_set_files",
                 fault="no-residual-forces",
             )
+        # RRATool must replace the forces; in other tools that is seldom meant.
         if tool.replace_force_set and not is_a(tool, "RRATool"):
             report(
                 "the forces of force_set_files replace those of the model: its muscles are gone",
@@ -244,11 +249,13 @@ def report_tool_setting(setup: Setup, report: FindingCollector) -> None:
                 tool,
                 fault="no-analysis",
             )
+    # 3. Analyses.
     names = Counter(item.name for item in setup.find_by_class("Analysis"))
     for analysis in setup.find_by_class("Analysis"):
         if not analysis.on:
             report(f"{describe_object(analysis)} is off", analysis, tag="on", fault="analysis-off")
         if names[analysis.name] > 1:
+            # Reported once for each name.
             names[analysis.name] = 0
             report(
                 f"two analyses are named '{analysis.name}' and write to the same files",
@@ -274,6 +281,7 @@ def report_tool_setting(setup: Setup, report: FindingCollector) -> None:
                     fault="nothing-analyzed",
                 )
         if is_a(analysis, "MuscleAnalysis") and analysis.on:
+            # Fiber lengths come from a states file if there is one, and else from the equilibrium.
             for tool in setup.find_by_class("AnalyzeTool"):
                 if (
                     is_given(tool.coordinates_file)
@@ -309,6 +317,7 @@ def report_tool_setting(setup: Setup, report: FindingCollector) -> None:
                         fault="reaction-on-neither",
                     )
             if len(analysis.apply_on_bodies) not in (0, 1, len(analysis.joint_names)):
+                # OpenSim takes none, one word for all joints, or one word for each.
                 report(
                     f"{len(analysis.apply_on_bodies)} words for {len(analysis.joint_names)} "
                     "joints: OpenSim rejects it",
@@ -316,7 +325,10 @@ def report_tool_setting(setup: Setup, report: FindingCollector) -> None:
                     tag="apply_on_bodies",
                     fault="reaction-count",
                 )
+    # 4. Forces and controllers that a set or tool adds.
     user = setup.tool[1] if setup.tool is not None else None
+    # Without `replace_force_set` a force of the same name replaces that of the model; OpenSim adds
+    # it by name.
     if setup.tree is not None and getattr(user, "replace_force_set", True) is False:
         present = {force.name for force in setup.tree.model.force_set.objects}
         for force in (
@@ -353,16 +365,19 @@ def _find_unactuated_coordinates(setup: Setup) -> list[str]:
     if setup.tree is None or not setup.tree.find_by_class("Actuator"):
         return []
     files = setup.find_having("force_set_files")
+    # A file that cannot be read may hold the residual actuators.
     if any(len(tool.force_set_files) > len(setup.added_sets) for tool in files):
         return []
     added = [
         force for _, top in setup.added_sets for force in top.walk() if is_a(force, "Actuator")
     ]
+    # Any actuator other than a muscle or path may act on the free coordinates.
     if any(
         not is_a(force, "PathActuator")
         for force in (*setup.tree.find_by_class("Actuator").values(), *added)
     ):
         return []
+    # A path to ground carries the model as well.
     parts: list[Any] = setup.tree.components
     if any(
         is_a(part, "AbstractPathPoint") and str(part.socket_parent_frame) == "/ground"

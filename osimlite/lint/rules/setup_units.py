@@ -57,26 +57,32 @@ def report_marker_size(setup: Setup, report: FindingCollector) -> None:
         unit = METRES_PER_UNIT.get(units.value.text) if units is not None else None
         if setup.tree is None or not table.is_markers or unit is None or units is None:
             continue
+        # A task that is not applied reads no markers.
         if not getattr(user, "apply", True):
             continue
         places, columns = locate_markers(setup), dict(list_marker_cells(table))
         names = [name for name in columns if name in places]
         sizes = []
+        # A few frames tell the size; some markers may be hidden in each.
         for row in islice(iterate_rows_between(table, user.time_range), _MAX_ROWS):
             seen = {name: row[columns[name]] for name in names}
+            # A marker exactly at the origin is a missing one in some files.
             seen = {
                 name: cells
                 for name, cells in seen.items()
                 if not any(map(math.isnan, cells)) and any(cells)
             }
             if len(seen) >= _MIN_MARKERS and (
+                # Markers at one place have no size to compare.
                 own := _measure_size([places[name] for name in seen])
             ):
                 sizes.append(_measure_size([*seen.values()]) / own)
         if not sizes:
             continue
+        # The median is not moved by frames with swapped markers.
         ratio = sorted(sizes)[len(sizes) // 2]
         low, high = _SIZE_RATIOS
+        # Larger units are tried first.
         better = [
             name for name in ("m", "cm", "mm") if low <= ratio * METRES_PER_UNIT[name] <= high
         ]
@@ -130,6 +136,7 @@ def report_load_units(setup: Setup, report: FindingCollector) -> None:
             [force for force in select_members(loads, "ExternalForce") if force.appliesForce], table
         )
         low, high = _WEIGHT_RANGE
+        # Unloaded plates of a short trial are small in any unit, hence the second test.
         if 0.0 < largest < _MAX_SLIGHT_SHARE * weight and low <= 1000.0 * largest / weight <= high:
             report(
                 f"the forces of '{loads.datafile}' are never larger than {largest:.3g} N "
@@ -149,6 +156,7 @@ def _find_largest_load(forces: Sequence[Any], table: Table) -> float:
     places = [own for own in places if len(own) == 3]
     sums = (
         sum(math.hypot(*(row[place] for place in own)) for own in places)
+        # Incomplete rows are left out.
         for row in table.rows.samples
         if len(row) == len(table.labels)
     )
@@ -180,6 +188,7 @@ def report_ground_twice(setup: Setup, report: FindingCollector) -> None:
         return
     for tool in setup.find_having("external_loads_file"):
         # A goal that tracks measured contact forces compares the loads and does not apply them.
+        # Replaced forces do not act, so contact cannot count twice.
         if getattr(tool, "replace_force_set", False) or is_a(tool, "MocoGoal"):
             continue
         loads: Any = setup.read_document(tool.external_loads_file)
@@ -194,6 +203,7 @@ def report_ground_twice(setup: Setup, report: FindingCollector) -> None:
             (force, body)
             for force, bodies in _find_ground_contacts(setup)
             if not _is_excluded(setup, tool, force)
+            # The body must be both loaded and in contact with ground.
             for body in sorted(bodies & loaded)
         ]
         if twice:

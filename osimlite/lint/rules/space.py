@@ -56,6 +56,7 @@ def report_degenerate_frame(subject: Subject, report: FindingCollector) -> None:
       </ComponentSet>
     ```
     """
+    # Each frame is followed once, so that long chains do not take quadratic time.
     followed: set[int] = set()
     for offset in subject.find_instances(PhysicalOffsetFrame):
         way: dict[int, PhysicalOffsetFrame] = {}
@@ -85,6 +86,7 @@ def report_degenerate_frame(subject: Subject, report: FindingCollector) -> None:
             locate_frame(subject, subject.target_of(station, "socket_parent_frame"))
             for station in stations
         ]
+        # Missing or wrong sockets have rules of their own.
         if len(stations) < 4:
             continue
         fixed_to = [
@@ -108,6 +110,7 @@ def report_degenerate_frame(subject: Subject, report: FindingCollector) -> None:
             place[1].transform_point(station.location) if place else None
             for place, station in zip(places, stations, strict=True)
         ]
+        # Exactly equal, as OpenSim's own test: near points give a frame, if a doubtful one.
         for one, other in combinations(range(3), 2):
             if spots[one] is not None and spots[one] == spots[other]:
                 report(
@@ -140,6 +143,8 @@ def _describe_circle(subject: Subject, circle: Sequence[PhysicalOffsetFrame]) ->
 
 DEPTH = Threshold("contact-depth", 1e-3, "m", "surfaces may start this deep inside each other")
 DEPTH_SHARE = Threshold(
+    # A relative limit as well, since small spheres at the floor start a few tenths of a millimetre
+    # deep by rounding.
     "contact-depth-share", 0.1, "of the radius", "a sphere may start this deep inside a surface"
 )
 LENGTH = Threshold("largest-length", 10.0, "m", "nothing on a body is longer")
@@ -167,10 +172,12 @@ def report_starts_in_contact(subject: Subject, report: FindingCollector) -> None
     deep, share = subject.config.value_of(DEPTH), subject.config.value_of(DEPTH_SHARE)
     for force, surfaces in _find_contact_groups(subject):
         for one, other in combinations(surfaces, 2):
+            # The pair is tried in both orders: a force may name the half-space first or second.
             ball, against = (one, other) if isinstance(one, ContactSphere) else (other, one)
             if not isinstance(ball, ContactSphere):
                 continue
             depth = _compute_depth(subject, ball, against)
+            # `not >` excludes NaN.
             if depth is None or not depth > max(deep, share * ball.radius):
                 continue
             sunk = isinstance(against, ContactHalfSpace) and depth > ball.radius
@@ -223,6 +230,7 @@ def report_lengths_in_millimetres(subject: Subject, report: FindingCollector) ->
                 if not numbers or (-longest <= min(numbers) and max(numbers) <= longest):
                     continue
                 if not any(
+                    # Infinity is reported by OSIM205.
                     longest < abs(number) < math.inf for number in numbers
                 ) or not _is_on_body(subject, item):
                     continue
@@ -293,29 +301,37 @@ def _find_circles(subject: Subject, frames: Sequence[Component]) -> set[int]:
     lowest: dict[int, int] = {}
     path: list[Component] = []
     open_ids: set[int] = set()
+    # Without recursion, since chains of frames may be deeper than Python's stack allows.
     for start in frames:
         pending: list[tuple[Component, Iterator[Component]]] = []
         entering: Component | None = None if id(start) in number else start
         while entering is not None or pending:
+            # 1. Enter a component: give it a number, and put it on the path.
             if entering is not None:
                 here = id(entering)
                 number[here] = lowest[here] = len(number)
                 path.append(entering)
                 open_ids.add(here)
                 pending.append((entering, _list_supports(subject, entering)))
+            # 2. Look at the next component that it depends on.
             owner, below = pending[-1]
             entering = next(
                 (item for item in below if id(item) not in number or id(item) in open_ids), None
             )
+            # 3. One on the path closes a circle; a component that depends on itself is a circle of
+            # one.
             if entering is not None and id(entering) in open_ids:
                 lowest[id(owner)] = min(lowest[id(owner)], number[id(entering)])
                 result |= {id(owner)} if entering is owner else set()
                 entering = None
+            # 4. All are seen: the component above inherits the lowest number that can be reached.
             elif entering is None:
                 pending.pop()
                 if pending:
                     above = id(pending[-1][0])
                     lowest[above] = min(lowest[above], lowest[id(owner)])
+                # 5. If nothing earlier can be reached, what lies above on the path is one component
+                # of the graph.
                 if lowest[id(owner)] == number[id(owner)]:
                     size = next(k for k in range(1, len(path) + 1) if path[-k] is owner)
                     circle = {id(item) for item in path[-size:]}
@@ -373,6 +389,7 @@ def _compute_depth(subject: Subject, ball: ContactSphere, other: ContactGeometry
     """Return the depth of a sphere in another surface (m), negative if apart; None if unknown."""
     inner, outer = _locate_surface(subject, ball), _locate_surface(subject, other)
     if inner is None or outer is None or inner[0] is outer[0]:
+        # Surfaces on one body do not move against each other.
         return None
     centre = inner[1].position
     if isinstance(other, ContactHalfSpace):

@@ -49,12 +49,15 @@ def report_unknown_tag(subject: Subject, report: FindingCollector) -> None:
     """
     groups: dict[tuple[object, ...], list[_UnknownTag]] = {}
     for note, owner in subject.notes_of("unknown-tag"):
+        # Wrappers and parts have rules that say more.
         if find_wrapper(note, owner) is not None or find_part(note, owner) is not None:
             continue
         old = successor(type(owner), note.word)
         if old is not None:
             _report_old(subject, report, note, owner, old)
             continue
+        # Equal faults in many objects, such as a tag that a program writes everywhere, are one
+        # finding.
         item = _describe_unknown(subject, note, owner)
         groups.setdefault((note.word, item.suggestion, item.severity), []).append(item)
     for first, *others in groups.values():
@@ -99,12 +102,15 @@ def _describe_unknown(subject: Subject, note: Note, owner: Object) -> _UnknownTa
         )
         return _UnknownTag(note, owner, message, INFO, fix=comment_out(subject.source, note.number))
     specs = get_field_specs(type(owner))
+    # Former names are far from the present ones in spelling; they are looked up first.
     suggestion = find_nearest(_FORMER.get(note.word, note.word), specs, cutoff=70)
+    # A similar spelling is no help if the content cannot stand there.
     if suggestion is not None and not _can_hold(subject, note, specs[suggestion]):
         suggestion = None
     message = f"{describe_object(owner)} has no property <{note.word}>; OpenSim ignores it"
     if suggestion is not None:
         kept = _format_default(specs[suggestion])
+        # If the correct tag stands beside it, the default is not what OpenSim uses.
         message += (
             f" and keeps the default of {suggestion}{kept}"
             if suggestion not in _list_given(owner)
@@ -112,15 +118,19 @@ def _describe_unknown(subject: Subject, note: Note, owner: Object) -> _UnknownTa
         )
     elif note.value is not None:
         message += f": {add_article(note.word)} cannot stand in {add_article(type(owner).tag)}"
+        # The element is a known object: say where it belongs.
         home = find_set(note.value)
         message += f"; it belongs in the {home}" if home and isinstance(owner, Model) else ""
     else:
         homes = list_homes(note.word, type(owner))
         message += f": it is a property of {join_words(homes, most=3)}" if homes else ""
+    # Only the letter case is wrong: the fix is certain.
     same = suggestion is not None and suggestion.lower() == note.word.lower()
+    # Renaming is no fix if the property is given as well: it would be there twice.
     free = suggestion is not None and suggestion not in _list_given(owner)
     fix = rename_tag(subject.source, note.number, suggestion, safe=same) if free else None
     severity = ERROR
+    # Old setups keep switched-off properties of tools that no longer have them.
     if not free and subject.model is None:
         severity = INFO if _is_switched_off(subject, note.number) else WARNING
     elif free and suggestion is not None and _is_default(subject, note.number, specs[suggestion]):
@@ -142,6 +152,7 @@ def _can_hold(subject: Subject, note: Note, spec: FieldSpec) -> bool:
 def _merge_fixes(fixes: Sequence[Fix | None]) -> Fix | None:
     """Return one fix that does what several do; None if one of them is missing."""
     known = [fix for fix in fixes if fix is not None]
+    # A single finding keeps its fix; a fix of a group must correct all.
     if len(known) < len(fixes) or not known:
         return known[0] if len(fixes) == 1 and known else None
     return Fix(tuple(edit for fix in known for edit in fix.edits), all(fix.safe for fix in known))
@@ -171,6 +182,8 @@ def _repeats_first(subject: Subject, owner: Object, number: int) -> bool:
     assert subject.source is not None and owner._index is not None
     spans, end = subject.source.spans, 0
     for first in range(owner._index + 1, number):
+        # `end` passes over the descendants of each child, so that only children of the owner are
+        # compared.
         if spans[first].start >= end:
             if spans[first].tag == spans[number].tag:
                 return (
@@ -215,6 +228,7 @@ def report_duplicate_tag(subject: Subject, report: FindingCollector) -> None:
         assert note.spec is not None
         value = getattr(owner, note.spec.name)
         taken = "" if isinstance(note.spec.kind, ObjectField) else f", {format_value(value)},"
+        # Two objects of different classes in a property that holds one.
         if note.word != note.spec.tag:
             report(
                 f"<{note.spec.tag}> of {describe_object(owner)} holds one object; OpenSim takes "
@@ -251,6 +265,7 @@ def report_element_in_value(subject: Subject, report: FindingCollector) -> None:
     """
     for note, owner in subject.notes_of("child-in-value"):
         assert note.spec is not None
+        # The reader marks comments, processing instructions and CDATA sections alike.
         if note.word == "!--":
             what = _describe_interruption(subject, note.number)
             if not what:
@@ -269,6 +284,7 @@ def report_element_in_value(subject: Subject, report: FindingCollector) -> None:
             number=note.number,
         )
     source = subject.source
+    # The scan of CDATA sections runs only for texts that have one.
     if source is not None and "<![CDATA[" in source.text:
         for number in _find_cdata_elements(source):
             _report_cdata(subject, source, number, report)
@@ -306,6 +322,7 @@ def _report_cdata(subject: Subject, source: Source, number: int, report: Finding
     texts = [part for part in _SECTIONS.split(inside) if part.strip()]
     sections = _SECTION.findall(inside)
     place = source.position(span.tag_end + inside.index("<![CDATA["), len("<![CDATA["))
+    # OpenSim's parser takes the first part of a mixed value only.
     if len(texts) + len(sections) > 1:
         report("a CDATA section is only a part of this value: OpenSim rejects the file", at=place)
     elif sections and not texts and sections[0] != sections[0].strip():
@@ -330,6 +347,8 @@ def _report_cdata(subject: Subject, source: Source, number: int, report: Finding
 def _find_property(subject: Subject, source: Source, number: int) -> FieldSpec | None:
     """Return the property that OpenSim reads from an element; None if it reads none."""
     span = source.spans[number]
+    # The elements are numbered in document order, so the parent is the nearest earlier one that
+    # ends later.
     above = next(
         (index for index in range(number - 1, -1, -1) if span.end <= source.spans[index].end), None
     )

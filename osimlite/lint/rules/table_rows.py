@@ -31,6 +31,7 @@ def report_no_rows(table: Table, report: FindingCollector) -> None:
     + 0.0 0.5
     ```
     """
+    # Labels with commas, and rows that are all faulty, are reported by other rules.
     if (
         table.labels
         and "," not in table.labels[0].text
@@ -69,6 +70,7 @@ def report_ragged_row(table: Table, report: FindingCollector) -> None:
     for fault in rows.select("row", "comment", "blank"):
         at = Position(fault.line, fault.column, fault.length)
         if fault.kind == "row":
+            # A tab too many at the end of each line is what several programs write.
             fix = (
                 _remove_last_tabs(table, rows.cells)
                 if table.is_markers and fault.number > rows.cells
@@ -85,7 +87,9 @@ def report_ragged_row(table: Table, report: FindingCollector) -> None:
                 f"OpenSim does not allow comments among the rows{fault.describe_rest('line')}",
                 at=at,
             )
+        # Blank lines after the last row do no harm.
         elif rows.count and fault.line <= rows.line_of(rows.count - 1):
+            # The newer reader stops at a blank line; the older one passes over it.
             if table.is_markers or table.is_strict:
                 lost = rows.line_of(rows.count - 1) - fault.line
                 report(
@@ -111,6 +115,7 @@ def _remove_last_tabs(table: Table, width: int) -> Fix | None:
     edits = []
     for match in _LAST_TABS.finditer(table.data, table.line_start(table.header.label_line + 2)):
         start = table.data.rfind(b"\n", 0, match.start()) + 1
+        # Only tabs at the end are removed, and no more than there are too many.
         surplus = min(table.data.count(b"\t", start, match.end()) - (width - 1), len(match[0]))
         if surplus > 0:
             edits.append(Edit(match.end() - surplus, match.end(), ""))
@@ -156,6 +161,7 @@ def report_not_a_number(table: Table, report: FindingCollector) -> None:
             consequence = "OpenSim treats the marker as not seen"
         elif table.is_strict:
             consequence = "OpenSim reads it as NaN"
+        # The older reader stops at a word, and fills what is left with zeros.
         else:
             lost = max(0, end - fault.line)
             consequence = (
@@ -196,6 +202,7 @@ def report_time_order(table: Table, report: FindingCollector) -> None:
     + 0.2 0.7
     ```
     """
+    # Without a column of times the order means nothing.
     if not table.is_markers and table.labels and table.labels[0].text.lower() != "time":
         return
     # OpenSim itself writes the last row of some results twice.
@@ -207,6 +214,7 @@ def report_time_order(table: Table, report: FindingCollector) -> None:
             if fault.number
             else f"{time} repeats that of the row before"
         )
+        # Repeated times are kept apart from times that go back, which no spline can be put through.
         severity = (
             None if fault.number or table.is_markers else INFO if fault.line == last else WARNING
         )
@@ -241,6 +249,7 @@ def report_time_gap(table: Table, report: FindingCollector) -> None:
     """
     rows = table.rows
     moments = rows.times
+    # Irregular steps have no usual step.
     if rows.count < 6 or rows.select("order", "time", "row") or table.step <= 0:
         return
     longest = 1.5 * table.step
@@ -250,7 +259,9 @@ def report_time_gap(table: Table, report: FindingCollector) -> None:
     # OpenSim starts some results one step before the others.
     gaps = [row for row, step in enumerate(steps, 1) if step >= longest and row > 1]
     even = sum(abs(step - table.step) <= 0.2 * table.step for step in steps)
+    # Few gaps in otherwise even steps; a table with variable steps has no gaps.
     if len(gaps) <= max(1, len(steps) // 50) and even + len(gaps) >= 0.95 * len(steps):
+        # The first twenty gaps show the cause.
         for row in gaps[:20]:
             missing = steps[row - 1] / table.step - 1
             lost = (

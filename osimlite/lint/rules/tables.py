@@ -47,10 +47,13 @@ def report_table_header(table: Table, report: FindingCollector) -> None:
     elif isinstance(header, MarkerHeader):
         _check_marker_header(table, header, report)
     elif header.end.text != "endheader":
+        # Of a misnamed marker file only the name is wrong; its lines need no further findings.
         words = table.data[:100].lstrip()
         if words.startswith(b"PathFileType"):
             report("this is marker data; the name of its file must end with .trc", at=start)
+        # The first line as the end of the header means that no line looks like one.
         elif header.end.at.line == 1:
+            # Line ends of old Macintosh programs make one line of the whole file.
             ends = (
                 "; its lines end with CR alone"
                 if b"\r" in table.data[:1000] and b"\n" not in table.data
@@ -60,6 +63,7 @@ def report_table_header(table: Table, report: FindingCollector) -> None:
                 f"expected a line 'endheader', found none: OpenSim rejects this storage file{ends}",
                 at=start,
             )
+        # The line is there in another letter case.
         elif header.end.text:
             report(
                 "the header must end with 'endheader' in lower case: OpenSim reads all that "
@@ -76,6 +80,7 @@ def report_table_header(table: Table, report: FindingCollector) -> None:
     elif not table.is_strict:
         for key, count in (("nRows", table.rows.count), ("nColumns", len(table.labels))):
             if key not in table.entries:
+                # A misspelt key keeps its value, so that its line is changed and none is added.
                 near = find_nearest(key, table.entries, cutoff=75)
                 entry = table.entries[near] if near else None
                 at = entry.key.at if entry else header.end.at
@@ -123,10 +128,13 @@ def _check_marker_header(table: Table, header: MarkerHeader, report: FindingColl
             f"{len(header.lines)}{ends}",
             at=Position(1, 1),
         )
+        # Without these lines nothing of the following can be located.
         return
     keys, values = header.words(2), header.words(3)
     for key, right in zip(keys, MARKER_KEYS, strict=False):
         if key.text != right:
+            # With a key missing or too many, the keys stand in other columns, and a replacement by
+            # position would be wrong.
             meant = right if len(keys) == len(MARKER_KEYS) else None
             report(
                 f"expected '{right}' in the header, found '{key.text}'",
@@ -134,6 +142,7 @@ def _check_marker_header(table: Table, header: MarkerHeader, report: FindingColl
                 suggestion=meant,
                 certain=True,
             )
+            # All following keys would differ as well.
             break
     else:
         if len(keys) < len(MARKER_KEYS):
@@ -147,6 +156,7 @@ def _check_marker_header(table: Table, header: MarkerHeader, report: FindingColl
                 "the file",
                 at=Position(3, 1),
             )
+    # The fifth line names the coordinates of each marker; OpenSim expects X1 Y1 Z1 X2 and so on.
     fifth = header.lines[4] if len(header.lines) > 4 else b""
     subscripts = [word.text for word in header.words(5)] if fifth else []
     count = len(table.labels)
@@ -156,10 +166,13 @@ def _check_marker_header(table: Table, header: MarkerHeader, report: FindingColl
         place = header.words(5)[wrong].at if wrong < len(subscripts) else Position(5, 1)
         line = "\t\t" + "\t".join(wanted)
         fix = None
+        # Complete but wrongly numbered subscripts are replaced as a line.
         if len(subscripts) == len(wanted) and all(word[:1] in "XYZ" for word in subscripts):
             fix = table.make_replacement(
                 Position(5, 1, len(fifth.rstrip())), None, line, certain=True
             )
+        # If the line is missing, the rows begin in the fifth line; it is added only if NumMarkers
+        # confirms the number.
         elif (fifth[:1].isdigit() or not fifth.strip()) and [word.text for word in values[3:4]] == [
             str(count)
         ]:
@@ -204,6 +217,7 @@ def report_table_count(table: Table, report: FindingCollector) -> None:
     else:
         known = WARNING if table.is_strict else ERROR
         counts = (("nRows", rows.count, "rows", known), ("nColumns", labels, "labels", known))
+    # Rows that are odd have findings of their own, and may be the reason for the difference.
     odd_rows = rows.select("row", "blank", "comment")
     for key, count, what, severity in counts:
         entry = table.entries.get(key)
@@ -214,6 +228,7 @@ def report_table_count(table: Table, report: FindingCollector) -> None:
         if number == count:
             continue
         consequence = ""
+        # Too large a number of rows is harmless: OpenSim stops at the end of the file.
         if severity is ERROR and what == "rows" and number == number:
             lost = count - number
             severity, consequence = (
@@ -225,6 +240,7 @@ def report_table_count(table: Table, report: FindingCollector) -> None:
                 if table.is_markers
                 else ": OpenSim puts numbers into the wrong columns"
             )
+        # A suggestion needs evidence from the rows.
         # Where a row has as many cells as the header says, it is a label that is wrong.
         in_rows = {"nColumns": rows.cells, "NumMarkers": (rows.cells - 2) // 3}.get(key, count)
         is_right = not odd_rows and rows.count > 0 and in_rows == count
@@ -265,6 +281,7 @@ def report_table_setting(table: Table, report: FindingCollector) -> None:
     entries = table.entries
     if table.is_markers:
         units = entries.get("Units")
+        # OpenSim knows km as well, but no measured marker is in kilometres.
         if units is not None and units.value.text not in ("m", "mm", "cm", "km"):
             near = {
                 "millimetre": "mm",
@@ -274,6 +291,7 @@ def report_table_setting(table: Table, report: FindingCollector) -> None:
                 "centimeter": "cm",
             }
             right = near.get(units.value.text.lower().rstrip("s"), units.value.text.lower())
+            # The suggestion is limited to the units of motion capture.
             report(
                 f"unknown units '{units.value.text}': OpenSim rejects the file",
                 at=units.value.at,
@@ -287,6 +305,7 @@ def report_table_setting(table: Table, report: FindingCollector) -> None:
                 at=rate.value.at,
                 severity=WARNING,
             )
+        # Times are rounded in most files, which moves the frequency by some per cent.
         elif (
             rate is not None
             and table.step > 0
@@ -299,6 +318,7 @@ def report_table_setting(table: Table, report: FindingCollector) -> None:
                 severity=INFO,
             )
         return
+    # OpenSim's keys depend on the letter case.
     for key, entry in entries.items():
         right = next(
             (known for known in ("inDegrees", "version", *COUNTS) if known.lower() == key.lower()),
@@ -314,10 +334,12 @@ def report_table_setting(table: Table, report: FindingCollector) -> None:
                 severity=severity,
             )
     degrees = entries.get("inDegrees")
+    # OpenSim's reader looks for yes and no only, in any letter case.
     if degrees is not None and degrees.value.text.lower() not in ("yes", "y", "no", "n"):
         meant = {"true": "yes", "1": "yes", "false": "no", "0": "no"}.get(
             degrees.value.text.lower()
         )
+        # A word that means no is read as no.
         harmless = meant == "no"
         report(
             f"'inDegrees' must be 'yes' or 'no', found '{degrees.value.text}': OpenSim reads no, "
@@ -347,6 +369,7 @@ def _check_cell_type(table: Table, report: FindingCollector) -> None:
             suggestion=find_nearest(kind.value.text, SUFFIXES),
             severity=None if table.is_strict else WARNING,
         )
+    # The newer reader splits at "=" and does not strip the rest; the older one does.
     for key, entry in table.entries.items() if table.is_strict else ():
         behind = table.header.lines[entry.key.at.line - 1][
             entry.key.at.column - 1 + entry.key.at.length :
@@ -455,6 +478,8 @@ def report_column_label(table: Table, report: FindingCollector) -> None:
                     certain=True,
                     fault="frame-and-time-label",
                 )
+        # Each marker has a label and two empty cells; an empty label is a cell where a label should
+        # be.
         cells = header.lines[3].split("\t") if header.lines[3:] else []
         empty = [index for index in range(2, len(cells) - 2, 3) if not cells[index].strip()]
         if empty and len(labels) < len(cells[2:]) // 3:
@@ -477,6 +502,7 @@ def report_column_label(table: Table, report: FindingCollector) -> None:
         return
     elif labels[0].text != "time":
         first, at = labels[0]
+        # These labels mean the time beyond doubt; of another the author must decide.
         near = "time" if first.lower() in ("time", "t", "times", "time(s)") else None
         if "," in first:
             report(
@@ -485,6 +511,7 @@ def report_column_label(table: Table, report: FindingCollector) -> None:
                 at=at,
                 fault="commas-between-labels",
             )
+        # The older reader takes "range" for "time", as some early files have it.
         elif all(label.text not in ("time", "range") for label in labels):
             report(
                 f"the first column is '{first}', expected 'time'",

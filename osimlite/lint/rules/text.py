@@ -12,6 +12,7 @@ from osimlite.lint.registry import ERROR, INFO, WARNING, FindingCollector, rule
 from osimlite.lint.subject import Subject
 from osimlite.schema.model import CURRENT_VERSION
 
+# The line of seven "=" between the two sides is left out: it may occur in a comment.
 _CONFLICT = re.compile(r"^(<{7}|>{7})(?= |$)[^\n]*", re.MULTILINE)
 _OLDEST_FOR_OPENSIM = 10901
 """The oldest version that OpenSim 4.6 loads."""
@@ -49,6 +50,7 @@ def report_syntax_error(subject: Subject, report: FindingCollector) -> None:
     + <Body name="thigh"> <mass>8</mass> <inertia>0.1 0.1 0.02 0 0 0</inertia> </Body>
     ```
     """
+    # Conflict markers are no XML either; OSIM005 explains them better.
     if subject.source is None or _find_conflicts(subject.source):
         return
     for fault in subject.faults:
@@ -64,6 +66,7 @@ def report_syntax_error(subject: Subject, report: FindingCollector) -> None:
 
 def _describe_extent(subject: Subject) -> str:
     """Return how much of a text with a syntax error was checked."""
+    # Below line 2 nothing was read with certainty.
     if subject.model is None or subject.sure_until is None or subject.sure_until < 2:
         return "nothing else is checked until this is fixed"
     return f"until this is fixed, only tags and values above line {subject.sure_until} are checked"
@@ -119,11 +122,13 @@ def report_encoding(subject: Subject, report: FindingCollector) -> None:
         )
     if source is None or source.encoding not in ("cp1252", "latin-1"):
         return
+    # The declaration is read from the bytes, since the encoding is what is in doubt.
     declared = re.match(rb"\s*<\?xml[^>]*?encoding\s*=\s*[\"']([A-Za-z0-9._-]+)", source.data)
     name = declared[1].decode() if declared else "UTF-8"
     try:
         source.data.decode(name)
     except UnicodeDecodeError as error:
+        # A byte-order mark decodes to a character that no editor counts as a column.
         before = source.data[: error.start].decode(name).removeprefix("\ufeff")
         report(
             f"byte 0x{source.data[error.start]:02X} is not {name}; the text is read as "
@@ -160,13 +165,16 @@ def report_not_a_model(subject: Subject, report: FindingCollector) -> None:
     if subject.source is None:
         return
     for fault in subject.faults:
+        # Faults of syntax and version have the rules OSIM001 and OSIM004.
         if isinstance(fault, (NotWellFormedError, VersionError)):
             continue
+        # The suggestion is printed apart.
         message = fault.message.removesuffix(f"; did you mean '{fault.meant}'?")
         if fault.meant is None or not subject.source.well_formed:
             _report_at(subject.source, report, message, fault.line, fault.column)
             continue
         root = subject.source.locate_tag(0)
+        # The wrong tag is the root, or the element inside it.
         number = int((root.line, root.column) != (fault.line, fault.column))
         fix = rename_tag(subject.source, number, fault.meant, safe=False)
         report(message, at=subject.source.locate_tag(number), suggestion=fault.meant, fix=fix)
@@ -196,6 +204,7 @@ def report_document_version(subject: Subject, report: FindingCollector) -> None:
             wanted = None if fault.version is not None else str(CURRENT_VERSION)
             report(fault.message, number=0, attribute="Version", suggestion=wanted)
     spans = subject.source.spans
+    # A bare <Model> is read by OpenSim as a document without a version.
     has_root = bool(spans) and spans[0].tag != "Model"
     late = ""
     if subject.version is not None and subject.version < _SOCKETS:
@@ -209,6 +218,7 @@ def report_document_version(subject: Subject, report: FindingCollector) -> None:
         )
         return
     if subject.version is not None and subject.version < _OLDEST_FOR_OPENSIM:
+        # `osimlite upgrade` cannot write what a wrong version hides.
         advice = "; `osimlite upgrade` writes the model in the current format" if not late else ""
         report(
             f"version {subject.version} is too old for OpenSim 4.6, which rejects it{advice}",
@@ -319,6 +329,7 @@ def report_second_object(subject: Subject, report: FindingCollector) -> None:
 
 
 def _find_conflicts(source: Source) -> list[tuple[int, int]]:
+    # This saves a search in texts that are valid, which are nearly all.
     # In well-formed XML only a comment can hold the first marker, and it then holds the last one
     # too.
     if source.well_formed and not (source.remarks and ">>>>>>>" in source.text):
@@ -340,6 +351,7 @@ def _compute_offset(source: Source, line: int | None, column: int | None) -> int
     lines = source.lines
     if line > len(lines):
         return len(source.text)
+    # The parser counts columns differently at the end of a line; the offset stays in its line.
     return source.line_start(line) + min(
         max((column or 1) - 1, 0), max(0, len(lines[line - 1]) - 1)
     )

@@ -45,6 +45,7 @@ def report_unconnected_body(subject: Subject, report: FindingCollector) -> None:
     ```
     """
     bones = build_skeleton(subject)
+    # A joint of an unknown class may be the connection.
     if not bones.complete or has_unknown_joints(subject):
         return
     groups = _Groups()
@@ -56,6 +57,7 @@ def report_unconnected_body(subject: Subject, report: FindingCollector) -> None:
             loose.setdefault(groups.find_root(body), []).append(body)
     if not loose:
         return
+    # OpenSim connects loose bodies by free joints, which needs a mass.
     massless = any(not any(body.mass for body in group) for group in loose.values())
     fails = massless or grow_tree(subject).fails
     for body, *others in loose.values():
@@ -103,6 +105,7 @@ def report_closed_loop(subject: Subject, report: FindingCollector) -> None:
     bones = build_skeleton(subject)
     pairs = Counter(map(_make_pair, bones.links))
     for link in grow_tree(subject).loops:
+        # Parallel joints have OSIM404.
         if pairs[_make_pair(link)] == 1 and link.child_base is not None:
             others = (
                 other.joint
@@ -148,6 +151,7 @@ def report_parallel_joints(subject: Subject, report: FindingCollector) -> None:
     bones = build_skeleton(subject)
     first: dict[frozenset[int], Joint] = {}
     loops = grow_tree(subject).loops
+    # Joints of the tree come first, as OpenSim keeps them and cuts the others.
     for link in bones.links:
         if link not in loops:
             first.setdefault(_make_pair(link), link.joint)
@@ -179,6 +183,7 @@ def report_massless_leaf(subject: Subject, report: FindingCollector) -> None:
     bones = build_skeleton(subject)
     if not bones.complete or has_unknown_joints(subject):
         return
+    # A massless body behind another joint makes the mass matrix singular.
     for body, members, joint in _find_massless_leaves(bones):
         welded = (
             f" with the bodies welded to it ({join_words(item.name for item in members)})"
@@ -200,6 +205,7 @@ def _make_pair(link: JointLink) -> frozenset[int]:
 def _describe_loop(bones: Skeleton, link: JointLink) -> str:
     """Return what OpenSim does with a joint between bodies that other joints already connect."""
     kind = type(link.joint)
+    # These cases are measured with OpenSim 4.6.
     to_ground = link.parent_base is bones.ground and issubclass(kind, WeldJoint | FreeJoint)
     if to_ground or link.child_base is bones.ground or issubclass(kind, CustomJoint):
         return "OpenSim rejects the model"
@@ -221,6 +227,7 @@ class _Groups:
 
     def find_root(self, item: Object) -> int:
         key = id(item)
+        # Chains of parents are short, as models have at most some hundred bodies.
         while self._up.get(key, key) != key:
             key = self._up[key]
         return key
@@ -233,6 +240,7 @@ class _Groups:
 def _find_massless_leaves(bones: Skeleton) -> Iterator[tuple[Body, list[Body], Joint]]:
     """Yield each rigid group of massless bodies on one moving joint: first body, other bodies, joint."""
     groups = _Groups()
+    # Bodies that are welded move as one, and share their mass.
     for link in bones.links:
         if isinstance(link.joint, WeldJoint):
             groups.join(link.parent_base, link.child_base)
@@ -241,6 +249,7 @@ def _find_massless_leaves(bones: Skeleton) -> Iterator[tuple[Body, list[Body], J
         members.setdefault(groups.find_root(base), []).append(base)
     for key, group in members.items():
         bodies = [base for base in group if isinstance(base, Body)]
+        # A group with ground or with any mass is no massless leaf.
         if len(bodies) != len(group) or any(body.mass != 0 for body in bodies):
             continue
         moving = [
@@ -254,5 +263,6 @@ def _find_massless_leaves(bones: Skeleton) -> Iterator[tuple[Body, list[Body], J
                 if base is not None
             }
         ]
+        # With two moving joints the group is in the middle of a chain, where mass follows.
         if len(moving) == 1:
             yield bodies[0], bodies[1:], moving[0].joint

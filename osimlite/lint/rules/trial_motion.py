@@ -63,6 +63,7 @@ def report_scale_marker_error(trial: Trial, report: FindingCollector) -> None:
     + peak of marker errors: 1.4 cm
     ```
     """
+    # The limits and their sources are OpenSim's own documents, so that users can look them up.
     advice = (
         "look at the markers on bones, the pairs that measure their segment, and the pose of the "
         "static trial"

@@ -47,6 +47,7 @@ def report_unreadable_value(subject: Subject, report: FindingCollector) -> None:
     for note, owner, spec, kind in _find_value_notes(
         subject, "unreadable", "ignored", "too-few", "too-many"
     ):
+        # If only the count is wrong, OSIM202 reports it.
         if note.kind.startswith("too-") and _are_readable(note.word, kind):
             continue
         text = _get_text(owner, spec)
@@ -61,8 +62,10 @@ def report_unreadable_value(subject: Subject, report: FindingCollector) -> None:
             word=note.word,
             suggestion=better,
             fix=replace_text(subject.source, subject.position(owner, tag=spec.tag), better)
+            # A value of several lines may hold comments, which a replacement would lose.
             if "\n" not in text
             else None,
+            # If OpenSim happens to read the intended value, the motion is right.
             severity=WARNING if better is not None and reads_as(better, kind, taken) else None,
         )
 
@@ -82,6 +85,7 @@ def report_wrong_count(subject: Subject, report: FindingCollector) -> None:
     ```
     """
     for note, owner, spec, kind in _find_value_notes(subject, "too-many", "too-few"):
+        # Words that cannot be read have OSIM201.
         if not _are_readable(note.word, kind):
             continue
         count = len(split_words(note.word))
@@ -151,6 +155,7 @@ def report_empty_value(subject: Subject, report: FindingCollector) -> None:
                 f"{_describe_kept_value(note, owner, spec, kind)}",
                 owner,
                 number=note.number,
+                # OpenSim keeps the default of most values without a message.
                 severity=ERROR if _is_refused(note, spec, kind) else WARNING,
             )
     for note in subject.notes:
@@ -215,6 +220,7 @@ def _get_text(owner: Object, spec: FieldSpec) -> str:
 
 
 def _is_refused(note: Note, spec: FieldSpec, kind: Value) -> bool:
+    # `note.value` is what OpenSim reads instead, if it continues.
     """Return whether OpenSim rejects a file for a value that it cannot read."""
     return note.value is None and (
         kind.legacy or (spec.tag == "mass" and spec.default != spec.default)
@@ -234,6 +240,7 @@ def _describe_kept_value(note: Note, owner: Object, spec: FieldSpec, kind: Value
 
 def _describe_foreign_characters(text: str) -> str:
     """Return which characters of a number only look like ASCII; empty without any."""
+    # Such characters come from PDF files and word processors.
     odd = [character for character in dict.fromkeys(text) if not character.isascii()]
     if not odd:
         return ""
@@ -247,13 +254,16 @@ def _make_readable(text: str, kind: Value) -> str | None:
     """Return the value as OpenSim would read it, if it is obvious; otherwise None."""
     if kind.scalar == "bool":
         known = {"yes": "true", "on": "true", "1": "true", "no": "false", "off": "false"}
+        # A slip such as "ture" is taken for the nearest word.
         return known.get(text.lower()) or find_nearest(text.lower(), ("true", "false"))
     if kind.scalar == "double":
+        # Brackets and separators of other languages, and invisible characters.
         words = re.sub(r"[,;()\[\]{}~\u200b\ufeff]", " ", _replace_digits(text)).split()
         try:
             numbers = [float(word) for word in words]
         except ValueError:
             return None
+        # One plain number would not have been unreadable.
         if (len(words) > 1 or not text.isascii()) and (
             kind.size is None or len(numbers) == kind.size
         ):
@@ -265,6 +275,7 @@ def _replace_digits(text: str) -> str:
     """Return the text with minus signs and digits of other scripts replaced by ASCII."""
     import unicodedata
 
+    # NFKC maps wide and other digits to ASCII; hyphens and dashes are left to the table.
     return unicodedata.normalize("NFKC", text).translate(
         dict.fromkeys((0x2010, 0x2011, 0x2012, 0x2013, 0x2212), "-")
     )
@@ -272,9 +283,11 @@ def _replace_digits(text: str) -> str:
 
 def _complete_number(word: str) -> str | None:
     """Return the intended number, if it is obvious; otherwise None."""
+    # A comma with digits on both sides is a decimal comma.
     comma = re.fullmatch(r"([+-]?\d+),(\d+)", word)
     if comma:
         return f"{comma[1]}.{comma[2]}"
+    # Fortran writes "1d3" for double precision.
     if re.fullmatch(r"[+-]?[\d.]+[dD][+-]?\d+", word):
         return re.sub("[dD]", "e", word)
     if re.fullmatch(r"0[xX][0-9a-fA-F]+", word):

@@ -85,6 +85,7 @@ class ElementBuilder:
     @property
     def folder(self) -> Path:
         """Folder of the model's file, in which other files are found."""
+        # Results then depend on files, and may not be cached by the model alone.
         self.reads_files = True
         return self._folder
 
@@ -110,6 +111,7 @@ class ElementBuilder:
         """
         for component in self.tree.components:
             unknown = (
+                # Unknown classes get an error, not silence.
                 # An unknown class in the force set may be a force: it gets an error, not silence.
                 isinstance(component, Unknown)
                 and self.tree.parent_of(component) is self.model.force_set
@@ -118,6 +120,7 @@ class ElementBuilder:
                 isinstance(component, Force)
                 and (
                     component.appliesForce
+                    # A muscle that is switched off keeps its states in OpenSim.
                     or getattr(FORCE_TYPES.find(type(component)), "states", False)
                 )
             ):

@@ -83,6 +83,7 @@ def build_external_loads(
             identifiers: Any = {
                 f"{part}_identifier": text for part, text in zip(PARTS, names, strict=False)
             }
+            # Names must differ if several loads act on one body.
             name = body.rpartition("/")[2] + (f"_{number}" if len(several) > 1 else "")
             loads.objects.append(ExternalForce(name=name, applied_to_body=body, **identifiers))
     return loads
@@ -109,6 +110,7 @@ def read_external_loads(
     if isinstance(source, ExternalLoads):
         loads, folder, file = source, Path(), None
     elif Path(source).suffix.lower() in TABLES:
+        # A table alone does not say where forces act.
         message = "this table does not name the bodies on which its forces act: name it in a document of ExternalLoads"
         raise DocumentError(f"{message}, or use --applied-to", file=str(source))
     else:
@@ -116,6 +118,7 @@ def read_external_loads(
         folder = Path(source).parent
         file = str(source)
     members: list[Any] = [*loads.objects]
+    # Members of unknown classes have no `appliesForce`.
     for item in members:
         if not isinstance(item, ExternalForce):
             kind = getattr(item, "class_name", "") or type(item).__name__
@@ -190,6 +193,7 @@ def _read_load(
         what: columns.find_functions(identifier, f"the {what}_identifier of '{force.name}'", file)
         for what, identifier in _list_identifiers(force).items()
     }
+    # A point alone applies nothing.
     if not functions.keys() & {"force", "torque"}:
         raise DocumentError(
             f"'{force.name}' has no force_identifier and no torque_identifier; give it one",
@@ -247,6 +251,7 @@ def _find_frame(mechanism: Mechanism, value: Any, what: str, file: str | None) -
     """
     name = value if isinstance(value, str) else value.name
     try:
+        # Relative paths of old files begin with "../"; a name without slashes is looked up by name.
         return mechanism.placement(f"/{name.lstrip('./')}" if "/" in name else name)
     except ModelError as error:
         raise DocumentError(f"{what} is '{name}', but {error.message}", file=file) from None
@@ -316,6 +321,7 @@ class _Columns:
         if places:
             result = join_words([labels[place] for place in places])
             return f"exactly three columns must begin with it, and '{file}' has {result}"
+        # Labels without their last letter are the possible identifiers.
         starts = [label[:-1] for label in labels if label[-1:] in ("x", "X", "1")]
         near = find_nearest(identifier, starts) or find_nearest(identifier, labels)
         hint = f"; did you mean '{near}'?" if near else f"; its columns are {join_words(labels)}"

@@ -60,6 +60,7 @@ class ElasticFoundation(PairContact):
             OsimliteError: a mesh file cannot be read.
             UnsupportedError: a surface is not a mesh, half space, sphere or ellipsoid.
         """
+        # Meshes have springs; the other surfaces are as in other contact forces.
         surfaces = []
         for geometry, material in read_geometries(builder, force):
             if isinstance(geometry, ContactMesh):
@@ -76,6 +77,7 @@ class ElasticFoundation(PairContact):
             if surfaces[second].mesh is None:
                 first, second = second, first
             a, b = surfaces[first], surfaces[second]
+            # Surfaces of one body, and ellipsoids (`radii`), do not touch a mesh.
             if a.body != b.body and b.mesh is not None and a.radii is None:
                 # The law takes the material of the mesh alone, so nothing is combined.
                 pairs.append(ContactPair(first, second, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)))
@@ -100,6 +102,7 @@ class ElasticFoundation(PairContact):
     def _make_pair(self, number: int, pair: ContactPair, places: Places) -> ForceRecord:
         one, two = self.surfaces[pair.first], self.surfaces[pair.second]
         links, numbers = self.pack_pair(pair, places)
+        # The kernel takes the springs of one mesh; two meshes are computed in Python.
         assert two.mesh is not None
         ints = *links, number, len(two.mesh.areas), int(one.is_half_space)
         if one.mesh is not None:
@@ -112,6 +115,7 @@ class ElasticFoundation(PairContact):
         springs = (
             x
             for area, middle in zip(two.mesh.areas.tolist(), middles, strict=True)
+            # Each spring is its stiffness times area and its place.
             for x in (stiffness * area, *middle)
         )
         return ForceRecord(
@@ -212,6 +216,7 @@ class Springs:
             turning: angular velocity of the other surface, 1/s.
         """
         _, c, us, ud, uv = surface.material
+        # Surface 1 pushes back with the opposite force.
         force = torque = ZERO
         energy = 0.0
         for k, x, y, z, *end in acting:
@@ -259,6 +264,7 @@ def _find_springs_inside(
         ground.
     """
     middles = pose.points(mesh.centroids)
+    # Springs in the frame of the other mesh, where its bounding box is fixed.
     seen = (middles - theirs.origin) @ theirs.turn
     # The bounding box excludes most springs before the costly search.
     boxed = np.all((seen >= other.points.min(axis=0)) & (seen <= other.points.max(axis=0)), axis=1)

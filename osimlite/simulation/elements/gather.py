@@ -96,12 +96,14 @@ def force_elements(
         raise UnsupportedError(
             f"osimlite cannot compute {join_words(summarize_skipped(skipped))}; set appliesForce to false{SKIP_ADVICE}"
         )
+    # External loads come after the forces of the model, as OpenSim adds them to the component set.
     if external_loads is not None:
         from osimlite.simulation.elements.external_loads import read_external_loads
 
         elements += read_external_loads(mechanism, external_loads)
     from osimlite.simulation.elements.probe_type import make_probes
 
+    # Probes read the records of forces, so they are made last.
     elements += make_probes(builder, elements)
     controls = builder.controls.controls
     reads_files = builder.reads_files or external_loads is not None
@@ -129,6 +131,7 @@ def summarize_skipped(skipped: Sequence[str]) -> list[str]:
         return list(skipped)
     groups: dict[str, list[str]] = {}
     for words in skipped:
+        # The words are "path (class)".
         path, _, kind = words.partition(" (")
         groups.setdefault(kind.removesuffix(")") or "others", []).append(path)
     return [

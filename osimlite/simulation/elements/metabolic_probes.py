@@ -66,12 +66,14 @@ def read_metabolic_probe(
                 muscle, numbers(item, muscle, find_muscle_mass(builder, probe, item, muscle))
             )
         )
+    # The basal power is a constant of the motion.
     basal = (
         probe.basal_coefficient * builder.mechanism.total_mass**probe.basal_exponent
         if probe.basal_rate_on
         else 0.0
     )
     labels: tuple[str, ...] = (f"{probe.name}_TOTAL",)
+    # -1: the results of single muscles are not reported.
     first = -1
     if not probe.report_total_metabolics_only:
         names = ("BASAL", *(item.name for item in parameters))
@@ -104,6 +106,7 @@ def find_muscle_mass(builder: ElementBuilder, probe: Any, item: Any, muscle: Any
     )
     for name in names:
         if not (getattr(item, name) or 0.0) > 0.0:
+            # A missing property is None.
             raise builder.unsupported_error(
                 probe, f" of the muscle '{item.name}', whose {name} is not positive"
             )
@@ -222,6 +225,7 @@ def _read_smoothed(
     form = forms[component.smoothing_type or "tanh"] if component.use_smoothing else 0.0
     sharpness = (getattr(component, name) for name in SmoothTransitions._fields[1:])
     smoothed = SmoothTransitions(
+        # Without a value OpenSim's smoothing parameter is 10.
         form, *(10.0 if number is None else number for number in sharpness)
     )
     subjects = []
@@ -259,6 +263,7 @@ def _measure_smoothed(
             Bhargava2004(*numbers[: -len(SmoothTransitions._fields)]),
             SmoothTransitions(*numbers[-len(SmoothTransitions._fields) :]),
         )
+        # The record has the quantities in the order of `BHARGAVA_INPUTS`.
         activation, control, active, passive, length, velocity, factor = (
             system.read_record(*place) for place in places
         )

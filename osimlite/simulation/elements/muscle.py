@@ -79,6 +79,7 @@ def define_curve(
     """
 
     def read(builder: ElementBuilder, force: Any) -> Sequence[float]:
+        # Muscles overwrite some properties of their curves.
         curve = getattr(force, name)
         properties = {name: getattr(curve, name) for name in type(curve).__annotations__} | changed(
             force

@@ -61,6 +61,7 @@ class Registry:
         module = self.modules.get(name)
         if module is None:
             return None
+        # Modules register their declarations when they are imported.
         if name not in self._declarations:
             import_module(module, __package__)
         return self._declarations[name]

@@ -43,6 +43,7 @@ def is_allowed(source: str) -> bool:
         OsimliteError: the environment variable names an unknown source.
     """
     only = os.environ.get(VARIABLE, "")
+    # A single source makes results reproducible, for example in tests.
     if only and only not in SOURCES:
         raise OsimliteError(
             f"{VARIABLE} is '{only}', which is no source of kernels{suggest_or_list(only, SOURCES)}"
@@ -78,6 +79,7 @@ def is_ready(name: str) -> bool:
     if name in _addresses:
         return True
     address = None
+    # The sources are asked in the order of their speed.
     if is_allowed(LIBRARY) and (library := kernel_library.load_library()) is not None:
         address = library.get_address(name)
     if address is None and is_allowed(COMPILER):
@@ -109,6 +111,7 @@ def prepare_laws(names: Sequence[str]) -> None:
             _addresses.update(compiled_laws.compile_laws(missing))
             return
         except CompilationError as error:
+            # The compiler may lack what a law needs; numba may still work.
             reason = error
     # Numba compiles without derivatives, so it comes last.
     if is_allowed(NUMBA) and _has_numba():
@@ -118,6 +121,7 @@ def prepare_laws(names: Sequence[str]) -> None:
             _addresses[name] = numba_laws.compile_law(name)
         return
     message = f"'{missing[0]}' is in no library, and there is neither a C++ compiler nor numba to compile it"
+    # The error of the compiler says more than a general one.
     raise reason or CompilationError(message)
 
 
@@ -130,6 +134,7 @@ def can_prepare(names: Iterable[str]) -> bool:
         return True
     if is_allowed(COMPILER) and find_compiler() is not None:
         return True
+    # Laws with dual numbers need the compiler.
     has_duals = any(find_law(name)[1] for name in missing)
     return not has_duals and is_allowed(NUMBA) and _has_numba()
 

@@ -87,6 +87,7 @@ class MeshFiles:
         except OsimliteError as error:
             raise MeshProblem(f"left out: {error}") from None
         file = self.add((str(source), signs), source.stem, _WRITTEN[kind], content)
+        # The file was found in another letter case.
         misspelt = not source.as_posix().endswith(Path(name).as_posix().removeprefix("./"))
         return MeshCopy(file, source, converted, misspelt)
 
@@ -146,5 +147,6 @@ def _convert_mesh(source: Path, kind: str, signs: Signs) -> tuple[bytes, str]:
         binary = format_binary_stl(content, source.name, signs)
         return binary, "" if is_binary(content) else "written as a binary STL file"
     surface = read_surface(source)
+    # Mirrored triangles must be turned around, which a scale in URDF does not do.
     text = (surface.stretch(signs) if min(signs) < 0.0 else surface).obj().encode()
     return text, "written as an OBJ file of triangles" if kind == ".vtp" else ""

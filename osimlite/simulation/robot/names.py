@@ -32,6 +32,7 @@ def legal(name: str) -> str:
         too
             long.
     """
+    # A name begins with a letter or an underscore.
     word = re.sub(r"[^A-Za-z0-9_.-]", "_", name)[:LONGEST] or "_"
     return word if word[0].isalpha() or word[0] == "_" else f"_{word}"
 
@@ -67,6 +68,7 @@ def xml_name(name: str) -> str:
     Returns:
         The name with ``_`` for every character that XML cannot write; ``_`` for an empty name.
     """
+    # The ranges are those of XML 1.0.
     return re.sub("[^\t\n\r -\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]", "_", name) or "_"
 
 
@@ -83,6 +85,7 @@ def distinct(names: Sequence[str], spell: Callable[[str], str]) -> list[str]:
         One name for each, in the same order.
     """
     result, taken = [*names], set[str]()
+    # Names that keep their spelling come first, since False sorts before True.
     for place in sorted(range(len(names)), key=lambda place: spell(names[place]) != names[place]):
         result[place] = make_unique_name(spell(names[place]), taken)
         taken.add(result[place])

@@ -213,6 +213,7 @@ class Robot:
             Transforms (4, 4) by the names of the links.
         """
         values = self.mechanism.values(q)
+        # The root is first, and joints come in the order from it.
         placed = {self.links[0].name: np.eye(4)}
         for joint in self.joints:
             placed[joint.child] = placed[joint.parent] @ joint.compute_transform(

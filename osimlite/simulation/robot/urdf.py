@@ -76,6 +76,7 @@ def urdf_text(robot: Robot, *, visuals: bool = True) -> str:
     }
     out.line('<?xml version="1.0" encoding="utf-8"?>')
     with out.element("robot", {"name": robot.name}):
+        # MuJoCo refuses massless bodies unless it is told the least mass.
         with out.element("mujoco"):
             least = number(LEAST_MASS)
             out.empty("compiler", {"boundmass": least, "boundinertia": least, "strippath": "false"})
@@ -96,6 +97,7 @@ def urdf_text(robot: Robot, *, visuals: bool = True) -> str:
                         _write_shape(out, collision)
         following = mimics(robot)
         for joint in robot.joints:
+            # Joints of coordinates that others follow.
             _write_joint(out, joint, following.get(joint.name))
     return out.text()
 
@@ -168,6 +170,7 @@ def _write_joint(out: _XmlWriter, joint: RobotJoint, mimic: Mimic | None) -> Non
         if joint.kind == "fixed":
             return
         out.empty("axis", {"xyz": numbers(joint.axis)})
+        # Most readers require effort and velocity.
         strength = {
             "effort": number(UNLIMITED if joint.effort is None else joint.effort),
             "velocity": number(UNLIMITED if joint.velocity is None else joint.velocity),

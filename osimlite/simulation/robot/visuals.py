@@ -106,6 +106,7 @@ class _Collector:
         self.found = Visuals(files=mesh_files.files)
 
     def collect(self) -> Visuals:
+        # Axes of frames are no shapes of bodies.
         for component in self.tree.components:
             if isinstance(component, Geometry) and not isinstance(component, FrameGeometry):
                 self._add(component, self.tree.path_of(component) or component.name)
@@ -137,6 +138,7 @@ class _Collector:
         body, where = self.mechanism.frames[frame]
         owner = "/ground" if body < 0 else self.mechanism.bodies[body].path
         red, green, blue, opacity = (
+            # Colours outside of 0 to 1 are refused by some programs.
             min(max(part, 0.0), 1.0) for part in (*appearance.color, appearance.opacity)
         )
         visual = Visual(shape, where @ placed, (red, green, blue, opacity), path)
@@ -153,6 +155,7 @@ class _Collector:
             Shape and frame (4, 4); None if it cannot be drawn, which is noted.
         """
         note, here = self.note, np.eye(4)
+        # The sign of a scale mirrors, which matters for meshes only.
         scale = tuple(abs(factor) for factor in geometry.scale_factors)
         match geometry:
             case Brick():
@@ -242,6 +245,7 @@ def frame_of(tree: Tree, geometry: Geometry) -> str | None:
     Raises:
         ModelError: the socket names no component.
     """
+    # ".." is the default: the frame around the geometry.
     socket = geometry.socket_frame
     if socket and not (isinstance(socket, str) and socket.strip() == ".."):
         return tree.path_of(tree.target(geometry, "socket_frame", socket))

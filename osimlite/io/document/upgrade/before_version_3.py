@@ -28,6 +28,7 @@ def move_engine_content(draft: Draft) -> None:
         return
     for holder in model.findall("DynamicsEngine"):
         for inner in list_elements(holder):
+            # SDFast and other engines described joints in ways that Simbody does not have.
             if inner.tag != "SimbodyEngine":
                 lost = (
                     ", ".join(sorted({f"<{part.tag}>" for part in list_elements(inner)}))
@@ -50,6 +51,7 @@ _UNIT_AXES = ("1 0 0", "0 1 0", "0 0 1")
 def convert_transform_axes(draft: Draft) -> None:
     """Turn <TransformAxisSet> into a <SpatialTransform> of six axes."""
     for joint, old in find_with_child(draft.find_tagged("CustomJoint"), "TransformAxisSet"):
+        # Old axes say whether they rotate; new ones know by their order, rotations first.
         axes_by_type: dict[str, list[Element]] = {"rotation": [], "translation": []}
         for axis in list_members(old):
             axes_by_type[
@@ -63,6 +65,7 @@ def convert_transform_axes(draft: Draft) -> None:
                     "the others would be lost",
                     draft.numbers[axes[3]],
                 )
+            # A joint has six axes in the new format, and missing ones must be independent.
             directions = _complete_directions([get_child_text(axis, "axis") for axis in axes])
             for index, direction in enumerate(directions):
                 name = f"{kind}{index + 1}"
@@ -95,6 +98,8 @@ def _complete_directions(present: list[str | None]) -> list[str]:
     if not known:
         return [*_UNIT_AXES]
     if len(known) == 1:
+        # OpenSim takes Y for the second direction, and Z if the first is (nearly) Y; 1e-4 is its
+        # tolerance.
         second = (0.0, 1.0, 0.0) if abs(abs(known[0][1]) - 1) >= 1e-4 else (0.0, 0.0, 1.0)
         known.append(second)
         texts.append(" ".join(f"{value:g}" for value in second))
@@ -108,6 +113,7 @@ def _compute_normal(left: Vector, right: Vector) -> str:
     """Return the text of the unit vector normal to two vectors."""
     normal = cross(left, right)
     length = norm(normal)
+    # Adding 0.0 turns -0.0 into 0.0.
     return " ".join(repr(value / length + 0.0) for value in normal) if length else "0 0 1"
 
 
@@ -123,6 +129,7 @@ def apply_scale_factors(draft: Draft) -> None:
     """
     for joint, factors in find_with_child(draft.find_tagged("CustomJoint"), "scale_factors"):
         scales = parse_reals(get_text(factors), 3)
+        # Unreadable factors stay, so that the reader reports them.
         if scales is None:
             continue
         for axis in joint.iter("TransformAxis"):
@@ -147,9 +154,11 @@ def apply_scale_factors(draft: Draft) -> None:
 def _add_multiplier(draft: Draft, holder: Element | None, scale: float, source: Element) -> None:
     """Replace the function in `holder` by its product with `scale`."""
     functions = [] if holder is None else list_elements(holder)
+    # A factor of 1 changes nothing, and would only lengthen the file.
     if holder is None or not functions or scale == 1.0:
         return
     function = functions[0]
+    # OpenSim scales no translation that equals its coordinate.
     if function.tag == "LinearFunction" and parse_reals(
         get_child_text(function, "coefficients"), 2
     ) == [
@@ -186,9 +195,11 @@ def convert_tool_controls(draft: Draft) -> None:
         if spring is not None and tool.tag == "ForwardTool":
             controller = draft.add(
                 _get_controllers(draft, tool), "CorrectionController", source=spring
+            # The gains that OpenSim's upgrade sets.
             )
             draft.add(controller, "kp", "16", source=spring)
             draft.add(controller, "kv", "8", source=spring)
+            # The springs of version 1 have another law.
             draft.record_change(
                 tool, at=spring, lost="corrective springs, which a CorrectionController replaces"
             )
@@ -225,6 +236,7 @@ def convert_actuator_bodies(draft: Draft) -> None:
     version is old, even if the tags are new, so that a set of actuators without a version pushes
     backwards.
     """
+    # Version 2 named the reaction body first.
     for actuator in draft.find_tagged(*_NEW_TAGS):
         for child in list_elements(actuator):
             if child.tag in _NEW_TAGS[actuator.tag]:
@@ -239,8 +251,10 @@ def convert_actuator_bodies(draft: Draft) -> None:
             reacting = actuator.find("body_A")
             if reacting is not None:
                 name = get_text(reacting)
+                # Reaction on ground is what the new format means.
                 lost = None if name in ("", "ground") else f"that the force reacts on '{name}'"
                 draft.remove(reacting)
+            # The old default is "true", the new one "false".
             if actuator.find("force_is_global") is None:
                 draft.add(actuator, "force_is_global", "true", source=actuator)
         draft.record_change(actuator, lost=lost)
@@ -283,6 +297,7 @@ def move_first_trial(draft: Draft) -> None:
         result = [] if trials is None else trials.findall("objects/IKTrial")
         if trials is None or not result:
             # OpenSim accepts a tool that is the root of its file.
+            # The root has no old counterpart if a new program wrote it.
             if draft.numbers[tool]:
                 draft.record_refusal(
                     tool,
@@ -294,10 +309,12 @@ def move_first_trial(draft: Draft) -> None:
             if is_element(child):
                 draft.move(child, tool)
             else:
+                # Comments move with their trial.
                 tool.append(child)
         for extra in result[1:]:
             draft.record_change(tool, at=extra, lost=f"the trial '{extra.get('name', '')}'")
         draft.add(tool, "constraint_weight", "20", source=trials)
+        # Defaults of the old version, which differ from the present ones.
         draft.add(tool, "accuracy", "1e-05" if draft.version == 10500 else "0.0001", source=trials)
         optimizer = tool.find("optimizer_algorithm")
         if optimizer is not None:
@@ -319,6 +336,7 @@ def convert_inverse_dynamics(draft: Draft) -> None:
         if analyses is None or analysis is None:
             continue
         uses_forces = is_true(get_child_text(analysis, "use_model_force_set") or "false")
+        # Times without a value have the old defaults.
         times = " ".join(
             get_child_text(tool, tag) or default
             for tag, default in (("initial_time", "0"), ("final_time", "1"))
@@ -330,6 +348,7 @@ def convert_inverse_dynamics(draft: Draft) -> None:
             if child.tag in _ABSTRACT_TOOL_TAGS:
                 draft.remove(child)
         draft.add(tool, "time_range", times, source=analysis)
+        # The old analysis computed moments without muscles unless it was told otherwise.
         draft.add(tool, "forces_to_exclude", "" if uses_forces else "Muscles", source=analysis)
         draft.add(
             tool,
@@ -357,6 +376,7 @@ def convert_geometry_files(draft: Draft) -> None:
         files = visible.find("geometry_files")
         source = visible if files is None else files
         scale = get_child_text(visible, "scale_factors") or "1 1 1"
+        # OpenSim names the meshes in this way.
         for count, file in enumerate((get_child_text(visible, "geometry_files") or "").split()):
             mesh = draft.add(
                 attached, "Mesh", source=source, name=f"{body.get('name', '')}_geom_{count}"
@@ -404,6 +424,7 @@ def convert_external_forces(draft: Draft) -> None:
                     if functions is None
                     else next((f.get("name", "") for f in list_members(functions)), "")
                 )
+                # "#" stands for a column by its number.
                 if first.startswith("#"):
                     draft.record_change(
                         force,
@@ -411,6 +432,7 @@ def convert_external_forces(draft: Draft) -> None:
                         lost=f"the columns from {first} on, which have no labels; give them labels",
                     )
                     first = ""
+                # The identifier is the label without its last letter, the axis.
                 draft.add(force, identifier, first[:-1], source=force)
                 if functions is not None:
                     draft.remove(functions)
@@ -435,6 +457,7 @@ def _find_functions(force: Element, name: str) -> Element | None:
 def collect_muscle_paths(draft: Draft) -> None:
     """Move the points and wraps of a muscle to its <GeometryPath>."""
     for muscle in draft.find_all("Muscle"):
+        # Some version 2 files have paths already.
         if muscle.find("GeometryPath") is not None:
             continue
         parts = [

@@ -121,6 +121,7 @@ class Draft:
         self.refusals: list[Refusal] = []
         self._changes: list[tuple[UpgradeStep, Element, Element, str | None]] = []
         if self.moves_elements:
+            # `cached_property`: access computes them.
             # Number the elements now, because steps move them later.
             assert self.numbers
 
@@ -161,6 +162,7 @@ class Draft:
         ]
         return sorted(result, key=lambda change: change.number)
 
+    # Version 1 has a model without a document around it.
     def wrap_root(self, tag: str) -> None:
         """Put a new root element around the tree."""
         new = etree.Element(tag)
@@ -185,6 +187,7 @@ class Draft:
         Args:
             kinds: names of classes.
         """
+        # Tags are looked up by class, so that lxml searches once for all of them.
         tags = {tag for kind in kinds for tag in self._tags.get(kind, ())}
         sets = [
             owner
@@ -199,6 +202,8 @@ class Draft:
                 for member in list_members(owner)
                 if not find_families(member.tag)
             ]
+            # Objects of plug-ins belong to the family of their set; sorting puts them in document
+            # order.
             if strange:
                 result = sorted(
                     dict.fromkeys([*result, *strange]), key=lambda element: self.numbers[element]
@@ -254,6 +259,7 @@ class Draft:
             element: the element.
             parent: its new parent.
         """
+        # The text behind an element is layout, and would move with it.
         element.tail = None
         parent.append(element)
         self.touched[element] = None
@@ -418,6 +424,7 @@ def make_body_path(name: str) -> str:
 
 
 def make_path(component: Element) -> str:
+    # OpenSim's paths leave out wrappers such as <objects>, and use the tag of sets.
     """Return the path of a component by the rules of version 4; a component without a name has that of its class."""
     words: list[str] = []
     here: Element | None = component

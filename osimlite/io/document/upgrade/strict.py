@@ -35,6 +35,7 @@ def check_strict_reading(draft: Draft) -> None:
     if draft.version < 30502:
         for frame in draft.find_all("PhysicalFrame"):
             visible = frame.find("VisibleObject")
+            # Versions before 20101 search the geometry by the name of the frame.
             named = draft.version < 20101 or (
                 visible is not None and visible.find("GeometrySet") is not None
             )
@@ -50,6 +51,7 @@ def _check_values(draft: Draft) -> None:
             for owner in draft.find_all(family):
                 if family == "Body" and owner.get("name") == "ground":
                     # Of ground OpenSim reads only geometry and wrap objects.
+                    # Each row holds for a range of versions.
                     continue
                 for path in paths.split():
                     for element in _find_elements(owner, path):
@@ -117,6 +119,7 @@ def _check_joint(draft: Draft, joint: Element) -> None:
     """Check that a joint outside a body names its frames in <connectors>."""
     wrapper = joint.getparent()
     body = None if wrapper is None or wrapper.tag != "Joint" else wrapper.getparent()
+    # Joints in bodies are checked with their bodies.
     if draft.version < 30501 and body is not None and body.tag == "Body":
         return
     connectors = joint.find("connectors")
@@ -163,6 +166,7 @@ def _is_number(text: str) -> bool:
     try:
         value = parse_real(word)
     except UncleanText as unclean:
+        # OpenSim reads a number with trailing characters, if it is cut.
         return unclean.trouble == "cut"
     return not others or isfinite(value)
 
@@ -188,6 +192,7 @@ def _is_vector(size: int) -> Callable[[str], bool]:
 def _vector_pattern(size: int) -> re.Pattern[str]:
     """Return the pattern of a vector."""
     # Compiled at first use: few documents need it, and it takes a millisecond.
+    # Commas between numbers are optional, brackets need not be there.
     numbers = r"\s*,?\s*".join([f"({_NUMBER})"] * size).replace(r"\s*,?\s*", r"(?:\s*,\s*|\s+)")
     return re.compile(rf"{numbers}|~?\s*\[\s*{numbers}\s*\]|~?\s*\(\s*{numbers}\s*\)")
 

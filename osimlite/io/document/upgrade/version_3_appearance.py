@@ -29,6 +29,7 @@ def convert_display_geometry(draft: Draft) -> None:
         shown = visible.find("GeometrySet")
         if shown is not None and shown.find("objects") is not None:
             attached = draft.add(body, "attached_geometry", source=shown)
+            # Other classes in the set were never shown.
             pieces = [piece for piece in list_members(shown) if piece.tag == "DisplayGeometry"]
             for count, piece in enumerate(pieces, 1):
                 _add_mesh(draft, body, visible, attached, piece, count)
@@ -40,6 +41,7 @@ def _add_mesh(
     draft: Draft, body: Element, visible: Element, attached: Element, piece: Element, count: int
 ) -> None:
     name = body.get("name", "")
+    # The pose of the body's geometry, then that of the piece.
     place = compose_transforms(
         get_child_text(visible, "transform"), get_child_text(piece, "transform")
     )
@@ -64,6 +66,7 @@ def _add_mesh(
     mesh = draft.add(attached, "Mesh", source=piece, name=f"{name}_geom_{count}")
     draft.add(mesh, "socket_frame", "..", source=piece)
     scale = piece.find("scale_factors")
+    # Scales of body and piece multiply.
     outer = visible.find("scale_factors")
     source = scale if scale is not None else outer if outer is not None else piece
     draft.add(mesh, "scale_factors", _multiply_scales(scale, outer), source=source)
@@ -79,6 +82,7 @@ def _add_mesh(
         if child.tag in ("color", "opacity"):
             draft.move(child, appearance)
         elif child.tag == "display_preference":
+            # Preferences 1 to 4: wireframe, solid and so on; 4 is the default, smooth shading.
             preference = get_text(child)
             if preference == "0":
                 draft.add(appearance, "visible", "false", source=child)
@@ -91,6 +95,7 @@ def _multiply_scales(scale: Element | None, outer: Element | None) -> str:
     inner_text = "1 1 1" if scale is None else get_text(scale)
     outer_text = "1 1 1" if outer is None else get_text(outer)
     inner_values, outer_values = parse_reals(inner_text, 3), parse_reals(outer_text, 3)
+    # Words stay as they are where possible, so that no digits change.
     if outer_values is None or outer_values == [1, 1, 1]:
         return inner_text
     if inner_values is None or inner_values == [1, 1, 1]:
@@ -152,6 +157,7 @@ def _compute_angles(axes: Axes) -> Vector:
     """Return body-fixed X-Y-Z angles; if the middle one is a right angle, the last is zero."""
     (xx, _, _), (yx, yy, yz), (sine, zy, zz) = axes
     middle = asin(max(-1.0, min(1.0, sine)))
+    # At a right angle (gimbal lock) only the sum of the other two is known.
     if abs(sine) > 1 - 4 * _EPSILON:
         return atan2(yz, yy), middle, 0.0
     return atan2(-zy, zz), middle, atan2(-yx, xx)
@@ -191,6 +197,7 @@ def convert_contact_appearance(draft: Draft) -> None:
         assert first is not None
         appearance = draft.add(geometry, "Appearance", source=first)
         if color is None:
+            # OpenSim's default colour of contact geometry, cyan.
             draft.add(appearance, "color", "0 1 1", source=first)
         else:
             draft.move(color, appearance)
@@ -200,6 +207,7 @@ def convert_contact_appearance(draft: Draft) -> None:
                 draft.add(appearance, "visible", "false", source=preference)
             else:
                 surface = draft.add(appearance, "SurfaceProperties", source=preference)
+                # 3 is solid; smooth shading (4) has no counterpart.
                 text = "3" if word == "4" else get_text(preference)
                 draft.add(surface, "representation", text, source=preference)
             draft.remove(preference)
@@ -215,6 +223,7 @@ def convert_wrap_appearance(draft: Draft) -> None:
         representation = "3"
         hidden = False
         set_by = color
+        # The preference of the wrap object comes before that of the visible object.
         for preference in (local, outer):
             word = "" if preference is None else get_text(preference)
             if word == "0":
@@ -248,6 +257,7 @@ def _add_appearance(
         draft.add(appearance, "visible", "false", source=source)
     text = "0 1 1" if color is None else get_text(color)
     draft.add(appearance, "color", text, source=source if color is None else color)
+    # OpenSim shows wrap objects half transparent.
     draft.add(appearance, "opacity", "0.5", source=source)
     surface = draft.add(appearance, "SurfaceProperties", source=source)
     draft.add(surface, "representation", representation, source=source)
@@ -264,6 +274,8 @@ def _is_shown_elsewhere(wrap: Element, visible: Element | None) -> bool:
     return (
         shown is not None
         and any(shown)
+        # OpenSim's wrap objects may be drawn elsewhere than they act, which the new format cannot
+        # say.
         and any(abs(a - b) > 1e-4 for a, b in zip(shown, here, strict=True))
     )
 
@@ -287,6 +299,7 @@ def convert_path_appearance(draft: Draft) -> None:
         appearance = path.find("Appearance")
         if appearance is None:
             appearance = draft.add(path, "Appearance", source=path)
+        # An explicit appearance is newer than these properties.
         if visible is not None:
             _hide_path(draft, appearance, visible)
         if appearance.find("color") is None:

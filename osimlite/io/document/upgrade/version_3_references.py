@@ -26,6 +26,7 @@ _SUFFIX = re.compile(r"((?:socket|input)_.*)_connectee_names?")
 def convert_connectors(draft: Draft) -> None:
     """Turn each entry of <connectors> into an element <socket_...>."""
     for component, old in find_with_child(draft.find_all("Component"), "connectors"):
+        # OpenSim leaves connectors with other names alone.
         if not all(
             re.fullmatch(r"\w+", connector.get("name", "")) for connector in list_elements(old)
         ):
@@ -72,6 +73,7 @@ def complete_body_paths(draft: Draft) -> None:
         )
     for component in draft.find_all("Component"):
         for child in list_elements(component):
+            # A second element for a socket is not read.
             if not child.tag.startswith("socket_") or component.find(child.tag) is not child:
                 continue
             text = get_text(child)
@@ -88,6 +90,7 @@ def complete_body_paths(draft: Draft) -> None:
 def _leads_to_body(component: Element, text: str, paths: dict[str, str]) -> bool:
     """Return whether a relative path leads to a body, or to a frame that the component contains."""
     here = make_path(component).split("/")[1:]
+    # ".." leads to the parent, as in paths of files.
     for word in text.split("/"):
         if word != "..":
             here.append(word)
@@ -97,6 +100,7 @@ def _leads_to_body(component: Element, text: str, paths: dict[str, str]) -> bool
         return True
     frames = (
         piece for tag in ("frames", "components") for piece in _list_children(component.find(tag))
+    # Relative names of frames inside the component are valid.
     )
     return any(piece.get("name") == text for piece in frames)
 
@@ -129,6 +133,7 @@ def add_joint_frames(draft: Draft) -> None:
             socket = joint.find(f"socket_{side}_frame")
             if socket is None:
                 continue
+            # Old sockets have names or paths; the last word is the name.
             body = get_text(socket).rpartition("/")[2]
             place = [joint.find(f"{what}_in_{side}") for what in ("location", "orientation")]
             socket.text = _add_frame(draft, joint, body, socket, place)
@@ -169,6 +174,7 @@ def _add_frame(
     source = next((part for part in place if part is not None), socket)
     frames = draft.get_list(owner, "frames", source=source)
     taken = {frame.get("name") for frame in frames}
+    # Names of frames must be unique in their list.
     name = make_unique_name(f"{body}_offset", taken, 0)
     frame = draft.add(frames, "PhysicalOffsetFrame", source=source, name=name)
     draft.add(frame, "socket_parent", make_body_path(body), source=socket)
@@ -248,6 +254,7 @@ def convert_point_coordinates(draft: Draft) -> None:
             if paths is None:
                 paths = _list_coordinate_paths(draft)
             name = get_text(child)
+            # An unknown name stays, so that the reader reports it.
             child.text = paths.get(name, name)
             if name in paths and name not in taken:
                 taken[name] = _find_opensim_path(draft, name)
@@ -283,6 +290,8 @@ def _find_opensim_path(draft: Draft, name: str) -> str:
 
     def order(element: Element) -> tuple[int, bool, float, int]:
         number, top = float(draft.numbers[element]), element
+        # OpenSim's order at that point of its upgrade: joints behind bodies, axes before
+        # coordinates.
         while (above := top.getparent()) is not None and above is not draft.model:
             if top.tag == "SpatialTransform":
                 before = [
@@ -316,6 +325,7 @@ def _list_coordinate_paths(draft: Draft) -> dict[str, str]:
         for joint in list_members(joint_set)
     ):
         name = joint.get("name") or joint.tag.lower()
+        # Joints of one name get "_0", "_1", as in OpenSim.
         free = make_unique_name(name, taken, 0)
         taken.add(free)
         for coordinate in joint.iter("Coordinate"):

@@ -54,6 +54,7 @@ def remove_white_space(draft: Draft) -> None:
     for component in draft.find_all("Component"):
         name = component.get("name")
         parent = component.getparent()
+        # OpenSim gives such a component the name of its class in lower case.
         if name is None:
             if parent is not None and not find_families(parent.tag):
                 component.set("name", component.tag.lower())
@@ -63,9 +64,11 @@ def remove_white_space(draft: Draft) -> None:
             siblings = (
                 () if parent is None else (other for other in parent if other is not component)
             )
+            # Two names may become equal without their blanks.
             taken = {sibling.get("name") for sibling in siblings}
             free = make_unique_name(new, taken, 0)
             component.set("name", free)
+            # Texts are compared with white space collapsed.
             renamed.setdefault(" ".join(name.split()), free)
             draft.record_change(component)
     if renamed:
@@ -93,6 +96,7 @@ def _rename_references(draft: Draft, renamed: dict[str, str]) -> None:
 def _rename_in_list(text: str, renamed: dict[str, str]) -> str:
     """Replace old names in a list of names, the longest first."""
     for old, new in sorted(renamed.items(), key=lambda pair: -len(pair[0])):
+        # The longest first: a name may be a part of another one.
         text = f" {text} ".replace(f" {old} ", f" {new} ").strip()
     return text
 
@@ -109,6 +113,7 @@ _INERTIA = {"xx": "1", "yy": "1", "zz": "1", "xy": "0", "xz": "0", "yz": "0"}
 def combine_inertia(draft: Draft) -> None:
     """Combine the six numbers of inertia into one <inertia>."""
     for body in draft.find_tagged("Body"):
+        # Ground has no inertia in the new format.
         if body.get("name") == "ground":
             continue
         parts = {axes: body.find(f"inertia_{axes}") for axes in _INERTIA}
@@ -144,6 +149,7 @@ def convert_ground(draft: Draft) -> None:
         )
         if body is not None:
             for child in list_elements(body):
+                # Ground keeps what is drawn or wrapped; mass and joint have no meaning.
                 if child.tag not in _GROUND_TAGS:
                     draft.remove(child)
             draft.rename(body, "Ground")
@@ -159,6 +165,7 @@ def move_joints(draft: Draft) -> None:
         for body, wrapper in find_with_child(list_members(bodies), "Joint"):
             result = list_elements(wrapper)
             if result:
+                # A body had one joint; more are malformed, and OpenSim takes the first.
                 _convert_joint(draft, result[0], body, objects)
             for extra in result[1:]:
                 draft.record_change(
@@ -180,6 +187,7 @@ def _convert_joint(draft: Draft, joint: Element, body: Element, objects: Element
     if parent is not None:
         parent.text = get_text(parent)
         draft.rename(parent, "socket_parent_frame")
+    # Development versions wrote the socket of the child already.
     if joint.find("socket_child_body") is None:
         draft.add(joint, "socket_child_frame", body.get("name", ""), source=body)
     draft.move(joint, objects)
@@ -255,6 +263,7 @@ def remove_usual_bounds(draft: Draft) -> None:
         for tag, usual in _DEFAULT_BOUNDS.items():
             bound = muscle.find(tag)
             value = None if bound is None else _parse_beginning(get_text(bound))
+            # The former defaults of all actuators; each muscle class has its own now.
             if bound is not None and value is not None and abs(value - usual) < 1e-14:
                 draft.remove(bound)
                 is_changed = True
@@ -266,6 +275,7 @@ def apply_reverse(draft: Draft) -> None:
     """Exchange the frames of a joint with <reverse>."""
     for joint, switch in find_with_child(draft.find_all("Joint"), "reverse"):
         parent, child = joint.find("socket_parent_frame"), joint.find("socket_child_frame")
+        # Reversing a joint and swapping its frames is the same.
         if is_true(get_text(switch)) and parent is not None and child is not None:
             parent.text, child.text = child.text, parent.text
             draft.record_change(joint)

@@ -23,6 +23,7 @@ def complete_axis_functions(draft: Draft) -> None:
     An axis with an empty function follows its coordinate, an axis without any function is fixed.
     """
     for axis in draft.find_tagged("TransformAxis"):
+        # An axis with a function is complete.
         if any("Function" in find_families(child.tag) for child in list_elements(axis)):
             continue
         holder = axis.find("function")
@@ -33,6 +34,7 @@ def complete_axis_functions(draft: Draft) -> None:
         )
         if holder is None:
             holder = draft.add(axis, "function", source=axis)
+        # The identity, which OpenSim assumes.
         if len(coordinates) == 1:
             draft.add(
                 draft.add(holder, "LinearFunction", source=holder),
@@ -42,6 +44,7 @@ def complete_axis_functions(draft: Draft) -> None:
             )
         elif not coordinates:
             draft.add(draft.add(holder, "Constant", source=holder), "value", "0", source=holder)
+        # An axis of several coordinates without a function has no meaning; the reader reports it.
         else:
             continue
         draft.record_change(axis)
@@ -100,8 +103,10 @@ def remove_meaningless(draft: Draft) -> None:
 def _describe_loss(child: Element, default: str) -> str | None:
     """Return the element and its value if that had an effect, else None."""
     text = get_text(child)
+    # An empty default marks elements that never had an effect.
     if not default or text == default or not text:
         return None
+    # Equal numbers may be written differently.
     count = len(default.split())
     values, expected = parse_reals(text, count), parse_reals(default, count)
     return None if values is not None and values == expected else f"{child.tag} {text}"
@@ -111,6 +116,7 @@ def name_paths(draft: Draft) -> None:
     """Name the <GeometryPath> of a force 'path'."""
     for path in draft.find_tagged("GeometryPath"):
         force = path.getparent()
+        # Only the first path of a force is read.
         if force is not None and force.find("GeometryPath") is path and draft.is_a(force, "Force"):
             path.set("name", "path")
             draft.record_change(path)
@@ -147,12 +153,14 @@ def convert_controller_actuators(draft: Draft) -> None:
         for force_set in draft.find_tagged("ForceSet")
         for force in list_members(force_set)
     ]
+    # Actuators come before other forces of the same name.
     by_name: dict[str, str] = {}
     for path, name in (*actuators, *forces):
         by_name.setdefault(name, path)
     for controller, names in listed:
         words = split_words(get_text(names))
         lost = None
+        # "ALL" stands for every actuator, in any letter case.
         if any(word.lower() == "all" for word in words):
             paths = [path for path, _ in actuators]
             if draft.model is None:
@@ -162,6 +170,7 @@ def convert_controller_actuators(draft: Draft) -> None:
         else:
             paths = [by_name.get(word, f"/forceset/{word}") for word in words]
             known = [path for path in paths if path in {*by_name.values()}]
+            # OpenSim fails over a repeated actuator.
             if len({*known}) < len(known):
                 draft.record_refusal(controller, names, "a controller names an actuator twice")
         names.text = " ".join(dict.fromkeys(paths))

@@ -70,6 +70,7 @@ def compute_fiber_forces(
     """
     fiber_length = now.fiber_length
     cos = cos_upright(fiber_length, m.height)
+    # Strain of the tendon: what the fibers leave of the path.
     strain = (now.length - fiber_length * cos) / m.slack - 1.0
     active, passive, tendon = force_law(fiber_length / m.optimal, strain, fields, curves)
     return cos, active, passive, tendon
@@ -130,6 +131,7 @@ def find_isometric_length(
     """
     # The path is too short to leave any length along the tendon: the fibers are across it.
     if length < m.slack:
+        # The height is the shortest fiber length.
         return m.height
     guess = make_guess(length, start, m)
     before, error_before = guess.length, 0.0
@@ -178,6 +180,7 @@ def compute_full_force(
 
 
 def _check_flags(builder: ElementBuilder, force: Any) -> None:
+    # These classes have the flags of their base, but not the behaviour.
     for flag in ("ignore_tendon_compliance", "ignore_activation_dynamics"):
         words = f"is true, which a {type(force).__name__} cannot do"
         Number(flag, lambda x: x == 0.0, words).read(builder, force)
@@ -275,6 +278,7 @@ def compute_delp_forces(
     active, _, _ = evaluate_function(curves.active, length)
     passive, _, _ = evaluate_function(curves.passive, length)
     tendon, _, _ = evaluate_function(curves.tendon, strain)
+    # A slack tendon does not push; the curve may have values below zero strain.
     return active, passive, tendon if strain >= 0.0 else 0.0
 
 
@@ -432,6 +436,7 @@ def compute_schutte_forces(
     tendon, _, _ = evaluate_function(curves.tendon, strain)
     passive = (
         evaluate_function(curves.passive, length)[0]
+        # OpenSim uses the exponential law where the file has no curve.
         if fields.has_curve
         else schutte_passive_force(length)
     )
@@ -459,6 +464,7 @@ def compute_schutte(
     # Fibers across the tendon carry nothing along it; OpenSim then takes the velocity of the path.
     if cos > NOTHING:
         borne = max(tendon / cos - passive, 0.0)
+        # The velocity follows from the force that the tendon bears.
         velocity = (
             schutte_velocity(now.activation, max(active, 0.0), borne, fields.damping)
             * m.optimal

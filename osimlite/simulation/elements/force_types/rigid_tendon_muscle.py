@@ -69,6 +69,7 @@ def compute_rigid_tendon_muscle(
         Tension (N), activation, fiber length (m), cosine of pennation, force-length and force-velocity
         factors, active and passive fiber force (N), fiber velocity (m/s).
     """
+    # A path shorter than the tendon leaves no fibers.
     along = max(now.length - m.slack, 0.0)
     fiber_length, cos = along, 1.0
     if m.height > MAX_PARALLEL_HEIGHT_M:
@@ -78,6 +79,7 @@ def compute_rigid_tendon_muscle(
     passive, _, _ = evaluate_function(curves.passive, fiber_length / m.optimal)
     factor, _, _ = evaluate_function(curves.velocity, now.rate / (m.optimal * m.fastest))
     active_force = m.strength * now.excitation * active * factor
+    # OpenSim clamps the passive curve between 0 and 10.
     passive_force = m.strength * min(max(passive, 0.0), 10.0)
     tension = (active_force + passive_force) * cos
     return (

@@ -38,6 +38,7 @@ def define_smooth_fields(
     """
 
     def others(builder: ElementBuilder, force: Any) -> tuple[float, ...]:
+        # The constants of activation may be those of another muscle, see `_find_activation_owner`.
         first = timed(builder, force)
         return (
             *compute_height(builder, force),

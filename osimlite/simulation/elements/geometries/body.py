@@ -155,6 +155,7 @@ def push_body(
         torque: torque along the axes, N.m.
         force: force along the axes, N.
     """
+    # The axes of the vectors may be those of ground or of the body.
     apply_torque(model, data, g[0], direction(model, data, g[2], rotate_back(at(gp, 3), torque)))
     point = station(model, data, g[1], vector(gp, 0))
     apply_force(
@@ -260,6 +261,7 @@ class AboutAxis(OnBodies):
         if not force.torque_is_global:
             # The axis is given along the frame of bodyA, but stored along its body.
             axis = to_triple(placed[:3, :3] @ axis)
+        # The second axis is for the speed: OpenSim reads the numbers as an axis of ground.
         return Anchors(
             (one, two), (), ((GROUND if force.torque_is_global else one, axis), (GROUND, as_given))
         )

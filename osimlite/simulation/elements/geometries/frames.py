@@ -63,6 +63,7 @@ def compute_deviations(model: Ints, data: Floats, g: Ints, gp: Floats, work: Flo
     store_vector(work, 9, end)
     x, y, z = rotate(one, vector(two, 0)), rotate(one, vector(two, 3)), rotate(one, vector(two, 6))
     store_vector(d, 0, xyz_angles(x[0], y[0], z[0], x[1], y[1], z[1], z[2]))
+    # The translation is that of the origins, along the axes of the first frame.
     store_vector(d, 3, rotate(one, minus(end, start)))
     # The rate is that in the first frame, which itself rotates.
     store_vector(
@@ -70,6 +71,7 @@ def compute_deviations(model: Ints, data: Floats, g: Ints, gp: Floats, work: Flo
         3,
         rotate(one, minus(velocity(model, data, g[1], end), velocity(model, data, g[0], end))),
     )
+    # The angular velocity of the second frame relative to the first, in its own axes.
     wx, wy, wz = rotate(
         two, minus(angular_velocity(model, data, g[1]), angular_velocity(model, data, g[0]))
     )
@@ -86,6 +88,8 @@ def load_frames(model: Ints, data: Floats, g: Ints, work: Floats) -> None:
         work: record of the bushing.
     """
     loads, d = at(work, LOADS), at(work, DEVIATIONS)
+    # The loads of the law are generalized: forces along the axes of the first frame, moments about
+    # the angles.
     force = rotate_back(at(work, AXES), vector(loads, 3))
     moment = rotate_back(at(work, AXES + 9), xyz_moment(d[1], d[2], loads[0], loads[1], loads[2]))
     store_vector(work, 0, force)
@@ -207,6 +211,7 @@ class BetweenFrames(ForceGeometry):
             origins of
                 the frames or of their bodies.
         """
+        # The record has the load on the second frame.
         push, moment, start, end = np.array(record[:12], dtype=float).reshape(4, 3)
         first, second = start, end
         if self.about_bodies:

@@ -55,6 +55,7 @@ def pull_ends(model: Ints, data: Floats, g: Ints, gp: Floats, work: Floats, tens
     """
     pull, back = times(tension, vector(work, 0)), times(-tension, vector(work, 0))
     apply_force(model, data, g[0], vector(work, 3), pull)
+    # The law reads the direction before; now the record becomes the report.
     apply_force(model, data, g[1], vector(work, 6), back)
     store_vector(work, 0, pull)
     # OpenSim reports these points in the frames that the force names, and acts at others: see `Ends`.

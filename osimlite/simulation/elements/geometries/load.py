@@ -61,6 +61,7 @@ def evaluate_load(g: Ints, gp: Floats, work: Floats, t: float) -> None:
         work: receives the values (9,).
         t: time, s.
     """
+    # Values of force, point and torque, if they exist.
     for k in range(9):
         if g[3 + k // 3] > 0:
             work[k], _, _ = evaluate_function(at(gp, g[6 + k]), t)
@@ -133,6 +134,7 @@ class GivenLoad(ForceGeometry):
             numbers += axes
         tables: list[int] = []
         for functions in location.groups:
+            # A missing group still has three offsets in the record.
             for function in functions or (None, None, None):
                 tables.append(len(numbers))
                 if function is not None:

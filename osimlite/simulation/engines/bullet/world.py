@@ -33,9 +33,11 @@ def mute_output(descriptor: int = 2) -> Iterator[None]:
     Args:
         descriptor: 2 for standard error, 1 for standard output.
     """
+    # PyBullet prints from C, so that only the descriptor can be redirected.
     try:
         kept = os.dup(descriptor)
     except OSError:
+        # Programs without standard error have nothing to mute.
         yield
         return
     nowhere = os.open(os.devnull, os.O_WRONLY)
@@ -103,6 +105,7 @@ class World:
         self._exact = exact
         try:
             self._load_robot(robot, gravity, files or {})
+        # A world that could not be loaded must not stay open: Bullet has a limit of worlds.
         except BaseException:
             self.close()
             raise
@@ -112,6 +115,7 @@ class World:
     ) -> None:
         client = self.client
         bullet.setGravity(*gravity, physicsClientId=client)
+        # Substeps would integrate in between without forces.
         bullet.setPhysicsEngineParameter(numSubSteps=0, physicsClientId=client)
         self.impossible = [link.name for link in robot.links if compute_inertia_excess(link) > 0.0]
         with write_temporary_file(write_robot(robot), files) as path:
@@ -142,6 +146,7 @@ class World:
     def _remove_damping(self, infos: Sequence[Sequence[Any]]) -> None:
         """Remove everything that slows a joint down: damping, speed limits and motors."""
         client = self.client
+        # -1 is the base.
         for index in (-1, *(int(info[0]) for info in infos)):
             bullet.changeDynamics(
                 self.id,
@@ -156,6 +161,7 @@ class World:
 
     def switch_motors_off(self) -> None:
         """Switch off the motor with which Bullet starts every joint."""
+        # Motors have a maximum force, which 0 disables.
         if self._indices:
             none = [0.0] * len(self._indices)
             bullet.setJointMotorControlArray(
@@ -228,6 +234,7 @@ class World:
             rates: their rates.
             forces: forces on the joints, N or N m.
         """
+        # A step of 1 s from these rates changes them by the acceleration (semi-implicit Euler).
         self.set_state(q, rates)
         self.step(1.0, forces)
         states = bullet.getJointStates(self.id, self._indices, self.client)

@@ -91,8 +91,10 @@ class Node:
         Returns:
             Integers and numbers.
         """
+        # The frame of the point in its link.
         link, frame = places.placement(self.body)
         frame = frame @ self.frame
+        # A locked coordinate has no number in the state, so its value goes into the record.
         value = places.locked_value(self.coordinate) if self.coordinate >= 0 else 0.0
         station = frame[:3, :3] @ self.location + frame[:3, 3]
         numbers = [*station.tolist(), value, *self.range, *frame[:3, :3].ravel().tolist()]
@@ -187,6 +189,7 @@ class ThroughPoints:
         """
         parts = [ForceRecord("pull_points", is_part=True)]
         wraps: list[int] = []
+        # Records of surfaces come before that of the path: offsets to them are negative.
         behind = sum(bool(surface.law) for surface in self.surfaces)
         # OpenSim solves one surface after the other, each by a kernel of its own. Geodesics are
         # solved together by the kernel of the path.
@@ -202,6 +205,7 @@ class ThroughPoints:
                 wraps.append(0)
             wraps += surface.first, surface.last
         nodes = [(point, places.freedom(point.coordinate)) for point in self.points]
+        # Each surface has two tangent points.
         nodes += [(surface.tangent, surface.number) for surface in self.surfaces for _ in range(2)]
         ints, numbers = [ITEM.OWN * len(parts), len(self.points), len(self.surfaces)], list[float]()
         for number, (node, of) in enumerate(nodes):
@@ -221,6 +225,7 @@ class ThroughPoints:
             for surface in self.surfaces:
                 wraps += len(numbers), surface.first, surface.last, surface.begin
                 numbers += surface.numbers
+            # The most surfaces on one segment decide how much work memory a search needs.
             most = max(Counter(surface.first for surface in self.surfaces).values())
             slots, work = layout_slots(most, len(self.surfaces), work)
             kernel, wraps = "geodesic_path", wraps + slots
@@ -244,6 +249,7 @@ def read_path(builder: ElementBuilder, owner: Any) -> ThroughPoints:
     """
     path = owner.geometry_path
     points = []
+    # Points of unknown classes have no reader.
     for point in path.path_point_set.objects:
         if type(point) not in READERS:
             raise builder.unsupported_error(
@@ -259,7 +265,9 @@ def read_path(builder: ElementBuilder, owner: Any) -> ThroughPoints:
         )
     wraps = path.path_wrap_set.objects
     result = [builder.resolve_target(wrap, "wrap_object", wrap.wrap_object) for wrap in wraps]
+    # A surface that several wraps name is one surface.
     numbers = {id(surface): number for number, surface in enumerate(result)}
+    # OpenSim treats a single wrap differently: it needs no order of wraps.
     alone = float(len(wraps) == 1)
     surfaces = []
     # In a pose without an active point in the range of a wrap, OpenSim ignores the following wraps.
@@ -283,6 +291,7 @@ def read_path(builder: ElementBuilder, owner: Any) -> ThroughPoints:
         may_leave |= surface.active and all(
             point.kind == CONDITIONAL for point in points[first : last + 1]
         )
+    # Geodesics need points that move continuously.
     if builder.geodesic:
         points = [
             replace(point, kind=CLAMPED) if point.kind == MOVING else point for point in points
@@ -322,10 +331,12 @@ def _read_surface(
         raise ModelError(
             f"'{builder.path(surface)}' has a size that is not positive; give it a positive one"
         )
+    # Ranges count from 1; values below 1 stand for the ends.
     first, last = (
         end - 1 if end >= 1 else other
         for end, other in zip(wrap.range, (0, points - 1), strict=True)
     )
+    # A wrap object stands in a set of its body.
     frame = surface
     while not isinstance(frame, PhysicalFrame):
         frame = builder.tree.parent_of(frame)
@@ -335,6 +346,7 @@ def _read_surface(
     numbers = (*side, method, alone, *sizes)
     if builder.geodesic:
         numbers = (*side, *_list_geodesic_numbers(surface))
+    # A surface that is inactive, or a point, does not touch.
     is_none = not surface.active or (builder.geodesic and min(sizes) == 0.0)
     law, curve = ("", "") if is_none else (law, curve)
     return Surface(number, tangent, law, curve, numbers, first, last)
@@ -369,6 +381,7 @@ def _read_conditional_point(builder: ElementBuilder, point: Any, body: int, fram
     builder.check_finite(point, (*point.location, *point.range))
     low, high = point.range
     coordinate = builder.find_coordinate(point, "socket_coordinate")
+    # The tolerance keeps points active at a range that is given with few digits.
     within = low - TOLERANCE, high + TOLERANCE
     return Node(
         body, frame, np.array(point.location), CONDITIONAL, coordinate, within, name=point.name
