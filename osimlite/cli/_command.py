@@ -33,7 +33,7 @@ class ParameterSpec:
         bare_value: value of an option that is given without one; None if it requires a value.
     """
 
-    # No dataclass: every command imports this module, and dataclasses take a millisecond each.
+    # No dataclass: every command imports this module, and pays for what it imports.
     __slots__ = "bare_value", "maker", "names", "settings"
 
     def __init__(

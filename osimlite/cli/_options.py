@@ -305,8 +305,8 @@ def parse_applied_loads(words: Iterable[str] | None) -> dict[str, list[list[str]
         SettingError: a word does not have this form, or two have the same body.
     """
     named = parse_named_words(words, "--applied-to", "BODY=FORCE,POINT,MOMENT")
+    # Several loads on one body are separated by "+", the columns of a load by commas.
     return {
-        # Several loads on one body are separated by "+", the columns of a load by commas.
         body: [load.strip().split(",") for load in text.split("+")] for body, text in named.items()
     }
 

@@ -162,8 +162,8 @@ def _make_plan(
         for name in known
         if known[name] is Parameter.empty and name in ranges
     }
+    # A partial function of this module can be sent to other processes.
     return plan(
-        # A partial function of this module can be sent to other processes.
         partial(_make_model, source, {**needed, **given}), ranges, parameters=known, **choices
     )
 

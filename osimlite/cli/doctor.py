@@ -125,7 +125,7 @@ def doctor(
 
     Example: osimlite doctor gait2392.osim
     """
-    # rich is imported where a table is printed: it takes longer than most commands.
+    # rich is imported only where a table is printed, so that other commands start fast.
     from rich.text import Text
 
     from osimlite import __version__

@@ -95,8 +95,8 @@ def muscles(
     require_plots(plot=plot)
     model = read(file)
     mechanism = build_mechanism(model)
+    # Two coordinates make a grid, whose size is the square of the number of values.
     values = _sample_coordinates(
-        # Two coordinates make a grid, whose size is the square of the number of values.
         mechanism, coordinate or (), points or (15 if len(coordinate or ()) > 1 else 50)
     )
     result: dict[str, MuscleCurves] = {}

@@ -181,8 +181,8 @@ class _BvhReader:
         # Some editors write a byte-order mark.
         text = read_file(path).decode("utf-8", "replace").lstrip("\ufeff")
         self.lines = text.splitlines()
+        # Line breaks have no meaning in the format, so words are read.
         self.words = [
-            # Line breaks have no meaning in the format, so words are read.
             (word, number) for number, line in enumerate(self.lines, 1) for word in line.split()
         ]
         self.position = 0

@@ -109,7 +109,7 @@ def parse_codes(words: tuple[str, ...] | list[str] | str | None) -> tuple[str, .
     cleaned = tuple(word.strip() for word in given if word.strip())
     if not cleaned:
         return ()
-    # Importing all rules takes a tenth of a second, which a check without options need not spend.
+    # A check without options need not import all rules.
     from osimlite.lint.registry import all_rules, rule_groups
 
     for word in cleaned:

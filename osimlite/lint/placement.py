@@ -294,8 +294,8 @@ def find_rotation_axes(subject: Subject, joint: Joint) -> list[tuple[str, Vector
         if motion.names[0] not in values or motion.axis == ZERO:
             return []
         result[motion.names[0]] = combine_axes(axes, motion.axis)
+        # Each rotation is about an axis that all earlier rotations have turned.
         axes = multiply_rotations(
-            # Each rotation is about an axis that all earlier rotations have turned.
             axes, rotation_about_axis(motion.axis, *_sine_cosine(motion.amount(values)))
         )
     return (

@@ -111,8 +111,8 @@ class Setup(Subject):
         return item
 
     def _find_element(self, item: Object | None) -> int | None:
-        # The top element is the place of findings on what is missing in the document.
         """Return the element of an object; the top element if the text does not contain the object."""
+        # The top element is the place of findings on what is missing in the document.
         number = None if item is None else item._index
         return number if number is not None or self.top is None else self.top._index
 
@@ -137,8 +137,7 @@ class Setup(Subject):
         self._looked_at[path] = None
         if not os.path.isfile(path):
             self._looked_at[os.path.dirname(path)] = None
-            # OpenSim changes into the folder of the setup, but some tools look in the working
-            # folder as well.
+            # A file that is not there is taken from the working folder.
             if os.path.isfile(name) and not os.path.isabs(name):
                 return name
         return path
@@ -318,7 +317,7 @@ class Setup(Subject):
         named: dict[int, str] = {}
         for file, top in dict(self.neighbours + around).items():
             if self.file is not None and os.path.realpath(file) == os.path.realpath(self.file):
-                # A setup does not write the files that it reads.
+                # Only other setups are searched.
                 continue
             folder = os.path.dirname(file)
             results = getattr(top, "results_directory", "") or "."

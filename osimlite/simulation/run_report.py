@@ -198,7 +198,6 @@ class Extreme:
 
     def __init__(self, operation: str, *, is_known: bool = False) -> None:
         self._extreme, self._is_new = EXTREME_RULES[operation]
-        # Simbody starts an extreme at the initial value, or at 0 where there was none before.
         if is_known:
             self._extreme = 0.0
 

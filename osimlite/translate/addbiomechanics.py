@@ -108,6 +108,7 @@ class SubjectFolder:
         base = Path(folder)
         header = self.subject.header
         written = self._write_models(base)
+        # Several trials may have the same name.
         names = UniqueNames()
         trials = []
         for trial in self.subject.trials:
@@ -144,6 +145,7 @@ class SubjectFolder:
             zip(self.subject.pass_types, self.subject.model_texts, strict=True)
         ):
             name = names(kind)
+            # Files without models hold raw data.
             if not text:
                 self.fidelity.add(
                     "model",
@@ -157,8 +159,10 @@ class SubjectFolder:
             written.append(path)
             self._models[index] = f"models/{name}.osim"
             self.fidelity.translated[f"/passes/{name}/model"] = self._models[index]
+            # The conversion changes the model in place.
             model = self.subject.read_model(index).copy_deep()
             try:
+                # Changes that do nothing in OpenSim are for information only.
                 changes = [change for change in convert_from_nimble(model) if change.done]
             except OsimliteError as error:
                 self.fidelity.add(
@@ -169,6 +173,7 @@ class SubjectFolder:
                     error.message,
                 )
                 continue
+            # Constraints are turned off in any case; only other changes need a second file.
             moved = [change for change in changes if "isEnforced" not in change.done]
             for change in moved:
                 self.fidelity.add(
@@ -177,6 +182,7 @@ class SubjectFolder:
                     change.difference,
                     f"models/{name}_opensim.osim: {change.done}",
                 )
+            # The setups of the trials use the model that moves as Nimble computed it.
             if moved:
                 repaired = base / "models" / f"{name}_opensim.osim"
                 write_atomically(repaired, to_text(model))
@@ -242,6 +248,7 @@ class SubjectFolder:
                 "missing_forces",
             )
         index = self._find_pass(trial)
+        # Trials without this pass still have markers and plates.
         if index is None:
             self.fidelity.add(
                 "pass",
@@ -257,6 +264,7 @@ class SubjectFolder:
             "coordinates",
             has_missing=False,
         )
+        # Ground forces come from the selected pass, as the model does.
         forces = trial.read_ground_forces(index)
         if forces.columns:
             put(FORCES_FILE, forces, "ground_forces", has_missing=False)
@@ -272,6 +280,7 @@ class SubjectFolder:
             model = f"../../{self._models[index]}"
             loads = LOADS_FILE if forces.columns else ""
             is_raw = trial.passes[index].type == KINEMATICS
+            # A negative frequency turns the filter off in OpenSim.
             cutoff = RAW_LOWPASS_HZ if is_raw else -1.0
             facts["setup_lowpass_hz"] = cutoff if is_raw else None
             setups = _create_setups(name, model, loads, (float(times[0]), float(times[-1])), cutoff)
@@ -296,6 +305,7 @@ class SubjectFolder:
             name = _get_last_name(str(coupler.dependent_coordinate_name))
             arguments = [_get_last_name(str(each)) for each in coupler.independent_coordinate_names]
             function = coupler.coupled_coordinates_function
+            # A coordinate that the file has is not computed again.
             if name in columns or function is None or not {*arguments} <= {*table.columns}:
                 continue
             curve = convert_function(function, len(arguments), coupler.path)
@@ -329,6 +339,7 @@ class SubjectFolder:
         for body in range(len(self.subject.contact_bodies)):
             point = stored[:, 3 * body : 3 * body + 3]
             written = forces.rows[:, 9 * body + 3 : 9 * body + 6]
+            # Zeros mark frames without a centre of pressure.
             selected = point.any(axis=1) & (np.abs(forces.rows[:, 9 * body + 1]) > LOADED_FORCE_N)
             distances += np.linalg.norm(point - written, axis=1)[selected].tolist()
         errors: Mapping[str, Error] = {"point": Error.measure(distances, "m")} if distances else {}

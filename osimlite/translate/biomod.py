@@ -85,10 +85,12 @@ def to_biomod(
         UnsupportedError: the model uses a joint or constraint that osimlite cannot compute.
     """
     mechanism = build_mechanism(model)
+    # biorbd's names have no slashes or blanks.
     robot = legal_names(build_robot(mechanism))
     fidelity = Fidelity(mechanism.name, "biomod")
     for body in mechanism.bodies:
         fidelity.translated[body.path] = f"segment {robot.link_of[body.path][0].name}"
+    # Each joint of the robot becomes a degree of freedom.
     for joint in robot.moving:
         if joint.coordinate is None:
             fidelity.add(
@@ -134,11 +136,13 @@ def _format_segments(robot: Robot) -> Iterator[str]:
         if joint.kind != "fixed" and word is None:
             # A segment moves along its own axes only: turn to the axis before, and back after.
             turned = np.eye(4)
+            # The helper segment has the axis of the joint as its z axis.
             turned[:3, :3] = _align(joint.axis)
             yield from _format_segment(
                 f"{link.name}_axis", parent, origin @ turned, joint, "z", robot
             )
             yield from ("\tmass 0", "endsegment", "")
+            # The rotation back is the transpose.
             parent, origin = f"{link.name}_axis", turned.T
             yield from _format_segment(link.name, parent, origin, None, "", robot)
         else:
@@ -180,11 +184,13 @@ def _format_segment(
 
 def _find_axis(joint: RobotJoint) -> str | None:
     """Return the word for the axis of a joint; None if it is not a positive coordinate axis."""
+    # Adding 0.0 turns -0.0 into 0.0, which the table has.
     return AXES.get(tuple((joint.axis + 0.0).tolist()))
 
 
 def _align(axis: Array) -> Array:
     """Return a rotation (3, 3) whose third column is an axis."""
+    # The axis that is farthest from parallel.
     helper = np.eye(3)[int(np.argmin(np.abs(axis)))]
     first = np.cross(helper, axis)
     first /= np.linalg.norm(first)
@@ -225,6 +231,7 @@ def _format_muscles(
             fidelity.add(
                 "muscle", muscle.path, "a path that is a function of coordinates", LEFT_OUT
             )
+            # biorbd has no paths that are functions.
             continue
         points = [point for point in path.path_point_set.objects if isinstance(point, PathPoint)]
         odd = len(path.path_point_set.objects) - len(points)
@@ -247,6 +254,7 @@ def _format_muscles(
             f"biorbd's '{MUSCLE_TYPE}'",
         )
         name = names(muscle.name)
+        # The first and the last point are attributes of the group, the others are via points.
         placed = [_place(point, robot, placements) for point in points]
         (first, origin), *inner, (last, insertion) = placed
         yield from (

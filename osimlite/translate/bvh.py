@@ -73,8 +73,10 @@ def to_bvh(
     if not 0.0 < scale < np.inf:
         raise SettingError(f"--scale takes a positive number, not {scale:g}")
     mechanism = build_mechanism(model)
+    # Without a motion the file has one frame, the default pose.
     times, values = np.zeros(1), np.asarray(mechanism.assemble({}), dtype=float)[None, :]
     if motion is not None:
+        # Poses that violate constraints would tear the skeleton.
         recorded = RecordedMotion.read(mechanism, motion).assembled()
         times, values = np.asarray(recorded.times), np.asarray(recorded.values)
     result = make_bvh(mechanism, times, values, scale=scale)
@@ -89,6 +91,7 @@ def to_bvh(
                 "position channels: poses are exact where they are read",
             )
     known = fidelity.translated.keys()
+    # Bodies that are welded to others have no joint.
     for component in model.body_set.objects:
         if isinstance(component, Body) and component.path not in known:
             fidelity.add("body", component.path, "a body that is part of another one", LEFT_OUT)

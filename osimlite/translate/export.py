@@ -136,6 +136,7 @@ def to_urdf(
     # Options are checked before the model is built, which may take seconds.
     mechanism = build_mechanism(model)
     fidelity = Fidelity(mechanism.name, "urdf")
+    # Meshes are searched beside the model, then in the named folders.
     places = MeshFolders(None if folder is None else Path(folder), geometry)
     mesh_files = MeshFiles(places)
     shapes = (

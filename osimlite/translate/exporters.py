@@ -288,5 +288,6 @@ def list_exporters(command: str) -> dict[str, Exporter]:
     """
     selected = [exporter for exporter in EXPORTERS if exporter.command == command]
     # Sorting is stable: the other formats keep their order.
+    # False sorts before True.
     selected.sort(key=lambda exporter: not exporter.is_default)
     return {exporter.name: exporter for exporter in selected}

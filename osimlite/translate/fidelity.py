@@ -161,6 +161,7 @@ class Fidelity:
             own: name of the component.
             name: name of the element.
         """
+        # Only new names are worth an entry.
         if name != own:
             self.renamed.setdefault(component, {})[kind] = name
 
@@ -187,6 +188,7 @@ class Fidelity:
 
         They are neither translated nor recorded, nor below a record.
         """
+        # A record covers all components below it.
         recorded = {record.component for record in self.records}
         missing = []
         for path in paths:

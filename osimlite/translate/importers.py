@@ -215,6 +215,7 @@ def find_format(path: Path) -> str | None:
     """
     suffix = path.suffix.lower()
     beginning = read_at_most(path, BEGINNING_BYTES)
+    # Suffixes such as .xml are shared by formats, which the beginning tells apart.
     for importer in IMPORTERS:
         if suffix in importer.suffixes and _has_mark(beginning, importer.marks):
             return importer.name

@@ -98,6 +98,7 @@ def convert_from_nimble(model: Model) -> list[NimbleChange]:
     changes: list[NimbleChange] = []
     parts: list[Object] = [*model.joint_set.objects]
     for joint in parts:
+        # Patellae are left out by Nimble.
         if not isinstance(joint, Joint) or joint.name in OMITTED_JOINTS:
             continue
         if not isinstance(joint, JOINT_CLASSES):
@@ -131,6 +132,7 @@ def _turn_ellipsoid(joint: EllipsoidJoint, tree: Tree) -> NimbleChange:
         frame = PhysicalOffsetFrame(
             name=f"{base.name}{TURNED_SUFFIX}",
             socket_parent=base,
+            # A quarter turn about Z.
             orientation=(0.0, 0.0, math.pi / 2),
         )
         joint.frames = [*joint.frames, frame]
@@ -164,6 +166,7 @@ def _rewrite_custom_joint(joint: CustomJoint) -> list[NimbleChange]:
             vectors[:3] = _orthogonalize(joint, vectors[:3], may_tilt=kind is NimbleJoint.EULER)
         if kind is NimbleJoint.EULER_FREE:
             vectors[3:] = UNIT_AXES
+        # The axes that follow a coordinate; all others are fixed.
         driven = {
             NimbleJoint.EULER: [0, 1, 2],
             NimbleJoint.EULER_FREE: [0, 1, 2, 3, 4, 5],
@@ -239,6 +242,7 @@ def _build_custom_axes(
         # The order of translations does not matter.
         return [(vector, *function) for vector, function in zip(vectors, functions, strict=True)]
     for unit in UNIT_AXES:
+        # Of two translations along one axis Nimble keeps the last.
         matches = [index for index in range(3, 6) if tuple(vectors[index]) == unit]
         chosen = functions[matches[-1]] if matches else (Constant(name="function", value=0.0), "")
         result.append((unit, *chosen))
@@ -266,6 +270,7 @@ def _orthogonalize(
             )
         return list(vectors)
     matrix = np.array(vectors, dtype=float).T
+    # Nimble tolerates small angles between axes of three rotations.
     products = [abs(float(matrix[:, i] @ matrix[:, j])) for i, j in ((0, 1), (1, 2), (2, 0))]
     if not may_tilt or max(products) >= MAX_SKEW:
         raise UnsupportedError(
@@ -292,6 +297,7 @@ def _replace_axis(
     if _describe(tuple(axis.axis), axis.function, axis.names) == _describe(
         vector, function, [name]
     ):
+        # Axes that already move in this way stay as they are.
         return False
     axis.axis = vector
     axis.function = function.copy_deep() if function is axis.function else function
@@ -329,6 +335,7 @@ def _extend_splines(joint: CustomJoint) -> list[NimbleChange]:
         if not isinstance(spline, SimmSpline) or len(axis.names) != 1:
             continue
         low, high = sorted(ranges.get(axis.names[0], (0.0, 0.0)))
+        # A spline of two points is a line in both programs.
         if len(spline.x) > 2 and (low < spline.x[0] or high > spline.x[-1]):
             _extend_spline(spline, low, high)
             extended.append(place)
@@ -375,6 +382,7 @@ def _extend_spline(spline: SimmSpline, low: float, high: float) -> None:
 def _note_bend(joint: ConstantCurvatureJoint) -> list[NimbleChange]:
     """Note that a ConstantCurvatureJoint bends farther in Nimble, if its ranges allow it."""
     for coordinate, neutral in zip(joint.coordinates, joint.neutral_angle_x_z_y, strict=False):
+        # The neutral angle adds to the coordinate.
         if max(abs(bound + neutral) for bound in coordinate.range) > MAX_BEND_RAD:
             return [
                 NimbleChange(

@@ -25,9 +25,11 @@ class Canvas:
     def __init__(self, width: int, height: int, background: Array) -> None:
         self.width, self.height = width, height
         self._colors = np.empty((width * height, 3), dtype=np.float32)
+        # float32 suffices for colours; depths stay double, since they decide what hides what.
         self._colors[:] = background
         self._depths = np.full(width * height, -np.inf)
 
+    # Nothing is drawn: infinitely far away.
     def solid(self, places: Array, colors: Array) -> None:
         """Draw triangles.
 
@@ -37,8 +39,10 @@ class Canvas:
         """
         for spans in self._spans(places):
             pixels, which, steps = spans.pixels()
+            # 1. The depth of each pixel becomes the largest of all triangles.
             depths = spans.values(places[:, :, 2], which, steps)
             np.maximum.at(self._depths, pixels, depths)
+            # 2. The triangle with this depth gives the colour.
             seen = np.flatnonzero(depths == self._depths[pixels])
             self._colors[pixels[seen]] = spans.values(colors, which[seen], steps[seen, None])
 
@@ -54,6 +58,7 @@ class Canvas:
         for spans in self._spans(places):
             pixels, which, steps = spans.pixels()
             depths = spans.values(places[:, :, 2], which, steps)
+            # Only what is in front of the opaque triangles shows.
             seen = np.flatnonzero(depths > self._depths[pixels])
             shades = spans.values(colors, which[seen], steps[seen, None])
             parts.append(
@@ -64,6 +69,7 @@ class Canvas:
         pixels, depths, shades, alphas = (
             np.concatenate(column) for column in zip(*parts, strict=True)
         )
+        # From the farthest to the nearest at each pixel.
         order = np.lexsort((depths, pixels))
         pixels, shades, alphas = pixels[order], shades[order], alphas[order]
         starts = (
@@ -71,6 +77,7 @@ class Canvas:
             if len(pixels)
             else np.zeros(0, dtype=int)
         )
+        # The rank of a triangle among those at its pixel; each pass blends one rank.
         ranks = np.arange(len(pixels)) - np.repeat(starts, np.diff(np.append(starts, len(pixels))))
         for rank in range(int(ranks.max(initial=-1)) + 1):
             now = ranks == rank
@@ -94,10 +101,13 @@ class Canvas:
     def _spans(self, places: Array) -> Iterator[_Spans]:
         """Yield the pixels whose centres triangles cover, in portions: row by row, from edge to edge."""
         flat = places[:, :, :2]
+        # Degenerate corners give NaN, which the next lines leave out.
         with np.errstate(all="ignore"):
             low, high = flat.min(axis=1), flat.max(axis=1)
+            # Triangles outside of the picture cover no pixel.
             wanted = (high > 0.0).all(axis=1) & (low < (self.width, self.height)).all(axis=1)
         chosen = np.flatnonzero(wanted & np.isfinite(places).all(axis=(1, 2)))
+        # A row is covered if its centre is between the ends of the triangle.
         top = np.ceil(low[chosen, 1] - 0.5).clip(0, self.height).astype(np.int64)
         bottom = np.floor(high[chosen, 1] - 0.5).clip(-1, self.height - 1).astype(np.int64)
         which, rows = _enumerate_ranges(top, bottom - top + 1)
@@ -111,6 +121,7 @@ class Canvas:
             (ends - starts + 1)[some],
         )
         total = np.cumsum(lengths)
+        # Portions of limited size, cut between rows.
         cuts = np.searchsorted(total, np.arange(_AT_ONCE, total[-1] if len(total) else 0, _AT_ONCE))
         for part in np.split(np.arange(len(rows)), cuts):
             triangle, row, start = triangles[part], rows[part], starts[part]
@@ -120,14 +131,17 @@ class Canvas:
     def _ends(self, corners: Array, y: Array) -> tuple[Indices, Indices]:
         """Return the first and the last pixel of a row that triangles cover, given corners (r, 3, 2) and heights (r,)."""
         left, right = np.full(len(y), np.inf), np.full(len(y), -np.inf)
+        # Each edge that crosses the height of the row limits the span.
         for one, other in ((0, 1), (1, 2), (2, 0)):
             (ax, ay), (bx, by) = corners[:, one].T, corners[:, other].T
             with np.errstate(all="ignore"):
                 along = (y - ay) / (by - ay)
                 x = ax + along * (bx - ax)
+                # A horizontal edge gives NaN, whose comparisons are false.
                 met = (along >= 0.0) & (along <= 1.0)
             np.minimum(left, x, out=left, where=met)
             np.maximum(right, x, out=right, where=met)
+        # Pixels count if their centres are inside.
         start = np.ceil(left - 0.5).clip(0, self.width).astype(np.int64)
         return start, np.floor(right - 0.5).clip(-1, self.width - 1).astype(np.int64)
 
@@ -181,6 +195,7 @@ def _enumerate_ranges(starts: Indices, counts: Indices) -> tuple[Indices, Indice
 
 def _compute_weights(corners: Array, x: Array, y: Array) -> tuple[Array, Array]:
     """Return the weights (k, 3) of the corners (k, 3, 2) of triangles at points in them, and their derivatives along x."""
+    # Barycentric coordinates: areas of partial triangles over the whole.
     (ax, ay), (bx, by), (cx, cy) = (corners[:, index].T for index in range(3))
     with np.errstate(all="ignore"):
         size = 1.0 / ((bx - ax) * (cy - ay) - (by - ay) * (cx - ax))

@@ -114,6 +114,7 @@ class _SceneCollector:
         self.axes: list[Axes] = []
         self.pushed: list[Pushed] = []
         self.remarks: list[tuple[str, str]] = []
+        # Bodies with a visible shape need no stick.
         self.drawn: set[int] = set()
         self.half_spaces: list[int] = []
 
@@ -121,7 +122,9 @@ class _SceneCollector:
         for component in self.tree.components:
             path = self.tree.path_of(component) or ""
             with self._remark_failure(path):
+                # One component that cannot be drawn is no reason to draw none.
                 self._component(component, path)
+        # A body without any shape is a stick to what it carries.
         bare = [k for k, _ in enumerate(self.mechanism.bodies) if k not in self.drawn]
         for body, ends in draw_sticks(self.mechanism, bare):
             self.lines.append(
@@ -148,11 +151,13 @@ class _SceneCollector:
             frozenset(self.items[place].path for place in self.half_spaces),
             self.remarks,
         )
+        # Half spaces are scaled last, when the size of the model is known.
         return self._widen_half_spaces(scene)
 
     # ------------------------------------------------------------------------------------- kinds of components
     def _component(self, component: Component, path: str) -> None:
         match component:
+            # Axes of frames are shown as frames, by their own switch.
             case geometry.FrameGeometry():
                 pass
             case geometry.Geometry():
@@ -176,6 +181,7 @@ class _SceneCollector:
                 self._path(component, path)
             case Force():
                 self._force(component, path)
+            # Only frames that are fixed to a body have a place in the mechanism.
             case PhysicalFrame() if path in self.mechanism.frames:
                 self.axes.append(Axes(path, *self.mechanism.frames[path]))
 
@@ -184,6 +190,7 @@ class _SceneCollector:
         if frame is None or frame not in self.mechanism.frames:
             raise UnsupportedError("is in a frame that is not fixed to a body")
         look, scale = shape.appearance, np.array(shape.scale_factors, dtype=float)
+        # 0 is OpenSim's number for hidden shapes.
         visible = look.visible and look.surface_properties.representation != 0
         body, placed = self.mechanism.frames[frame]
         if isinstance(shape, geometry.LineGeometry):
@@ -215,6 +222,7 @@ class _SceneCollector:
         self._add(path, "contact", body, own, here @ size, look.color, opacity, visible)
 
     def _wrap(self, surface: wrapping.WrapObject, path: str) -> None:
+        # A wrap object stands in a set of its body.
         frame = self.tree.parent_of(surface)
         while frame is not None and not isinstance(frame, PhysicalFrame):
             frame = self.tree.parent_of(frame)
@@ -250,6 +258,7 @@ class _SceneCollector:
                     (shape.radius, shape.radius, length)
                 )
             case contact.ContactTorus() if shape.torus_radius > 0.0:
+                # A unit torus has the major radius 1, and is scaled by it.
                 return unit_shapes.make_torus(
                     shape.tube_radius / shape.torus_radius
                 ), _make_stretch((shape.torus_radius,) * 3)
@@ -275,6 +284,7 @@ class _SceneCollector:
                 f"is a {type(path).__name__}, which runs nowhere: osimlite does not draw it"
             )
         of = (self.tree.path_of(owner) if owner is not None else None) or name
+        # Paths of disabled forces would look as if they pulled.
         visible = path.appearance.visible and getattr(owner, "appliesForce", True)
         result: list[Component | None] = []
         if isinstance(path, GeometryPath):
@@ -311,10 +321,12 @@ class _SceneCollector:
                 spec = get_field_specs(type(force).ContactParameters)["geometry"]
                 for parameters in force.contact_parameters.objects:
                     for index, word in enumerate(parameters.geometry):
+                        # A HuntCrossleyForce names several surfaces.
                         result = self.tree.resolve(Use(parameters, force, spec, word, index)).target
                         self._push(force.name, path, result, None)
             case contact_forces.SmoothSphereHalfSpaceForce():
                 sphere = self.tree.target(force, "socket_sphere", force.socket_sphere)
+                # Only the load on the sphere is shown; the half space has its opposite.
                 self._push(force.name, path, sphere, "Sphere")
 
     def _add_line_between(self, path: str, force: Any, *ends: tuple[str, Any]) -> None:
@@ -335,6 +347,7 @@ class _SceneCollector:
             return
         frame = self.tree.target(surface, "socket_frame", surface.socket_frame)
         body, placed = self.mechanism.placement(self.tree.path_of(frame) or "")
+        # OpenSim's records are labelled by the frame, its body, or the surface.
         base = self.mechanism.bodies[body].name if body >= 0 else "ground"
         labels = (label,) if label else (frame.name, base, surface.name)
         near = (placed @ make_offset(surface.location, surface.orientation))[:3, 3]
@@ -362,8 +375,10 @@ class _SceneCollector:
         opacity: float = 1.0,
         visible: bool = True,
     ) -> None:
+        # NaN in a matrix would spoil the picture and the page.
         if not np.isfinite(matrix).all():
             raise ModelError("has a size or a place that is no number")
+        # Unit shapes are shared by all components that use them.
         if id(surface) not in self.places:
             self.places[id(surface)] = len(self.surfaces)
             self.surfaces.append(surface)
@@ -426,6 +441,7 @@ class _SceneCollector:
 def _measure_fibers(muscle: Muscle) -> tuple[float, float]:
     """Return the drawn radius of the fibers in their middle and the tendon slack length, both in m."""
     force, tendon = abs(float(muscle.max_isometric_force)), abs(float(muscle.tendon_slack_length))
+    # The cross-section A = F / stress gives the radius of a circle.
     radius = SLENDER * math.sqrt(force / (math.pi * STRESS)) if math.isfinite(force) else THICKEST
     return min(max(radius, 0.0035), THICKEST), tendon if math.isfinite(tendon) else 0.0
 

@@ -44,6 +44,7 @@ def write_glb(scene: Scene, q: Array, motion: ShownMotion | None, path: str | Pa
     times, rows = np.zeros(1), q[None, :]
     if motion is not None:
         recorded = np.asarray(motion.times, dtype=float)
+        # More moments than a player shows would only make the file larger.
         usual = round((recorded[-1] - recorded[0]) * RATE) + 1
         times = (
             recorded if len(recorded) <= usual else np.linspace(recorded[0], recorded[-1], usual)
@@ -51,6 +52,7 @@ def write_glb(scene: Scene, q: Array, motion: ShownMotion | None, path: str | Pa
         values = values_of(motion, scene.mechanism)
         rows = at_times(motion, values, times)
     poses = [scene.at(row) for row in rows]
+    # glTF has Y up; the root turns the vertical of the model to it.
     written = _GlbWriter(
         times - times[0], _make_turns(np.cross(scene.up, (0.0, 1.0, 0.0)), scene.up[1])
     )
@@ -60,6 +62,7 @@ def write_glb(scene: Scene, q: Array, motion: ShownMotion | None, path: str | Pa
             name,
             _Track(
                 [p.origins[k] for p in poses],
+                # The quaternions of osimlite begin with w, those of glTF end with it.
                 _make_continuous(
                     np.roll(quaternion_of([p.rotations[k] for p in poses]), -1, axis=1)
                 ),
@@ -98,10 +101,12 @@ def _list_segments(
             corners = [pose.lines[index] for pose in poses]
             most = max(map(len, corners))
             full = [
+                # The last corner is repeated where a moment has fewer corners.
                 result[np.minimum(np.arange(most), len(result) - 1)]
                 for result in corners
                 if len(result)
             ]
+            # A path without corners at some moment is left out.
             if len(full) == len(poses):
                 for k in range(most - 1):
                     yield line.path, line.color, line.radius, np.array(full)[:, k : k + 2]
@@ -120,6 +125,7 @@ def _lay_tubes(ends: Array, radius: float) -> _Track:
     lengths = np.linalg.norm(ways, axis=1)
     ways = ways / np.maximum(lengths, 1e-300)[:, None]
     turns = np.array([_make_turns(np.array((-y, x, 0.0)), z) for x, y, z in ways])
+    # A piece without length has no thickness either.
     thick = np.where(lengths > 0.0, radius, 0.0)
     return _Track(
         ends.mean(axis=1), _make_continuous(turns), np.column_stack((thick, thick, lengths))
@@ -128,8 +134,10 @@ def _lay_tubes(ends: Array, radius: float) -> _Track:
 
 def _make_turns(axis: Array, cosine: float) -> Array:
     """Return the quaternion x y z w that turns one unit vector into another, from their cross product and cosine."""
+    # The sum of axis and 1 + cosine is the quaternion of half the angle, up to its length.
     result = np.array((*axis, 1.0 + cosine))
     size = float(np.linalg.norm(result))
+    # Opposite vectors: half a turn about X.
     return result / size if size > 1e-9 else np.array((1.0, 0.0, 0.0, 0.0))
 
 
@@ -175,6 +183,7 @@ class _GlbWriter:
             "type": _KINDS[data.shape[1]],
         }
         if bounds:
+            # glTF requires bounds of positions and times.
             entry |= {"min": data.min(axis=0).tolist(), "max": data.max(axis=0).tolist()}
         self.accessors.append(entry)
         return len(self.accessors) - 1
@@ -202,6 +211,7 @@ class _GlbWriter:
             "alphaMode": "OPAQUE" if opacity >= 1.0 else "BLEND",
             "doubleSided": True,
         }
+        # Geometry is stored once, whatever the number of its colours.
         geometry = ("geometry", id(surface))
         if geometry not in self._known:
             self._known[geometry] = self._accessor(surface.points, bounds=True, target=_VERTICES)
@@ -224,6 +234,7 @@ class _GlbWriter:
                 continue
             array = np.asarray(values)
             node[what] = array[0].tolist()
+            # A node that never moves needs no channel.
             if self._moves and np.ptp(array, axis=0).max() > 0.0:
                 self.samplers.append({"input": self._times, "output": self._accessor(array)})
                 target = {"node": place, "path": what}
@@ -235,6 +246,7 @@ class _GlbWriter:
     def shape(self, parent: int, name: str, mesh: int, matrix: Array) -> None:
         """Add a node that is fixed to another: `matrix` (4, 4) in its frame."""
         self.nodes[parent].setdefault("children", []).append(len(self.nodes))
+        # Matrices are stored by columns.
         self.nodes.append({"name": name, "mesh": mesh, "matrix": matrix.T.ravel().tolist()})
 
     def data(self, name: str) -> bytes:
@@ -258,6 +270,8 @@ class _GlbWriter:
         text = json.dumps(
             {key: part for key, part in parts.items() if part != []}, separators=(",", ":")
         ).encode()
+        # Chunks have lengths that are multiples of four: text is filled with blanks, data with
+        # zeros.
         text += b" " * (-len(text) % 4)
         body = bytes(self.buffer) + bytes(-len(self.buffer) % 4)
         chunks = struct.pack("<I4s", len(text), b"JSON") + text

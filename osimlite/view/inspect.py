@@ -41,6 +41,7 @@ def component_tree(model: Model) -> tuple[list[dict[str, Any]], dict[str, list[s
     tags: dict[str, list[str]] = {}
     nodes: list[dict[str, Any]] = []
     for component in tree.components:
+        # Components that osimlite adds are not in the file.
         if tree.is_internal(component):
             continue
         path = tree.path_of(component) or "/"
@@ -58,6 +59,7 @@ def component_tree(model: Model) -> tuple[list[dict[str, Any]], dict[str, list[s
             ],
             "given": [index for index, (_, _, given) in enumerate(rows) if given],
         }
+        # Most components of a class have the same properties, which are written once.
         if tags.setdefault(kind, names) != names:
             node["tags"] = names
         places[id(component)] = len(nodes)
@@ -92,6 +94,7 @@ def _name_values(tree: Tree, item: Object, reference: Reference, value: Any) -> 
     if isinstance(value, Component):
         try:
             return tree.format_reference(tree.owner_of(item), reference, value)
+        # A reference to a component outside of the model has a name at least.
         except OsimliteError:
             return value.name
     if isinstance(value, tuple):
@@ -118,6 +121,7 @@ def place_pins(model: Model, scene: Scene, findings: Sequence[Finding]) -> list[
     tree, mechanism = model.tree(), scene.mechanism
     results: dict[str, list[Finding]] = {}
     for item in findings:
+        # Remarks have no pin: there may be hundreds.
         if item.component in tree.by_path and item.severity.rank < 2:
             results.setdefault(item.component, []).append(item)
     result = []
@@ -141,6 +145,7 @@ def _find_point(
     tree: Tree, mechanism: Mechanism, scene: Scene, component: Component | None
 ) -> tuple[int, Any] | None:
     """Return the body of a component and its point (3,) there, or those of the nearest owner that has a position."""
+    # 1. What is drawn of it; 2. its place in the mechanism; 3. its owner.
     while component is not None:
         path = tree.path_of(component) or ""
         item = next((item for item in scene.items if item.path == path), None)
@@ -158,6 +163,7 @@ def _find_point(
             joint = component if isinstance(component, Joint) else tree.parent_of(component)
             for index, mobile in enumerate(mechanism.bodies):
                 if joint is not None and mobile.mobilizer.joint == tree.path_of(joint):
+                    # The frame of the joint on the body that it moves.
                     own = mobile.mobilizer
                     return index, (own.parent_frame if own.reversed else own.child_frame)[:3, 3]
         if isinstance(component, PathPoint):
@@ -170,6 +176,7 @@ def _find_point(
         above = tree.parent_of(component)
         component = (
             above
+            # The model itself has no place.
             if isinstance(component, AbstractGeometryPath) or not isinstance(above, Model)
             else None
         )

@@ -89,6 +89,7 @@ def read_activations(scene: Scene, motion: ShownMotion) -> dict[str, Array]:
     known = {}
     for label, column in motion.auxiliary.items():
         if result := re.fullmatch(r"(?:.*/)?(.+)[./]activation", label):
+            # Unknown activations count as 0; rounding may leave the range.
             known[result[1]] = np.clip(np.nan_to_num(np.asarray(column, dtype=float)), 0.0, 1.0)
     paths = [line.path for line in scene.lines if line.layer == "paths"]
     return {path: known[name] for path in paths if (name := path.rpartition("/")[2]) in known}
@@ -105,6 +106,7 @@ def find_moving_bodies(poses: Sequence[Bodies]) -> Array:
         np.array([p.rotations for p in poses]),
         np.array([p.origins for p in poses]),
     )
+    # Rotations and origins that change by rounding do not count.
     change = np.ptp(rotations, axis=0).max(axis=(1, 2)) + np.ptp(origins, axis=0).max(axis=1)
     result: Array = change > 1e-9
     if not result.any():

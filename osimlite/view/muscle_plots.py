@@ -60,6 +60,7 @@ def plot_muscles(
     base = make_folder(Path(folder))
     written = []
     for quantity, rows in curves.columns.items():
+        # A quantity that no muscle has, such as forces without equilibrium, gets no page.
         if not np.isfinite(rows).any():
             continue
         title = _make_title(quantity)
@@ -119,6 +120,7 @@ def _draw_lines(
         (region, part) for region, pairs in groups.items() for part in divide_among_panels(pairs)
     ]
     pages = ceil(len(panels) / MAX_LINE_PANELS)
+    # Pages of equal size, not a full one and a rest.
     size = ceil(len(panels) / pages)
     for number, first in enumerate(range(0, len(panels), size), 1):
         page = panels[first : first + size]
@@ -127,6 +129,7 @@ def _draw_lines(
         down = ceil(len(page) / across_page)
         figure = figure_of(f"{title}{count}", (6.5 * across_page, 0.6 + 2.9 * down))
         axes = figure.subplots(down, across_page, squeeze=False).ravel()
+        # Panels that are not needed leave the page.
         for place in axes[len(page) :]:
             place.remove()
         for place, (region, pairs) in zip(axes, page, strict=False):
@@ -141,6 +144,7 @@ def _widen_constant(place: Any) -> None:
     """Give a panel whose curves are constant a range in which rounding errors do not show."""
     low, high = place.dataLim.intervaly
     size = max(abs(low), abs(high))
+    # Matplotlib would show the noise of a constant in full height.
     if high - low <= 1e-6 * size:
         place.set_ylim(low - 0.1 * size, high + 0.1 * size)
 
@@ -191,6 +195,7 @@ def _draw_maps(
             drawn = place.pcolormesh(
                 xs,
                 ys,
+                # pcolormesh wants rows by y.
                 rows[:, index].reshape(len(xs), len(ys)).T,
                 shading="nearest",
                 cmap="viridis",

@@ -47,6 +47,7 @@ HEIGHT = 460
 
 COLORS = {"error": "#d1242f", "warning": "#b97700", "info": "#5d6b7a"}
 
+# The page unpacks itself in the frame: notebooks store less, and need no server.
 _UNPACK = """<!doctype html><meta charset="utf-8"><script>
 new Response(new Blob([Uint8Array.from(atob("@PAGE@"), (c) => c.charCodeAt(0))]).stream()
   .pipeThrough(new DecompressionStream("gzip"))).text()
@@ -59,6 +60,7 @@ def model(item: Model) -> str:
     tree = item.tree()
     own = [component for component in tree.components if not tree.is_internal(component)]
     below: dict[int, list[Component]] = {}
+    # The first component is the model itself.
     for component in own[1:MOST_COMPONENTS]:
         below.setdefault(id(tree.parent_of(component)), []).append(component)
 
@@ -94,6 +96,7 @@ def findings(item: Report) -> str:
             f"<b style='color:{COLORS[finding.severity]}'>{finding.severity}</b>",
             f"<span title='{escape(finding.name)}'>{finding.code}</span>",
             escape(finding.place),
+            # Texts of models and findings may contain HTML.
             escape(finding.message),
             escape(finding.suggestion or ""),
         ]
@@ -170,9 +173,11 @@ def _embed_viewer(item: Model, motion: Trajectory | None = None) -> str:
         from osimlite.view.shown import Shown
 
         shown = Shown.of(item, None if motion is None else motion.mechanism, folders, motion=motion)
+        # mtime=0: equal pages give equal notebooks.
         packed = base64.b64encode(gzip.compress(shown.page_text().encode(), 6, mtime=0)).decode()
     except OsimliteError as error:
         return f"<div>no picture: {escape(error.message)}</div>"
+    # Notebooks with larger outputs become slow to open.
     if len(packed) > MOST_BYTES:
         return (
             f"<div>a page of {len(packed) / 1e6:.0f} MB is too large for a notebook; write it to a file: "
@@ -180,6 +185,7 @@ def _embed_viewer(item: Model, motion: Trajectory | None = None) -> str:
         )
     remarks = "".join(f"<div>{escape(remark)}</div>" for remark in shown.remarks)
     return (
+        # sandbox: the page may run its scripts, and nothing else.
         f"<iframe srcdoc='{escape(_UNPACK.replace('@PAGE@', packed))}' sandbox='allow-scripts' loading='lazy' "
         f"style='width:100%;height:{HEIGHT}px;border:1px solid #d9dfe6;border-radius:6px'></iframe>{remarks}"
     )

@@ -101,10 +101,12 @@ def page_data(
     """
     mechanism = scene.mechanism
     recorded = None if motion is None else _describe_motion(scene, motion)
+    # With a motion the page starts at its first moment.
     start = q if motion is None else values_of(motion, mechanism)[0]
     low, high = np.array(scene.box(q) if recorded is None else recorded["box"])
     tree, tags = component_tree(model)
     hints = model.model_visual_preferences.model_display_hints
+    # Couplers are solved in the page; others are listed.
     couplers = [item for item in mechanism.constraints if isinstance(item, Coupler)]
     others = [
         item.name
@@ -187,6 +189,7 @@ def _describe_items(scene: Scene) -> dict[str, Any]:
 
 
 def _describe_surface(surface: Surface) -> dict[str, str]:
+    # Normals in one byte per component: their error is below half a degree.
     normals = np.rint(127.0 * np.clip(compute_normals(surface), -1.0, 1.0)).astype(np.int8)
     return {
         "points": text_of(surface.points.astype("<f4")),
@@ -201,8 +204,10 @@ def _describe_coordinates(
     rows = []
     for index, info in enumerate(mechanism.coordinates):
         low, high = info.range
+        # A slider needs finite ends.
         if not (math.isfinite(low) and math.isfinite(high) and low < high):
             low, high = -10.0, 10.0
+        # Motions may leave the range of a coordinate.
         ends = [float(q[index])] if recorded is None else recorded["ends"][index]
         still = (
             "locked"
@@ -274,6 +279,7 @@ def _choose_view(scene: Scene, values: Array) -> dict[str, Any]:
 
     If the model travels, the box is relative to the moving bodies, because the camera follows them.
     """
+    # A few moments suffice to find the extent.
     rows = values[np.unique(np.linspace(0, len(values) - 1, MOMENTS).astype(int))]
     poses = [scene.at(row) for row in rows]
     moves = find_moving_bodies(poses)[:-1]
@@ -296,6 +302,7 @@ def _choose_view(scene: Scene, values: Array) -> dict[str, Any]:
 
 def _choose_directions(up: Array) -> tuple[Array, Array]:
     """Unit vectors (3,) to the front and to the right. OpenSim's models face +X, and have Z on their right."""
+    # OpenSim's models have Y up.
     if abs(up[1]) > 0.9:
         return np.array((1.0, 0.0, 0.0)), np.array((0.0, 0.0, 1.0))
     front = np.cross(up, np.eye(3)[int(np.argmin(np.abs(up)))])
@@ -309,8 +316,10 @@ def _place_floor(scene: Scene, q: Array) -> dict[str, Any]:
     for item in scene.drawn():
         outward = -bodies.matrix(item.body, item.matrix)[:3, 0]
         size = float(np.linalg.norm(outward))
+        # A steep half space is a wall.
         if item.path in scene.half_spaces and outward @ scene.up > STEEPEST * size:
             matrix = item.matrix.copy()
+            # The plane's X axis points into the half space; the grid has Y upwards.
             matrix[:3, :3] = np.column_stack((matrix[:3, 1], -matrix[:3, 0], matrix[:3, 2])) / size
             return {"body": item.body, "matrix": _flatten_rows(matrix)}
     front, side = _choose_directions(scene.up)

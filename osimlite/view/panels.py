@@ -115,16 +115,19 @@ def split_sides(names: Iterable[str]) -> dict[str, tuple[str, str]]:
 
 def _split_side(name: str, known: Collection[str]) -> tuple[str, str]:
     """Return a name without its side, and the side."""
+    # Letters such as "r" are in many words; a name has a side only if its opposite exists.
     matches = [
         (match, opposite) for token, opposite in _SIDE_TOKENS for match in token.finditer(name)
     ]
     for match, opposite in matches:
         other = name[: match.start()] + opposite[match[0]] + name[match.end() :]
+        # "_r" and "_l" at the end are taken for sides in any case.
         if other in known or name[max(0, match.start() - 1) :] in ("_r", "_l"):
             stem = _trim(name[: match.start()] + name[match.end() :])
             return stem or name, match[0][0].lower()
     if matches and _mirror(name) in known:
         stem = name
+        # Several letters for sides, as in "calcn_r_right".
         for token, _ in _SIDE_TOKENS:
             stem = token.sub("", stem)
         return _trim(stem) or name, matches[0][0][0][0].lower()
@@ -149,6 +152,7 @@ def _trim(stem: str) -> str:
 
 def is_constant(values: Array) -> bool:
     """Return whether known values do not change, or none is known."""
+    # Rounding errors of a constant are no curve.
     known = values[np.isfinite(values)]
     return not known.size or bool(
         np.ptp(known) <= RELATIVE_CHANGE * max(1e-3, float(np.abs(known).max()))
@@ -194,6 +198,7 @@ def group_columns(
             Panel(stem, column.unit, [], column.group, column.section),
         )
         panel.curves.append(PanelCurve(times, values, side, style, label, steps or {}))
+    # Panels of a group stay together.
     groups: dict[tuple[str, str], list[Panel]] = {}
     for panel in panels.values():
         groups.setdefault((panel.section, panel.group), []).append(panel)
@@ -205,6 +210,7 @@ def _describe_constant(column: Column, values: Array) -> str:
     if not known.size:
         return f"{column.name} (no values)"
     unit = f" {column.unit}" if column.unit else ""
+    # Adding 0.0 turns -0.0 into 0.0.
     return f"{column.name} {0.0 + round(float(known[0]), 9):.4g}{unit}"
 
 
@@ -285,6 +291,7 @@ def _divide_into_pages(panels: Sequence[Panel]) -> Iterator[list[list[Panel]]]:
     A group starts a new row where it fits in one row, but not in the rest of the row before.
     """
     count = len(panels)
+    # Four panels are two rows of two.
     width = count if count < MAX_COLUMNS else 2 if count == 4 else MAX_COLUMNS
     rows: list[list[Panel]] = []
     groups: dict[str, list[Panel]] = {}
@@ -294,6 +301,7 @@ def _divide_into_pages(panels: Sequence[Panel]) -> Iterator[list[list[Panel]]]:
         for index, panel in enumerate(group):
             room = width - len(rows[-1]) if rows else 0
             splits = index == 0 and len(group) > 1 and room < len(group) <= width
+            # A group that fits in a row is not divided.
             if not room or splits:
                 rows.append([])
             rows[-1].append(panel)
@@ -341,6 +349,7 @@ def draw_panel(place: Any, panel: Panel, abscissa: str, *, cyclic: bool = False)
 
 def _coincide(curve: PanelCurve, other: PanelCurve) -> bool:
     """Return whether two curves cannot be distinguished in a picture."""
+    # Curves of different trials may have other times.
     if len(curve.values) != len(other.values):
         return False
     near = 1e-3 * np.nanmax(np.abs(curve.values), initial=0.0)
@@ -361,6 +370,7 @@ def _draw_curve(place: Any, curve: PanelCurve, *, cyclic: bool) -> None:
         return
     cycles = [
         np.interp(first + (last - first) * PERCENT / 100.0, curve.times, curve.values)
+        # Each cycle is resampled at the same per cents, so that a mean can be taken.
         for first, last in _select_cycles(curve)
     ]
     if len(cycles) > 1:
@@ -396,6 +406,7 @@ def style_axes(place: Any, label: str) -> None:
     place.set_axisbelow(True)
     place.spines[["top", "right"]].set_visible(False)
     place.tick_params(labelsize=8)
+    # No common offset at the axis: it is easily overlooked.
     place.ticklabel_format(axis="y", useOffset=False, scilimits=(-4, 6))
     place.margins(x=0.0)
     place.set_xlabel(label, fontsize=8)
@@ -411,6 +422,7 @@ def figure_of(title: str, size: tuple[float, float]) -> Any:
     Raises:
         MissingDependency: matplotlib is not installed.
     """
+    # Figures without pyplot: no global state, and no window.
     figures = require("matplotlib.figure", extra="plot", purpose="a picture")
     require("matplotlib.backends.backend_agg", extra="plot", purpose="a picture")
     figure = figures.Figure(figsize=size, layout="constrained")

@@ -76,15 +76,18 @@ class Camera(NamedTuple):
         cls, points: Array, up: Array, direction: Array, aspect: float, margin: float = 1.12
     ) -> Camera:
         """Return the camera that sees all points (k, 3) from a direction (3,), in a picture `aspect` times as wide as high."""
+        # `back` points from the model to the viewer.
         back = direction / np.linalg.norm(direction)
         right = np.cross(up, back)
         if np.linalg.norm(right) < 1e-9:
+            # The view is along the vertical: any direction serves as up.
             right = np.cross(np.roll(up, 1), back)
         right = right / np.linalg.norm(right)
         upward = np.cross(back, right)
         flat = points @ np.array((right, upward)).T
         middle = 0.5 * (flat.min(axis=0) + flat.max(axis=0))
         wide, high = np.maximum(margin * 0.5 * np.ptp(flat, axis=0), 1e-3).tolist()
+        # The larger of both extents decides, by the shape of the picture.
         half = max(wide, high * aspect), max(high, wide / aspect)
         depth = float((points @ back).mean())
         return cls(right, upward, middle[0] * right + middle[1] * upward + depth * back, half)
@@ -129,6 +132,7 @@ def draw_scene(
         OsimliteError: the picture is not 16 to 8000 pixels wide and high.
     """
     image = require("PIL.Image", extra="view", purpose="a picture")
+    # Larger pictures would need gigabytes of memory at this fineness.
     if min(size) < 16 or max(size) > 8000:
         raise OsimliteError(
             f"a picture is 16 to 8000 pixels wide and high, not {size[0]} × {size[1]}"
@@ -159,6 +163,7 @@ def _fill_background(
     for line, corners in zip(scene.lines, bodies.lines, strict=True):
         if line.visible and line.layer in scene.shown:
             color = style.colors.get(line.path, line.color)
+            # Corners of a line are balls, which close the gaps between cylinders.
             for start, end in pairwise(corners):
                 heap.put(
                     unit_shapes.make_cylinder(8), _make_cylinder(start, end, line.radius), color
@@ -178,6 +183,7 @@ def _fill_background(
     thick = 0.012 * heap.camera.half[1]
     for arrow in arrows:
         length = float(np.linalg.norm(arrow.vector))
+        # An arrow shorter than its head would be a blot.
         if length < 2.0 * thick:
             continue
         tip, end = (
@@ -198,9 +204,11 @@ def _lay_floor(heap: _Heap, scene: Scene, height: float) -> None:
     across = np.cross(up, (0.0, 0.0, 1.0) if abs(up[2]) < 0.9 else (1.0, 0.0, 0.0))
     across /= np.linalg.norm(across)
     along = np.cross(across, up)
+    # Lines at half a metre, at wider views at powers of ten.
     step = 0.5 if half < 4.0 else 10.0 ** np.ceil(np.log10(half / 8.0))
     reach = step * np.ceil(1.2 * half / step)
     middle = heap.camera.center
+    # Lines are at multiples of the step, so that the floor stands still when the camera moves.
     first, second = (step * np.round(middle @ axis / step) for axis in (across, along))
     for k in np.arange(-reach, reach + 0.5 * step, step):
         one = (first - reach, second + k), (first + reach, second + k)
@@ -218,6 +226,7 @@ def _lay_floor(heap: _Heap, scene: Scene, height: float) -> None:
 def _cut_half_space(heap: _Heap, placed: Array) -> None:
     """Add a half space seen from its edge: its line, and what is below it, behind everything else."""
     camera, inward = heap.camera, placed[:3, 0] / np.linalg.norm(placed[:3, 0])
+    # Seen from above or below, the square of the half space is enough.
     if abs(float(inward @ camera.towards)) > _FROM_THE_EDGE:
         return
     along = np.cross(inward, camera.towards)
@@ -259,6 +268,7 @@ class _Heap:
         points = surface.points @ matrix[:3, :3].T + matrix[:3, 3]
         places = self.camera.places(points, self.width, self.height)
         if front:
+            # 1 km towards the viewer.
             places[:, 2] += 1e3
         shades = np.tile(np.array(color, dtype=float), (len(points), 1))
         if lit:
@@ -268,6 +278,7 @@ class _Heap:
             normals = unit_shapes.compute_normals(surface) @ cofactors.T @ self._axes.T
             lengths = np.linalg.norm(normals, axis=1, keepdims=True)
             normals = normals / np.where(lengths > 0.0, lengths, 1.0)
+            # Both sides of a triangle are lit as if they faced the viewer.
             normals *= np.where(normals[:, 2:] < 0.0, -1.0, 1.0)
             light = (
                 _AMBIENT
@@ -281,6 +292,7 @@ class _Heap:
         is_hidden = surface.is_closed and np.linalg.det(matrix[:3, :3]) > 0.0
         if is_hidden or (opacity < 1.0 and len(corners) > 2):
             (ax, ay), (bx, by), (cx, cy) = (corners[:, index, :2].T for index in range(3))
+            # The sign of the area says which side is seen; the y axis of pictures points down.
             seen = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax) < 0.0
             corners, colors = corners[seen], colors[seen]
         if opacity >= 1.0:
@@ -301,6 +313,7 @@ def _make_cylinder(start: Array, end: Array, radius: float) -> Array:
     along = end - start
     length = float(np.linalg.norm(along))
     z = along / length if length > 0.0 else np.array((0.0, 0.0, 1.0))
+    # An axis that is far from parallel to Z of the cylinder.
     x = np.cross(z, np.eye(3)[int(np.argmin(np.abs(z)))])
     x /= np.linalg.norm(x)
     matrix = np.eye(4)

@@ -87,6 +87,7 @@ def compute_energies(motion: ShownMotion, mechanism: Mechanism) -> tuple[Array, 
     """
     times = np.asarray(motion.times, dtype=float)
     known = getattr(motion, "energy", None)
+    # A simulated trajectory has its energies; other motions need them computed at fewer moments.
     if known is not None:
         kinetic, height = np.asarray(known["kinetic"]), np.asarray(known["gravity"])
         parts = {"kinetic": kinetic, "potential of gravity": height}
@@ -142,6 +143,7 @@ def _one_of_each_pair(forces: Sequence[ContactForce]) -> Iterator[ContactForce]:
     for force in forces:
         by_element.setdefault(force.element, []).append(force)
     for group in by_element.values():
+        # Force and reaction would be one curve over another.
         opposite = len(group) == 2 and np.allclose(group[0].vectors, -group[1].vectors)
         yield from group[:1] if opposite else group
 
@@ -151,6 +153,7 @@ def _plot_contacts(times: Array, forces: Sequence[ContactForce]) -> Any:
         f"{force.element} on {force.frame}": np.linalg.norm(force.vectors, axis=1)
         for force in forces
     }
+    # Noise of contacts that do not touch.
     threshold = _NEVER_MIND * max(float(size.max()) for size in sizes.values())
     acting = {label: size for label, size in sizes.items() if size.max() > threshold}
     figure, (above, below) = make_sheet("Contact forces", [3.4, 0.5 + 0.25 * max(1, len(acting))])
@@ -159,6 +162,7 @@ def _plot_contacts(times: Array, forces: Sequence[ContactForce]) -> Any:
     above.set_ylim(bottom=0.0)
     for row, size in enumerate(acting.values()):
         spans = [
+            # A contact of one moment still gets a visible bar.
             (times[first], max(times[last] - times[first], 1e-3))
             for first, last in _find_spans(size > threshold)
         ]
@@ -201,6 +205,7 @@ def make_sheet(title: str, heights: Sequence[float]) -> tuple[Any, Any]:
 def divide_among_panels(lines: Mapping[str, Line]) -> list[dict[str, Line]]:
     """Return the lines of each panel: equal numbers, at most `LINES_IN_PANEL` in one."""
     items = list(lines.items())
+    # Panels of equal size, not a full one and a rest.
     size = ceil(len(items) / ceil(len(items) / LINES_IN_PANEL))
     return [dict(items[first : first + size]) for first in range(0, len(items), size)]
 
@@ -220,6 +225,7 @@ def lines_in(panel: Any, across: Array, lines: Mapping[str, Array], **style: Any
             np.allclose(column, other, rtol=0.0, atol=near, equal_nan=True) for other in drawn
         ):
             # What lies below shows through.
+            # The more curves are below, the shorter the dashes.
             looks["ls"] = (0.0, (6.0 / (below + 1), 6.0 * below / (below + 1)))
         drawn.append(column)
         # Matplotlib leaves a label that begins with an underscore out of the legend.
@@ -256,5 +262,6 @@ def finish_panels(panels: Sequence[Any], across: Array, note: str, label: str = 
 
 def _find_spans(mask: Array) -> list[tuple[int, int]]:
     """First and last place of every run of true values."""
+    # Edges are where the mask changes; a zero on both sides closes runs at the ends.
     edges = np.flatnonzero(np.diff(np.concatenate(([0], mask.astype(int), [0]))))
     return [(int(first), int(end) - 1) for first, end in edges.reshape(-1, 2)]

@@ -73,6 +73,7 @@ def read_recording(
         OsimliteError: a file is missing or no motion; see :meth:`.RecordedMotion.read`.
     """
     recorded = RecordedMotion.read(mechanism, path)
+    # The caller's values replace those of the file.
     rows = recorded.values
     for name, value in (values or {}).items():
         rows[:, mechanism.coordinate_index(name)] = value
@@ -88,6 +89,7 @@ def read_recording(
             columns = compute_forces(model, mechanism, recorded.times, rows, speeds, folder)
         except OsimliteError as error:
             remarks.append(f"no forces are shown: {error.message}")
+    # Without speeds there are no forces that depend on them.
     still = np.zeros_like(rows) if speeds is None else speeds
     states = {label: table[label] for label in table.columns if label.endswith("activation")}
     return Recording(
@@ -99,6 +101,7 @@ def _follow_couplers(mechanism: Mechanism, rows: Array, missing: set[str]) -> No
     """Give coordinates that are not on record the values that their couplers want; those may depend on each other."""
     couplers = [item for item in mechanism.constraints if isinstance(item, Coupler)]
     couplers = [item for item in couplers if mechanism.coordinates[item.dependent].name in missing]
+    # A chain of couplers is complete after as many rounds as it is long.
     for coupler in couplers * len(couplers):
         own = list(coupler.independent)
         rows[:, coupler.dependent] = [coupler.function.evaluate(row[own])[0] for row in rows]
@@ -131,6 +134,7 @@ def compute_forces(
         OsimliteError: a file is missing or cannot be read.
         SimulationError: at a state the rates of coordinates are not defined.
     """
+    # Imported here: files with forces need no engine.
     from osimlite.simulation.elements import force_elements
     from osimlite.simulation.system import System
 
@@ -148,6 +152,7 @@ def _read_speeds(mechanism: Mechanism, table: StoTable) -> Array | None:
     for index, info in enumerate(mechanism.coordinates):
         label = f"{info.path}/speed"
         if label in table.columns:
+            # Files in degrees have angular speeds in degrees per second.
             turned = table.in_degrees and info.motion_type == "rotational"
             speeds[:, index] = np.radians(table[label]) if turned else table[label]
         elif not info.locked:

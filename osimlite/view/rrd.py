@@ -34,6 +34,7 @@ def write_rrd(scene: Scene, q: Array, motion: ShownMotion | None, path: str | Pa
         MissingDependency: rerun-sdk is not installed.
         OsimliteError: the file cannot be written.
     """
+    # Rerun's types are too many to declare, hence Any.
     rr: Any = require("rerun", extra="rerun", purpose="a recording for Rerun")
     times, rows = np.zeros(1), q[None, :]
     if motion is not None:
@@ -44,6 +45,7 @@ def write_rrd(scene: Scene, q: Array, motion: ShownMotion | None, path: str | Pa
     stream = recording.binary_stream()
 
     def entity(*parts: str) -> str:
+        # Paths of components begin with a slash, which would make an empty part.
         return str(rr.new_entity_path([word for part in parts for word in part.split("/") if word]))
 
     def still(name: str, *what: Any) -> None:
@@ -56,6 +58,7 @@ def write_rrd(scene: Scene, q: Array, motion: ShownMotion | None, path: str | Pa
         moving(name, rr.Scalars.columns(scalars=scalars))
 
     axis = int(np.argmax(np.abs(scene.up)))
+    # Rerun knows only axes of the coordinate system as vertical.
     upright = f"RIGHT_HAND_{'XYZ'[axis]}_{'UP' if scene.up[axis] > 0.0 else 'DOWN'}"
     still("model", getattr(rr.ViewCoordinates, upright))
     bodies = [
@@ -100,6 +103,7 @@ def write_rrd(scene: Scene, q: Array, motion: ShownMotion | None, path: str | Pa
         pushes = Pushes.of(scene, motion, times)
         low, high = scene.box(rows[0])
         size = float(np.linalg.norm(high - low))
+        # 1e-300 prevents a division by zero.
         scale = LONGEST_ARROW * size / max(pushes.largest, 1e-300)
         for push in pushes.pushes:
             name = entity("forces", push.on.path, push.on.labels[0])

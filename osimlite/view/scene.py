@@ -120,6 +120,7 @@ class Bodies:
     @cached_property
     def lines(self) -> list[Array]:
         """Corners (k, 3) in ground of each line of the scene."""
+        # Paths are traced together, in the order of the lines.
         paths = iter(self.scene.polylines.trace(self.q, self.rotations[:-1], self.origins[:-1]))
         return [
             np.concatenate([self.points(point.body, point.location[None]) for point in line.course])
@@ -135,6 +136,7 @@ class Bodies:
     def matrix(self, body: int, placed: Array) -> Array:
         """Return a transform (4, 4) from a body's frame to ground; it may contain a scale."""
         result = placed.copy()
+        # The scale in the upper part is kept.
         result[:3, :3] = self.rotations[body] @ placed[:3, :3]
         result[:3, 3] = self.points(body, placed[None, :3, 3])[0]
         return result
@@ -192,6 +194,7 @@ class Scene:
         usual = np.array(
             [item.visible and item.layer == "geometry" for item in self.items], dtype=bool
         )
+        # The median is the usual size, which a few large shapes do not change.
         limit = SCENERY * float(np.median(sizes[usual])) if usual.any() else np.inf
         return frozenset(
             k
@@ -202,6 +205,7 @@ class Scene:
     def corners(self, item: Item) -> Array:
         """Points (k, 3) around an item, in the body's frame: its own if they are few, else corners of a box."""
         points = self.surfaces[item.surface].points
+        # Eight corners of a box instead of all points: an outline is enough here.
         if len(points) > _FEW:
             points = _box_corners(points.min(axis=0), points.max(axis=0))
         placed: Array = points @ item.matrix[:3, :3].T + item.matrix[:3, 3]
@@ -209,6 +213,7 @@ class Scene:
 
     def extent(self, bodies: Bodies) -> Iterator[tuple[int, Array]]:
         """Body and points (k, 3) in ground of everything that is drawn and no scenery; lines belong to body -2."""
+        # -2 is no body: lines go from body to body.
         for index, item in enumerate(self.items):
             if item.visible and item.layer in self.shown and index not in self.large:
                 yield item.body, bodies.points(item.body, self.corners(item))
@@ -227,6 +232,7 @@ class Scene:
         points = np.concatenate(result or [bodies.origins])
         low, high = points.min(axis=0), points.max(axis=0)
         little = (
+            # A point gets a box of some size, so that nothing is divided by zero.
             0.05 * max(1.0, float(np.abs(points).max()))
             if float((high - low).max()) < 1e-6
             else 0.0
@@ -240,6 +246,7 @@ class Scene:
             float((_box_corners(low, high) @ self.up).min()),
             float(np.linalg.norm(high - low)),
         )
+        # A floor slightly below 0 is an effect of shapes that sink in.
         return 0.0 if lowest >= -0.05 * size else lowest
 
 
@@ -263,6 +270,7 @@ def draw_sticks(
         own = everyone[index].mobilizer
         return LinePoint(index, (own.parent_frame if own.reversed else own.child_frame)[:3, 3])
 
+    # Sticks go to the joints of all bodies that it carries.
     for index in bodies:
         ends = [joint(place) for place, other in enumerate(everyone) if other.parent == index]
         for end in ends or [LinePoint(index, everyone[index].mass_properties.center)]:

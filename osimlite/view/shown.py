@@ -98,6 +98,7 @@ class Shown:
             mesh_paths=tuple(str(folder.resolve()) for folder in places.searched),
         )
         findings = validate(model if file is None else file, config=config).findings
+        # What could not be built is said before what could not be drawn.
         if left_out:
             scene = replace(scene, remarks=[*left_out, *scene.remarks])
         remarks = [*describe_left_out(scene.remarks)]
@@ -153,6 +154,7 @@ class Shown:
         seen = [*(p for _, p in scene.extent(bodies) if len(p)), *(a.point[None] for a in arrows)]
         # Of a model without bodies there is ground to see.
         points = np.concatenate(seen or [np.array(scene.box(q))])
+        # Any direction across the vertical will do if it is the X axis.
         side = np.cross((1.0, 0.0, 0.0), up) if abs(up[0]) < 0.9 else np.cross((0.0, 1.0, 0.0), up)
         direction = HOME[0] * np.cross(up, side) + HOME[1] * up + HOME[2] * side
         camera = Camera.around(points, up, direction, size[0] / size[1])
@@ -182,6 +184,8 @@ class Shown:
         moment = np.array([first if time is None else time])
         values = values_of(motion, self.scene.mechanism)
         q = at_times(motion, values, moment)[0]
+        # The scale of arrows follows the largest force of the whole motion, so that pictures
+        # compare.
         largest = Pushes.of(self.scene, motion, np.asarray(motion.times, dtype=float)).largest
         low, high = self.scene.box(q)
         scale = (

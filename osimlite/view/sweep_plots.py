@@ -40,6 +40,7 @@ def plot_runs(
         MissingDependency: matplotlib is not installed.
         OsimliteError: the folder or a file cannot be written.
     """
+    # Failed runs have no measure.
     known = {
         name: _to_numbers(columns[name]) for name in (*variables, *measures) if name in columns
     }
@@ -69,6 +70,7 @@ def _rank_variables(known: Mapping[str, Array], varied: Sequence[str], measure: 
 
     def correlate(name: str) -> float:
         x, y = known[name][finite], known[measure][finite]
+        # A constant has no correlation.
         if np.ptp(x) == 0.0 or np.ptp(y) == 0.0:
             return 0.0
         return float(abs(np.corrcoef(x, y)[0, 1]))
@@ -111,6 +113,7 @@ def _draw_pages(
 def _draw_map(figure: Any, place: Any, x: Array, y: Array, color: Array) -> None:
     """Draw a measure over two quantities: cells of a grid, or points; runs without it are crosses."""
     xs, ys = np.unique(x), np.unique(y)
+    # Every combination was run: cells of a grid.
     if len(xs) * len(ys) == len(x) and len(xs) > 1 and len(ys) > 1:
         cells = np.full((len(ys), len(xs)), np.nan)
         cells[np.searchsorted(ys, y), np.searchsorted(xs, x)] = color

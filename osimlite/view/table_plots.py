@@ -124,6 +124,7 @@ class ColumnNames(NamedTuple):
                 regions[item.name] = _describe_region(item)
             elif isinstance(item, CoordinateActuator):
                 info = infos.get(str(item.coordinate))
+                # An unknown coordinate is taken for an angle.
                 turns = info is None or info.motion_type == "rotational"
                 units[item.name] = MOMENT if turns else FORCE
             else:
@@ -166,6 +167,7 @@ def describe_columns(table: StoTable, names: ColumnNames) -> list[Column]:
 def _find_kind(label: str) -> str:
     """Return the kind of a state by its label; "" for columns that are no states."""
     owner, _, kind = label.rpartition("/")
+    # Labels of states are paths; those of older files have dots.
     if owner:
         return kind
     word = label.partition(".")[2]
@@ -184,16 +186,19 @@ def _describe_column(label: str, values: Array, table: StoTable, names: ColumnNa
             values,
             names.regions.get(item, ""),
         )
+    # Files of OpenSim 3 have "soleus_r.activation".
     item, _, last = label.partition(".")
     if last in ("activation", *STATE_UNITS):
         words = item if last in SECTIONS else f"{item} {last.replace('_', ' ')}"
         return Column(words, STATE_UNITS.get(last, ""), values, names.regions.get(item, ""))
+    # Labels that end with a component are vectors even in tables of actuators.
     is_vector = any(pattern.fullmatch(label) for pattern in _VECTORS)
     if table.name in ACTUATOR_TABLES and not is_vector:
         # Actuators of a coordinate often have its name.
         return _describe_actuator(label, values, table, names)
     if label in names.coordinates:
         return _describe_coordinate(label, values, table, names, False)
+    # OpenSim's tables of states of version 3 have speeds as "<coordinate>_u".
     if label.endswith("_u") and label[:-2] in names.coordinates:
         return _describe_coordinate(label[:-2], values, table, names, True)
     for pattern, describe in _ENDINGS:
@@ -217,6 +222,7 @@ def _describe_column(label: str, values: Array, table: StoTable, names: ColumnNa
 def _describe_actuator(label: str, values: Array, table: StoTable, names: ColumnNames) -> Column:
     """Return the column of an actuator or another force, by the name of the actuator."""
     group = names.regions.get(label, "")
+    # Reserve actuators are named after their coordinate.
     info = names.coordinates.get(re.sub(r"_reserve$|^reserve_", "", label))
     group = group or ("" if info is None else _find_group(info.name, names))
     turns = info is None or info.motion_type == "rotational"

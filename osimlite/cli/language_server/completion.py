@@ -83,7 +83,6 @@ def _complete_names(
     for name in list_names(known, cursor, reference, holder) if known is not None else ():
         item = _make_item(
             analysis, cursor, name.text, name.text, types.CompletionItemKind.Reference, name.detail
-        # `sort_text` is compared as text.
         )
         # Editors sort by this text, so likely names come first.
         item.sort_text = f"{'0' if name.likely else '1'}{name.text}"

@@ -275,9 +275,9 @@ class B3dTrial:
             "markers", np.full((self.frame_count, 3 * len(names)), np.nan)
         )
         positions = rows.reshape(len(rows), len(names), VECTOR_SIZE)
+        # Markers without a name cannot be assigned to the model.
         indices = [index for index, name in enumerate(names) if name]
         return tuple(names[index] for index in indices), positions[:, indices]
-# Markers without a name cannot be assigned to the model.
 
     def read_wrenches(self, processing_pass: int | str | None = None) -> Array:
         """Return torque about the origin of ground (N m) and force (N) of the ground on each contact body.
@@ -538,8 +538,8 @@ def read_b3d(path: str | Path) -> B3dSubject:
         if len(start) < LENGTH_BYTES or not 0 < length <= size - LENGTH_BYTES:
             raise DocumentError(
                 "this is not a .b3d file, or it was cut off within its header", file=file
-            # 1. The header: its length is compared with the file's before memory is taken for it.
             )
+        # 1. The header: its length is compared with the file's before memory is taken for it.
         expect_size(length, path)
         data = memoryview(_read_at(stream, LENGTH_BYTES, length, Path(path)))
     try:
@@ -607,8 +607,8 @@ def _expect_plausible(header: Mapping[str, Any], file: str) -> None:
     problems = []
     counts = ("dof_count", "sensor_frame_size", "pass_frame_size", "emg_samples")
     problems += [f"'{name}' is {header[name]}" for name in counts if header[name] < 0]
+    # Sizes of custom values must belong to their names.
     if len(header["custom_names"]) != len(header["custom_sizes"]) or any(
-        # Sizes of custom values must belong to their names.
         size < 0 for size in header["custom_sizes"]
     ):
         problems.append("its custom values have wrong sizes")

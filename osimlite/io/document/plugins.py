@@ -135,10 +135,10 @@ MAX_VALUES = 1_000_000
 
 class _Declarations:
     """Declarations of one file; its classes are added to those of earlier files."""
-# The classes of earlier files may be bases of this one.
 
     def __init__(self, path: str, found: dict[str, type[Object]]) -> None:
         self.path = path
+        # The classes of earlier files may be bases of this one.
         self.found = found
         self.text = read_file(path).decode("utf-8", "replace")
         try:
@@ -178,7 +178,7 @@ class _Declarations:
 
     def find_class(self, name: str, *words: str) -> type[Object]:
         """Return a class by name: OpenSim's, one of an earlier file, or one of this file, made when needed."""
-        # OpenSim's classes are imported one by one; importing all takes half a second.
+        # OpenSim's classes are imported one by one: a file refers to few of them.
         if name in MODULES and name not in self.entries:
             return cast("type[Object]", getattr(import_module(MODULES[name]), name))
         if name not in self.found:
@@ -216,8 +216,8 @@ class _Declarations:
                 f"'bases' of '{name}' must list the class that it derives from, the nearest first",
                 name,
             )
+        # Names with "<" are templates of C++, which have no class here.
         base = self.find_class(
-            # Names with "<" are templates of C++, which have no class here.
             next((word for word in bases if "<" not in word), "Object"), name, "bases", bases[0]
         )
         inside: dict[str, Any] = {

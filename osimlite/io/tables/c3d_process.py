@@ -55,8 +55,8 @@ def read_markers(path: str) -> dict[str, Array]:
     points = result["parameters"]["POINT"]
     # Millimetres are what most systems write.
     unit = METRES_PER_UNIT.get(points["UNITS"]["value"][0].strip().lower(), 0.001)
+    # More than 255 labels continue in LABELS2 and so on.
     names = [
-        # More than 255 labels continue in LABELS2 and so on.
         name for key, more in points.items() if key.startswith("LABELS") for name in more["value"]
     ]
     # ezc3d has (coordinate, marker, frame).

@@ -78,8 +78,8 @@ def measure_model(
         raise NoMachineCodeError(NEEDS_MACHINE_CODE)
     # `READY_CODE` uses machine code only if it has been compiled before.
     code = None if compiles else READY_CODE
+    # What an earlier measurement found at rest need not be measured again.
     paths = Paths(
-        # What an earlier measurement found at rest need not be measured again.
         model, code=code, left_out=still.swept if still is not None else (), mechanism=mechanism
     )
     has_surfaces = any(

@@ -94,7 +94,7 @@ def report_default_outside_range(subject: Subject, report: FindingCollector) -> 
     """
     for coordinate in subject.find_instances(Coordinate):
         low, high = coordinate.range
-        # Ranges and defaults are often written with nine digits.
+        # Defaults at a bound may differ from it by rounding.
         slack = (
             1e-9 * max(abs(low), abs(high), 1.0)
             if math.isfinite(low) and math.isfinite(high)

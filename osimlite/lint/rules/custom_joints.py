@@ -230,7 +230,6 @@ def _compute_axis_rates(joint: CustomJoint, coordinate: Coordinate) -> list[floa
             if place is None
             else _compute_slope(axis.function, place, values.get(names[0], 0.0))
         )
-        # Square roots of different integers are independent over the rationals.
         # No combination of these numbers is 0 by chance.
         result.append(math.sqrt(2 + number + 7 * (place or 0)) if known is None else known)
     return result

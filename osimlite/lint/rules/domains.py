@@ -97,7 +97,7 @@ def _describe_nan_consequence(
 ) -> str:
     """Return what OpenSim 4.6 does with NaN or infinity in a property (measured)."""
     assert isinstance(spec.kind, Value)
-    # Lists of the older format are parsed number by number, which fails at "nan".
+    # A list of the older kind is the one case in which OpenSim rejects the file.
     if spec.kind.legacy and spec.kind.shape == "list":
         return "OpenSim rejects the file"
     if spec.tag == "gravity" or (spec.tag == "mass" and not number > 0.0):

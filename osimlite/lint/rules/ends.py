@@ -206,8 +206,7 @@ def _coincide(subject: Subject, before: Any, point: Any) -> bool:
         if frame is None:
             return False
         frames.append(frame)
-    # The direction of a segment between points of one body is never needed by the equations of
-    # motion.
+    # Points on one body are left to OSIM612.
     if find_base(subject, frames[0]) is find_base(subject, frames[1]):
         return False
     first = _locate_in_ground(subject, frames[0], before.location)

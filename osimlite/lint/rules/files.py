@@ -163,7 +163,6 @@ def _has_content(source: Source | None, number: int) -> bool:
     if source is None:
         return False
     # An empty set has empty elements for members and groups.
-    # GUI programs write these empty elements into every set.
     if all(
         source.spans[i].tag in ("objects", "groups") and not source.children(i)
         for i in source.children(number)

@@ -144,8 +144,8 @@ def _find_stray_texts(source: Source) -> Iterator[tuple[int, str]]:
     if source.mixed is None:
         # A ">" inside a value of an attribute would end the tag for the patterns.
         plain = _QUOTED.sub(lambda match: match[0].replace(">", "_"), blank_comments(source.text))
+        # Both patterns may find the same text, hence the set.
         for start, end in {
-            # Both patterns may find the same text, hence the set.
             match.span(1) for pattern in (_AFTER, _BEFORE) for match in pattern.finditer(plain)
         }:
             yield start, plain[start:end].rstrip()

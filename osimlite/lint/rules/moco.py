@@ -220,8 +220,8 @@ def report_study_data(setup: Setup, report: FindingCollector) -> None:
 
 def _describe_guess_fault(setup: Setup, tree: Tree, guess: Table) -> str:
     """Return what is wrong with the columns of a trajectory; empty if nothing is."""
+    # Parameters are columns of a guess as well.
     wanted = set(find_variables(tree, "state or control variable")) | {
-        # Parameters are columns of a guess as well.
         item.name for item in setup.find_by_class("MocoParameter")
     }
     columns = {

@@ -236,8 +236,7 @@ def _drives_sliding(subject: Subject, material: HuntCrossleyContactParameters) -
         if isinstance(force, HuntCrossleyForce)
         else 0.0
     )
-    # Simbody's curve (Hunt and Crossley, Sherman) peaks near twice the static coefficient times the
-    # relative speed.
+    # Near rest Simbody's friction is v / vt (ud + 2 (us - ud)) + uv v: here its slope is negative.
     return 2 * material.static_friction + viscous < material.dynamic_friction
 
 

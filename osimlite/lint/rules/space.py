@@ -110,7 +110,7 @@ def report_degenerate_frame(subject: Subject, report: FindingCollector) -> None:
             place[1].transform_point(station.location) if place else None
             for place, station in zip(places, stations, strict=True)
         ]
-        # Exactly equal, as OpenSim's own test: near points give a frame, if a doubtful one.
+        # Exactly equal locations: points that are near to each other still define a frame.
         for one, other in combinations(range(3), 2):
             if spots[one] is not None and spots[one] == spots[other]:
                 report(
@@ -142,9 +142,9 @@ def _describe_circle(subject: Subject, circle: Sequence[PhysicalOffsetFrame]) ->
 
 
 DEPTH = Threshold("contact-depth", 1e-3, "m", "surfaces may start this deep inside each other")
+# A relative limit as well, since small spheres at the floor start a few tenths of a millimetre deep
+# by rounding.
 DEPTH_SHARE = Threshold(
-    # A relative limit as well, since small spheres at the floor start a few tenths of a millimetre
-    # deep by rounding.
     "contact-depth-share", 0.1, "of the radius", "a sphere may start this deep inside a surface"
 )
 LENGTH = Threshold("largest-length", 10.0, "m", "nothing on a body is longer")
@@ -229,8 +229,8 @@ def report_lengths_in_millimetres(subject: Subject, report: FindingCollector) ->
                 # Almost all are small; with NaN among them no comparison need be true.
                 if not numbers or (-longest <= min(numbers) and max(numbers) <= longest):
                     continue
+                # Infinity is reported by OSIM205.
                 if not any(
-                    # Infinity is reported by OSIM205.
                     longest < abs(number) < math.inf for number in numbers
                 ) or not _is_on_body(subject, item):
                     continue

@@ -322,7 +322,7 @@ def _report_cdata(subject: Subject, source: Source, number: int, report: Finding
     texts = [part for part in _SECTIONS.split(inside) if part.strip()]
     sections = _SECTION.findall(inside)
     place = source.position(span.tag_end + inside.index("<![CDATA["), len("<![CDATA["))
-    # OpenSim's parser takes the first part of a mixed value only.
+    # A value of several pieces is rejected, whatever the pieces are.
     if len(texts) + len(sections) > 1:
         report("a CDATA section is only a part of this value: OpenSim rejects the file", at=place)
     elif sections and not texts and sections[0] != sections[0].strip():

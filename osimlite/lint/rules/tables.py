@@ -511,7 +511,7 @@ def report_column_label(table: Table, report: FindingCollector) -> None:
                 at=at,
                 fault="commas-between-labels",
             )
-        # The older reader takes "range" for "time", as some early files have it.
+        # The older reader also accepts a column "range".
         elif all(label.text not in ("time", "range") for label in labels):
             report(
                 f"the first column is '{first}', expected 'time'",

@@ -220,8 +220,8 @@ def _get_text(owner: Object, spec: FieldSpec) -> str:
 
 
 def _is_refused(note: Note, spec: FieldSpec, kind: Value) -> bool:
-    # `note.value` is what OpenSim reads instead, if it continues.
     """Return whether OpenSim rejects a file for a value that it cannot read."""
+    # `note.value` is what OpenSim reads instead, if it continues.
     return note.value is None and (
         kind.legacy or (spec.tag == "mass" and spec.default != spec.default)
     )

@@ -224,8 +224,8 @@ def _read_smoothed(
     forms = {"tanh": 1.0, "huber": 2.0}
     form = forms[component.smoothing_type or "tanh"] if component.use_smoothing else 0.0
     sharpness = (getattr(component, name) for name in SmoothTransitions._fields[1:])
+    # Without a value OpenSim's smoothing parameter is 10.
     smoothed = SmoothTransitions(
-        # Without a value OpenSim's smoothing parameter is 10.
         form, *(10.0 if number is None else number for number in sharpness)
     )
     subjects = []

@@ -137,8 +137,8 @@ class _Collector:
             )
         body, where = self.mechanism.frames[frame]
         owner = "/ground" if body < 0 else self.mechanism.bodies[body].path
+        # Colours outside of 0 to 1 are refused by some programs.
         red, green, blue, opacity = (
-            # Colours outside of 0 to 1 are refused by some programs.
             min(max(part, 0.0), 1.0) for part in (*appearance.color, appearance.opacity)
         )
         visual = Visual(shape, where @ placed, (red, green, blue, opacity), path)

@@ -53,6 +53,7 @@ def _add_distance(draft: MjcfDraft, item: b.DistanceConstraint) -> str:
         draft.get_section("equality"),
         "tendon",
         name=name,
+        # MuJoCo's tendon equalities are about changes from the length at qpos0.
         tendon1=name,
         # The equality sets the change of length from the reference length.
         polycoef=[item.distance - length, 0, 0, 0, 0],
@@ -67,6 +68,7 @@ def _add_point_on_line(draft: MjcfDraft, item: b.PointOnLineEquations) -> str:
     """
     name = draft.make_name("joint", item.name)
     frame = np.eye(4)
+    # The frame has the axes of the body, in which the line is given.
     frame[:3, 3] = item.line.location
     speck = draft.add_speck(name, draft.bodies[item.line.body], frame)
     add_element(speck, "joint", name=name, type="slide", axis=item.along)

@@ -144,6 +144,7 @@ def add_element(parent: _Element, tag: str, **attributes: Value) -> _Element:
         for name, value in attributes.items()
         if value is not None
     }
+    # A text may well be "NaN"; a number of that kind would end MuJoCo's reader.
     for name, words in said.items():
         if NON_FINITE_WORDS.intersection(words.split()) and not isinstance(
             attributes.get(name), str
@@ -259,6 +260,7 @@ class MjcfDraft:
             path: absolute path of the component.
             became: kind and name of the element.
         """
+        # Components below become what their owner becomes, unless they have their own entry.
         for each in self.tree.by_path:
             if each == path or each.startswith(f"{path}/"):
                 self.fidelity.translated.setdefault(each, became)
@@ -279,6 +281,7 @@ class MjcfDraft:
         own = path.rsplit("/", 1)[-1]
         whole = xml_name(to_dotted_name(path))
         name = xml_name(own or whole)
+        # The short name if it is free: users look for it.
         if name in taken:
             # The path is unique in the model, but another pass may have used it.
             name = whole if whole not in taken else make_unique_name(whole, taken, first=2)

@@ -34,6 +34,7 @@ def add_point_spring(draft: MjcfDraft, force: PointToPointSpring, path: str) -> 
     Returns:
         Kind and name of the element.
     """
+    # OpenSim takes both points in the bodies, whatever frames are named.
     ends = [
         _add_point_site(draft, force, path, "socket_body1", force.point1),
         _add_point_site(draft, force, path, "socket_body2", force.point2),
@@ -63,6 +64,7 @@ def add_point_to_point_actuator(draft: MjcfDraft, force: PointToPointActuator, p
         _add_point_site(draft, force, path, "bodyA", force.pointA),
         _add_point_site(draft, force, path, "bodyB", force.pointB),
     ]
+    # The gear scales the control to a force.
     name = draft.make_name("actuator", path)
     add_element(
         draft.get_section("actuator"),
@@ -89,11 +91,13 @@ def add_torque_actuator(draft: MjcfDraft, force: TorqueActuator, path: str) -> s
         Untranslatable: its axis is fixed in ground while both bodies move.
     """
     first = draft.find_placement(force, "bodyA")
+    # Without body B the reaction acts on ground.
     second = draft.find_placement(force, "bodyB") if force.bodyB else GROUND_FRAME
     gear = np.append(np.zeros(3), _normalize_axis(force.axis) * force.optimal_force)
     one = draft.add_site(path, *first)
     # The axis is fixed in body B; MuJoCo applies the torque in the axes of the reference site.
     if not force.torque_is_global:
+        # The opposite torque on the other body, with the sign reversed, is the same.
         return _add_site_motor(draft, path, -gear, draft.add_site(path, *second), one)
     if second.body != GROUND:
         raise Untranslatable("its axis is fixed in ground while both its bodies move")
@@ -115,6 +119,7 @@ def add_point_actuator(draft: MjcfDraft, force: PointActuator, path: str) -> str
         Untranslatable: its point is fixed in ground.
     """
     if force.point_is_global:
+        # A direction in ground needs a site there as the reference.
         raise Untranslatable("its point is given in ground, so that it wanders through the body")
     gear = np.append(_normalize_axis(force.direction) * force.optimal_force, np.zeros(3))
     site = _add_point_site(draft, force, path, "body", force.point)

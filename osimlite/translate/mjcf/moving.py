@@ -52,11 +52,13 @@ def fit_composition(
     if len(known) == len(exact):
         return np.eye(DEGREE + 1)[1], np.array([_pad_coefficients(item) for item in known])
     low, high = span
+    # Chebyshev points keep the error even over the range.
     at = 0.5 * (low + high) + 0.5 * (high - low) * UNIT_POINTS
     values = np.stack([sample_function(item, at) for item in functions], axis=1)
     # The left and right sides have equal or opposite functions, and share the cached fit.
     signs = np.where(values[0] < 0.0, -1.0, 1.0)
     bent, rows = fit_quartics((values * signs).tobytes())
+    # Maps the range of the coordinate to [-1, 1].
     normal = Polynomial((-(low + high) / (high - low), 2.0 / (high - low)))
     slides = np.array(
         [_pad_coefficients(Chebyshev(row).convert(kind=Polynomial)) for row in (rows * signs).T]
@@ -82,6 +84,7 @@ def fit_quartics(data: bytes) -> tuple[Array, Array]:
     powers = np.vander(UNIT_POINTS, DEGREE + 1, increasing=True)
 
     # The inner quartic is scaled to [-1, 1], so that its bends are its only free numbers.
+    # The inner quartic must reach -1 and 1, so that the outer one uses its complete range.
     def make_inner(bends: Array) -> Array:
         bent = np.array((0.0, 1.0, *bends))
         reached = powers @ bent
@@ -91,11 +94,13 @@ def fit_quartics(data: bytes) -> tuple[Array, Array]:
         return bent / half
 
     def fit_outer(bends: Array) -> tuple[Array, Array]:
+        # For given bends the outer quartics follow by linear least squares (variable projection).
         basis = np.polynomial.chebyshev.chebvander(powers @ make_inner(bends), DEGREE)
         result: Array = np.asarray(np.linalg.lstsq(basis, values, rcond=None)[0], dtype=np.float64)
         return result, (basis @ result - values).ravel()
 
     search = require("scipy.optimize", extra="sim", purpose="fits of moving points").least_squares
+    # 1e3 lets the search end at a sensible relative change.
     best = min(
         (search(lambda bends: 1e3 * fit_outer(bends)[1], start) for start in INITIAL_BENDS),
         key=lambda each: each.cost,

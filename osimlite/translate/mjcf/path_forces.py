@@ -53,6 +53,7 @@ def add_spring(draft: MjcfDraft, force: PathSpring, path: str) -> str:
     element.attrib.update(
         {
             "stiffness": format_value(force.stiffness),
+            # Between 0 and the rest length the spring of MuJoCo is slack.
             "springlength": format_value((0.0, force.resting_length)),
         }
     )
@@ -108,6 +109,7 @@ def _fit_spring(lengths: Array, tension: Array) -> tuple[float, float]:
     Both are zero if it is never taut.
     """
     if len(np.unique(lengths)) < 2:
+        # A line needs two lengths.
         return 0.0, 0.0
     slope, start = np.polyfit(lengths, tension, 1)
     return float(slope), float(-start / slope)

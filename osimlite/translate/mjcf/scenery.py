@@ -20,9 +20,11 @@ FRAME_GROUP = 5
 
 def add_shapes(draft: MjcfDraft) -> None:
     """Add the shapes with which bodies are drawn."""
+    # A class without users would be a remark of MuJoCo.
     if not any(link.visuals for link in draft.robot.links):
         return
     looks = add_element(draft.get_section("default"), "default", class_="looks")
+    # Shapes neither collide nor have mass: inertia is that of the bodies.
     add_element(looks, "geom", contype=0, conaffinity=0, group=SHAPE_GROUP, mass=0)
     for link, element in draft.iterate_links():
         for visual in link.visuals:
@@ -52,6 +54,7 @@ def add_camera(draft: MjcfDraft) -> None:
         ]
     )
     low, high = spots.min(axis=0), spots.max(axis=0)
+    # Without gravity the axes of OpenSim are assumed.
     fall = draft.mechanism.gravity if draft.mechanism.gravity.any() else np.array((0.0, -1.0, 0.0))
     fall = fall / np.abs(fall).max()
     up = -fall / np.linalg.norm(fall)
@@ -59,6 +62,7 @@ def add_camera(draft: MjcfDraft) -> None:
     right = np.eye(3)[0] if abs(up[0]) < 0.9 else np.eye(3)[1]
     right = right - (right @ up) * up
     right /= np.linalg.norm(right)
+    # Far enough to see everything in the default field of view.
     place = 0.5 * (low + high) + (1.0 + float(np.linalg.norm(high - low))) * cross(right, up)
     # MuJoCo's default headlight leaves bones dark.
     add_element(

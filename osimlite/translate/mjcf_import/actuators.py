@@ -55,6 +55,7 @@ def add_actuators(draft: ConversionDraft) -> None:
                 _add_joint_actuator(draft, actuator, target)
         elif transmission == int(kinds.mjTRN_TENDON):
             path = draft.paths[target]
+            # The gear of a tendon has one number that counts.
             gear = float(model.actuator_gear[actuator, 0])
             if is_muscle:
                 muscle = make_muscle(
@@ -81,6 +82,7 @@ def _sample_lengths(draft: ConversionDraft) -> Array:
     return tendon_lengths(source, tendons, poses, draft.version)
 
 
+# A component has one owner.
 def _copy(path: TendonPath) -> TendonPath:
     """Return a copy of a path: several actuators may pull at one tendon."""
     return TendonPath(path.path.copy_deep(), path.shift)
@@ -93,6 +95,7 @@ def _read_gain(
     model, mujoco = draft.mj, draft.source.mujoco
     gain, bias = int(model.actuator_gaintype[actuator]), int(model.actuator_biastype[actuator])
     numbers = [float(value) for value in model.actuator_gainprm[actuator, :3]]
+    # An affine gain without slopes is a fixed gain.
     if gain == int(mujoco.mjtGain.mjGAIN_AFFINE) and not any(numbers[1:]):
         gain = int(mujoco.mjtGain.mjGAIN_FIXED)
     if gain != int(mujoco.mjtGain.mjGAIN_FIXED) or not numbers[0]:
@@ -123,6 +126,7 @@ def _set_limits(
     model = draft.mj
     low, high = -np.inf, np.inf
     if model.actuator_ctrllimited[actuator]:
+        # No limit is infinite in OpenSim.
         low, high = map(float, model.actuator_ctrlrange[actuator])
     if model.actuator_forcelimited[actuator]:
         limits = [float(value) for value in model.actuator_forcerange[actuator]]
@@ -132,6 +136,7 @@ def _set_limits(
                 "actuator", actuator, "a limit of a force that depends on motion", LEFT_OUT, text
             )
         else:
+            # Gains may be negative, which exchanges the limits.
             ends = sorted(limit / gain for limit in limits)
             low, high = max(low, ends[0]), min(high, ends[1])
             draft.record(
@@ -144,6 +149,7 @@ def _add_joint_actuator(draft: ConversionDraft, actuator: int, joint: int) -> No
     model = draft.mj
     read, delay = _read_gain(draft, actuator), _read_dynamics(draft, actuator)
     gear = float(model.actuator_gear[actuator, 0])
+    # A gear of 0 makes an actuator without a force.
     if read is None or delay is None or not gear:
         draft.drop(
             "actuator",
@@ -173,6 +179,7 @@ def _add_joint_actuator(draft: ConversionDraft, actuator: int, joint: int) -> No
         # The force is gear (constant + by_length gear q + by_speed gear u).
         stiffness, viscosity = -by_length * gear * gear, -by_speed * gear * gear
         spring = draft.unique("force", f"{name}_bias")
+        # A negative stiffness or a constant force is not what SpringGeneralizedForce means.
         if (stiffness > 0.0 and viscosity >= 0.0) or not (stiffness or constant):
             draft.model.add(
                 SpringGeneralizedForce(
@@ -201,6 +208,7 @@ def _add_joint_muscle(draft: ConversionDraft, actuator: int, joint: int) -> None
     gear = float(model.actuator_gear[actuator, 0])
     low, high = draft.made[draft.coordinates[joint][0]].range
     least = min(gear * low, gear * high)
+    # OpenSim's paths have positive lengths: 1 cm at least.
     shift = max(0.0, 0.01 - least)
     path = FunctionBasedPath(
         name="path",
@@ -245,6 +253,7 @@ def _add_path_actuator(
                 name=spring,
                 geometry_path=_copy(path).path,
                 resting_length=path.shift,
+                # MuJoCo's spring also pushes.
                 clamp_stretch=False,
                 expression=(
                     f"({-gear * constant!r})-({by_length * gear * gear!r})*s"
@@ -271,6 +280,7 @@ def _add_site_actuator(draft: ConversionDraft, actuator: int, site: int) -> None
         read is None
         or delay != 0.0
         or any(read[1])
+        # A reference site, or a force together with a torque, has no counterpart in one actuator.
         or int(model.actuator_trnid[actuator, 1]) >= 0
         or force.any() == torque.any()
         or body == 0
@@ -344,6 +354,7 @@ def _add_tendon_springs(draft: ConversionDraft) -> None:
                     expression="+".join(terms),
                 )
             )
+        # A PathSpring keeps the path, so that its length can be read.
         elif tendon not in driven:
             draft.model.add(
                 PathSpring(

@@ -54,6 +54,7 @@ def add_contacts(draft: ConversionDraft) -> None:
         _record_all(draft)
         return
     surfaces: dict[int, list[ContactGeometry]] = {}
+    # Sorted, so that equal files give equal models.
     for geom in sorted(_find_colliding_geoms(draft)):
         made = _make_surfaces(draft, geom)
         if made:
@@ -75,6 +76,7 @@ def _find_colliding_geoms(draft: ConversionDraft) -> set[int]:
     result = {int(geom) for pair in range(model.npair) for geom in _pair(model, pair)}
     types, affinities = model.geom_contype, model.geom_conaffinity
     for geom in range(model.ngeom):
+        # MuJoCo's test: the type of one and the affinity of the other, in either order.
         others = (types[geom] & affinities) | (affinities[geom] & types)
         if np.any(others[np.arange(model.ngeom) != geom]):
             result.add(geom)
@@ -117,6 +119,7 @@ def _make_surfaces(draft: ConversionDraft, geom: int) -> list[ContactGeometry]:
         draft.record("geom", geom, "contact of a capsule", "contact of the spheres at its ends")
         return [sphere(np.array((0.0, 0.0, end)), size[0]) for end in (-size[1], size[1])]
     if kind == BOX:
+        # Spheres in the corners touch a plane as the box does, up to rounded corners.
         radius = CORNER_RADIUS * min(size)
         draft.record(
             "geom",
@@ -125,6 +128,7 @@ def _make_surfaces(draft: ConversionDraft, geom: int) -> list[ContactGeometry]:
             "contact of spheres in its corners",
             f"radius {radius:g} m",
         )
+        # The spheres lie inside of the box.
         return [
             sphere(np.array(signs) * (np.array(size) - radius), radius)
             for signs in product((-1.0, 1.0), repeat=3)
@@ -179,6 +183,7 @@ def _add_forces(draft: ConversionDraft, surfaces: dict[int, list[ContactGeometry
             for geom in (one, two)
             if int(model.geom_type[geom]) in (SPHERE, CAPSULE, ELLIPSOID, BOX)
         ]
+        # OpenSim's Hunt-Crossley force acts between half spaces and round shapes.
         if len(planes) != 1 or len(round_) != 1:
             for geom in (one, two):
                 others[geom] = others.get(geom, 0) + 1
@@ -202,11 +207,13 @@ def _can_touch(draft: ConversionDraft, one: int, two: int) -> bool:
         return False
     bodies = [int(model.body_weldid[model.geom_bodyid[geom]]) for geom in (one, two)]
     parents = [int(model.body_weldid[model.body_parentid[body]]) for body in bodies]
+    # Geoms of one rigid body do not move against each other.
     if bodies[0] == bodies[1]:
         return False
     # A body does not touch its parent, unless this is the world.
     if 0 not in bodies and (bodies[0] == parents[1] or bodies[1] == parents[0]):
         return False
+    # MuJoCo stores both bodies in one integer.
     signature = {
         (int(model.geom_bodyid[one]) << 16) + int(model.geom_bodyid[two]),
         (int(model.geom_bodyid[two]) << 16) + int(model.geom_bodyid[one]),
@@ -226,15 +233,18 @@ def _add_force(
     root = int(model.body_rootid[body])
     mass = float(model.body_subtreemass[root])
     if pair is None:
+        # MuJoCo's mixing rule for the parameters of two geoms.
         weights = model.geom_solmix[[plane, geom]]
         share = weights / weights.sum() if weights.sum() > 0.0 else np.array((0.5, 0.5))
         reference = share @ model.geom_solref[[plane, geom]]
         impedance = share @ model.geom_solimp[[plane, geom]]
+        # Of two frictions MuJoCo takes the larger.
         friction = float(model.geom_friction[[plane, geom], 0].max())
     else:
         reference, impedance = model.pair_solref[pair], model.pair_solimp[pair]
         friction = float(model.pair_friction[pair, 0])
     linear, _ = compute_softness(reference, impedance, 1.0 / max(mass, 1e-6))
+    # Without gravity any weight will do.
     weight = max(mass * float(np.linalg.norm(model.opt.gravity)), 1e-3)
     depth = weight / linear
     radius = float(model.geom_size[geom, 0])

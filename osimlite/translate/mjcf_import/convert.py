@@ -167,6 +167,7 @@ def from_mjcf(
             words = " or ".join(f"'{item}'" for item in known if item is not None)
             raise SettingError(f"--{word} is {words}, not '{value}'")
     options = ImportOptions(
+        # Versions before 3 follow the rules of version 3.
         written_for=None if written_for is None else max(written_for, 3),
         muscle=muscle_class,
         armature=armature,
@@ -196,6 +197,7 @@ def start_draft(path: Path, options: ImportOptions) -> ConversionDraft:
     if disabled & int(source.mujoco.mjtDisableBit.mjDSBL_GRAVITY):
         gravity = [0.0, 0.0, 0.0]
     if options.up == "y":
+        # Z up becomes y up: (x, y, z) is (x, z, -y).
         gravity = [gravity[0], gravity[2], -gravity[1]]
     model = Model(
         name=legal(source.name),

@@ -136,6 +136,7 @@ class ConversionDraft:
         Returns:
             The frame, and whether it is new. A new frame is in the model's component set.
         """
+        # A frame that would be the body itself is not needed.
         owner = self.frames[body]
         if not position.any() and np.array_equal(rotation, np.eye(3)):
             return owner, False
@@ -155,6 +156,7 @@ def vector(values: Sequence[float] | Array) -> tuple[float, float, float]:
     Returns:
         The three floats.
     """
+    # Adding 0.0 turns -0.0 into 0.0.
     x, y, z = (float(value) + 0.0 for value in values)
     return x, y, z
 

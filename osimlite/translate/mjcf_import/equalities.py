@@ -50,6 +50,7 @@ def shifted_polynomial(draft: ConversionDraft, number: int) -> Polynomial:
     one, other = int(model.eq_obj1id[number]), int(model.eq_obj2id[number])
     first = float(model.qpos0[model.jnt_qposadr[one]])
     coefficients = model.eq_data[number, :5]
+    # Without a second joint the first one keeps a value.
     if other < 0:
         return Polynomial([first + float(coefficients[0])])
     second = float(model.qpos0[model.jnt_qposadr[other]])
@@ -66,6 +67,7 @@ def _couple_joints(draft: ConversionDraft, number: int) -> None:
         coordinate = draft.made[dependent]
         value = float(polynomial.coef[0])
         coordinate.default_value, coordinate.locked = value, active
+        # A clamped coordinate needs its default in the range.
         low, high = coordinate.range
         coordinate.range = (min(low, value), max(high, value))
         draft.record("equality", number, SOFT, f"coordinate {dependent} is locked")
@@ -73,6 +75,7 @@ def _couple_joints(draft: ConversionDraft, number: int) -> None:
     coefficients = tuple(float(value) for value in polynomial.coef[::-1])
     name = draft.unique("constraint", draft.source.name_of("equality", number))
     function = (
+        # OpenSim lists the highest power first.
         LinearFunction(
             name="coupled_coordinates_function",
             coefficients=coefficients if len(coefficients) == 2 else (0.0, *coefficients),
@@ -89,6 +92,7 @@ def _couple_joints(draft: ConversionDraft, number: int) -> None:
             isEnforced=active,
         )
     )
+    # Otherwise the assembly would move the independent coordinate.
     if active:
         draft.made[dependent].is_free_to_satisfy_constraints = True
     draft.record("equality", number, SOFT, "an exact coupler of coordinates", f"constraint {name}")
@@ -104,6 +108,7 @@ def _frames_of(draft: ConversionDraft, number: int) -> tuple[int, int, bool]:
 def _connect(draft: ConversionDraft, number: int) -> None:
     model = draft.mj
     one, two, sites = _frames_of(draft, number)
+    # Sites have their points themselves, bodies have them in the data.
     if sites:
         points = model.site_pos[one], model.site_pos[two]
         one, two = int(model.site_bodyid[one]), int(model.site_bodyid[two])
@@ -135,6 +140,7 @@ def _weld(draft: ConversionDraft, number: int) -> None:
         ]
         one, two = int(model.site_bodyid[one]), int(model.site_bodyid[two])
     else:
+        # The pose of the second body in the first, as MuJoCo stores it.
         relative = quaternion_matrix(model.eq_data[number, 6:10])
         poses = [(np.array(model.eq_data[number, 3:6]), relative), (here, straight)]
         # The anchor is a point of the second body; its place in the first one is in the data.

@@ -70,11 +70,14 @@ def group_joints(draft: ConversionDraft, body: int) -> list[JointGroup]:
     for joint in range(first, first + int(model.body_jntnum[body])):
         kind = int(model.jnt_type[joint])
         if kind in (FREE, BALL):
+            # A ball or free joint is a joint of its own.
             if slides or hinges:
                 groups.append(JointGroup(tuple(slides), tuple(hinges)))
                 slides, hinges = [], []
             groups.append(JointGroup((), (), joint))
             continue
+        # A CustomJoint rotates first and translates in axes of the parent, so that a slide after a
+        # hinge needs a new joint.
         fits = (
             not hinges and len(slides) < 3 and _is_independent(model, joint, slides)
             if kind == SLIDE
@@ -112,6 +115,7 @@ def add_joints(draft: ConversionDraft, body: int, frame: Body, parent: PhysicalF
     for number, group in enumerate(groups):
         is_last = number == len(groups) - 1
         if is_last:
+            # Bodies between the groups carry no mass.
             child, suffix = frame, ""
         else:
             name = draft.unique("body", f"{frame.name}_{number + 1}")
@@ -144,6 +148,7 @@ def add_joints(draft: ConversionDraft, body: int, frame: Body, parent: PhysicalF
                 child_at=vector(anchor),
             )
         draft.model.add(joint)
+        # The following groups begin in the frame of the helper body.
         parent, position, rotation = child, np.zeros(3), np.eye(3)
     if len(groups) > 1:
         draft.record(
@@ -168,6 +173,7 @@ def _make_custom_joint(draft: ConversionDraft, group: JointGroup, name: str) -> 
                 reference = float(model.qpos0[model.jnt_qposadr[joint]])
                 coordinate = _make_coordinate(draft, joint, reference)
                 axis.coordinates = (coordinate.name,)
+                # MuJoCo's hinge is 0 at its reference, where the coordinate has that value.
                 axis.function = LinearFunction(name="function", coefficients=(1.0, -reference))
                 coordinates.append(coordinate)
             axes[axis.name] = axis
@@ -182,6 +188,7 @@ def _make_coordinate(draft: ConversionDraft, joint: int, value: float) -> Coordi
     limited = bool(model.jnt_limited[joint])
     half = math.pi if rotational else FREE_RANGE_M
     low, high = map(float, model.jnt_range[joint])
+    # A range that is not set is 0 to 0.
     if not low < high:
         low, high = value - half, value + half
     if not low <= value <= high:
@@ -261,6 +268,7 @@ def _make_joint(
 
 def add_joint_forces(draft: ConversionDraft) -> None:
     """Add springs, dampers, limits and armature of joints, and record friction."""
+    # Joints that an equality determines have no limit of their own.
     model = draft.mj
     dependent = _find_dependent_joints(draft)
     for joint in range(model.njnt):
@@ -302,6 +310,7 @@ def _add_spring(draft: ConversionDraft, joint: int, name: str) -> None:
         _polynomial(model, "jnt_stiffnesspoly", joint),
         _polynomial(model, "dof_dampingpoly", dof),
     )
+    # SpringGeneralizedForce has a linear spring and damper, of positive numbers.
     if any(springs) or any(dampers) or min(stiffness, damping) < 0.0:
         # MuJoCo: force = -x (k + k1 |x| + k2 x^2), and the same for the speed.
         terms = _force_expression(stiffness, springs, f"(q-({rest!r}))") + _force_expression(
@@ -336,6 +345,7 @@ def _force_expression(first: float, higher: tuple[float, ...], x: str) -> str:
     text = ""
     for power, value in enumerate((first, *higher)):
         if value:
+            # Even powers need the absolute value, so that the force always resists.
             size = f"abs({x})" if power % 2 else ""
             factor = f"*{x}^{power - power % 2}" if power > 1 else ""
             text += f"-({value!r})*{x}{factor}" + (f"*{size}" if size else "")
@@ -359,6 +369,7 @@ def _add_armature(draft: ConversionDraft, joint: int, name: str) -> None:
         )
         return
     rotor = Body(
+        # The rotor stands in ground, where its inertia acts on the coordinate alone.
         name=draft.unique("body", f"{name}_rotor"),
         mass=ROTOR_MASS_KG,
         inertia=(armature, armature, armature, 0.0, 0.0, 0.0),
@@ -408,6 +419,7 @@ def _add_limit(draft: ConversionDraft, joint: int, name: str) -> None:
         model.jnt_solref[joint], model.jnt_solimp[joint], float(model.dof_invweight0[dof])
     )
     rotational = int(model.jnt_type[joint]) == HINGE
+    # CoordinateLimitForce has degrees for rotations.
     scale = math.pi / 180.0 if rotational else 1.0
     draft.model.add(
         CoordinateLimitForce(
@@ -450,7 +462,9 @@ def compute_softness(
         Stiffness and damping in the units of the mass.
     """
     first, second = map(float, reference[:2])
+    # MuJoCo limits impedances in this way.
     most = min(max(float(impedance[1]), 1e-4), 0.9999)
+    # A positive first number is a time constant, a negative one the stiffness.
     if first > 0.0:
         k = 1.0 / max(most * most * first * first * second * second, 1e-15)
         b = 2.0 / max(most * first, 1e-15)

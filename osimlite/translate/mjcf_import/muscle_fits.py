@@ -63,6 +63,7 @@ class Shape(NamedTuple):
         """Return the active force at normalized lengths."""
         low, high = 0.5 * (self.lmin + 1.0), 0.5 * (1.0 + self.lmax)
         short = x <= 1.0
+        # Widths of 0 give NaN only where another branch is selected.
         with np.errstate(divide="ignore", invalid="ignore"):
             inner = np.where(short, (1.0 - x) / (1.0 - low), (x - 1.0) / (high - 1.0))
             outer = np.where(
@@ -83,6 +84,7 @@ class Shape(NamedTuple):
 
     def passive(self, x: Array) -> Array:
         """Return the passive force at normalized lengths."""
+        # A parabola up to the end of the width, then a line with the slope that it has there.
         s = np.maximum((x - self.passive_start) / self.passive_width, 0.0)
         return np.asarray(self.fpmax * np.where(s <= 1.0, 0.5 * s**2, s - 0.5))
 
@@ -95,6 +97,7 @@ class Shape(NamedTuple):
         low, high = 0.5 * (self.lmin + 1.0), 0.5 * (1.0 + self.lmax)
         y = self.fvmax - 1.0
 
+        # `step` of OpenSim's expressions switches between the pieces.
         def between(first: float, last: float) -> str:
             return f"step(x-{_n(first)})*(1-step(x-{_n(last)}))"
 
@@ -163,6 +166,7 @@ class FittedCurves(NamedTuple):
 
 def fit_curves(shape: Shape) -> FittedCurves:
     """Return the curves of a Millard muscle that are nearest to MuJoCo's."""
+    # Rounded numbers let muscles of equal shape share a fit.
     rounded = Shape(*(round(float(value), DIGITS) for value in shape))
     return FittedCurves(
         _fit_active(rounded.lmin, rounded.lmax),
@@ -192,6 +196,7 @@ def _fit_active(lmin: float, lmax: float) -> dict[str, float]:
         }
 
     least = max(lmin, LEAST_LENGTH)
+    # The bounds keep the properties in the order that the curve requires.
     longest = max(lmax, 1.06)
     return _search(
         properties,
@@ -298,9 +303,11 @@ def _search(
     def errors(p: Array) -> Array:
         try:
             return residual(properties(p))
+        # Properties that define no curve get a large error, so that the search leaves them.
         except ValueError:
             return np.full(POINTS, NO_CURVE)
 
+    # Starts at a bound would have no gradient.
     begins = [np.clip(start, np.array(low) + 1e-3, np.array(high) - 1e-3) for start in starts]
     begins.sort(key=lambda p: float(np.sum(np.square(errors(p)))))
     solutions = [

@@ -75,14 +75,17 @@ def read_muscle(draft: ConversionDraft, actuator: int, gear: float, shift: float
     low, high = map(float, model.actuator_lengthrange[actuator])
 
     def lengths(numbers: Array) -> tuple[float, float]:
+        # Two lengths of the path, at both ends of the normalized range, give fiber and tendon.
         fiber = (high - low) / (float(numbers[1]) - float(numbers[0]))
         return fiber, low - float(numbers[0]) * fiber
 
     def strength(numbers: Array) -> float:
         force = float(numbers[2])
+        # A negative force means that MuJoCo scales by the acceleration at unit force.
         return force if force >= 0.0 else float(numbers[3] / model.actuator_acc0[actuator])
 
     fiber, slack = lengths(gain)
+    # Active and passive curves may be scaled differently.
     passive_fiber, passive_slack = lengths(bias)
     force = strength(gain)
     middle = 0.5 * (1.0 + float(bias[5]))
@@ -120,6 +123,7 @@ def make_muscle(
         )
         return None
     data = read_muscle(draft, actuator, gear, path.shift)
+    # NaN comes from ranges without a length.
     if not (
         np.all(np.isfinite((*data[:4], *data.shape)))
         and data.force > 0.0
@@ -137,6 +141,7 @@ def make_muscle(
         )
         return None
     detail = ""
+    # The slack length moves into the fiber, which leaves the force as it is.
     if data.slack < LEAST_SLACK_M:
         detail = f"; its tendon slack length of {data.slack:.4g} m is now part of the fiber"
         data = data.with_slack(LEAST_SLACK_M)
@@ -145,6 +150,7 @@ def make_muscle(
     limits = (0.0, 1.0)
     if model.actuator_ctrllimited[actuator]:
         low, high = map(float, model.actuator_ctrlrange[actuator])
+        # OpenSim's muscles have controls from 0 to 1.
         limits = max(low, 0.0), min(high, 1.0)
     if draft.options.muscle == "exact":
         return _make_exact(draft, actuator, name, path, data, lags, limits, detail)
@@ -202,6 +208,7 @@ def _compare(data: MuscleData, curves: FittedCurves, lengths: Array) -> Array:
     """Return the errors of the tension at full activation, over the isometric force."""
     speeds = np.array(SPEEDS)
     active, passive, velocity = curves.evaluate((lengths - data.slack) / data.fiber, speeds)
+    # Tension over the isometric force, in rows of speeds.
     ours = active * velocity[:, None] + passive
     theirs = [data.tension(lengths, speed, 1.0) / data.force for speed in SPEEDS]
     return (ours - np.array(theirs)).ravel()

@@ -62,6 +62,7 @@ class Surfaces:
 
     def _make(self, key: WrapKey) -> str:
         draft, model = self._draft, self._draft.mj
+        # Each side of a geom is a surface of its own.
         name = draft.source.name_of("geom", key.geom)
         if key.side >= 0:
             name = f"{name}_{draft.source.name_of('site', key.side)}"
@@ -70,6 +71,7 @@ class Surfaces:
         surface: WrapObject
         if int(model.geom_type[key.geom]) == 5:
             drawn = 2.0 * float(model.geom_size[key.geom, 1])
+            # Cylinders of MuJoCo have no ends, so that theirs must be beyond all paths.
             needed = 2.0 * self._reach.get(key.geom, 0.0) + CYLINDER_MARGIN_M
             surface = WrapCylinder(name=name, radius=radius, length=max(drawn, needed))
         else:
@@ -93,16 +95,19 @@ def turn_to_side(draft: ConversionDraft, key: WrapKey) -> Array:
     default pose counts.
     """
     source, model = draft.source, draft.mj
+    # Kinematics alone: no forces are needed for places.
     data = source.mujoco.MjData(model)
     source.mujoco.mj_kinematics(model, data)
     turned = data.geom_xmat[key.geom].reshape(3, 3)
     side = turned.T @ (data.site_xpos[key.side] - data.geom_xpos[key.geom])
+    # Across the axis of the cylinder.
     if int(model.geom_type[key.geom]) == 5:
         side = np.array((side[0], side[1], 0.0))
         up = np.array((0.0, 0.0, 1.0))
     else:
         up = np.eye(3)[int(np.argmin(np.abs(side)))]
     length = np.linalg.norm(side)
+    # A side site in the middle gives no direction.
     if length < 1e-12:
         return np.eye(3)
     x = side / length
@@ -134,6 +139,7 @@ def make_geometry_path(
     points: list[AbstractPathPoint] = []
     for number, site in enumerate(sites):
         name = draft.source.name_of("site", site)
+        # Names of path points have a limited set of characters.
         name = "".join(letter if letter.isalnum() or letter in "_.-" else "_" for letter in name)
         if name in used:
             name = f"{name}_{number + 1}"

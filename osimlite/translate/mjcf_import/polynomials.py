@@ -43,6 +43,7 @@ def list_exponents(count: int, order: int) -> NDArray[np.int64]:
 def evaluate_terms(values: Array, exponents: NDArray[np.int64]) -> Array:
     """Return the terms (P, k) at values (P, n)."""
     order = int(exponents.max(initial=0))
+    # Powers are computed once, and multiplied for all terms.
     powers = values[:, None, :] ** np.arange(order + 1)[None, :, None]
     result = np.ones((len(values), len(exponents)))
     for column in range(values.shape[1]):
@@ -89,6 +90,7 @@ def fit_polynomial(
     exponents = exponents[np.argsort(exponents.sum(1), kind="stable")]
     terms = evaluate_terms(values, exponents)
     scale = np.abs(terms).max(0)
+    # A term that is zero in all samples is not scaled.
     scale[scale == 0.0] = 1.0
     q, r = np.linalg.qr(terms / scale)
     projected = q.T @ lengths
@@ -96,6 +98,7 @@ def fit_polynomial(
     best: tuple[float, int, Array, Array] | None = None
     for order in orders:
         size = math.comb(count + order, order)
+        # Terms that depend on each other (a coordinate that does not move) end the search.
         diagonal = np.abs(np.diag(r)[:size])
         if diagonal.min() < SINGULAR * diagonal.max() and best is not None:
             break
@@ -103,12 +106,14 @@ def fit_polynomial(
         solution = solution / scale[:size]
         errors = check_terms[:, :size] @ solution - expected
         rms = float(np.sqrt(np.mean(errors**2)))
+        # A higher order must be clearly better, since it swings between the samples.
         if best is None or rms < GAIN * best[0]:
             best = rms, order, solution, errors
         if best[0] < CLOSE_M:
             break
     assert best is not None
     _, order, solution, errors = best
+    # OpenSim has another order of terms.
     found = dict(zip(map(tuple, exponents[: len(solution)].tolist()), solution, strict=True))
     function = MultivariatePolynomialFunction(
         name="length_function",

@@ -80,6 +80,7 @@ def _draw(
     model = draft.mj
     rgba = model.geom_rgba[geom]
     material = int(model.geom_matid[geom])
+    # MuJoCo's default colour means that the material decides.
     if material >= 0 and np.allclose(rgba, (0.5, 0.5, 0.5, 1.0)):
         rgba = model.mat_rgba[material]
     red, green, blue, opacity = (float(min(max(value, 0.0), 1.0)) for value in rgba)
@@ -116,6 +117,7 @@ def _make_parts(draft: ConversionDraft, geom: int) -> list[_Part] | None:
         file = write_mesh(draft, int(model.geom_dataid[geom]))
         return [_Part(Mesh(mesh_file=file.rpartition("/")[2]), here, straight)]
     if kind == PLANE:
+        # A plane is endless; contact surfaces show it.
         draft.translated("geom", geom, "not drawn: a plane")
         return None
     draft.drop("geom", geom, "a height field or another shape that OpenSim does not have")
@@ -138,6 +140,7 @@ def write_mesh(draft: ConversionDraft, mesh: int) -> str:
         first, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
         vertices = model.mesh_vert[first : first + count]
         first, count = int(model.mesh_faceadr[mesh]), int(model.mesh_facenum[mesh])
+        # Indices of OBJ files begin with 1.
         faces = model.mesh_face[first : first + count] + 1
         lines = [f"v {x:.8g} {y:.8g} {z:.8g}" for x, y, z in vertices.tolist()]
         lines += [f"f {a} {b} {c}" for a, b, c in faces.tolist()]

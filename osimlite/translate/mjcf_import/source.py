@@ -54,6 +54,7 @@ class MjcfSource:
     @property
     def name(self) -> str:
         """Name of the model, or of the file where the model has none."""
+        # The first text among the names is that of the model.
         text = bytes(self.model.names).split(b"\0", 1)[0].decode("utf-8", "replace")
         return self.path.stem if text in ("", "MuJoCo Model") else text
 
@@ -103,6 +104,7 @@ def load_mjcf(path: Path) -> MjcfSource:
     # Without a handler MuJoCo writes warnings into a file in the current folder.
     mujoco.set_mju_user_warning(lambda text: warnings.append(str(text)))
     try:
+        # The handler is global in MuJoCo, and is restored afterwards.
         model = mujoco.MjModel.from_xml_path(str(path))
     except Exception as error:  # MuJoCo raises ValueError, and others for lack of memory
         raise _explain_failure(path, str(error)) from error
@@ -122,6 +124,7 @@ def _require_plausible_numbers(path: Path, model: Any) -> None:
     """Raise an error for numbers that no mechanism has."""
     for name in CHECKED_ARRAYS:
         values = np.asarray(getattr(model, name), dtype=float)
+        # `not <=` refuses NaN as well.
         if not np.all(np.abs(values) <= LARGEST_NUMBER):
             raise DocumentError(
                 f"the compiled model has a number in '{name}' that is not finite, or is larger than "
@@ -144,6 +147,7 @@ def _try_in_another_process(path: Path) -> None:
         "except Exception as error:\n"
         "    sys.stderr.write('MJCF:' + str(error)); sys.exit(3)\n"
     )
+    # Nothing is imported from the current folder, which may hold anything.
     environment = {**os.environ, "PYTHONSAFEPATH": "1", "PYTHONIOENCODING": "utf-8"}
     try:
         with TemporaryDirectory() as folder:
@@ -170,6 +174,7 @@ def _try_in_another_process(path: Path) -> None:
 
 def _explain_failure(path: Path, message: str) -> DocumentError:
     """Return an error with MuJoCo's own message on one line."""
+    # The position goes into the error, where editors find it.
     line = re.search(r"line (\d+)", message)
     text = re.sub(r"\s*\n\s*", "; ", message.strip()) or "it gives no reason"
     text = text.removeprefix("XML Error: ").removeprefix("Error: ")

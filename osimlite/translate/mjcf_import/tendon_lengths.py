@@ -69,10 +69,12 @@ def read_tendon(source: MjcfSource, index: int) -> Tendon:
         value = float(model.wrap_prm[part])
         if kind == JOINT:
             joints.append((number, value))
+        # A pulley ends a branch: the next site begins a new one.
         elif kind == PULLEY:
             divisor, last, geom, has_pulley = value, -1, -1, True
         elif kind == SITE:
             if last >= 0:
+                # A geom between two sites belongs to the segment that the second one ends.
                 segments.append(TendonSegment(last, number, geom, side, divisor))
             last, geom, side = number, -1, -1
         else:
@@ -101,6 +103,7 @@ def segment_lengths(
     second = poses.sites[:, [item.second for item in segments]]
     lengths = norm(second - first).T.copy()
     touching = np.zeros_like(lengths)
+    # Segments of one kind are computed in one call.
     groups: dict[tuple[str, bool], list[int]] = {}
     for number, item in enumerate(segments):
         if item.geom >= 0:
@@ -110,6 +113,7 @@ def segment_lengths(
         geoms = [segments[number].geom for number in members]
         turns, middles = poses.turns[:, geoms], poses.geoms[:, geoms]
 
+        # Points in the frame of each geom; the defaults bind the arrays of this round.
         def local(points: Array, turns: Array = turns, middles: Array = middles) -> Array:
             return np.einsum("psji,psj->spi", turns, points - middles)
 
@@ -130,6 +134,7 @@ def segment_lengths(
         lengths[members] = np.where(touches, total, lengths[members])
         touching[members] = np.where(touches, bends.length[select], 0.0)
         if sided:
+            # Choice 3 leads through the inside, where OpenSim's wraps cannot follow.
             touching[members] = np.where(touches & (bends.choice == 3), np.nan, touching[members])
     return lengths, touching
 

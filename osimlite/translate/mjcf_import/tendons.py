@@ -59,6 +59,7 @@ def find_version(draft: ConversionDraft, tendons: list[Tendon], poses: SampledPo
     if draft.options.written_for is not None:
         return draft.options.written_for
     lengths = [tendon_lengths(draft.source, tendons, poses, version) for version in (3, 4)]
+    # The versions agree on most files.
     apart = np.abs(lengths[0] - lengths[1]).max(1, initial=0.0)
     if not len(apart) or apart.max() <= SAME_MEANING_M:
         return draft.source.major
@@ -77,6 +78,7 @@ def add_tendon_paths(draft: ConversionDraft) -> None:
     tendons = [read_tendon(source, index) for index in range(model.ntendon)]
     for tendon in tendons:
         for item in tendon.segments:
+            # -1 stands for no side site.
             draft.path_sites |= {item.first, item.second, *({item.side} - {-1})}
             if item.geom >= 0:
                 draft.wrapping_geoms.add(item.geom)
@@ -105,6 +107,7 @@ class _Selection:
         self.draft, self.source = draft, draft.source
         self.tendons, self.poses, self.version = tendons, poses, version
         self.reach = _find_reach(draft, tendons, poses)
+        # Other poses than those that decide, so that errors are honest.
         self.checks = place(self.source, sample_qpos(self.source, CHECK_POSES, 1))
         self.truth = tendon_lengths(self.source, tendons, self.checks, version)
 
@@ -113,10 +116,12 @@ class _Selection:
         draft = self.draft
         quadrants, bad = self._select_quadrants()
         routes = {
+            # A pulley divides forces, which one OpenSim path cannot do.
             row: tuple(quadrants.get(_key(item)) for item in tendon.segments)
             for row, tendon in enumerate(self.tendons)
             if not tendon.has_pulley and not any(_key(item) in bad for item in tendon.segments)
         }
+        # All candidates are measured in one model, which is built once.
         bench = Bench(draft)
         surfaces = Surfaces(draft, bench.frames, self.reach)
         numbers = {
@@ -133,9 +138,11 @@ class _Selection:
             rms = _rms(errors[row]) if row in errors else np.inf
             if rms > GOOD_WRAP_M:
                 path, off = self._fit(row)
+                # A polynomial needs many numbers, so it must be clearly better.
                 if _rms(off) < 0.5 * rms:
                     polynomials[row] = path, off
         self._record(polynomials, routes)
+        # Names of the trial surfaces are free again.
         draft.names.pop("wrap", None)
         surfaces = Surfaces(draft, draft.frames, self.reach)
         for row, tendon in enumerate(self.tendons):
@@ -159,6 +166,7 @@ class _Selection:
         for number, item in enumerate(segments):
             if item in bad:
                 continue
+            # A side site inside of a geom means a path through it.
             options: tuple[Quadrant | None, ...] = ("all",)
             if item.side >= 0:
                 options = (None,) if self._is_inside(item) else ("all", "+x")

@@ -28,7 +28,6 @@ def move_engine_content(draft: Draft) -> None:
         return
     for holder in model.findall("DynamicsEngine"):
         for inner in list_elements(holder):
-            # SDFast and other engines described joints in ways that Simbody does not have.
             if inner.tag != "SimbodyEngine":
                 lost = (
                     ", ".join(sorted({f"<{part.tag}>" for part in list_elements(inner)}))
@@ -98,8 +97,7 @@ def _complete_directions(present: list[str | None]) -> list[str]:
     if not known:
         return [*_UNIT_AXES]
     if len(known) == 1:
-        # OpenSim takes Y for the second direction, and Z if the first is (nearly) Y; 1e-4 is its
-        # tolerance.
+        # The second direction is Y, or Z if the first is nearly Y.
         second = (0.0, 1.0, 0.0) if abs(abs(known[0][1]) - 1) >= 1e-4 else (0.0, 0.0, 1.0)
         known.append(second)
         texts.append(" ".join(f"{value:g}" for value in second))
@@ -195,11 +193,10 @@ def convert_tool_controls(draft: Draft) -> None:
         if spring is not None and tool.tag == "ForwardTool":
             controller = draft.add(
                 _get_controllers(draft, tool), "CorrectionController", source=spring
-            # The gains that OpenSim's upgrade sets.
             )
+            # The gains that OpenSim's upgrade sets.
             draft.add(controller, "kp", "16", source=spring)
             draft.add(controller, "kv", "8", source=spring)
-            # The springs of version 1 have another law.
             draft.record_change(
                 tool, at=spring, lost="corrective springs, which a CorrectionController replaces"
             )

@@ -424,8 +424,8 @@ def make_body_path(name: str) -> str:
 
 
 def make_path(component: Element) -> str:
-    # OpenSim's paths leave out wrappers such as <objects>, and use the tag of sets.
     """Return the path of a component by the rules of version 4; a component without a name has that of its class."""
+    # OpenSim's paths leave out wrappers such as <objects>, and use the tag of sets.
     words: list[str] = []
     here: Element | None = component
     while here is not None and here.tag != "Model":

@@ -35,7 +35,7 @@ def check_strict_reading(draft: Draft) -> None:
     if draft.version < 30502:
         for frame in draft.find_all("PhysicalFrame"):
             visible = frame.find("VisibleObject")
-            # Versions before 20101 search the geometry by the name of the frame.
+            # Before version 20101 all geometry needs a named frame, later only a GeometrySet does.
             named = draft.version < 20101 or (
                 visible is not None and visible.find("GeometrySet") is not None
             )

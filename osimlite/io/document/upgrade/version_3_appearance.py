@@ -82,7 +82,7 @@ def _add_mesh(
         if child.tag in ("color", "opacity"):
             draft.move(child, appearance)
         elif child.tag == "display_preference":
-            # Preferences 1 to 4: wireframe, solid and so on; 4 is the default, smooth shading.
+            # 0 hides the mesh, 4 draws it as a Mesh is drawn anyway; the others are lost.
             preference = get_text(child)
             if preference == "0":
                 draft.add(appearance, "visible", "false", source=child)
@@ -207,7 +207,7 @@ def convert_contact_appearance(draft: Draft) -> None:
                 draft.add(appearance, "visible", "false", source=preference)
             else:
                 surface = draft.add(appearance, "SurfaceProperties", source=preference)
-                # 3 is solid; smooth shading (4) has no counterpart.
+                # Smooth shading (4) becomes a filled surface (3).
                 text = "3" if word == "4" else get_text(preference)
                 draft.add(surface, "representation", text, source=preference)
             draft.remove(preference)

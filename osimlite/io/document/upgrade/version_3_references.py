@@ -100,8 +100,8 @@ def _leads_to_body(component: Element, text: str, paths: dict[str, str]) -> bool
         return True
     frames = (
         piece for tag in ("frames", "components") for piece in _list_children(component.find(tag))
-    # Relative names of frames inside the component are valid.
     )
+    # Relative names of frames inside the component are valid.
     return any(piece.get("name") == text for piece in frames)
 
 

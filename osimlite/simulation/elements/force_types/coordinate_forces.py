@@ -139,7 +139,6 @@ register_force_type(
 
 
 def compute_linear_stop(
-    # The law is that of Simbody's Force::MobilityLinearStop.
     q: float, u: float, k: float, d: float, upper: float, lower: float
 ) -> tuple[float, float]:
     """Return the force -k x (1 + d v) of a stop, which never pulls, and the energy k x^2 / 2.

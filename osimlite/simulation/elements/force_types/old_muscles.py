@@ -436,7 +436,7 @@ def compute_schutte_forces(
     tendon, _, _ = evaluate_function(curves.tendon, strain)
     passive = (
         evaluate_function(curves.passive, length)[0]
-        # OpenSim uses the exponential law where the file has no curve.
+        # OpenSim uses its built-in law where the file has no curve.
         if fields.has_curve
         else schutte_passive_force(length)
     )

@@ -115,7 +115,6 @@ class World:
     ) -> None:
         client = self.client
         bullet.setGravity(*gravity, physicsClientId=client)
-        # Substeps would integrate in between without forces.
         bullet.setPhysicsEngineParameter(numSubSteps=0, physicsClientId=client)
         self.impossible = [link.name for link in robot.links if compute_inertia_excess(link) > 0.0]
         with write_temporary_file(write_robot(robot), files) as path:

@@ -267,7 +267,6 @@ def read_path(builder: ElementBuilder, owner: Any) -> ThroughPoints:
     result = [builder.resolve_target(wrap, "wrap_object", wrap.wrap_object) for wrap in wraps]
     # A surface that several wraps name is one surface.
     numbers = {id(surface): number for number, surface in enumerate(result)}
-    # OpenSim treats a single wrap differently: it needs no order of wraps.
     alone = float(len(wraps) == 1)
     surfaces = []
     # In a pose without an active point in the range of a wrap, OpenSim ignores the following wraps.
