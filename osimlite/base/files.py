@@ -14,6 +14,7 @@ from osimlite.base.reading import read_at_most as read_at_most
 from osimlite.base.writing import WriteRefusedError as WriteRefusedError
 from osimlite.base.writing import expect_folder_of as expect_folder_of
 from osimlite.base.writing import make_folder as make_folder
+from osimlite.base.writing import make_folder_of as make_folder_of
 from osimlite.base.writing import open_atomically as open_atomically
 from osimlite.base.writing import prepare_folder as prepare_folder
 from osimlite.base.writing import replace_with as replace_with

@@ -14,6 +14,9 @@ from types import ModuleType
 
 from osimlite.errors import MissingDependency
 
+DISTRIBUTIONS = {"PIL": "Pillow", "yaml": "PyYAML"}
+"""Packages that are installed under another name than that of their import."""
+
 
 @cache
 def find_missing_packages(*packages: str) -> tuple[str, ...]:
@@ -38,6 +41,7 @@ def require(module: str, *, extra: str, purpose: str, instead: str = "") -> Modu
         MissingDependency: the package is not installed, or cannot be loaded.
     """
     package = module.partition(".")[0]
+    known = DISTRIBUTIONS.get(package, package)
     if (loaded := sys.modules.get(module)) is not None:
         return loaded
     cure = (f"use {instead}, or " if instead else "") + f"run: pip install 'osimlite[{extra}]'"
@@ -47,14 +51,14 @@ def require(module: str, *, extra: str, purpose: str, instead: str = "") -> Modu
     except ModuleNotFoundError as error:
         if error.name == package:
             raise MissingDependency(
-                f"{purpose} needs {package}, which is not installed; {cure}"
+                f"{purpose} needs {known}, which is not installed; {cure}"
             ) from error
         raise MissingDependency(
-            f"{purpose} needs {package}, which is installed without its dependency {error.name}; {cure}"
+            f"{purpose} needs {known}, which is installed without its dependency {error.name}; {cure}"
         ) from error
     except ImportError as error:
         raise MissingDependency(
-            f"{purpose} needs {package}, which is installed but cannot be loaded ({error}); reinstall it, or {cure}"
+            f"{purpose} needs {known}, which is installed but cannot be loaded ({error}); reinstall it, or {cure}"
         ) from error
 
 

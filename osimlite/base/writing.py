@@ -45,13 +45,30 @@ class WriteRefusedError(OsimliteError):
 
 
 def expect_folder_of(path: str | Path) -> None:
-    """Check before long work that the folder of an output file exists.
+    """Check before long work that the folder of an output file exists or can be made.
 
     Raises:
-        OsimliteError: the folder does not exist.
+        OsimliteError: a file has the name of a folder above the output file, or the folder in which
+            folders would be made is read-only.
     """
-    if not os.path.isdir(os.path.dirname(os.path.realpath(path))):
-        raise _make_folder_error(path)
+    folder = os.path.dirname(os.path.realpath(path))
+    while not os.path.exists(folder):
+        folder = os.path.dirname(folder)
+    if not os.path.isdir(folder):
+        raise OsimliteError(
+            "cannot make a folder here: this is a file, not a folder", file=str(folder)
+        )
+    if not os.access(folder, os.W_OK):
+        raise OsimliteError("cannot write here: permission denied", file=str(folder))
+
+
+def make_folder_of(path: str | Path) -> None:
+    """Make the folder of an output file that the user named, unless it exists.
+
+    Raises:
+        OsimliteError: the folder cannot be made; the message says why.
+    """
+    make_folder(os.path.dirname(os.path.realpath(path)))
 
 
 def _make_folder_error(path: str | Path) -> OsimliteError:

@@ -221,6 +221,10 @@ def _was_interrupted(error: BaseException | None) -> bool:
     return error is not None
 
 
+SYNONYMS = {"--to": "--until", "--until": "--to"}
+"""Options of other commands with the same meaning: the last time of a simulation, or of recorded data."""
+
+
 def _exit_with_message(error: BaseException, words: list[str]) -> NoReturn:
     """Exit with a one-line message for known errors of other libraries; raise the others again."""
     from osimlite.cli._console import complain
@@ -251,5 +255,10 @@ def _exit_with_message(error: BaseException, words: list[str]) -> NoReturn:
     # Errors about an option without a value come without a context.
     command = " ".join(["osimlite", *(word for word in words[:1] if word in COMMANDS)])
     path = context.command_path if context is not None else command
+    synonym = SYNONYMS.get(getattr(error, "option_name", ""))
+    if synonym and context is not None:
+        options = {word for item in context.command.params for word in item.opts}
+        if synonym in options:
+            error.possibilities = [synonym]  # type: ignore[attr-defined]
     complain(f"{error.format_message().rstrip('.')}; '{path} --help' lists what there is")
     raise SystemExit(2) from None

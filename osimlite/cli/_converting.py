@@ -99,10 +99,16 @@ class Request:
             raise SettingError(
                 f"-o names a file of the format '{by_suffix}', but --to is '{target}'; leave out one of them"
             )
-        if goal is None and output is not None and output.suffix and not _is_folder(output):
+        if output is not None and _names_other_file(output, by_suffix, goal):
+            advice = (
+                "name another file with -o, such as robot.urdf, or a format with --to; --formats lists the formats"
+                if goal is None
+                else f"name a file with the suffix '{_get_suffix(goal)}', or a folder without a suffix"
+                if _get_suffix(goal)
+                else "name a folder without a suffix"
+            )
             raise SettingError(
-                f"'{output.suffix}' is the suffix of no format that can be written; name another file with "
-                "-o, such as robot.urdf, or a format with --to; --formats lists the formats"
+                f"'{output.suffix}' is the suffix of no format that can be written; {advice}"
             )
         if goal is None:
             raise SettingError(
@@ -134,8 +140,21 @@ class Request:
             )
         return cls(file, found, goal, folder, name)
 
+    @property
+    def main(self) -> str:
+        """Name of the main file; "" if the conversion writes a folder."""
+        if self.target in (OSIM, MARKERS):
+            return f"{self.name}.{self.target}"
+        suffix = next((each.suffix for each in EXPORTERS if each.name == self.target), "")
+        return f"{self.name}{suffix}" if suffix else ""
+
     def carry_out(
-        self, motion: Path | None, geometry: Sequence[Path] | None, chosen: Mapping[str, Any]
+        self,
+        motion: Path | None,
+        geometry: Sequence[Path] | None,
+        chosen: Mapping[str, Any],
+        *,
+        overwrite: bool = False,
     ) -> Conversion:
         """Convert the file, and write all results.
 
@@ -143,14 +162,16 @@ class Request:
             motion: file of coordinates over time; None without a motion.
             geometry: folders in which mesh files are searched.
             chosen: options of the formats that were set.
+            overwrite: whether files of other conversions and programs may be replaced.
 
         Raises:
-            SettingError: an option does not belong to the formats, or the summary of another command
-                would be replaced.
+            SettingError: an option does not belong to the formats, or a file would be replaced that
+                this conversion has not written before.
             OsimliteError: the file cannot be read, or the results cannot be written.
         """
         # Checked before anything is written.
-        _protect_summary(self.folder)
+        guard = OutputGuard(self.folder, self.main, self.file.name, overwrite=overwrite)
+        guard.protect_records()
         importer = list_importers().get(self.source)
         exporter = next((each for each in EXPORTERS if each.name == self.target), None)
         used = [each for each in (importer, exporter) if each is not None]
@@ -176,17 +197,20 @@ class Request:
             from osimlite.io.document.reader import read
 
             result = self._export(
-                read(self.file), exporter, motion, geometry, values[exporter.name]
+                read(self.file), exporter, motion, geometry, values[exporter.name], guard
             )
         else:
             imported = importer.read(self.file, name=self.name, **values[importer.name])
             if exporter is None:
+                guard.protect_files(imported)
                 files = imported.write(self.folder)
                 result = Conversion(files, imported.fidelity, dict(imported.summary))
             else:
                 # Only importers that make one model can be followed by an exporter, and these have it.
                 model: Model = getattr(imported, "model")  # noqa: B009
-                result = self._export(model, exporter, motion, geometry, values[exporter.name])
+                result = self._export(
+                    model, exporter, motion, geometry, values[exporter.name], guard
+                )
                 # Losses of the first step are losses of the result, too.
                 result.fidelity.records[:0] = imported.fidelity.records
                 result.summary.update(imported.summary)
@@ -213,6 +237,7 @@ class Request:
         motion: Path | None,
         geometry: Sequence[Path] | None,
         choices: Mapping[str, Any],
+        guard: OutputGuard,
     ) -> Conversion:
         """Write a model in the format of an exporter."""
         folders = options.list_mesh_folders(self.file, geometry)
@@ -222,7 +247,9 @@ class Request:
             made = exporter.write(
                 model, folder=self.file.parent, name=self.name, geometry=folders, **moved, **choices
             )
+            guard.protect_files(made)
             return Conversion(made.write(self.folder), made.fidelity)
+        guard.protect_files(None)
         from osimlite.schema.forces import Force
         from osimlite.schema.frames import Body
         from osimlite.translate.fidelity import LEFT_OUT, Fidelity
@@ -252,26 +279,99 @@ class Request:
         return Conversion([path], fidelity)
 
 
+def _names_other_file(output: Path, by_suffix: str | None, goal: str | None) -> bool:
+    """Return whether an output has the suffix of a file that is not written.
+
+    Folders have suffixes as well; one that begins with a digit, as in 'results-1.2', means a folder.
+    """
+    suffix = output.suffix.lower()
+    if not suffix or by_suffix is not None or _is_folder(output):
+        return False
+    return not suffix[1:2].isdigit() and (goal is None or suffix != _get_suffix(goal))
+
+
 def _is_folder(output: Path | None) -> bool:
     """Return whether an output is a folder that exists."""
     return output is not None and output.is_dir()
 
 
-def _protect_summary(folder: Path) -> None:
-    """Raise SettingError if the folder has a summary that no conversion wrote.
+class OutputGuard:
+    """Protection of the files in an output folder against a conversion.
 
-    Other commands, such as ``simulate``, write results and a summary of the same name.
+    A conversion replaces the files that it has written before, so that it can be repeated. Other
+    files are replaced only on request. One folder has the record of one conversion.
+
+    Args:
+        folder: the output folder.
+        main: name of the main file; "" if the conversion writes a folder.
+        source: name of the converted file.
+        overwrite: whether to replace any file.
     """
-    path = folder / SUMMARY_FILE
-    if not path.is_file():
-        return
-    try:
-        summary = json.loads(read_file(path))
-    except ValueError:
-        summary = None
-    if not (isinstance(summary, dict) and {"source", "from", "to", "parts"} <= summary.keys()):
+
+    def __init__(self, folder: Path, main: str, source: str, *, overwrite: bool) -> None:
+        self.folder, self.main, self.overwrite = folder, main, overwrite
+        summary = self._read_summary()
+        has_record = (folder / FIDELITY_FILE).is_file()
+        if summary:
+            files = summary["files"] or [""]
+            # A folder of results has no main file by which it could be recognized.
+            self.is_repeated = files[0] == main if main else summary["source"] == source
+        else:
+            # 'osimlite translate' writes no summary.
+            self.is_repeated = bool(main) and has_record and (folder / main).is_file()
+        self._summary = summary
+
+    def _read_summary(self) -> dict[str, Any] | None:
+        """Return the summary of an earlier conversion; None without one."""
+        path = self.folder / SUMMARY_FILE
+        if not path.is_file():
+            return None
+        try:
+            summary = json.loads(read_file(path))
+        except ValueError:
+            return None
+        is_conversion = (
+            isinstance(summary, dict)
+            and {
+                "source",
+                "from",
+                "to",
+                "files",
+                "parts",
+            }
+            <= summary.keys()
+        )
+        return summary if is_conversion else None
+
+    def protect_records(self) -> None:
+        """Raise SettingError if the record of another conversion or command would be replaced."""
+        if self.overwrite:
+            return
+        if self._summary is None and (self.folder / SUMMARY_FILE).is_file():
+            self._refuse(SUMMARY_FILE, "was written by another command")
+        if not self.is_repeated and (self.folder / FIDELITY_FILE).is_file():
+            self._refuse(FIDELITY_FILE, "is the record of another conversion")
+
+    def protect_files(self, made: Any) -> None:
+        """Raise SettingError if a file would be replaced that no conversion of this name wrote.
+
+        Args:
+            made: result with the names of further files as keys of its attribute `files`; None
+                without further files.
+        """
+        if self.overwrite or self.is_repeated:
+            return
+        # URDF and bioMod have this file beside them.
+        sidecar = f"{Path(self.main).stem}.coordinates.json"
+        own = [self.main, sidecar] if self.main else []
+        for name in [*own, *getattr(made, "files", ())]:
+            if (self.folder / name).is_file():
+                self._refuse(name, "exists already")
+
+    def _refuse(self, name: str, reason: str) -> None:
         raise SettingError(
-            f"'{path}' was written by another command, and would be replaced; name another folder with -o"
+            f"'{self.folder / name}' {reason}, and would be replaced; name another folder with -o, or "
+            "add --overwrite"
         )
 
 

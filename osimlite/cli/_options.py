@@ -243,6 +243,12 @@ def read_feedback(controller: Path | None, par: Path | None) -> Feedback | None:
     return Feedback(controller, {} if par is None else par)
 
 
+Overwrite = Annotated[
+    bool,
+    Option("--overwrite", help="Replace files of other conversions and programs, too."),
+]
+
+
 def choose_output_folder(file: Path, output: Path | None) -> Path:
     """Return the requested folder, by default one in the current folder, named after the model's file.
 

@@ -42,6 +42,7 @@ def build(
 
     Example: osimlite build dynamic-walker -p thigh_length=0.42 -o walker.osim
     """
+    from osimlite.base.files import make_folder_of
     from osimlite.base.text import format_count
     from osimlite.cli._console import complain, print_for_programs, say, show
     from osimlite.errors import OsimliteError
@@ -71,6 +72,7 @@ def build(
         raise OsimliteError(
             f"{target}: this is the name of a study; name the model's file, {target.stem}.osim"
         )
+    make_folder_of(target)
     write(model, target, numbers=style)
     count = sum(1 for _ in model.components())
     warned = len(report.warnings)

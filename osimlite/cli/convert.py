@@ -76,6 +76,7 @@ def convert(
     formats: Annotated[
         bool, Option("--formats", help="List all formats and what each carries.")
     ] = False,
+    overwrite: options.Overwrite = False,
     **chosen: Any,
 ) -> None:
     """Convert a file: AddBiomechanics, MuJoCo, URDF, glTF and other formats from and to OpenSim's.
@@ -95,4 +96,4 @@ def convert(
         raise SettingError("name a file to convert; --formats lists the formats")
     given = {name: value for name, value in chosen.items() if value is not None}
     request = converting.Request.create(file, output, source, target)
-    converting.report(request, request.carry_out(motion, geometry, given))
+    converting.report(request, request.carry_out(motion, geometry, given, overwrite=overwrite))

@@ -57,6 +57,7 @@ def modify(
     Example: osimlite modify gait.osim --replace muscles=degroote --replace tendon=rigid --replace
         paths=polynomial
     """
+    from osimlite.base.files import make_folder_of
     from osimlite.base.text import format_count
     from osimlite.cli._console import add_row, create_console, create_table, say
     from osimlite.errors import DocumentError, SettingError
@@ -94,6 +95,7 @@ def modify(
         rewritten = convert_from_nimble(model)
     fitted = [item for change in changes for item in change(model, file.parent) or ()]
     target = output or file.with_name(f"{file.stem}_modified.osim")
+    make_folder_of(target)
     write(model, target)
     for each in rewritten:
         say(f"{each.component}: {each.difference}; {each.done or 'not changed'}")

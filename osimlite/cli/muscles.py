@@ -73,7 +73,7 @@ def muscles(
 
     Example: osimlite muscles gait2392.osim --coordinate knee_angle_r=-120deg:0 --plot
     """
-    from osimlite.base.files import expect_folder_of
+    from osimlite.base.files import expect_folder_of, make_folder_of
     from osimlite.base.text import join_words
     from osimlite.cli._console import say
     from osimlite.cli._progress import progress_bar
@@ -125,6 +125,7 @@ def muscles(
         result = dict(zip(result, (first, second), strict=True))
     _print_ranges(list(result.values()), file, compare)
     if output is not None:
+        make_folder_of(output)
         _write_curves(result, output)
         say(f"wrote {output}")
     if plot:

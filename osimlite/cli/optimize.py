@@ -120,6 +120,7 @@ def optimize(
     Example: osimlite optimize walker.osim --objective distance --vary RHip_rz=0:60deg --vary
         Pelvis_tx/speed=0:2
     """
+    from osimlite.base.files import make_folder_of
     from osimlite.cli._progress import progress_bar
     from osimlite.studies.sweep.optimize import Objective, read_best_values
     from osimlite.studies.sweep.optimize import optimize as search
@@ -141,6 +142,7 @@ def optimize(
         controller=options.read_feedback(controller, par),
         **chosen,
     )
+    make_folder_of(output)
     with progress_bar("searching", budget) as progress:
         result = search(
             plan,

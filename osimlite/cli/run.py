@@ -238,7 +238,10 @@ def _write_report(
     from osimlite.cli._console import say
 
     if report is not None:
+        from osimlite.base.files import make_folder_of
         from osimlite.tools.report import report as write_report
+
+        make_folder_of(report)
 
         say(f"wrote {write_report(outcomes, report)}", err=err)
 

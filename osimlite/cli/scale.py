@@ -57,6 +57,7 @@ def scale(
     Example: osimlite scale gait2392.osim static.trc --distance femur_r=RASI:RKNE --mass 72 --place
         -o subject.osim
     """
+    from osimlite.base.files import make_folder_of
     from osimlite.cli._console import say
     from osimlite.errors import SettingError
     from osimlite.fitting.scale_tool import scale as scaled
@@ -100,6 +101,7 @@ def scale(
     if result.unknown:
         say(result.unknown, err=True)
     path = Path("scaled.osim") if output is None else output
+    make_folder_of(path)
     write(result.model, path)
     say(f"wrote {path}")
 

@@ -84,6 +84,7 @@ def sweep(
     Example: osimlite sweep walker.osim --vary RHip_rz=20deg:40deg --vary Pelvis_tx/speed=0:1
         --samples 1000
     """
+    from osimlite.base.files import make_folder_of
     from osimlite.cli._progress import progress_bar
     from osimlite.cli._recorded import describe_pictures, require_plots
     from osimlite.studies.sweep.run import sweep as run
@@ -109,6 +110,7 @@ def sweep(
     )
     # Samples are drawn before the runs, so that a resumed sweep has the same.
     points = choose(plan.variables, sampler, samples, seed)
+    make_folder_of(output)
     with progress_bar("sweeping", points.count) as progress:
         outcome = run(
             plan,

@@ -57,6 +57,7 @@ def translate(
             bare_value=WRITTEN,
         ),
     ] = None,
+    overwrite: options.Overwrite = False,
     **chosen: Any,
 ) -> None:
     """Translate a model to another format: writes the model, its meshes and fidelity.json.
@@ -69,6 +70,7 @@ def translate(
 
     Example: osimlite translate gait.osim --geometry ~/OpenSim/Geometry -o robot
     """
+    from osimlite.cli._converting import OutputGuard
     from osimlite.errors import OsimliteError, SettingError
     from osimlite.io.document.reader import read
 
@@ -117,7 +119,12 @@ def translate(
             geometry=options.list_mesh_folders(file, geometry),
             **given,
         )
-    written = made.write(options.choose_output_folder(file, output))
+    folder = options.choose_output_folder(file, output)
+    suffix = OSIM if importer is not None else {"mjcf": "xml"}.get(to, to)
+    guard = OutputGuard(folder, f"{file.stem}.{suffix}", file.name, overwrite=overwrite)
+    guard.protect_records()
+    guard.protect_files(made)
+    written = made.write(folder)
 
     if len(made.fidelity):
         create_console().print(tabulate(made.fidelity, to.upper()))
@@ -137,7 +144,7 @@ def translate(
     if check is not None:
         from osimlite.cli._checking_mjcf import print_mjcf_check as check_mjcf
 
-        check_mjcf(file, written[0], options.choose_output_folder(file, output))
+        check_mjcf(file, written[0], folder)
 
 
 def _find_importer(file: Path) -> Importer:

@@ -39,6 +39,7 @@ def upgrade(
 
     Example: osimlite upgrade gait2354.osim -o gait2354_v4.osim
     """
+    from osimlite.base.files import make_folder_of
     from osimlite.errors import OsimliteError
     from osimlite.io.document.printer import write
     from osimlite.io.document.reader import read_document, require_stated_version
@@ -58,6 +59,7 @@ def upgrade(
         raise OsimliteError(
             f"'{target}' exists already; name the file to write with -o", file=str(file)
         )
+    make_folder_of(target)
     write(document.top, target, numbers=style)
     _print_changes(document)
     say(

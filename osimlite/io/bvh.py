@@ -25,6 +25,9 @@ ROTATIONS = ("Zrotation", "Xrotation", "Yrotation")
 POSITIONS = ("Xposition", "Yposition", "Zposition")
 """Position channels that are written."""
 
+MAX_NUMBER = 1e9
+"""Largest accepted size of a number; motions are degrees and at most some kilometres in millimetres."""
+
 MAX_JOINTS = 10_000
 """Largest accepted number of joints; more are a sign of damage."""
 
@@ -170,7 +173,8 @@ def format_bvh(motion: BvhMotion) -> Iterator[str]:
 
 def _format_numbers(numbers: Sequence[float] | Array) -> str:
     """Return numbers with all digits, separated by blanks."""
-    return " ".join(format_number(float(number)) for number in numbers)
+    # The sum with 0 turns a negative zero into 0.
+    return " ".join(format_number(float(number) + 0.0) for number in numbers)
 
 
 class _BvhReader:
@@ -208,7 +212,7 @@ class _BvhReader:
         return word
 
     def take_number(self) -> float:
-        """Return the next word as a finite number."""
+        """Return the next word as a finite number of at most `MAX_NUMBER`."""
         word = self.peek()
         try:
             number = float(word)
@@ -217,6 +221,8 @@ class _BvhReader:
         # NaN and infinity are words that float() accepts.
         if not math.isfinite(number):
             raise self.fail(f"expected a number, found '{word}'")
+        if abs(number) > MAX_NUMBER:
+            raise self.fail(f"expected a number of at most {MAX_NUMBER:g}, found '{word}'")
         self.position += 1
         return number
 

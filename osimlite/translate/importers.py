@@ -73,19 +73,24 @@ class Importer:
     choices: tuple[OptionSpec, ...] = ()
 
 
-def read_mjcf(path: Path, **choices: Any) -> Osim:
+def read_mjcf(path: Path, *, written_for: str | None = None, **choices: Any) -> Osim:
     """Convert an MJCF file to an OpenSim model; see :func:`osimlite.from_mjcf`."""
     from osimlite.translate.mjcf_import.convert import from_mjcf
 
-    return from_mjcf(path, **choices)
+    version: Any = written_for
+    if written_for is not None and written_for.isdecimal():
+        version = int(written_for)
+    return from_mjcf(path, written_for=version, **choices)
 
 
 MJCF_CHOICES = (
     OptionSpec(
         "written_for",
-        int | None,
-        "The version of MuJoCo that the file was written for, 3 (or older) or 4: it decides what a "
-        "side site of a tendon means, and is required where that makes a difference.",
+        # Text, so that a wrong value gets a message with the right ones.
+        str | None,
+        "The version of MuJoCo that the file was written for: 2, 3 or 4. It decides what a side site "
+        "of a tendon means, and is required where that makes a difference.",
+        unit="VERSION",
         group="From MJCF",
     ),
     OptionSpec(

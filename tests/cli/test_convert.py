@@ -160,3 +160,64 @@ def test_formats_are_listed_without_what_reads_them() -> None:
     code = "import sys; from osimlite.translate.importers import list_importers; list_importers(); print(*sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert not set(done.stdout.split()) & {"numpy", "lxml", "pydantic", "mujoco"}
+
+
+def test_an_output_with_a_foreign_suffix_is_no_folder(tmp_path: Path) -> None:
+    (tmp_path / "a.bvh").write_text(BVH)
+    code, _, message = run("convert", "a.bvh", "-o", "m.csv", folder=tmp_path)
+    assert code == 2 and "'.trc'" in message and not (tmp_path / "m.csv").exists()
+    assert run("convert", "a.bvh", "-o", "take-1.2", folder=tmp_path).code == 0
+    assert (tmp_path / "take-1.2" / "a.trc").exists()
+
+
+BVH = """HIERARCHY
+ROOT a
+{
+  OFFSET 0 0 0
+  CHANNELS 3 Xrotation Yrotation Zrotation
+}
+MOTION
+Frames: 1
+Frame Time: 0.1
+0 0 0
+"""
+
+
+def test_a_folder_has_the_record_of_one_conversion(walker: Path) -> None:
+    assert run("convert", "walker.osim", "-o", "out/a.urdf", folder=walker).code == 0
+    assert run("convert", "walker.osim", "-o", "out/a.urdf", folder=walker).code == 0
+    before = (walker / "out" / "fidelity.json").read_text()
+    for command in (
+        ("convert", "walker.osim", "-o", "out/b.urdf"),
+        ("convert", "walker.osim", "-o", "out/a.glb"),
+        ("translate", "walker.osim", "--to", "mjcf", "-o", "out"),
+    ):
+        code, _, message = run(*command, folder=walker)
+        assert code == 2 and "is the record of another conversion" in message
+        assert "--overwrite" in message
+        assert (walker / "out" / "fidelity.json").read_text() == before
+    assert run("convert", "walker.osim", "-o", "out/b.urdf", "--overwrite", folder=walker).code == 0
+
+
+@pytest.mark.parametrize("name", ["w.urdf", "w.coordinates.json"])
+def test_files_of_others_are_not_replaced(walker: Path, name: str) -> None:
+    (walker / "out").mkdir()
+    (walker / "out" / name).write_text("mine")
+    words = ("convert", "walker.osim", "-o", "out/w.urdf")
+    code, _, message = run(*words, folder=walker)
+    assert code == 2 and f"{name}' exists already" in message
+    assert (walker / "out" / name).read_text() == "mine"
+    assert run(*words, "--overwrite", folder=walker).code == 0
+    assert (walker / "out" / name).read_text() != "mine"
+
+
+@pytest.mark.parametrize(
+    ("words", "advice"),
+    [
+        (("static-optimization", "a.osim", "b.mot", "--to", "1"), "--until"),
+        (("simulate", "a.osim", "--until", "1"), "--to"),
+    ],
+)
+def test_the_last_time_has_two_names(words: tuple[str, ...], advice: str) -> None:
+    code, _, message = run(*words)
+    assert code == 2 and f"(Possible options: {advice})" in message

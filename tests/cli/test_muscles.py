@@ -131,8 +131,14 @@ def test_a_muscle_without_equilibrium_hides_no_other(file):
     assert (curves.columns["length"] > 0.3).all()
 
 
-def test_a_folder_that_is_not_there_is_told_before_the_work(file, tmp_path):
+def test_a_folder_that_cannot_be_made_is_told_before_the_work(file, tmp_path):
     # The model is not even read: there is none.
-    done = run("muscles", tmp_path / "none.osim", "-o", tmp_path / "nowhere" / "m.csv")
+    (tmp_path / "taken").touch()
+    done = run("muscles", tmp_path / "none.osim", "-o", tmp_path / "taken" / "m.csv")
     assert done.code == 2
-    assert "cannot write here: the folder does not exist" in done.err
+    assert "cannot make a folder here: this is a file" in done.err
+
+
+def test_the_folder_of_the_output_is_made(file, tmp_path):
+    done = run("muscles", file, "--coordinate", "x=0.3:0.4", "-o", tmp_path / "a" / "b" / "m.csv")
+    assert done.code == 0 and (tmp_path / "a" / "b" / "m.csv").is_file()

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from osimlite.errors import DocumentError, OsimliteError
-from osimlite.io.bvh import BvhJoint, BvhMotion, find_angles, format_bvh, read_bvh
+from osimlite.io.bvh import ROTATIONS, BvhJoint, BvhMotion, find_angles, format_bvh, read_bvh
 
 TEXT = """HIERARCHY
 ROOT Hips of a man
@@ -113,6 +113,7 @@ def test_a_right_angle_has_an_answer() -> None:
             "expected a number, found 'x'",
         ),
         ("OFFSET 0 -40 0\n    CHANNELS", "OFFSET 0 nan 0\n    CHANNELS", 8, "expected a number"),
+        ("OFFSET 0 -40 0\n    CHANNELS", "OFFSET 0 1e300 0\n    CHANNELS", 8, "at most 1e+09"),
         ("Xposition", "Wposition", 5, "unknown channel 'Wposition'"),
         ("CHANNELS 3", "CHANNELS 9", 9, "9 channels; there are six at most"),
         ("CHANNELS 3", "CHANNELS -1", 9, "expected a count"),
@@ -147,3 +148,9 @@ def test_endless_joints_are_refused(tmp_path: Path) -> None:
     text = "HIERARCHY\nROOT a\n" + "{ OFFSET 0 0 0 JOINT b\n" * 10_001
     with pytest.raises(OsimliteError, match="more than 10000 joints"):
         read_bvh(write(tmp_path, text))
+
+
+def test_zeros_have_no_sign(tmp_path: Path) -> None:
+    joint = BvhJoint("a", -1, np.array([-0.0, 0.0, -0.0]), ROTATIONS)
+    text = "".join(format_bvh(BvhMotion((joint,), 0.01, np.array([[-0.0, 1.0, -0.0]]))))
+    assert "-0" not in text

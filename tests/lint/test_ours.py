@@ -128,7 +128,8 @@ def test_only_folders_that_are_named_lead_to_the_page_about_folders(
 ):
     monkeypatch.chdir(tmp_path)
     model = str(fixtures / "lint" / "leg.osim")
-    assert main_code("upgrade", model, "-o", "no/such.osim") == 2
-    assert "the folder does not exist (see docs/errors.md#files)" in capsys.readouterr().err
+    (tmp_path / "taken").touch()
+    assert main_code("upgrade", model, "-o", "taken/such.osim") == 2
+    assert "this is a file, not a folder (see docs/errors.md#files)" in capsys.readouterr().err
     assert main_code("validate", model, "--geometry", "nowhere") == 2
     assert capsys.readouterr().err.endswith("(see docs/errors.md#folders)\n")

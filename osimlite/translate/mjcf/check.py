@@ -28,6 +28,7 @@ from osimlite.translate.fidelity import Error
 from osimlite.translate.mjcf.isometric import compute_isometric_tension
 from osimlite.translate.mjcf.muscles import Curves
 from osimlite.translate.mjcf.poses import draw_poses, list_free_coordinates, measure_arm_errors
+from osimlite.translate.mjcf.warnings import collect_warnings
 
 MAX_FOLLOWER_CHAIN = 4
 """Longest chain of joints that follow one another; the equalities are applied this many times."""
@@ -97,6 +98,12 @@ def check_mjcf(model: Model, file: str | Path, *, poses: int = 50, seed: int = 7
         ModelError: the model has no muscles, or none in common with the file.
     """
     mujoco: Any = require("mujoco", extra="mujoco", purpose="the check of a file of MuJoCo's")
+    with collect_warnings(mujoco):
+        return _compare(mujoco, model, file, poses, seed)
+
+
+def _compare(mujoco: Any, model: Model, file: str | Path, poses: int, seed: int) -> Check:
+    """Compare a MuJoCo file with a model; for the arguments see :func:`check_mjcf`."""
     try:
         compiled = mujoco.MjModel.from_xml_path(str(file))
     except ValueError as error:

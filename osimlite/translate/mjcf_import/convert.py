@@ -101,12 +101,13 @@ PASSES: tuple[Callable[[ConversionDraft], None], ...] = (
     add_bodies,
     add_joint_forces,
     add_equalities,
+    # Paths over obstacles start from the default pose, which a keyframe can set.
+    add_keyframes,
     add_tendon_paths,
     add_actuators,
     add_markers,
     add_contacts,
     add_shapes,
-    add_keyframes,
     record_unseen,
 )
 """Passes of a conversion in their order."""

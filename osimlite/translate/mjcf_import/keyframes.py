@@ -16,9 +16,9 @@ def add_keyframes(draft: ConversionDraft) -> None:
     names = [draft.source.name_of("key", key) for key in range(model.nkey)]
     wanted = draft.options.keyframe
     if wanted is not None and wanted not in names:
-        known = ", ".join(names) or "none"
+        known = f"; it has {', '.join(names)}" if names else "; it has no keyframes"
         raise SettingError(
-            f"the file has no keyframe '{wanted}'{suggest_name(wanted, names)}; it has: {known}"
+            f"--keyframe: the file has no keyframe '{wanted}'{suggest_name(wanted, names)}{known}"
         )
     if not names:
         return

@@ -15,6 +15,7 @@ import numpy as np
 from osimlite.base.records import dataclass
 from osimlite.base.require import require
 from osimlite.errors import DocumentError, MissingFileError, UnsupportedError
+from osimlite.translate.mjcf.warnings import collect_warnings
 
 LARGEST_FILE = 50_000_000
 """Size (bytes) up to which a file is given to MuJoCo."""
@@ -99,17 +100,11 @@ def load_mjcf(path: Path) -> MjcfSource:
             file=str(path),
         )
     _try_in_another_process(path)
-    warnings: list[str] = []
-    before = mujoco.get_mju_user_warning()
-    # Without a handler MuJoCo writes warnings into a file in the current folder.
-    mujoco.set_mju_user_warning(lambda text: warnings.append(str(text)))
-    try:
-        # The handler is global in MuJoCo, and is restored afterwards.
-        model = mujoco.MjModel.from_xml_path(str(path))
-    except Exception as error:  # MuJoCo raises ValueError, and others for lack of memory
-        raise _explain_failure(path, str(error)) from error
-    finally:
-        mujoco.set_mju_user_warning(before)
+    with collect_warnings(mujoco) as warnings:
+        try:
+            model = mujoco.MjModel.from_xml_path(str(path))
+        except Exception as error:  # MuJoCo raises ValueError, and others for lack of memory
+            raise _explain_failure(path, str(error)) from error
     if model.nbody < 2:
         raise UnsupportedError(
             "the MJCF file has no bodies besides the world; there is nothing to convert",

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 
+import numpy as np
 import pytest
 
 import osimlite
 from osimlite.errors import ModelError, OsimliteError
 from osimlite.translate import to_mjcf
 from osimlite.translate.mjcf.check import check_mjcf
+from osimlite.translate.mjcf.warnings import collect_warnings
 
 
 @pytest.fixture(scope="module")
@@ -69,3 +71,16 @@ def test_files_that_cannot_be_compared(model, tmp_path):
         checked(model, "<mujoco/>", tmp_path)
     with pytest.raises(OsimliteError, match="MuJoCo does not load it"):
         checked(model, "<mujoco><joint/></mujoco>", tmp_path)
+
+
+def test_warnings_of_mujoco_leave_no_file(tmp_path, monkeypatch):
+    mujoco = pytest.importorskip("mujoco")
+    monkeypatch.chdir(tmp_path)
+    with collect_warnings(mujoco) as texts:
+        data = mujoco.MjData(model := mujoco.MjModel.from_xml_string(UNSTABLE))
+        data.qvel[:] = np.nan
+        mujoco.mj_step(model, data)
+    assert texts and not list(tmp_path.iterdir())
+
+
+UNSTABLE = "<mujoco><worldbody><body><freejoint/><geom size='.1'/></body></worldbody></mujoco>"

@@ -44,7 +44,7 @@ def test_the_keyframe_is_the_default_pose(mechanism):
     made = osimlite.from_mjcf(mechanism, keyframe="high")
     assert made.model["/jointset/trunk_joint/root_tz"].default_value == 2.0
     assert "lift\tturn" in made.files["model_keyframes.mot"]
-    with pytest.raises(OsimliteError, match="it has: high"):
+    with pytest.raises(OsimliteError, match="it has high"):
         osimlite.from_mjcf(mechanism, keyframe="low")
 
 
