@@ -27,7 +27,7 @@ import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGES = (
@@ -201,20 +201,80 @@ def try_mutant(
     return {0: "survived", 5: "untested"}.get(done.returncode, "killed")
 
 
-def record(file: Path) -> int:
-    """Run the quick suite under coverage, with the name of each test as context."""
-    command = [
-        sys.executable,
-        "-m",
-        "pytest",
-        "-q",
-        "--cov=osimlite",
-        "--cov-context=test",
-        "--cov-report=",
-    ]
-    return subprocess.run(
-        command, cwd=ROOT, env={**os.environ, "COVERAGE_FILE": str(file)}, check=False
-    ).returncode
+RECORDING = """[run]
+source_pkgs = osimlite
+branch = true
+parallel = true
+data_file = {file}
+context = ${{PYTEST_CURRENT_TEST-}}
+patch = subprocess
+"""
+"""Coverage of each process that a run starts.
+
+A command that a test starts inherits the variable with the name of that test. The tests of
+`check_*.py` run in one process for many, whose context the plugin switches.
+"""
+
+
+def record(file: Path, words: Sequence[str]) -> int:
+    """Run tests of the quick suite under coverage, with the name of each test as context.
+
+    Args:
+        file: what is recorded; records that it has of other tests are kept.
+        words: further arguments of pytest, such as folders; the whole suite without them.
+
+    Returns:
+        The exit code of pytest.
+    """
+    from coverage import Coverage
+
+    with tempfile.TemporaryDirectory() as place:
+        configuration = Path(place) / "coverage.ini"
+        data = Path(place) / "lines"
+        configuration.write_text(RECORDING.format(file=data), encoding="utf-8")
+        environment = {
+            **os.environ,
+            "COVERAGE_PROCESS_START": str(configuration),
+            "PYTEST_PLUGINS": "benchmarks.mutants",
+            "PYTHONPATH": os.pathsep.join(
+                [str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])]
+            ),
+        }
+        # Each test takes about three times as long as without.
+        command = [sys.executable, "-m", "pytest", "-q", "-o", "timeout=1200", *words]
+        code = subprocess.run(command, cwd=ROOT, env=environment, check=False).returncode
+        parts = sorted(str(part) for part in Path(place).glob("lines.*"))
+        before = [str(file)] if file.exists() else []
+        coverage = Coverage(data_file=str(data), branch=True)
+        coverage.combine([*before, *parts])
+        coverage.save()
+        shutil.move(data, file)
+    return code
+
+
+def pytest_runtest_logstart(nodeid: str) -> None:
+    """Record the lines that run from here as those of this test."""
+    coverage = _running_coverage()
+    if coverage is not None:
+        coverage.switch_context(nodeid)
+
+
+def pytest_unconfigure() -> None:
+    """Write what has been recorded: processes of tests are ended without a chance to do so."""
+    coverage = _running_coverage()
+    if coverage is not None:
+        coverage.stop()
+        coverage.save()
+        coverage.start()
+
+
+def _running_coverage() -> Any:
+    """Return the coverage that this process was started under, or None."""
+    if "COVERAGE_PROCESS_START" not in os.environ:
+        return None
+    from coverage import Coverage
+
+    return Coverage.current()
 
 
 def main() -> int:
@@ -231,9 +291,11 @@ def main() -> int:
     parser.add_argument(
         "--seconds", type=float, default=300.0, help="time limit of the tests of one mutant"
     )
-    words = parser.parse_args()
+    words, others = parser.parse_known_args()
+    if others and not words.record:
+        parser.error(f"unknown arguments: {' '.join(others)}")
     if words.record:
-        return record(words.record)
+        return record(words.record, others)
     lines = Lines(words.lines) if words.lines else None
     counts: Counter[str] = Counter()
     with tempfile.TemporaryDirectory() as place:

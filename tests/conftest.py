@@ -37,17 +37,25 @@ settings.load_profile("osimlite")
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Add the option that runs the full suite."""
+    """Add the options that choose the tests and their order."""
     parser.addoption(
         "--full",
         action="store_true",
         help="run all tests, also those marked `full` (release, nightly)",
     )
+    parser.addoption(
+        "--shuffle",
+        type=int,
+        metavar="SEED",
+        help="run the files, and the tests of each, in the random order of this seed",
+    )
 
 
 def pytest_configure(config: pytest.Config) -> None:
     """Let commands that tests start be interrupted: a shell that starts pytest in the background has it ignore that."""
-    config.pluginmanager.register(Suite(config.getoption("--full")), "osimlite-suite")
+    config.pluginmanager.register(
+        Suite(config.getoption("--full"), config.getoption("--shuffle")), "osimlite-suite"
+    )
     if not config.getoption("--full"):
         settings.load_profile("osimlite-quick")
     if not separate.is_server(config):

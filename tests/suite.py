@@ -1,7 +1,9 @@
-"""The quick and the full suite: the option ``--full``, and how tests ask which of the two runs."""
+"""The quick and the full suite: the option ``--full``, how tests ask which of the two runs, and their order."""
 
 from __future__ import annotations
 
+import random
+from collections.abc import Sequence
 from types import SimpleNamespace
 from typing import Any
 
@@ -28,14 +30,16 @@ def choose(quick: Any, full: Any) -> Any:
 class Suite:
     """Pytest plugin that leaves tests marked ``full`` out unless the option ``--full`` is given."""
 
-    def __init__(self, full: bool) -> None:
+    def __init__(self, full: bool, seed: int | None = None) -> None:
         _state["full"] = full
+        self.seed = seed
 
     def pytest_report_header(self) -> str:
         """Name the suite. The count follows at the end: workers collect the tests, after this header."""
+        order = "" if self.seed is None else f"; in random order {self.seed}"
         if is_full():
-            return "suite: full"
-        return f"suite: quick, without the tests marked `full`; {HOW}"
+            return f"suite: full{order}"
+        return f"suite: quick, without the tests marked `full`; {HOW}{order}"
 
     @pytest.hookimpl(trylast=True)
     def pytest_collection_modifyitems(
@@ -43,8 +47,10 @@ class Suite:
     ) -> None:
         """Deselect the tests of the full suite."""
         if not separate.is_server(config):
-            # The process that asks for tests of `check_*.py` has chosen them.
+            # The process that asks for tests of `check_*.py` has chosen them, and their order.
             _mark_cases(config, items)
+            if self.seed is not None:
+                items[:] = shuffle_tests(items, self.seed)
         if is_full():
             return
         slow = [item for item in items if item.get_closest_marker("full")]
@@ -77,6 +83,21 @@ class Suite:
             )
             for line in _describe(_state["deselected"]):
                 terminalreporter.write_line(line)
+
+
+def shuffle_tests(items: Sequence[pytest.Item], seed: int) -> list[pytest.Item]:
+    """Return tests in a random order: the files, and the tests of each file.
+
+    A file stays together, for what its tests share is set up once. Every worker must get the same
+    order, so it depends on the seed alone.
+    """
+    draw = random.Random(seed)
+    files: dict[str, list[pytest.Item]] = {}
+    for item in items:
+        files.setdefault(item.nodeid.partition("::")[0], []).append(item)
+    for tests in files.values():
+        draw.shuffle(tests)
+    return [item for name in draw.sample(list(files), len(files)) for item in files[name]]
 
 
 def _mark_cases(config: pytest.Config, items: list[pytest.Item]) -> None:

@@ -1,4 +1,4 @@
-"""The option ``--full`` of the tests, and what a run without it says."""
+"""The options ``--full`` and ``--shuffle`` of the tests, and what a run without them says."""
 
 from __future__ import annotations
 
@@ -39,7 +39,9 @@ def project(
     pytester.makeconftest(
         "from tests.suite import Suite\n"
         "def pytest_addoption(parser):\n    parser.addoption('--full', action='store_true')\n"
-        "def pytest_configure(config):\n    config.pluginmanager.register(Suite(config.getoption('--full')))\n"
+        "    parser.addoption('--shuffle', type=int)\n"
+        "def pytest_configure(config):\n    suite = Suite(config.getoption('--full'), config.getoption('--shuffle'))\n"
+        "    config.pluginmanager.register(suite)\n"
     )
     pytester.makepyfile(CASES)
     return pytester
@@ -65,3 +67,25 @@ def test_the_option_runs_all(project: pytest.Pytester, workers: list[str]) -> No
     result.assert_outcomes(passed=3)
     result.stdout.fnmatch_lines(["suite: full"])
     result.stdout.no_fnmatch_line("*left out*")
+
+
+def test_a_seed_gives_a_random_order_that_workers_share(project: pytest.Pytester) -> None:
+    for name in "abc":
+        project.makepyfile(**{f"test_{name}": "\n".join(f"def test_{k}(): pass" for k in range(6))})
+
+    def order(*words: str) -> list[str]:
+        result = project.runpytest_subprocess("-v", *words, "test_a.py", "test_b.py", "test_c.py")
+        result.assert_outcomes(passed=18)
+        return [line.split()[0] for line in result.outlines if "::" in line]
+
+    first = order("--shuffle", "1")
+    assert sorted(first) == order()
+    assert order("--shuffle", "1") == first
+    assert order("--shuffle", "2") != first
+    # Each file stays together, though its tests change places.
+    assert [line[:9] for line in first] == [
+        file for file in dict.fromkeys(line[:9] for line in first) for _ in range(6)
+    ]
+    project.runpytest_subprocess("-p", "xdist", "-n", "2", "--shuffle", "1").assert_outcomes(
+        passed=19, deselected=2
+    )
