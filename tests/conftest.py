@@ -12,7 +12,10 @@ from typing import Any, NamedTuple
 import pytest
 from hypothesis import settings
 
+from osimlite.schema.model import Model
 from tests import separate
+from tests.bare import BareEnvironment
+from tests.simple_models import read_walker
 from tests.suite import Suite
 
 # For the tests of tests/suite.py and tests/separate.py.
@@ -136,6 +139,18 @@ def repo() -> Path:
 def fixtures() -> Path:
     """The small inputs that are committed with the tests."""
     return ROOT / "fixtures"
+
+
+@pytest.fixture(scope="session")
+def bare(tmp_path_factory: pytest.TempPathFactory) -> BareEnvironment:
+    """An environment with the base dependencies alone."""
+    return BareEnvironment(tmp_path_factory.mktemp("bare") / "environment")
+
+
+@pytest.fixture
+def walker() -> Model:
+    """The dynamic walker as OpenSim wrote it; each test has its own."""
+    return read_walker()
 
 
 @pytest.fixture(scope="session")

@@ -20,6 +20,7 @@ from osimlite.schema.markers import Station
 from osimlite.schema.model import Model
 from osimlite.schema.tree import Tree
 from tests.mechanics.multibody.cases import load
+from tests.simple_models import read_walker
 
 WALKER = load("walker_dynamics_cases.json")
 CONTACT_BODIES = {
@@ -33,8 +34,8 @@ CONTACT_BODIES = {
 
 
 @pytest.fixture(scope="module")
-def walker(fixtures) -> Mechanism:
-    return osimlite.mechanism(osimlite.read(fixtures / "walker" / "DynamicWalkerModel.osim"))
+def walker() -> Mechanism:
+    return osimlite.mechanism(read_walker())
 
 
 def _unlocked(mechanism: Mechanism) -> Mechanism:
