@@ -1,18 +1,25 @@
-"""The quick and the full suite: the option ``--full``, how tests ask which of the two runs, and their order."""
+"""The quick and the full suite: the option ``--full``, how tests ask which of the two runs, and their order.
+
+It also ends a process in which a test hangs, and tells pytest-xdist to go on when one has ended.
+"""
 
 from __future__ import annotations
 
+import faulthandler
 import random
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from _pytest.faulthandler import fault_handler_stderr_fd_key
 
 from tests import separate
 from tests.quick_cases import QUICK_CASES, QUICK_STRIDES
 
 HOW = "`pytest --full` runs them"
+SECONDS_TO_END = 60.0
+"""What tearing down a test that has timed out may take, besides a fifth of its limit."""
 _ANSWER = "tests_of_the_full_suite"
 _state = {"full": False, "deselected": 0}
 
@@ -58,6 +65,35 @@ class Suite:
             items[:] = [item for item in items if not item.get_closest_marker("full")]
             config.hook.pytest_deselected(items=slow)
         _state["deselected"] = len(slow)
+
+    @pytest.hookimpl(optionalhook=True)
+    def pytest_xdist_make_scheduler(self, config: pytest.Config, log: Any) -> Any:
+        """Distribute tests in a way that goes on when a worker dies."""
+        from tests.scheduling import make_scheduler
+
+        return make_scheduler(config, log)
+
+    @pytest.hookimpl(optionalhook=True, wrapper=True)
+    def pytest_timeout_set_timer(
+        self, item: pytest.Item, settings: Any
+    ) -> Generator[None, Any, Any]:
+        """End the process some time after pytest-timeout should have ended the test.
+
+        Pytest-timeout raises in Python code, which never comes where a library hangs.
+        """
+        if settings.timeout > 0:
+            faulthandler.dump_traceback_later(
+                1.2 * settings.timeout + SECONDS_TO_END,
+                file=item.config.stash[fault_handler_stderr_fd_key],
+                exit=True,
+            )
+        return (yield)
+
+    @pytest.hookimpl(optionalhook=True, wrapper=True)
+    def pytest_timeout_cancel_timer(self, item: pytest.Item) -> Generator[None, Any, Any]:
+        """Let the process live: the test has ended in time."""
+        faulthandler.cancel_dump_traceback_later()
+        return (yield)
 
     def pytest_report_collectionfinish(self) -> list[str]:
         """Count the tests that were left out, where this process has collected them itself."""

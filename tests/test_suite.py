@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from pathlib import Path
 
 import pytest
@@ -89,3 +90,42 @@ def test_a_seed_gives_a_random_order_that_workers_share(project: pytest.Pytester
     project.runpytest_subprocess("-p", "xdist", "-n", "2", "--shuffle", "1").assert_outcomes(
         passed=19, deselected=2
     )
+
+
+DEATHS = """
+import ctypes
+import os
+import signal
+import pytest
+
+def test_before(): pass
+
+def test_ends_its_process():
+    os.kill(os.getpid(), signal.SIGKILL)
+
+def test_between(): pass
+
+@pytest.mark.timeout(1)
+def test_hangs_in_a_library():
+    # The limit of pytest-timeout comes as this signal.
+    signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGALRM])
+    ctypes.CDLL(None).sleep(100)
+
+def test_after(): pass
+"""
+
+
+@pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="Windows has no such signals")
+@pytest.mark.parametrize("workers", ["1", pytest.param("2", marks=pytest.mark.full)])
+def test_a_worker_that_dies_or_hangs_costs_one_test(project: pytest.Pytester, workers: str) -> None:
+    conftest = project.path / "conftest.py"
+    conftest.write_text(
+        conftest.read_text() + "\nimport tests.suite\ntests.suite.SECONDS_TO_END = 1.0\n"
+    )
+    project.makepyfile(test_dies=DEATHS, test_other="def test_other(): pass")
+    words = ("-p", "xdist", "-p", "pytest_timeout", "--dist=loadfile", "--no-loadscope-reorder")
+    result = project.runpytest_subprocess(
+        *words, "-n", workers, "test_dies.py", "test_other.py", timeout=100
+    )
+    result.assert_outcomes(passed=4, failed=2)
+    result.stdout.fnmatch_lines(["*crashed while running 'test_dies.py::test_hangs_in_a_library'*"])
