@@ -186,6 +186,19 @@ def neighbours(mutant: Mutant) -> list[str]:
     return sorted(names, key=lambda name: (parts[-1] not in name, name))[:8]
 
 
+def copy_repository(folder: Path) -> None:
+    """Copy what git knows of, as it is now, and the library of kernels into a folder."""
+    listed = ["git", "ls-files", "-z"]
+    names = subprocess.run(listed, cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    for name in filter(None, names.split("\0")):
+        if (ROOT / name).is_file():
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy(ROOT / name, folder / name)
+    # Without the library each kernel is compiled when it is first called.
+    native = ROOT / "osimlite" / "native"
+    shutil.copytree(native, folder / "osimlite" / "native", dirs_exist_ok=True)
+
+
 class Trials:
     """Calls of tests with mutants in place, in a copy of the repository."""
 
@@ -195,15 +208,6 @@ class Trials:
         self.seconds = seconds
         self.failing: set[str] = set()
         self.passing: set[str] = set()
-        listed = ["git", "ls-files", "-z"]
-        names = subprocess.run(listed, cwd=ROOT, capture_output=True, text=True, check=True).stdout
-        for name in filter(None, names.split("\0")):
-            if (ROOT / name).is_file():
-                (folder / name).parent.mkdir(parents=True, exist_ok=True)
-                shutil.copy(ROOT / name, folder / name)
-        # Without the library each kernel is compiled when it is first called.
-        native = ROOT / "osimlite" / "native"
-        shutil.copytree(native, folder / "osimlite" / "native", dirs_exist_ok=True)
 
     def try_mutant(self, mutant: Mutant, tests: Sequence[str]) -> tuple[str, str]:
         """Call tests with a mutant in place.
@@ -251,7 +255,7 @@ class Trials:
         if lost:
             # A case whose name depends on the run, such as the path of its temporary folder.
             return self.call([test for test in tests if test not in lost])
-        failed = re.search(r"^(?:FAILED|ERROR) (tests/.*?)(?: - .*)?$", done.stdout, re.MULTILINE)
+        failed = re.search(r"^(?:FAILED|ERROR) (.*?)(?: - .*)?$", done.stdout, re.MULTILINE)
         # 0: all pass. 5: pytest has collected no test.
         outcome = {0: "survived", 5: "untested"}.get(done.returncode, "killed")
         return outcome, failed.group(1) if failed else ""
@@ -369,6 +373,7 @@ def main() -> int:
     part, parts = map(int, words.part.split("/"))
     counts: Counter[str] = Counter()
     with tempfile.TemporaryDirectory() as place:
+        copy_repository(Path(place))
         trials = Trials(Path(place), full=words.full, seconds=words.seconds)
         for mutant in mutants[part - 1 :: parts]:
             tests = (lines.tests_of(mutant) if lines else []) or neighbours(mutant)
