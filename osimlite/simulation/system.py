@@ -111,12 +111,12 @@ class System(StateEvaluator):
             return result
         copied, sources, computed = self._sort_columns()
         slices, places = [], list[int](sources)
-        for element, columns in computed:
+        for number, columns in computed:
             own = []
-            for place, room in self._items[element]:
+            for place, room in self._items[number]:
                 own.append(slice(len(places), len(places) + room))
                 places += range(place, place + room)
-            slices.append((self.forces.elements[element], own, columns))
+            slices.append((self.forces.elements[number], own, columns))
         # Reports of torques need the origins of the bodies, hence rotation and position of each
         # link.
         links = int(self.structure[MODEL.WORK_LINK])

@@ -142,7 +142,7 @@ class Silent:
         """Return an empty row, since there are no columns."""
         return []
 
-    def find_copied_places(self) -> Sequence[int]:
+    def find_copied_places(self) -> Sequence[int] | None:
         """Return no places, since there are no columns."""
         return ()
 

@@ -382,7 +382,7 @@ class DeclaredForce:
             for output in force_type.labels.values()
         ]
 
-    def find_copied_places(self) -> list[int] | None:
+    def find_copied_places(self) -> Sequence[int] | None:
         """Return the places in its last record that are columns; None if its geometry computes them."""
         force_type = self.force_type
         if force_type.labels is None:

@@ -11,6 +11,7 @@ import ctypes
 import hashlib
 import json
 import sys
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -34,11 +35,11 @@ def list_models() -> dict[str, Any]:
 
     Built-in models come first, then one joint of each kind, then every force on a chain of bodies.
     """
-    made = {"walker": furthest_walker, "jumper": jumper}
+    made: dict[str, Any] = {"walker": furthest_walker, "jumper": jumper}
     joints = ROOT / "fixtures/kinematics/mixed_joint_tree.osim"
     made["joints"] = lambda: osimlite.read(joints)
-    for name in FORCES:
-        made[name] = lambda name=name: with_force(FORCES[name])
+    for name, make in FORCES.items():
+        made[name] = partial(with_force, make)
     return made
 
 
