@@ -54,7 +54,7 @@ def line() -> GeometryPath:
 
 def hung(force: Any, excitations: Sequence[float] = (0.0,), gravity: float = 0.0) -> Model:
     """The model with a muscle, excited so much at the time 0, 1, 2 ..."""
-    model = make_slide(force, body="block", mass=MASS, gravity=(gravity, 0.0, 0.0))
+    model = make_slide(force, name="one", body="block", mass=MASS, gravity=(gravity, 0.0, 0.0))
     brain = PrescribedController(name="brain", socket_actuators=(f"/forceset/{force.name}",))
     times = tuple(map(float, range(len(excitations) + 1)))
     brain.ControlFunctions.objects.append(PiecewiseLinearFunction(x=times, y=(*excitations, 0.0)))
