@@ -867,6 +867,72 @@ def not_a_number_unused() -> list[Case]:
     return cases
 
 
+OLD_TEXT = """<?xml version="1.0"?><OpenSimDocument Version="30000"><Model name="m"><gravity>0 -9.8 0</gravity>
+<BodySet><objects><Body name="ground"><mass>0</mass><Joint/></Body><Body name="b"><mass>1</mass>
+<mass_center>0 0 0</mass_center><inertia_xx>1</inertia_xx><inertia_yy>1</inertia_yy>
+<inertia_zz>1</inertia_zz><Joint><PinJoint name="j"><parent_body>ground</parent_body>
+<CoordinateSet><objects><Coordinate name="COORDINATE"/></objects></CoordinateSet></PinJoint></Joint>
+</Body></objects></BodySet><ForceSet><objects>FORCES</objects>GROUPS</ForceSet>
+<ControllerSet><objects>CONTROLLERS</objects></ControllerSet>
+<ContactGeometrySet><objects>GEOMETRY</objects></ContactGeometrySet>
+<ProbeSet><objects>PROBES</objects></ProbeSet></Model></OpenSimDocument>
+"""
+"""A pendulum in the format of OpenSim 3, with places for more elements."""
+
+
+def old_names() -> list[Case]:
+    """Return old models with a blank in a name, which OpenSim takes out of the name and out of nothing else."""
+
+    def old(name: str, verdict: str, **places: str) -> Case:
+        text = OLD_TEXT
+        for place in ("COORDINATE", "FORCES", "GROUPS", "CONTROLLERS", "GEOMETRY", "PROBES"):
+            text = text.replace(place, places.get(place, "q" if place == "COORDINATE" else ""))
+        return Case(
+            f"blank in an old name: {name}", text, "OSIM312" if verdict == FAILS else "", verdict
+        )
+
+    def drive(name: str, coordinate: str = "q", more: str = "") -> str:
+        inside = f"{more}<coordinate>{coordinate}</coordinate>"
+        return f'<CoordinateActuator name="{name}">{inside}</CoordinateActuator>'
+
+    def control(tag: str, actuators: str) -> str:
+        functions = (
+            '<ControlFunctions><FunctionSet name="f"><objects><Constant name="x"><value>1</value>'
+            "</Constant></objects></FunctionSet></ControlFunctions>"
+        )
+        more = functions if tag == "PrescribedController" else ""
+        return f'<{tag} name="c"><actuator_list>{actuators}</actuator_list>{more}</{tag}>'
+
+    disabled = "<isDisabled>true</isDisabled>"
+    shapes = (
+        '<ContactSphere name="a s"><body_name>b</body_name><radius>0.1</radius></ContactSphere>'
+        '<ContactHalfSpace name="h"><body_name>ground</body_name></ContactHalfSpace>'
+    )
+    parameters = "HuntCrossleyForce::ContactParameters"
+    contact = (
+        f'<HuntCrossleyForce name="t"><{parameters}Set><objects><{parameters}><geometry>a s h'
+        f"</geometry><stiffness>1e5</stiffness></{parameters}></objects></{parameters}Set>"
+        "</HuntCrossleyForce>"
+    )
+    limit = '<CoordinateLimitForce name="l"><coordinate>a q</coordinate></CoordinateLimitForce>'
+    probe = '<ActuatorPowerProbe name="p"><actuator_names>a t</actuator_names></ActuatorPowerProbe>'
+    group = '<groups><ObjectGroup name="g"><members>a t</members></ObjectGroup></groups>'
+    prescribed_control = control("PrescribedController", "a t")
+    control_of_set = control("ControlSetController", "a t")
+    return [
+        old("used by an actuator", FAILS, COORDINATE="a q", FORCES=drive("t", "a q")),
+        old("used while off", FAILS, COORDINATE="a q", FORCES=drive("t", "a q", disabled)),
+        old("used by a limit", FAILS, COORDINATE="a q", FORCES=limit),
+        old("used by a probe", FAILS, FORCES=drive("a t"), PROBES=probe),
+        old("used by a controller", FAILS, FORCES=drive("a t"), CONTROLLERS=prescribed_control),
+        old("used by a contact", FAILS, GEOMETRY=shapes, FORCES=contact),
+        old("used by a group", RUNS, FORCES=drive("a t"), GROUPS=group),
+        old("used by a set of controls", RUNS, FORCES=drive("a t"), CONTROLLERS=control_of_set),
+        old("used as OpenSim writes it", RUNS, COORDINATE="a q", FORCES=drive("t", "aq")),
+        old("used by nobody", RUNS, COORDINATE="a q"),
+    ]
+
+
 CASES = [
     *expressions(),
     *constraints(),
@@ -880,5 +946,6 @@ CASES = [
     *others(),
     *magnitudes(),
     *not_a_number_unused(),
+    *old_names(),
 ]
 """All of them."""

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from osimlite.base.text import format_count, join_words
+from osimlite.io.document.source import Source
+from osimlite.io.document.spans import Span
 from osimlite.lint.registry import ERROR, INFO, WARNING, FindingCollector, rule
 from osimlite.lint.rules.references import BrokenReference, find_broken_references
 from osimlite.lint.subject import Subject, cache_per_subject
@@ -64,8 +66,8 @@ def report_illegal_name(subject: Subject, report: FindingCollector) -> None:
     Reports white space, `/`, `\`, `*` and `+` in the names of components.
 
     Names are the parts of paths; OpenSim rejects the file. In files older than version 30500 it
-    removes white space from the names, but not from references to them: a muscle or a marker is
-    then not found.
+    removes white space from the names, but not from references to them: it refuses the file unless
+    only groups and controllers use the name.
 
     ```xml
     - <Marker name="right asis"> <socket_parent_frame>/bodyset/pelvis</socket_parent_frame> </Marker>
@@ -105,11 +107,14 @@ def report_illegal_name(subject: Subject, report: FindingCollector) -> None:
             name = subject.source.text[start : start + place.length]
             if any(character.isspace() for character in name) and not name.startswith("<"):
                 better = "".join(name.split())
+                users = list_old_references(subject.source, name)
                 used = subject.source.text.count(name) > 1
                 frame = subject.source.spans[change.number].tag in ("Body", "Ground")
                 consequence = f"OpenSim makes it '{better}'" + (
                     ", but not where others use it" if used else ""
                 )
+                if users:
+                    consequence = f"OpenSim makes it '{better}', but not in <{users[0]}>, and refuses the file"
                 if frame:
                     consequence = (
                         "OpenSim creates frames of that name for the joints and rejects them"
@@ -119,8 +124,38 @@ def report_illegal_name(subject: Subject, report: FindingCollector) -> None:
                     f"{subject.version} {consequence}",
                     at=place,
                     suggestion=better,
-                    severity=ERROR if frame else None if used else INFO,
+                    severity=ERROR if frame or users else None if used else INFO,
                 )
+
+
+def list_old_references(source: Source, name: str) -> list[str]:
+    """Return the tags of elements of an old document that OpenSim refuses if nothing has the name they give.
+
+    Args:
+        source: the document.
+        name: a name with white space, which OpenSim takes out of the name alone.
+    """
+    # Almost no document has such a name, and every start would pay for the import.
+    from osimlite.io.document.upgrade.version_3_structure import NAME_LIST_TAGS, TEXT_TAGS
+
+    words = " ".join(name.split())
+    result: list[str] = []
+    owners: list[Span] = []
+    for span in source.spans:
+        while owners and owners[-1].end <= span.start:
+            owners.pop()
+        inside = source.text[span.tag_end : span.inner_end]
+        text = " ".join(inside.split())
+        found = words == text or (span.tag in NAME_LIST_TAGS and f" {words} " in f" {text} ")
+        # OpenSim leaves out what a group or most controllers name in vain.
+        harmless = span.tag == "members" or (
+            span.tag in ("actuator_list", "muscle_list")
+            and not (owners and owners[-1].tag == "PrescribedController")
+        )
+        if found and not harmless and span.tag not in TEXT_TAGS:
+            result.append(span.tag)
+        owners.append(span)
+    return result
 
 
 @rule("OSIM313", "missing-name", severity=WARNING)

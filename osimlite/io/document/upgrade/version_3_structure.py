@@ -17,7 +17,7 @@ from osimlite.io.document.upgrade.draft import (
 )
 from osimlite.schema.fields import Value
 
-_TEXT_TAGS = {
+TEXT_TAGS = {
     "credits",
     "publications",
     "data_file",
@@ -32,7 +32,7 @@ _TEXT_TAGS = {
 """Elements whose text is never the name of a component."""
 
 
-_NAME_LIST_TAGS = {
+NAME_LIST_TAGS = {
     "actuator_list",
     "coordinates",
     "geometry",
@@ -80,9 +80,9 @@ def _rename_references(draft: Draft, renamed: dict[str, str]) -> None:
     for element in draft.root.iter("*"):
         if len(element) == 0:
             text = get_text(element)
-            if " " in text and element.tag not in _TEXT_TAGS:
+            if " " in text and element.tag not in TEXT_TAGS:
                 new = renamed.get(text) or (
-                    _rename_in_list(text, renamed) if element.tag in _NAME_LIST_TAGS else text
+                    _rename_in_list(text, renamed) if element.tag in NAME_LIST_TAGS else text
                 )
                 if new != text:
                     element.text = new
