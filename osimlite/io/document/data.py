@@ -10,13 +10,15 @@ from __future__ import annotations
 
 import json
 import math
+import sys
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 from osimlite.base.files import read_file, write_atomically
 from osimlite.base.require import require
-from osimlite.base.text import suggest_name
+from osimlite.base.text import shorten_message, suggest_name
 from osimlite.errors import DocumentError, MissingFileError, ModelError
 from osimlite.io.document.lexical import UncleanText, parse_real
 from osimlite.io.document.objects import get_layout
@@ -289,20 +291,24 @@ class _Reader:
                 where,
                 spec.tag if kind.form == "single" else getattr(default, "name", ""),
             )
-        if isinstance(kind, Value) and kind.scalar == "double":
-            # YAML reads "1e-9" as text, and JSON has no infinity.
-            data = (
-                [self._parse_number(word) for word in data]
-                if isinstance(data, list)
-                else self._parse_number(data)
-            )
         try:
+            if isinstance(kind, Value) and kind.scalar == "double":
+                # YAML reads "1e-9" as text, and JSON has no infinity.
+                data = (
+                    [self._parse_number(word) for word in data]
+                    if isinstance(data, list)
+                    else self._parse_number(data)
+                )
             return kind.check(data, None)
         except (ValueError, OverflowError) as error:
-            raise ModelError(f"{where}: {error}") from None
+            raise ModelError(shorten_message(f"{where}: {error}")) from None
 
     def _parse_number(self, data: Any) -> Any:
-        """Parse a number that JSON cannot represent or that YAML reads as text (1e-9); return others unchanged."""
+        """Parse a number that JSON cannot represent or that YAML reads as text (1e-9); return others unchanged.
+
+        Raises:
+            ValueError: a whole number is too large for a real number.
+        """
         self._count_values()
         # Text that is no number is left to `check`, whose message names the property.
         if isinstance(data, str):
@@ -310,6 +316,9 @@ class _Reader:
                 return parse_real(data.strip())
             except UncleanText:
                 return data
+        if isinstance(data, int) and abs(data) > sys.float_info.max:
+            # Python's whole numbers have no end. All digits in a message would hide its words.
+            raise ValueError("a whole number is larger than 1.8e308, the largest real number")
         return data
 
     def _count_values(self, weight: int = 1) -> None:
@@ -367,7 +376,7 @@ def _list_parts(data: dict[str, Any] | list[Any]) -> list[Any]:
 
 def _parse_json(text: str, file: str) -> Any:
     try:
-        return json.loads(text)
+        return json.loads(text, object_pairs_hook=lambda pairs: _join_pairs(pairs, file))
     except json.JSONDecodeError as error:
         raise DocumentError(
             f"not JSON: {error.msg}", file=file, line=error.lineno, column=error.colno
@@ -376,6 +385,20 @@ def _parse_json(text: str, file: str) -> Any:
         raise DocumentError(
             "the JSON text is nested too deeply, or has too long a number", file=file, line=1
         ) from None
+
+
+def _join_pairs(pairs: list[tuple[str, Any]], file: str) -> dict[str, Any]:
+    """Return the dict of a mapping in JSON.
+
+    Raises:
+        DocumentError: a key stands twice; Python would keep the last without a word.
+    """
+    result = dict(pairs)
+    if len(result) < len(pairs):
+        counts = Counter(key for key, _ in pairs)
+        twice = next(key for key, count in counts.items() if count > 1)
+        raise DocumentError(f"the key {twice!r} stands twice in one mapping", file=file)
+    return result
 
 
 def parse_yaml(text: str, file: str, *, with_lines: bool = False) -> Any:
@@ -392,7 +415,13 @@ def parse_yaml(text: str, file: str, *, with_lines: bool = False) -> Any:
     """
     yaml = _import_yaml()
     try:
-        return yaml.compose(text, yaml.SafeLoader) if with_lines else yaml.safe_load(text)
+        loader = yaml.SafeLoader(text)
+        top = loader.get_single_node()
+        # The nodes keep all pairs of a mapping: in settings a key may stand several times.
+        if with_lines or top is None:
+            return top
+        _refuse_repeated_keys(yaml, top, file)
+        return loader.construct_document(top)
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
         line, column = (mark.line + 1, mark.column + 1) if mark is not None else (1, 1)
@@ -402,6 +431,39 @@ def parse_yaml(text: str, file: str, *, with_lines: bool = False) -> Any:
     # class's constructor.
     except (RecursionError, ValueError, ArithmeticError, LookupError, TypeError, AttributeError):
         raise DocumentError("the YAML text cannot be read as a model", file=file, line=1) from None
+
+
+def _refuse_repeated_keys(yaml: Any, top: Any, file: str) -> None:
+    """Raise an error if a key stands twice in one mapping, of which PyYAML keeps the last without a word.
+
+    Raises:
+        DocumentError: a key stands twice; with its line.
+    """
+    # Aliases lead to one node from several places, and may lead in circles.
+    met = set()
+    left = [top]
+    while left:
+        node = left.pop()
+        if id(node) in met or isinstance(node, yaml.ScalarNode):
+            continue
+        met.add(id(node))
+        if isinstance(node, yaml.SequenceNode):
+            left.extend(node.value)
+            continue
+        keys = set()
+        for key, value in node.value:
+            left += (key, value)
+            if not isinstance(key, yaml.ScalarNode):
+                continue
+            if key.value in keys:
+                mark = key.start_mark
+                raise DocumentError(
+                    f"the key {key.value!r} stands twice in one mapping",
+                    file=file,
+                    line=mark.line + 1,
+                    column=mark.column + 1,
+                )
+            keys.add(key.value)
 
 
 def _import_yaml() -> Any:

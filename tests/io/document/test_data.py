@@ -175,3 +175,85 @@ def test_yaml_is_only_needed_for_yaml(monkeypatch: pytest.MonkeyPatch, tmp_path:
     with pytest.raises(MissingDependency, match="YAML"):
         read_data(path)
     assert from_data({"name": "m"}).name == "m"
+
+
+@pytest.mark.parametrize(
+    "number",
+    ["1" * 400, "-" + "9" * 400, "0x" + "f" * 300, "1" + ":59" * 300, "0" + "7" * 400],
+    ids=["ones", "nines below zero", "base 16", "base 60", "base 8"],
+)
+@pytest.mark.parametrize(
+    "text",
+    [
+        "gravity: [{}, 0, 0]",
+        "body_set: [{{name: b, mass: {}}}]",
+        "force_set: [{{class: TorqueActuator, name: a, optimal_force: {}}}]",
+    ],
+    ids=["in a list", "alone", "of a force"],
+)
+def test_a_whole_number_without_end_is_told_with_its_place(
+    tmp_path: Path, number: str, text: str
+) -> None:
+    pytest.importorskip("yaml")
+    path = tmp_path / "it.yaml"
+    path.write_text("name: m\n" + text.format(number))
+    with pytest.raises(ModelError, match=r"(gravity|mass|optimal_force): .*larger than 1\.8e308"):
+        read_data(path)
+
+
+@pytest.mark.parametrize(
+    "word",
+    [
+        "9" * 5000,
+        "2001-99-99",
+        "2001-01-01T99:99:99Z",
+        "2001-01-01T01:01:01+99:99",
+        "1" + ":59" * 300 + ".5",
+        "!!int abc",
+        "!!float ''",
+        "!!bool perhaps",
+        "!!timestamp x",
+        "!!binary a",
+        "!!pairs [a: 1, 2]",
+    ],
+)
+def test_a_word_that_yaml_cannot_convert_is_an_error(tmp_path: Path, word: str) -> None:
+    pytest.importorskip("yaml")
+    path = tmp_path / "it.yaml"
+    path.write_text(f"name: m\ncredits: {word}\n")
+    with pytest.raises(DocumentError, match="YAML"):
+        read_data(path)
+
+
+def test_a_long_number_does_not_fill_the_message(tmp_path: Path) -> None:
+    path = tmp_path / "it.json"
+    path.write_text('{"credits": ' + "9" * 4000 + "}")
+    with pytest.raises(ModelError, match="credits: expected a text, got") as caught:
+        read_data(path)
+    assert len(str(caught.value)) < 700
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "name: a\ngravity: [0, 0, 0]\nname: b\n",
+        "body_set: [{name: b, mass: 1, mass: 2}]\n",
+        "a: &a {name: b}\nc: *a\nd: {e: 1, f: &f [*a, {e: 1, 'e': 2}]}\n",
+    ],
+)
+def test_a_key_that_stands_twice_in_yaml_is_refused(tmp_path: Path, text: str) -> None:
+    pytest.importorskip("yaml")
+    path = tmp_path / "it.yaml"
+    path.write_text(text)
+    with pytest.raises(DocumentError, match="stands twice in one mapping"):
+        read_data(path)
+
+
+@pytest.mark.parametrize(
+    "text", ['{"name": "a", "name": "b"}', '{"body_set": [{"mass": 1, "mass": 2}]}']
+)
+def test_a_key_that_stands_twice_in_json_is_refused(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "it.json"
+    path.write_text(text)
+    with pytest.raises(DocumentError, match="stands twice in one mapping"):
+        read_data(path)
