@@ -160,8 +160,10 @@ def test_damaged_c3d_files_end_no_process(tmp_path: Path, fixtures: Path, damage
             read(tmp_path / "it.c3d")
 
 
-def compressed_mesh(kind: str, size: int, blocks: int, promised: int) -> bytes:
-    """Return a mesh of zeros whose header promises some bytes in each block."""
+def compressed_mesh(
+    kind: str, size: int, blocks: int, promised: int, dtype: str = "Float64", pieces: int = 1
+) -> bytes:
+    """Return a mesh of zeros whose header promises some bytes in each block, used by each piece."""
     import lzma
 
     compress = zlib.compress if kind == "ZLib" else lzma.compress
@@ -169,8 +171,10 @@ def compressed_mesh(kind: str, size: int, blocks: int, promised: int) -> bytes:
     head = np.array([blocks, promised, 0] + [len(block)] * blocks, "<u8").tobytes()
     start = (
         '<VTKFile type="PolyData" byte_order="LittleEndian" header_type="UInt64" '
-        f'compressor="vtk{kind}DataCompressor"><PolyData><Piece><Points><DataArray type="Float64" '
-        'format="appended" offset="0"/></Points></Piece></PolyData><AppendedData encoding="raw">_'
+        f'compressor="vtk{kind}DataCompressor"><PolyData>'
+        + f'<Piece><Points><DataArray type="{dtype}" format="appended" offset="0"/></Points></Piece>'
+        * pieces
+        + '</PolyData><AppendedData encoding="raw">_'
     )
     return start.encode() + head + block * blocks + b"</AppendedData></VTKFile>"
 
@@ -183,6 +187,19 @@ def test_meshes_do_not_grow(kind: str, promised: int, words: str) -> None:
     blocks = 1 if promised == 8 else 500
     with pytest.raises(OsimliteError, match=words):
         read_vtp(compressed_mesh(kind, 1_000_000, blocks, promised), "it.vtp")
+
+
+@pytest.mark.parametrize("kind", ["ZLib", "LZMA"])
+@pytest.mark.parametrize(
+    ("blocks", "dtype", "pieces"),
+    [(51, "Int8", 1), (51, "UInt8", 1), (101, "Int16", 1), (3, "Int8", 20)],
+    ids=["bytes", "bytes without sign", "two bytes", "pieces of one array"],
+)
+def test_small_numbers_count_as_large_as_they_become(
+    kind: str, blocks: int, dtype: str, pieces: int
+) -> None:
+    with pytest.raises(OsimliteError, match="more than 400 MB"):
+        read_vtp(compressed_mesh(kind, 1_000_000, blocks, 1_000_000, dtype, pieces), "it.vtp")
 
 
 @pytest.mark.parametrize("count", [200, 5000, 100_000])

@@ -115,7 +115,8 @@ def _name_errors(name: str) -> Iterator[None]:
 
 class _File:
     def __init__(self, content: bytes, *, all_digits: bool = False) -> None:
-        self.all_digits, self.left = all_digits, MAX_BYTES
+        self.all_digits = all_digits
+        self.left: float = MAX_BYTES
         # Appended data may be raw bytes, which are not XML, so they are cut out before parsing.
         self.appended = b""
         mark = content.find(b"<AppendedData")
@@ -262,12 +263,13 @@ class _File:
                         (array.text or "").split(), dtype=np.float64 if exact else dtype
                     )
                 case "binary":
-                    data = self._read_block(_decode_base64((array.text or "").encode()))
+                    stream = _decode_base64((array.text or "").encode())
                 case "appended":
-                    data = self._read_block(self._get_appended_array(int(array.get("offset", "0"))))
+                    stream = self._get_appended_array(int(array.get("offset", "0")))
                 case _:
                     raise _Unreadable(f"it has numbers in the format '{form}'")
-            return np.frombuffer(data, dtype)
+            # Whoever asks for the numbers makes eight bytes of each, however few the file has.
+            return np.frombuffer(self._read_block(stream, 8 / dtype.itemsize), dtype)
         except MemoryError:
             raise _Unreadable(
                 f"its numbers named '{array.get('Name', '')}' need more memory than there is"
@@ -285,19 +287,24 @@ class _File:
         part = self.appended[offset:end]
         return part if self.raw else _decode_base64(part)
 
-    def _count_bytes(self, count: int) -> None:
+    def _count_bytes(self, count: float) -> None:
         """Add bytes to the sum of numbers read, which is limited: several arrays may use the same bytes."""
         self.left -= count
         if self.left < 0:
             raise _Unreadable(f"it has more than {MAX_BYTES / 1e6:g} MB of numbers")
 
-    def _read_block(self, stream: bytes) -> bytes:
-        """Return the content of a block of bytes after its header, decompressed."""
+    def _read_block(self, stream: bytes, weight: float) -> bytes:
+        """Return the content of a block of bytes after its header, decompressed.
+
+        Args:
+            stream: the header and the block.
+            weight: bytes in memory for each byte of the content.
+        """
         width = self.header.itemsize
         if not self.compressor:
             size = int(np.frombuffer(stream, self.header, 1)[0])
             # The size that the header says may be more than is there.
-            self._count_bytes(min(size, len(stream)))
+            self._count_bytes(weight * min(size, len(stream)))
             data = stream[width : width + size]
             if len(data) != size:
                 raise ValueError
@@ -313,7 +320,7 @@ class _File:
         # compressed sizes.
         _, whole, last, *sizes = np.frombuffer(stream, self.header, 3 + blocks).tolist()
         # Check the declared size before decompressing anything; no block may be larger.
-        self._count_bytes(whole * (blocks - bool(last)) + last)
+        self._count_bytes(weight * (whole * (blocks - bool(last)) + last))
         place, parts = (3 + blocks) * width, []
         for size in sizes:
             parts.append(
