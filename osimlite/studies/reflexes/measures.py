@@ -130,8 +130,13 @@ class Measure(ABC):
         soft = node.get("soft_threshold")
         self.offset = node.number("result_offset", 0.0)
         self.threshold = None if threshold is None else node.number("threshold")
-        # SCONE's soft threshold subtracts the threshold from the value, then cuts at zero.
+        # SCONE's soft threshold subtracts the threshold from the value, then cuts at zero. SCONE lets
+        # it replace the two others without a word.
         if soft is not None:
+            for key in ("result_offset", "threshold"):
+                other = node.get(key)
+                if other is not None:
+                    raise other.error(f"'{key}' and 'soft_threshold' exclude each other; keep one")
             self.offset = -node.number("soft_threshold")
             self.threshold = 0.0
         self.transition = node.number("threshold_transition", 0.0)

@@ -234,8 +234,8 @@ class MjcfDraft:
             self.fidelity.add(
                 "default-pose",
                 "/",
-                "a default pose near none that fulfils the constraints",
-                "as it is",
+                "a default pose that the constraints do not allow, nor any pose near it",
+                "the pose of the model, with the constraints violated",
             )
             return self.mechanism.values({}), self.mechanism.speeds({})
 

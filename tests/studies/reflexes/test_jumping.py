@@ -122,6 +122,18 @@ def test_a_jump_is_as_high_as_the_mass_centre_comes(folder, changes, values, at_
         assert walked.report["early rise"][0] > 1.0
 
 
+@pytest.mark.parametrize(
+    ("first", "second"),
+    [("soft_threshold = 1", "KEY = 2"), ("KEY = 2", "soft_threshold = 1")],
+    ids=["soft first", "soft last"],
+)
+@pytest.mark.parametrize("key", ["result_offset", "threshold"])
+def test_a_soft_threshold_excludes_what_it_would_replace(folder, key, first, second) -> None:
+    new = f"JumpMeasure {{ {first} {second}".replace("KEY", key)
+    with pytest.raises(OsimliteError, match=f"'{key}' and 'soft_threshold' exclude each other"):
+        scenario(folder, ("JumpMeasure {", new)).walk(PUSHES)
+
+
 def test_signs_weights_and_sums(folder) -> None:
     high = scenario(folder).walk(PUSHES).terms["JumpMeasure"][0]
     for new, wanted, result in (
