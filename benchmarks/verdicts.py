@@ -3,6 +3,7 @@
     python benchmarks/verdicts.py --edits 1000 [--before FOLDER]     random edits of real models
     python benchmarks/verdicts.py --pairs 2000 [--before FOLDER]     two random edits at once
     python benchmarks/verdicts.py --faults 8000 [--before FOLDER]    two of the walker's faults at once
+    python benchmarks/verdicts.py --combinations [--shard 1/2]       all pairs of faults on 20 models
 
 `--before` names the folder of another version of osimlite, whose verdicts stand beside those of
 this one. A verdict is *missed* if OpenSim 4.6 does not load or initialise the model, or computes
@@ -25,7 +26,7 @@ import subprocess
 import sys
 import tempfile
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import chain, combinations
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -108,13 +109,21 @@ def ask_opensim(path: Path) -> str:
     return words[-1]
 
 
-def read_models(shared: Path, folder: Path) -> list[Path]:
-    """Return copies of the models of the corpus that OpenSim runs, each in a folder with its files."""
+def read_models(shared: Path, folder: Path, names: Sequence[str] = ()) -> list[Path]:
+    """Return copies of the models of the corpus that OpenSim runs, each in a folder with its files.
+
+    Args:
+        shared: where the corpus is.
+        folder: where the copies go.
+        names: folders of the corpus to which it is limited; all without names.
+    """
     import shutil
 
     result = []
     for source in sorted((shared / "corpus" / "models").glob("*/*.osim")):
         if source.stat().st_size > LARGEST_BYTES or b"<Model" not in source.read_bytes():
+            continue
+        if names and source.parent.name not in names:
             continue
         home = folder / source.parent.name
         shutil.copytree(source.parent, home)
@@ -175,12 +184,42 @@ def combine_faults(path: Path, count: int, draw: random.Random) -> Iterator[Tria
         yield Trial(path, changed, f"{first.name}; {second.name}")
 
 
+COMBINED = (
+    *("m0719", "m0483", "m0123", "m0178", "m0134", "m0072", "m0066", "m0713", "m0119", "m0113"),
+    *("m0093", "m0117", "m0387", "m0199", "m0150", "m0139", "m0166", "m0472", "m0478", "m0153"),
+)
+"""Models of the corpus for all combinations of two faults: small ones, of seven versions of the format."""
+
+
+def combine_general_faults(texts: dict[Path, str], shard: str) -> Iterator[Trial]:
+    """Yield each model with each general fault alone, then with all pairs: those of a shard such as "1/2"."""
+    from tests.lint.general_faults import GENERAL_FAULTS
+
+    first, count = map(int, shard.split("/"))
+    for size in (1, 2):
+        for path, text in texts.items():
+            for faults in [*combinations(GENERAL_FAULTS, size)][first - 1 :: count]:
+                changed = text
+                try:
+                    for fault in faults:
+                        before, changed = changed, fault.change(changed)
+                        if before == changed:
+                            raise ValueError(fault.name)
+                except ValueError:
+                    # The model has nothing that the fault changes, or the first took it away.
+                    continue
+                yield Trial(path, changed, "; ".join(fault.name for fault in faults))
+
+
 def main() -> None:
     """Run the comparison and print the table."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--edits", type=int, default=0)
     parser.add_argument("--pairs", type=int, default=0)
     parser.add_argument("--faults", type=int, default=0)
+    parser.add_argument("--combinations", action="store_true")
+    parser.add_argument("--models", nargs="*", default=COMBINED, help="folders of the corpus")
+    parser.add_argument("--shard", default="1/1", help="such as 1/2, of the combinations")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--before", type=Path)
     parser.add_argument("--shared", type=Path, default=HERE.parents[1] / "shared")
@@ -207,6 +246,8 @@ def main() -> None:
         models = []
         if chosen.edits or chosen.pairs:
             models = read_models(chosen.shared, Path(place))
+        if chosen.combinations:
+            models = read_models(chosen.shared, Path(place), chosen.models)
         texts = {path: path.read_text(encoding="utf-8", errors="replace") for path in models}
         walker = Path(place) / "walker.osim"
         walker.write_bytes((HERE.parent / "fixtures/walker/DynamicWalkerModel.osim").read_bytes())
@@ -218,6 +259,7 @@ def main() -> None:
         trials = chain(
             edit_models(texts, chosen.edits, chosen.pairs, draw),
             combine_faults(walker, chosen.faults, draw) if chosen.faults else (),
+            combine_general_faults(texts, chosen.shard) if chosen.combinations else (),
         )
         for number, (path, text, what) in enumerate(trials):
             if number % 50 == 0:
