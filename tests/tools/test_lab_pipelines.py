@@ -128,6 +128,38 @@ def test_a_lock_is_named(tmp_path: Path, setup: str) -> None:
     assert (errors["pelvis_tx"] == 0.0).all()
 
 
+SHORT_MUSCLE = """<Thelen2003Muscle name="short"><max_isometric_force>381</max_isometric_force>
+<optimal_fiber_length>0.052</optimal_fiber_length><tendon_slack_length>{slack:.12f}</tendon_slack_length>
+<path><GeometryPath name="path"><PathPointSet><objects>
+<PathPoint name="a"><socket_parent_frame>/bodyset/pelvis</socket_parent_frame><location>-0.06 -0.02 0</location></PathPoint>
+<PathPoint name="b"><socket_parent_frame>/bodyset/thigh</socket_parent_frame><location>-0.03 -0.05 0</location></PathPoint>
+</objects></PathPointSet></GeometryPath></path></Thelen2003Muscle></objects></ForceSet>"""
+
+
+def test_computed_controls_do_not_depend_on_rounding(tmp_path: Path) -> None:
+    """A tendon that is longer by an atom's width changes the forces of no muscle.
+
+    Fibers of a short muscle at a small activation are stiff. With the accuracy of OpenSim's
+    prediction they do not converge: the first forces change by 0.8 N, those after 0.1 s by 85 N.
+    """
+    tables = []
+    for number in range(3):
+        (tmp_path / str(number)).mkdir()
+        folder = copy_lab("locked", tmp_path / str(number))
+        muscle = SHORT_MUSCLE.format(slack=0.023 + number * 1e-10)
+        change(folder / "leg.osim", ("</objects></ForceSet>", muscle))
+        result = osimlite.run(folder / "cmc_free.xml", folder / "out")
+        assert result.done
+        (table,) = (
+            item for name, item in result.tables.items() if name.endswith("_Actuation_force.sto")
+        )
+        tables.append(table)
+    first, *others = tables
+    for other in others:
+        assert first.columns == other.columns
+        assert np.abs(first.rows[0] - other.rows[0]).max() < 0.05
+
+
 PART = '<LabContactForce name="cartilage">'
 UNKNOWN = {
     "a force": [],
