@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -127,6 +127,14 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
                 item.add_marker(pytest.mark.skip(reason=f"needs {ENGINES[engine]}"))
         if {"corpus", "corpus_model"} & set(getattr(item, "fixturenames", ())):
             item.add_marker("corpus")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def terminal_width() -> Iterator[None]:
+    """Tables are as wide as in a terminal of 80 columns, however wide that of the tests is."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("COLUMNS", "80")
+        yield
 
 
 @pytest.fixture(scope="session")

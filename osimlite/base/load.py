@@ -103,12 +103,12 @@ class _Finder:
         if (
             spec is not None
             and type(spec.loader) is SourceFileLoader
-            and self._is_users(spec.loader.path)
+            and self.is_users(spec.loader.path)
         ):
             spec.loader = _Loader(name, spec.loader.path)
         return spec
 
-    def _is_users(self, file: str) -> bool:
+    def is_users(self, file: str) -> bool:
         """Return whether a file is a user's; packages installed in a user's folder, as in .venv, are not."""
         folders = {*self.folders, *map(os.path.abspath, sys.path)}
         parents = [folder for folder in folders if file.startswith(os.path.join(folder, ""))]
@@ -124,12 +124,32 @@ def _register_user_folder(folder: str) -> None:
     if _FINDER not in sys.meta_path:
         sys.meta_path.insert(sys.meta_path.index(PathFinder), _FINDER)
     importlib.invalidate_caches()
-    for name, module in list(sys.modules.items()):
-        spec = getattr(module, "__spec__", None)
-        if isinstance(getattr(spec, "loader", None), _Loader) and not name.startswith(
-            "_osimlite_source_"
-        ):
-            del sys.modules[name]
+    # Where a folder without ``__init__.py`` is, Python asks the packages around it: all are found
+    # before one is forgotten.
+    known = [
+        name
+        for name, module in list(sys.modules.items())
+        if _is_users_module(getattr(module, "__spec__", None))
+        and not name.startswith("_osimlite_source_")
+    ]
+    for name in known:
+        del sys.modules[name]
+
+
+def _is_users_module(spec: ModuleSpec | None) -> bool:
+    """Return whether a module was loaded from a user's folder, or is such a folder without ``__init__.py``."""
+    if spec is None:
+        return False
+    if isinstance(spec.loader, _Loader):
+        return True
+    if spec.origin is not None or spec.submodule_search_locations is None:
+        return False
+    try:
+        folders = list(spec.submodule_search_locations)
+    except KeyError:
+        # The package around it is no longer there.
+        return False
+    return any(_FINDER.is_users(os.path.join(folder, "__init__.py")) for folder in folders)
 
 
 @contextmanager

@@ -85,6 +85,14 @@ def test_files_of_one_name_in_two_folders(tmp_path: Path) -> None:
         assert run_python_file(folder / "mine.py").value == number
 
 
+def test_a_folder_without_init_gives_way_to_another_of_its_name(tmp_path: Path) -> None:
+    files = (("first", "kit/part.py", "kit.part"), ("second", "kit/__init__.py", "kit"))
+    for number, (folder, file, module) in enumerate((*files, files[0], files[0])):
+        write(tmp_path / folder / "mine.py", f"from {module} import value\n")
+        write(tmp_path / folder / file, f"value = {number}\n")
+        assert run_python_file(tmp_path / folder / "mine.py").value == number
+
+
 def test_a_module_of_the_current_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     for name, file in (("mine", "mine.py"), ("kit.mine", "kit/mine.py")):
