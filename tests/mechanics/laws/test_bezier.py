@@ -121,3 +121,11 @@ def test_the_integral_has_the_curve_as_its_slope(low, curviness, x):
 def test_what_makes_no_curve(make, words):
     with pytest.raises(ValueError, match=words):
         make()
+
+
+def test_slopes_that_meet_beside_their_section_make_no_curve() -> None:
+    # OpenSim 4.6 refuses this curve: x falls at first, and cannot be inverted.
+    with pytest.raises(ValueError, match="meet beside"):
+        muscle_curves.active_force_length(
+            0.7128559333577094, 0.9806258776360097, 4.995436, 2.3516971896065857, 0.0
+        )
