@@ -11,6 +11,7 @@ With the normalized length L and velocity V, a = (lmin + 1)/2, b = (1 + lmax)/2 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -45,6 +46,8 @@ DIGITS = 6
 """Digits of the parameters that the cache of fitted curves distinguishes."""
 LEAST_FVMAX = 1.001
 """Least force of lengthening fibers that a ForceVelocityCurve can have: it must be above 1."""
+LENGTH_STEP = 0.05
+"""Step of the largest length of a fit, so that similar muscles share a cached curve."""
 LEAST_LENGTH = 0.01
 """Least active fiber length of an ActiveForceLengthCurve."""
 
@@ -164,14 +167,24 @@ class FittedCurves(NamedTuple):
         )
 
 
-def fit_curves(shape: Shape) -> FittedCurves:
-    """Return the curves of a Millard muscle that are nearest to MuJoCo's."""
+def fit_curves(shape: Shape, longest: float = 1.0) -> FittedCurves:
+    """Return the curves of a Millard muscle that are nearest to MuJoCo's.
+
+    Args:
+        shape: parameters of MuJoCo's muscle.
+        longest: largest normalized length that occurs; the passive curve is fitted up to there.
+    """
     # Rounded numbers let muscles of equal shape share a fit.
     rounded = Shape(*(round(float(value), DIGITS) for value in shape))
     return FittedCurves(
         _fit_active(rounded.lmin, rounded.lmax),
         _fit_velocity(rounded.fvmax),
-        _fit_passive(rounded.passive_start, rounded.passive_width, rounded.fpmax),
+        _fit_passive(
+            rounded.passive_start,
+            rounded.passive_width,
+            rounded.fpmax,
+            round(math.ceil(longest / LENGTH_STEP) * LENGTH_STEP, DIGITS),
+        ),
     )
 
 
@@ -250,13 +263,13 @@ def _fit_velocity(fvmax: float) -> dict[str, float]:
 
 
 @lru_cache(maxsize=1024)
-def _fit_passive(start: float, width: float, fpmax: float) -> dict[str, float]:
+def _fit_passive(start: float, width: float, fpmax: float, longest: float) -> dict[str, float]:
     if fpmax < 1e-6:
         # A curve that begins beyond all lengths that occur.
         return {"strain_at_zero_force": 9.0, "strain_at_one_norm_force": 10.0}
     # The length at which the force is 1.
     one = start + width * (np.sqrt(2.0 / fpmax) if fpmax >= 2.0 else 1.0 / fpmax + 0.5)
-    x = np.linspace(start - 0.1, max(one, 1.0) + 0.3 * (one - start), POINTS)
+    x = np.linspace(start - 0.1, max(max(one, 1.0) + 0.3 * (one - start), longest), POINTS)
     target = Shape(0.5, 1.6, 1.4, start, width, fpmax).passive(x)
     zero = start - 1.0
 

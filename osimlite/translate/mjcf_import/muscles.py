@@ -19,6 +19,10 @@ MOST_PASSIVE = 10.0
 """Passive force at which a RigidTendonMuscle cuts its curve off, as a part of the isometric force."""
 DEFAULT_ACTIVATION = 0.01
 """Activation at the start. MuJoCo starts with 0, which OpenSim's muscle of De Groote does not accept."""
+LONGEST_QUANTILE = 0.95
+"""Quantile of the lengths in sampled poses up to which the passive curve is fitted."""
+MOST_LENGTH = 4.0
+"""Normalized length beyond which no passive curve is fitted."""
 SPEEDS = (-0.5, -0.25, 0.0, 0.25, 0.5)
 """Normalized velocities at which forces are compared."""
 
@@ -154,7 +158,9 @@ def make_muscle(
         limits = max(low, 0.0), min(high, 1.0)
     if draft.options.muscle == "exact":
         return _make_exact(draft, actuator, name, path, data, lags, limits, detail)
-    curves = fit_curves(data.shape)
+    # Polynomial paths can have odd lengths in single poses, which must not decide.
+    longest = float(np.quantile(lengths, LONGEST_QUANTILE) - data.slack) / data.fiber
+    curves = fit_curves(data.shape, min(longest, MOST_LENGTH))
     active, velocity, passive = curves.components()
     muscle = Millard2012EquilibriumMuscle(
         name=name,
