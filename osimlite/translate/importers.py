@@ -131,6 +131,14 @@ MJCF_CHOICES = (
         group="From MJCF",
     ),
     OptionSpec(
+        "tendon_paths",
+        str | None,
+        "'wraps' makes paths with wrap objects, 'geodesics' paths over contact surfaces "
+        "(Scholz2015GeometryPath) where these are nearer to MuJoCo's.",
+        shown="wraps",
+        group="From MJCF",
+    ),
+    OptionSpec(
         "keyframe",
         str | None,
         "The keyframe that gives the default pose.",

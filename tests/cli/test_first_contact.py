@@ -10,12 +10,14 @@ import pytest
 import osimlite
 from tests.cli.command import run
 from tests.cli.support import loaded
-from tests.simple_models import make_pendulum
 
 
 @pytest.fixture
 def box(tmp_path: Path) -> Path:
-    osimlite.write(make_pendulum("b"), tmp_path / "box.osim")
+    model = osimlite.Model(name="box")
+    body = model.add(osimlite.Body(name="b", mass=1.0, inertia=(1.0, 1.0, 1.0, 0.0, 0.0, 0.0)))
+    model.add(osimlite.PinJoint(name="pin").between(model.ground, body))
+    osimlite.write(model, tmp_path / "box.osim")
     return tmp_path
 
 

@@ -26,6 +26,7 @@ from osimlite.translate.mjcf_import.draft import (
     ImportOptions,
     Limits,
     MuscleType,
+    TendonPathOption,
     Up,
     vector,
 )
@@ -123,6 +124,7 @@ def from_mjcf(
     contacts: ContactOption = "forces",
     up: Up = "z",
     keyframe: str | None = None,
+    tendon_paths: TendonPathOption = "wraps",
     name: str | None = None,
 ) -> Osim:
     """Convert an MJCF file, the format of MuJoCo, to an OpenSim model.
@@ -144,6 +146,9 @@ def from_mjcf(
             surfaces alone, ``"none"`` nothing.
         up: ``"z"`` keeps MuJoCo's axes, ``"y"`` turns the model so that y is up.
         keyframe: name of the keyframe that gives the default pose.
+        tendon_paths: ``"wraps"`` makes GeometryPaths with wrap objects; ``"geodesics"`` makes
+            Scholz2015GeometryPaths of those tendons that they follow within 1e-6 m in all sampled
+            poses, and that wrap objects do not.
         name: name of the files to write, without suffix; that of the input if None.
 
     Returns:
@@ -163,6 +168,7 @@ def from_mjcf(
         ("joint-limits", joint_limits, ("forces", "range")),
         ("contacts", contacts, ("forces", "geometry", "none")),
         ("up", up, ("y", "z")),
+        ("tendon-paths", tendon_paths, ("wraps", "geodesics")),
     ):
         if value not in known:
             words = " or ".join(f"'{item}'" for item in known if item is not None)
@@ -176,6 +182,7 @@ def from_mjcf(
         contact=contacts,
         up=up,
         keyframe=keyframe,
+        tendon_paths=tendon_paths,
     )
     draft = start_draft(Path(path), options)
     for make in PASSES:

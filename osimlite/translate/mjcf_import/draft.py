@@ -23,6 +23,7 @@ Limits = Literal["forces", "range"]
 MuscleType = Literal["millard", "exact"]
 Up = Literal["y", "z"]
 ContactOption = Literal["forces", "geometry", "none"]
+TendonPathOption = Literal["wraps", "geodesics"]
 
 
 @dataclass(frozen=True)
@@ -36,6 +37,7 @@ class ImportOptions:
     contact: ContactOption = "forces"
     up: Up = "z"
     keyframe: str | None = None
+    tendon_paths: TendonPathOption = "wraps"
     poses: int = 60
     seed: int = 0
 

@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 
+from osimlite.errors import ModelError
 from osimlite.io.document.printer import to_text
 from osimlite.io.document.reader import read_text
+from osimlite.mechanics.multibody import build_mechanism
 from osimlite.mechanics.multibody.spatial import Array
 from osimlite.schema.frames import PhysicalFrame
 from osimlite.schema.muscles import PathActuator
 from osimlite.schema.paths import AbstractGeometryPath
+from osimlite.simulation.elements.builder import ElementBuilder
+from osimlite.simulation.elements.geometries.path import PATH
 from osimlite.simulation.paths import Paths
 from osimlite.translate.mjcf_import.coordinate_map import CoordinateMap
 from osimlite.translate.mjcf_import.draft import ConversionDraft
@@ -41,6 +46,17 @@ class Bench:
         self.model.add(PathActuator(name=f"candidate_{self._count}", geometry_path=path))
         self._count += 1
         return self._count - 1
+
+    def find_unsolvable(self) -> set[int]:
+        """Return the numbers of the candidates that osimlite cannot lay in the default pose."""
+        builder = ElementBuilder(self.model, build_mechanism(self.model), Path())
+        result = set()
+        for number in range(self._count):
+            try:
+                PATH.read(builder, self.model.find(f"/forceset/candidate_{number}"))
+            except ModelError:
+                result.add(number)
+        return result
 
     def measure(self, qpos: Array, *, arms: bool = False) -> tuple[Array, Array, list[str]]:
         """Measure all candidates.

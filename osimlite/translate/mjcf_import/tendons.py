@@ -18,6 +18,13 @@ from osimlite.schema.paths import FunctionBasedPath
 from osimlite.translate.fidelity import Error
 from osimlite.translate.mjcf.wrapping import norm
 from osimlite.translate.mjcf_import.draft import ConversionDraft, TendonPath
+from osimlite.translate.mjcf_import.geodesic_paths import (
+    CLOSE_M,
+    Hints,
+    Obstacles,
+    make_geodesic_path,
+    select_geodesics,
+)
 from osimlite.translate.mjcf_import.joints import BALL, FREE
 from osimlite.translate.mjcf_import.path_comparison import Bench
 from osimlite.translate.mjcf_import.path_parts import Quadrant, Surfaces, make_geometry_path
@@ -42,6 +49,8 @@ SAME_MEANING_M = 1e-6
 """Difference of lengths up to which a tendon means the same in MuJoCo 3 and 4."""
 GOOD_WRAP_M = 3e-4
 """Error (rms) of a wrapped path above which a polynomial is tried."""
+TRIAL_POSES = 300
+"""Number of further poses in which a path over contact surfaces must be right."""
 CHECK_POSES = 100
 """Number of poses in which errors are measured; none is one that decided anything."""
 ARM_POSES = 20
@@ -132,8 +141,28 @@ class _Selection:
         }
         lengths, _, _ = bench.measure(self.checks.qpos) if numbers else (np.empty(0), None, None)
         errors = {row: lengths[number] - self.truth[row] for row, number in numbers.items()}
+        geodesics: dict[int, Hints] = {}
+        if draft.options.tendon_paths == "geodesics":
+            rows = [
+                row
+                for row in range(len(self.tendons))
+                if row not in errors or np.abs(errors[row]).max() > CLOSE_M
+            ]
+            selected = select_geodesics(
+                draft,
+                [self.tendons[row] for row in rows],
+                [
+                    self.poses,
+                    self.checks,
+                    place(self.source, sample_qpos(self.source, TRIAL_POSES, 3)),
+                ],
+                self.version,
+            )
+            geodesics = {rows[index]: hints for index, hints in selected.items()}
         polynomials: dict[int, tuple[FunctionBasedPath, Array]] = {}
         for row in range(len(self.tendons)):
+            if row in geodesics:
+                continue
             report_progress("fitting paths", row, len(self.tendons))
             rms = _rms(errors[row]) if row in errors else np.inf
             if rms > GOOD_WRAP_M:
@@ -141,13 +170,21 @@ class _Selection:
                 # A polynomial needs many numbers, so it must be clearly better.
                 if _rms(off) < 0.5 * rms:
                     polynomials[row] = path, off
-        self._record(polynomials, routes)
+        self._record(polynomials, routes, geodesics)
         # Names of the trial surfaces are free again.
         draft.names.pop("wrap", None)
+        draft.names.pop("obstacle", None)
         surfaces = Surfaces(draft, draft.frames, self.reach)
+        obstacles = Obstacles(draft, draft.frames, draft.model)
         for row, tendon in enumerate(self.tendons):
             if row in polynomials:
                 draft.paths[tendon.number] = TendonPath(polynomials[row][0])
+            elif row in geodesics:
+                draft.paths[tendon.number] = TendonPath(
+                    make_geodesic_path(
+                        draft, draft.frames, obstacles, tendon.segments, geodesics[row]
+                    )
+                )
             else:
                 draft.paths[tendon.number] = TendonPath(
                     make_geometry_path(draft, draft.frames, surfaces, tendon.segments, routes[row])
@@ -247,14 +284,22 @@ class _Selection:
         self,
         polynomials: dict[int, tuple[FunctionBasedPath, Array]],
         routes: dict[int, tuple[Quadrant | None, ...]],
+        geodesics: dict[int, Hints],
     ) -> None:
         """Measure the selected paths, and record their deviations."""
         draft, model = self.draft, self.draft.mj
         bench = Bench(draft)
         surfaces = Surfaces(draft, bench.frames, self.reach)
+        obstacles = Obstacles(draft, bench.frames, bench.model)
         for row, tendon in enumerate(self.tendons):
             if row in polynomials:
                 bench.add(polynomials[row][0].copy_deep())
+            elif row in geodesics:
+                bench.add(
+                    make_geodesic_path(
+                        draft, bench.frames, obstacles, tendon.segments, geodesics[row]
+                    )
+                )
             else:
                 bench.add(
                     make_geometry_path(draft, bench.frames, surfaces, tendon.segments, routes[row])
@@ -292,6 +337,14 @@ class _Selection:
                     f"order {function.order} of {function.dimension} coordinates, not to be used "  # type: ignore[union-attr]
                     "outside of their ranges",
                     errors,
+                )
+            elif errors["length"].max > EXACT_M and row in geodesics:
+                draft.record(
+                    "tendon",
+                    tendon.number,
+                    f"the way around a geom by the rules of MuJoCo {self.version}",
+                    "a Scholz2015GeometryPath over contact surfaces",
+                    errors=errors,
                 )
             elif errors["length"].max > EXACT_M:
                 words = sorted({str(word) for word in routes[row] if word})

@@ -125,3 +125,24 @@ def test_the_version_is_asked_for_where_it_matters(tmp_path):
         osimlite.from_mjcf(path)
     made = osimlite.from_mjcf(path, written_for=3)
     assert "MuJoCo 3" in str(made.fidelity.to_json()) or made.fidelity.translated["/tendon/t"]
+
+
+@pytest.mark.parametrize("up", ["z", "y"])
+def test_geodesics_are_nearer_than_wrap_objects(arm, up):
+    def measure(option):
+        made = osimlite.from_mjcf(arm, written_for=4, tendon_paths=option, up=up)
+        records = {record.component: record for record in made.fidelity}
+        paths = {
+            muscle.name: type(muscle.geometry_path).__name__
+            for muscle in made.model.components(osimlite.Muscle)
+        }
+        over = records.get("/tendon/over")
+        return paths, over.errors["length"].max if over else 0.0
+
+    before, wrapped = measure("wraps")
+    after, geodesic = measure("geodesics")
+    assert "Scholz2015GeometryPath" not in before.values()
+    # In a turned world, the frame of the first points is no body.
+    assert (after["m_over"] == "Scholz2015GeometryPath") == (wrapped > 1e-6)
+    assert geodesic <= max(min(wrapped, 1e-6), 0.0)
+    assert after["m_through"] == before["m_through"]
