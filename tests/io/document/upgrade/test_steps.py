@@ -126,6 +126,25 @@ def test_references_follow_a_name_that_loses_its_white_space() -> None:
     assert model.force_set.groups[0].members == ("hipmotor",)
 
 
+def test_each_name_of_a_list_loses_its_white_space() -> None:
+    motors = "".join(
+        f'<CoordinateActuator name="{name}"> <coordinate>flexion</coordinate> </CoordinateActuator>'
+        for name in ("hip motor", "motor", "left hip motor")
+    )
+    model = document(
+        BODIES
+        + f"""<ForceSet> <objects> {motors} </objects> </ForceSet>
+        <ControllerSet> <objects> <ControlSetController name="c">
+        <actuator_list>motor left hip motor hip motor</actuator_list>
+        </ControlSetController> </objects> </ControllerSet>"""
+    ).model
+    assert model["/controllerset/c"].socket_actuators == (
+        "/forceset/motor",
+        "/forceset/lefthipmotor",
+        "/forceset/hipmotor",
+    )
+
+
 def test_a_name_without_its_white_space_may_be_taken() -> None:
     second = '<Body name="thi gh"> <Joint> <PinJoint name="j"> <parent_body>thigh</parent_body> </PinJoint> </Joint> </Body>'
     model = document(
