@@ -45,7 +45,7 @@ PREDICTION_TOLERANCE = 5e-8
 """Error of one step in the predicted states of actuators.
 
 OpenSim's is 5e-6. With that, short fibers at small activations do not converge, and a muscle that is
-longer by 1e-9 m gets another force by more than 10 N in the first window.
+longer by 1e-9 m gets another force by 5 N in the first window.
 """
 MAX_PREDICTION_STEP_S = 1e-3
 """Longest step of the prediction, s."""
